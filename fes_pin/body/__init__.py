@@ -1,0 +1,1 @@
+"""The walking body on Pinocchio: A, B, C, modes, controllability."""

@@ -1,0 +1,5 @@
+"""The command line: `fes-pin`."""
+
+
+def main() -> None:
+    """Run the command line."""

@@ -1,0 +1,31 @@
+"""The one error that bad input raises: a line that says where it is and what was expected."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class InputError(ValueError):
+    """Something that a person gave is not what it must be; the command line turns it into one line and exit code 2.
+
+    Parameters
+    ----------
+    message
+        What is wrong and what was expected, one sentence.
+    file, row, column
+        Where: path, line number in the file (the header is row 1), column name or dotted key. Each is optional.
+    """
+
+    def __init__(
+        self, message: str, *, file: str | Path | None = None, row: int | None = None, column: str | None = None
+    ) -> None:
+        self.message, self.file, self.row, self.column = message, file, row, column
+        super().__init__(" ".join(str(self).split()))
+
+    def __str__(self) -> str:
+        place = [str(self.file)] if self.file is not None else []
+        if self.row is not None:
+            place.append(f"row {self.row}")
+        if self.column is not None:
+            place.append(f"column {self.column}" if self.row is not None else str(self.column))
+        return f"{', '.join(place)}: {self.message}" if place else self.message

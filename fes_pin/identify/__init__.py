@@ -1,0 +1,1 @@
+"""Fits of models to trials, their noise and their uncertainty."""

@@ -1,0 +1,1 @@
+"""Models: stages, rigs, effects; expressions compiled to machine code."""

@@ -1,0 +1,1 @@
+"""One file for each physical thing that a nominal model may leave out."""

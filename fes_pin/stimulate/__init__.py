@@ -1,0 +1,1 @@
+"""Nerves, allocation of joint torques to pulse widths, control."""

@@ -1,0 +1,1 @@
+"""Figures, the report, the meshcat viewer; they only read results."""

@@ -1,0 +1,38 @@
+"""The imports run one way: view -> diagnose -> identify -> models -> data, and stimulate -> body."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "fes_pin"
+ALLOWED = {
+    "data": set(),
+    "models": {"data"},
+    "identify": {"models", "data"},
+    "diagnose": {"identify", "models", "data"},
+    "body": {"data"},
+    "stimulate": {"body", "data", "models", "identify"},
+}
+
+
+def imported_chapters(path: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fes_pin."):
+            names.add(node.module.split(".")[1])
+        elif isinstance(node, ast.ImportFrom) and node.module == "fes_pin":
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.Import):
+            names.update(a.name.split(".")[1] for a in node.names if a.name.startswith("fes_pin."))
+    return names
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_run_one_way(path):
+    chapter = path.relative_to(PACKAGE).parts[0]
+    if chapter not in ALLOWED:
+        return
+    known = set(ALLOWED) | {"view", "cli"}
+    forbidden = (imported_chapters(path) & known) - ALLOWED[chapter] - {chapter}
+    assert not forbidden, f"{path} imports {sorted(forbidden)}"
