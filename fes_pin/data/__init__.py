@@ -1,1 +1,1 @@
-"""Studies and trials: measured data in, and nothing else; the only place with degrees, microseconds and milliamperes."""
+"""Studies and trials: measured data in; the only place with degrees, microseconds and milliamperes."""
