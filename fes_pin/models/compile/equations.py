@@ -1,0 +1,231 @@
+"""A model's equations and their sensitivities as CasADi functions.
+
+With states x, memories m, parameters p and their sensitivities S = dx/dp, R = dm/dp:
+
+    rest     g(z; p) = 0,  dz/dp = -g_p / g_z,   x(0) = x0(z, p),  S(0) = x0_z dz/dp + x0_p
+    sample   m+ = D(x, m, u, p),                 R+ = D_x S + D_m R + D_p
+    rates    x' = f(x, m, u, p),                 S' = f_x S + f_m R + f_p
+    output   y = h(x, m, p),                     dy/dp = h_x S + h_m R + h_p
+
+Only the entries of S and R that can be other than zero are carried.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+
+from fes_pin.models.maths import clip
+from fes_pin.models.model import Model
+from fes_pin.models.stage import Signals
+
+TIMING = ("t0", "dt", "step", "shift")
+"""Constants that every program reads: time of the first sample, sample and integration step, whole samples of delay."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Names and order of what goes in and out of a compiled program."""
+
+    kind: str
+    inputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    unknowns: tuple[str, ...]
+    constants: tuple[str, ...]
+    outputs: tuple[str, ...]
+    columns: tuple[str, ...]
+    """Parameters and unknowns with respect to which the program gives sensitivities."""
+
+    @property
+    def values(self) -> tuple[str, ...]:
+        """Everything that is a parameter to the program."""
+        return (*self.parameters, *self.unknowns)
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The functions of one model and kind of trial; see the module."""
+
+    layout: Layout
+    rest: ca.Function
+    start: ca.Function
+    sample: ca.Function
+    rates: ca.Function
+    output: ca.Function
+
+
+def make_layout(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...]) -> Layout:
+    """The layout of a model's program for trials of a kind with these input columns."""
+    rig = model.rig
+    return Layout(
+        kind=kind,
+        inputs=inputs,
+        parameters=tuple(model.parameters()),
+        unknowns=rig.unknowns(kind),
+        constants=(*rig.constant_names(kind), *TIMING),
+        outputs=rig.outputs(kind),
+        columns=columns,
+    )
+
+
+class _Symbols:
+    """Symbols of one model, and the signals made of them."""
+
+    def __init__(self, model: Model, layout: Layout) -> None:
+        self.model, self.layout = model, layout
+        rig, kind = model.rig, layout.kind
+        self.states = list(rig.states(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.states]
+        self.memories = list(rig.memories(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.memories]
+        self.x, self.m = _symbols("x", self.states), _symbols("m", self.memories)
+        self.p, self.c = _symbols("p", layout.values), _symbols("c", layout.constants)
+        self.u, self.t, self.since, self.z = _symbols("u", layout.inputs), *(ca.SX.sym(n) for n in ("t", "since", "z"))
+
+    def vector(self, which: dict[str, Any]) -> ca.SX:
+        return ca.vertcat(*which.values()) if which else ca.SX(0, 1)
+
+    def signals(self, states: dict[str, Any], memories: dict[str, Any]) -> Signals:
+        """Signals and effects with symbols in place of numbers."""
+        layout, p = self.layout, self.p
+        effects = [
+            dataclasses.replace(e, **{n: p[f"{e.name}.{n}"] for n in e.parameters()}) for e in self.model.effects
+        ]
+        s = Signals(
+            effects,
+            kind=layout.kind,
+            x=SimpleNamespace(**{n: v for n, v in states.items() if "." not in n}),
+            m=SimpleNamespace(**{n: v for n, v in memories.items() if "." not in n}),
+            u=SimpleNamespace(**self.u),
+            c=SimpleNamespace(**self.c),
+            initial=SimpleNamespace(**{n: p[n] for n in layout.unknowns}),
+            time=self.t - self.c["t0"],
+            since=self.since,
+            step=self.c["step"],
+        )
+        s.owned = {
+            e.name: {n: states[f"{e.name}.{n}"] for n in e.states}
+            | {n: memories[f"{e.name}.{n}"] for n in e.memories}
+            for e in self.model.effects
+        }
+        s.delayed = lambda now, before: self._delayed(s, now, before)
+        return s
+
+    def _delayed(self, s: Signals, now: Any, before: Any) -> Any:
+        """What is held between samples, later by the model's delay: exact to an integration step.
+
+        Whole samples of the delay shift the input (`shift`); of the rest f, the steps before f see the sample before.
+        """
+        delay = s.through("delay", 0.0)
+        if not any(e.signal == "delay" for e in self.model.effects):
+            return now
+        rest = delay - s.c.shift * s.c.dt
+        share = clip((rest - s.since) / s.step, 0.0, 1.0)
+        return share * before + (1.0 - share) * now
+
+    def rig(self) -> Any:
+        names = [n for n in self.layout.parameters if "." not in n]
+        return dataclasses.replace(self.model.rig, **{n: self.p[n] for n in names})
+
+    def at_rest(self) -> tuple[dict[str, Any], dict[str, Any], Any]:
+        """States, memories and residual of the static equilibrium as expressions in z."""
+        rig = self.rig()
+        s = self.signals(dict.fromkeys(self.states, 0.0), dict.fromkeys(self.memories, 0.0))
+        rig.set_rest(s, self.z)
+        states = dict.fromkeys(self.states, 0.0) | vars(s.x)
+        memories = dict.fromkeys(self.memories, 0.0) | vars(s.m)
+        for effect in s.effects:
+            for n, value in effect.rest(s.of(effect)).items():
+                (states if n in effect.states else memories)[f"{effect.name}.{n}"] = value
+        s = self.signals(states, memories)
+        s.time = 0.0
+        rig.rates(s)
+        return states, memories, rig.rest_residual(s, self.z)
+
+    def running(self) -> tuple[list[Any], list[Any], list[Any]]:
+        """Next memories, rates of the states, readings."""
+        rig = self.rig()
+        s = self.signals(self.x, self.m)
+        after = rig.sample(s)
+        memories = {n: after.get(n, self.m[n]) for n in self.memories}
+        for effect in s.effects:
+            for n, value in effect.update(s.of(effect)).items():
+                memories[f"{effect.name}.{n}"] = value
+        s = self.signals(self.x, self.m)
+        rates = dict(rig.rates(s))
+        for effect in s.effects:
+            rates.update({f"{effect.name}.{n}": v for n, v in effect.rate(s.of(effect)).items()})
+        s = self.signals(self.x, self.m)
+        readings = rig.readings(s)
+        return [memories[n] for n in self.memories], [rates[n] for n in self.states], list(readings)
+
+
+def derive(model: Model, layout: Layout) -> Equations:
+    """Write out a model's equations and sensitivities."""
+    sym = _Symbols(model, layout)
+    x, m, p, c, u = (sym.vector(v) for v in (sym.x, sym.m, sym.p, sym.c, sym.u))
+    states, memories, residual = sym.at_rest()
+    x0, m0 = _column(list(states.values())), _column(list(memories.values()))
+    g = _column([residual])
+    after, rates, readings = (_column(v) for v in sym.running())
+    wanted = ca.DM(len(layout.values), len(layout.columns))
+    for k, name in enumerate(layout.columns):
+        wanted[layout.values.index(name), k] = 1.0
+
+    def tangent(f: Any, *inner: tuple[Any, Any]) -> Any:
+        total = ca.mtimes(ca.jacobian(f, p), ca.sparsify(wanted))
+        for variable, sensitivity in inner:
+            total = total + ca.mtimes(ca.jacobian(f, variable), sensitivity)
+        return ca.sparsify(total)
+
+    g_z = ca.jacobian(g, sym.z)
+    dz = -tangent(g) / g_z
+    start_s, start_r = tangent(x0, (sym.z, dz)), tangent(m0, (sym.z, dz))
+    s_pattern, r_pattern = start_s.sparsity(), start_r.sparsity()
+    while True:
+        s, r = ca.SX.sym("S", s_pattern), ca.SX.sym("R", r_pattern)
+        s_rates = tangent(rates, (x, s), (m, r))
+        r_after = tangent(after, (x, s), (m, r))
+        wider_s, wider_r = s_pattern.unite(s_rates.sparsity()), r_pattern.unite(r_after.sparsity())
+        if wider_s.nnz() == s_pattern.nnz() and wider_r.nnz() == r_pattern.nnz():
+            break
+        s_pattern, r_pattern = wider_s, wider_r
+    dy = ca.densify(tangent(readings, (x, s), (m, r)))
+    state = ca.vertcat(x, _nonzeros(s, s_pattern))
+    memory = ca.vertcat(m, _nonzeros(r, r_pattern))
+    t, since, z = sym.t, sym.since, sym.z
+    y = ca.vertcat(readings, ca.vec(dy.T) if layout.columns else ca.SX(0, 1))
+
+    def function(name: str, ins: list[Any], outs: list[Any]) -> ca.Function:
+        return ca.Function(name, ins, ca.cse([ca.densify(o) for o in outs]))
+
+    return Equations(
+        layout=layout,
+        rest=function("rest", [z, p, c], [g, g_z]),
+        start=function(
+            "start",
+            [z, p, c],
+            [ca.vertcat(x0, _nonzeros(start_s, s_pattern)), ca.vertcat(m0, _nonzeros(start_r, r_pattern))],
+        ),
+        sample=function("sample", [state, memory, u, t, p, c], [ca.vertcat(after, _nonzeros(r_after, r_pattern))]),
+        rates=function("rates", [state, memory, u, t, since, p, c], [ca.vertcat(rates, _nonzeros(s_rates, s_pattern))]),
+        output=function("output", [state, memory, u, t, p, c], [y]),
+    )
+
+
+def _symbols(prefix: str, names: Any) -> dict[str, ca.SX]:
+    return {n: ca.SX.sym(f"{prefix}_{n.replace('.', '_')}") for n in names}
+
+
+def _column(values: list[Any]) -> ca.SX:
+    return ca.vertcat(*[ca.SX(v) for v in values]) if values else ca.SX(0, 1)
+
+
+def _nonzeros(matrix: Any, pattern: ca.Sparsity) -> ca.SX:
+    """The entries of `matrix` at `pattern`, as a column."""
+    dense = ca.densify(matrix)
+    rows, columns = pattern.get_triplet()
+    entries = [dense[i, j] for i, j in zip(rows, columns, strict=True)]
+    return ca.vertcat(*entries) if entries else ca.SX(0, 1)

@@ -1,0 +1,100 @@
+"""LLVM on this processor: IR text in, callable machine code out, with a cache of object code on disk."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import sys
+import threading
+from functools import cache
+from pathlib import Path
+
+import llvmlite
+import llvmlite.binding as llvm
+
+from fes_pin.data.files import write_bytes
+
+_LOCK = threading.Lock()
+
+
+def cache_folder() -> Path:
+    """Where compiled models are kept: `FES_PIN_CACHE`, else the user's cache folder."""
+    chosen = os.environ.get("FES_PIN_CACHE")
+    if chosen:
+        return Path(chosen)
+    base = os.environ.get("XDG_CACHE_HOME") or (
+        Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+    )
+    return Path(base) / "fes_pin"
+
+
+@cache
+def _target() -> llvm.TargetMachine:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, jit=True
+    )
+
+
+@cache
+def processor() -> str:
+    """What the object code was made for and by."""
+    features = llvm.get_host_cpu_features().flatten()
+    return f"{llvm.get_host_cpu_name()} {features} llvmlite {llvmlite.__version__}"
+
+
+class MachineCode:
+    """A compiled module; keep it as long as its functions are called."""
+
+    def __init__(self, object_code: bytes) -> None:
+        with _LOCK:
+            _target()
+            empty = llvm.parse_assembly("")
+            self._engine = llvm.create_mcjit_compiler(empty, _target())
+            self._engine.add_object_file(llvm.ObjectFileRef.from_data(object_code))
+            self._engine.finalize_object()
+
+    def function(self, name: str, *argument_types: type) -> ctypes._CFuncPtr:
+        """The function of that name as a ctypes callable; ctypes releases the interpreter lock while it runs."""
+        return ctypes.CFUNCTYPE(None, *argument_types)(self._engine.get_function_address(name))
+
+
+def compile_object(assembly: str) -> bytes:
+    """Optimise and compile LLVM assembly for this processor.
+
+    Contraction to fused multiply-add is left to the assembly; NaN and infinity are honoured.
+    """
+    with _LOCK:
+        target = _target()
+        module = llvm.parse_assembly(assembly)
+        options = llvm.create_pipeline_tuning_options(speed_level=1)
+        options.loop_vectorization = options.slp_vectorization = False
+        builder = llvm.create_pass_builder(target, options)
+        builder.getModulePassManager().run(module, builder)
+        return target.emit_object(module)
+
+
+def cached_path(key: str, suffix: str) -> Path:
+    """The file of the cache that belongs to `key`."""
+    return cache_folder() / f"{hashlib.sha256((processor() + key).encode()).hexdigest()[:40]}{suffix}"
+
+
+def read_cached(path: Path) -> bytes | None:
+    """What the cache holds at `path`, or None; a damaged entry counts as none."""
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    digest, body = data[:32], data[32:]
+    return body if hashlib.sha256(body).digest() == digest else None
+
+
+def write_cached(path: Path, body: bytes) -> None:
+    """Keep `body` at `path`; a cache that cannot be written is no error."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(path, hashlib.sha256(body).digest() + body)
+    except OSError:
+        return

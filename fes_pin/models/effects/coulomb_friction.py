@@ -1,0 +1,35 @@
+"""Dry friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.maths import tanh
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+V_SMOOTH = 0.02
+"""Speed below which dry friction fades, rad/s; far below the speeds of a limb's motion (1 rad/s)."""
+
+
+@dataclass(frozen=True)
+class CoulombFriction(Effect):
+    """Dry friction at the joint.
+
+        torque - T tanh(v / (V_SMOOTH + T h / J))
+
+    The slope at rest is held below J / h (h the integration step), so that sticking is never stiff.
+
+    Tell-tale: the joint comes to rest at other angles from above than from below; free swings shrink by equal steps.
+    Source: Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation,
+    European Journal of Control 4 (1998).
+    """
+
+    torque_nm: float = parameter(0.01, unit="N m", null=0.0, lower=0.0, upper=100.0, scale=0.01)
+
+    name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "torque", ("ankle", "joint")
+    dissipative = True
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value - self.torque_nm * tanh(s.v / (V_SMOOTH + self.torque_nm * s.step / s.inertia))

@@ -1,0 +1,83 @@
+"""A model: a rig with its nominal parameters, and the effects added to it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fes_pin.models.parameters import Parameter
+from fes_pin.models.rigs.base import Rig
+from fes_pin.models.stage import Effect
+
+
+@dataclass(frozen=True)
+class Model:
+    """A rig and its effects; immutable. `model + effect` is the extended model.
+
+    A parameter's name is its path: `gain`, `coulomb_friction.torque_nm`.
+    """
+
+    rig: Rig
+    effects: tuple[Effect, ...] = ()
+
+    def __add__(self, effect: Effect) -> Model:
+        if any(e.name == effect.name for e in self.effects):
+            raise ValueError(f"the model has {effect.name} already")
+        if self.rig.name not in effect.rigs:
+            raise ValueError(f"{effect.name} is not for the rig {self.rig.name}")
+        return Model(self.rig, (*self.effects, effect))
+
+    def __sub__(self, name: str) -> Model:
+        return Model(self.rig, tuple(e for e in self.effects if e.name != name))
+
+    def parameters(self) -> dict[str, float]:
+        """Every parameter's value, by name."""
+        values = {n: float(getattr(self.rig, n)) for n in self.rig.parameters()}
+        for effect in self.effects:
+            values.update({f"{effect.name}.{n}": float(getattr(effect, n)) for n in effect.parameters()})
+        return values
+
+    def parameter_info(self) -> dict[str, Parameter]:
+        """Every parameter's unit, null, bounds and scale, by name."""
+        info = dict(self.rig.parameters())
+        for effect in self.effects:
+            info.update({f"{effect.name}.{n}": i for n, i in effect.parameters().items()})
+        return info
+
+    def fitted_parameters(self) -> tuple[str, ...]:
+        """What a fit moves: the rig's fitted parameters and all of the effects' but discrete choices."""
+        names = list(self.rig.fitted_parameters())
+        for effect in self.effects:
+            names += [f"{effect.name}.{n}" for n, i in effect.parameters().items() if i.fitted]
+        return tuple(names)
+
+    def with_parameters(self, values: Mapping[str, float]) -> Model:
+        """The same model with other values.
+
+        Raises
+        ------
+        KeyError
+            For a name that the model does not have.
+        """
+        known = self.parameters()
+        for name in values:
+            if name not in known:
+                raise KeyError(f"no parameter {name}; there are {', '.join(known)}")
+        rig = dataclasses.replace(self.rig, **{n: float(v) for n, v in values.items() if "." not in n})
+        effects = []
+        for effect in self.effects:
+            prefix = f"{effect.name}."
+            own = {n.removeprefix(prefix): float(v) for n, v in values.items() if n.startswith(prefix)}
+            effects.append(dataclasses.replace(effect, **own))
+        return Model(rig, tuple(effects))
+
+    def structure(self) -> tuple[str, ...]:
+        """What compiled code depends on: the rig and the effects, not their values."""
+        return (self.rig.name, *(e.name for e in self.effects))
+
+    def __str__(self) -> str:
+        info = self.parameter_info()
+        lines = [f"{self.rig.name} model" + "".join(f" + {e.name}" for e in self.effects)]
+        lines += [f"  {n:40s} {v:12.6g} {info[n].unit}" for n, v in self.parameters().items()]
+        return "\n".join(lines)

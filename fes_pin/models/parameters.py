@@ -1,0 +1,61 @@
+"""Parameters: fields of dataclasses with unit, null, bounds and scale in their metadata."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+_KEY = "fes_pin"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What is known of a parameter beside its value.
+
+    Attributes
+    ----------
+    unit
+        Unit as printed; "" for a pure number.
+    null
+        Value at which an effect vanishes; None for a shape parameter, which means something only beside the effect,
+        and for a nominal parameter.
+    lower, upper
+        Physical bounds.
+    scale
+        A step that matters: the size in which a search thinks.
+    grid
+        Start values for a search, in order; for a shape parameter also what a screen tries.
+    fitted
+        False for a discrete choice, which a search enumerates and never moves.
+    """
+
+    unit: str = ""
+    null: float | None = None
+    lower: float = -math.inf
+    upper: float = math.inf
+    scale: float = 1.0
+    grid: tuple[float, ...] = ()
+    fitted: bool = True
+
+
+def parameter(
+    default: float,
+    *,
+    unit: str = "",
+    null: float | None = None,
+    lower: float = -math.inf,
+    upper: float = math.inf,
+    scale: float = 1.0,
+    grid: tuple[float, ...] = (),
+    fitted: bool = True,
+) -> Any:
+    """A dataclass field that is a parameter; see `Parameter`."""
+    info = Parameter(unit, null, lower, upper, scale, grid, fitted)
+    return dataclasses.field(default=default, metadata={_KEY: info})
+
+
+def parameters_of(thing: Any) -> dict[str, Parameter]:
+    """Name and description of every parameter of a dataclass or an instance of one, in order."""
+    return {f.name: f.metadata[_KEY] for f in dataclasses.fields(thing) if _KEY in f.metadata}

@@ -1,0 +1,131 @@
+"""The paper's ankle: nerve, muscle and one joint with a load on a cable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from fes_pin.data.trial import Trial
+from fes_pin.models.maths import clip, cos, exp, ramp, sin, where
+from fes_pin.models.parameters import parameter
+from fes_pin.models.rigs.base import GRAVITY, Rig
+from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
+from fes_pin.models.stage import Signals
+
+CONSTANTS = (
+    "foot_mass_kg",
+    "com_distance_m",
+    "moment_arm_m",
+    "force_scale_n",
+    "threshold_us",
+    "saturation_us",
+    "f0_n",
+    "f1_per_rad",
+    "theta_r_rad",
+)
+
+
+@dataclass(frozen=True)
+class Ankle(Rig):
+    """An ankle moved by a stimulated muscle against a load; Dombre, Fournier and Coiffet, section II.
+
+        r            = clip((w - threshold) / (saturation - threshold), 0, 1)
+        tau da/dt    = r - a
+        F_M          = K F_ref a
+        F_ANT(theta) = f0 (exp(f1 (theta - theta_r)) - 1), 0 below theta_r
+        J theta''    = (a_arm F_M - l (F_ANT - M g)) sin(theta) + m g l cos(theta) - xi theta'        eq. (1)
+
+    A motion trial starts at rest and unstimulated, at the static equilibrium of its load. The foot's gravity torque
+    comes from Pinocchio, as A cos(theta) + B sin(theta).
+    """
+
+    gain: float = parameter(0.65, lower=1e-3, upper=100.0, scale=0.1)
+    time_constant_s: float = parameter(0.05, unit="s", lower=2e-3, upper=2.0, scale=0.01)
+    inertia_kgm2: float = parameter(1e-3, unit="kg m2", lower=1e-6, upper=10.0, scale=2e-4)
+    damping_nms: float = parameter(0.06, unit="N m s", lower=0.0, upper=100.0, scale=0.01)
+
+    name = "ankle"
+
+    def states(self, kind: str) -> tuple[str, ...]:
+        return ("act", "q", "v") if kind == "motion" else ("act",)
+
+    def memories(self, kind: str) -> tuple[str, ...]:
+        return ("r", "r_before", "rest") if kind == "motion" else ("r", "r_before")
+
+    def outputs(self, kind: str) -> tuple[str, ...]:
+        return ("angle_rad",) if kind == "motion" else ("force_n",)
+
+    def input_columns(self, trial: Trial) -> tuple[str, ...]:
+        return ("pulse_width_us",)
+
+    def constant_names(self, kind: str) -> tuple[str, ...]:
+        return (*CONSTANTS, "gravity_cos", "gravity_sin", "load_kg" if kind == "motion" else "angle_rad")
+
+    def trial_constants(self, trial: Trial) -> dict[str, float]:
+        known = {name: float(self.constants[name]) for name in CONSTANTS}
+        condition = "load_kg" if trial.kind == "motion" else "angle_rad"
+        a, b = _foot_gravity(known["foot_mass_kg"], known["com_distance_m"])
+        return {**known, "gravity_cos": a, "gravity_sin": b, condition: float(trial.conditions[condition])}
+
+    def guess(self, trial: Trial) -> float:
+        return 1.75
+
+    def set_rest(self, s: Signals, z: Any) -> None:
+        for name in vars(s.x):
+            setattr(s.x, name, 0.0)
+        s.m.r = s.m.r_before = 0.0
+        if s.kind == "motion":
+            s.x.q, s.x.v, s.m.rest = z, 0.0, z
+        s.q = z
+
+    def rest_residual(self, s: Signals, z: Any) -> Any:
+        return s.torque if s.kind == "motion" else z
+
+    def sample(self, s: Signals) -> dict[str, Any]:
+        c = s.c
+        width = s.through("pulse_width", s.u.pulse_width_us)
+        r = clip((width - c.threshold_us) / (c.saturation_us - c.threshold_us), 0.0, 1.0)
+        r = s.through("recruitment", r)
+        return {"r": r, "r_before": s.m.r}
+
+    def rates(self, s: Signals) -> dict[str, Any]:
+        c = s.c
+        s.arm, s.lever = c.moment_arm_m, c.com_distance_m
+        s.force_scale = self.gain * c.force_scale_n
+        s.r = s.delayed(s.m.r, s.m.r_before)
+        s.q, s.v = (s.x.q, s.x.v) if s.kind == "motion" else (c.angle_rad, 0.0)
+        s.act = s.x.act
+        s.act_rate = (s.r - s.act) / s.through("time_constant", self.time_constant_s)
+        s.drive = s.through("activation", s.act)
+        s.force = s.through("force", s.force_scale * s.drive)
+        rates = {"act": s.act_rate}
+        if s.kind == "motion":
+            rates.update(self._joint_rates(s))
+        return rates
+
+    def _joint_rates(self, s: Signals) -> dict[str, Any]:
+        c, q, v = s.c, s.q, s.v
+        s.load = s.through("load", c.load_kg)
+        s.inertia = self.inertia_kgm2
+        force = s.through("net_force", s.force)
+        antagonist = where(q > c.theta_r_rad, c.f0_n * (exp(c.f1_per_rad * ramp(q - c.theta_r_rad)) - 1.0), 0.0)
+        tilted = s.through("gravity_angle", q)
+        gravity = c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted)
+        cable = c.moment_arm_m * force - c.com_distance_m * (antagonist - s.load * GRAVITY)
+        s.torque = s.through("torque", cable * sin(q) - gravity - self.damping_nms * v)
+        s.inertia = s.through("inertia", self.inertia_kgm2)
+        s.acceleration = s.through("acceleration", s.through("inertial_torque", s.torque) / s.inertia)
+        return {"q": v, "v": s.acceleration}
+
+    def readings(self, s: Signals) -> tuple[Any, ...]:
+        if s.kind == "motion":
+            s.rest_reading, s.q, s.v = s.m.rest, s.x.q, s.x.v
+            return (s.through("reading", s.x.q),)
+        self.rates(s)
+        return (s.force,)
+
+
+@cache
+def _foot_gravity(mass: float, distance: float) -> tuple[float, float]:
+    return gravity_coefficients(point_foot(mass, distance))

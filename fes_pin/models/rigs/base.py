@@ -1,0 +1,115 @@
+"""What every rig provides: names of its signals and the equations of its nominal model."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.models.parameters import Parameter, parameters_of
+from fes_pin.models.stage import Signals
+
+GRAVITY = 9.81
+"""Standard gravity as the paper rounds it, m/s2 (eq. 7)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rig:
+    """A rig and its nominal model: fields are what the nominal model fits, `constants` what is known before.
+
+    A subclass writes its equations on `Signals`: `s.x` states, `s.m` memories, `s.u` inputs, `s.c` constants of rig
+    and trial, `s.initial` per-trial unknowns, `s.time`, `s.since` (time since the sample began), `s.step`.
+    Each method serves all `kind`s of trial.
+    """
+
+    constants: Mapping[str, float] = dataclasses.field(default_factory=dict, kw_only=True)
+    fitted: tuple[str, ...] | None = dataclasses.field(default=None, kw_only=True)
+
+    name: ClassVar[str]
+    inputs: ClassVar[Mapping[str, str]]
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """Name and description of what the nominal model can fit."""
+        return parameters_of(cls)
+
+    def fitted_parameters(self) -> tuple[str, ...]:
+        """The parameters that a nominal fit moves."""
+        return tuple(self.parameters()) if self.fitted is None else self.fitted
+
+    def states(self, kind: str) -> tuple[str, ...]:
+        """Names of the continuous states."""
+        raise NotImplementedError
+
+    def memories(self, kind: str) -> tuple[str, ...]:
+        """Names of what is held from sample to sample."""
+        raise NotImplementedError
+
+    def unknowns(self, kind: str) -> tuple[str, ...]:
+        """Names of what each trial must estimate for itself: its initial state, if that is not known."""
+        return ()
+
+    def output(self, kind: str) -> str:
+        """Name of the column that the model predicts first."""
+        return self.outputs(kind)[0]
+
+    def outputs(self, kind: str) -> tuple[str, ...]:
+        """Names of the columns that the model predicts."""
+        raise NotImplementedError
+
+    def input_columns(self, trial: Trial) -> tuple[str, ...]:
+        """Columns of a trial that drive the model."""
+        raise NotImplementedError
+
+    def constant_names(self, kind: str) -> tuple[str, ...]:
+        """Names of the constants of rig and trial that the equations read."""
+        raise NotImplementedError
+
+    def trial_constants(self, trial: Trial) -> dict[str, float]:
+        """Values of those constants for a trial."""
+        raise NotImplementedError
+
+    def initial_unknowns(self, trial: Trial) -> dict[str, float]:
+        """Start values of the unknowns of a trial, from its first samples."""
+        return {}
+
+    def guess(self, trial: Trial) -> float:
+        """Where the search for the static equilibrium starts."""
+        return 0.0
+
+    def set_rest(self, s: Signals, z: Any) -> None:
+        """Put states and memories at rest, with the unknown z of the static equilibrium."""
+        raise NotImplementedError
+
+    def rest_residual(self, s: Signals, z: Any) -> Any:
+        """What is zero at the static equilibrium; called after `rates` at rest."""
+        raise NotImplementedError
+
+    def sample(self, s: Signals) -> dict[str, Any]:
+        """Next memories, once per sample, from the inputs."""
+        raise NotImplementedError
+
+    def rates(self, s: Signals) -> dict[str, Any]:
+        """Time derivatives of the states; leaves the signals that effects read in `s`."""
+        raise NotImplementedError
+
+    def readings(self, s: Signals) -> tuple[Any, ...]:
+        """The predicted columns, in the order of `outputs`."""
+        raise NotImplementedError
+
+
+def first_rate(time: np.ndarray, position: np.ndarray, span_s: float = 0.05) -> tuple[float, float]:
+    """Position and its rate at the first sample, from a parabola through the first `span_s` seconds.
+
+    Parameters
+    ----------
+    time, position
+        Shape (n,), s and rad or m.
+    """
+    count = int(np.clip(np.searchsorted(time - time[0], span_s), min(6, len(time)), len(time)))
+    t = time[:count] - time[0]
+    coefficients = np.polynomial.polynomial.polyfit(t, position[:count], min(2, count - 1))
+    return float(coefficients[0]), float(coefficients[1])

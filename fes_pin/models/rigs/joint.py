@@ -1,0 +1,89 @@
+"""Any rig with one joint, from its URDF: revolute or prismatic, driven by an effort or free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.data.trial import Trial
+from fes_pin.models.maths import cos, sin
+from fes_pin.models.parameters import parameter
+from fes_pin.models.rigs.base import Rig, first_rate
+from fes_pin.models.stage import Signals
+
+
+@dataclass(frozen=True)
+class Joint(Rig):
+    """One joint with viscous damping, moved by a commanded effort or by nothing.
+
+        inertia_scale M v' = effort - gravity_scale (A cos(q) + B sin(q)) - damping v
+
+    M, A and B are read off Pinocchio's CRBA and gravity of the URDF (`constants`: `inertia`, `gravity_cos`,
+    `gravity_sin`); for a prismatic joint gravity is the constant A. The effort is held between samples. Each trial has
+    its own initial position and velocity.
+    """
+
+    inertia_scale: float = parameter(1.0, lower=1e-3, upper=1e3, scale=0.1)
+    damping: float = parameter(0.0, unit="N m s/rad", lower=0.0, upper=1e4, scale=1e-3)
+    gravity_scale: float = parameter(1.0, lower=-10.0, upper=10.0, scale=0.1)
+
+    name = "joint"
+
+    def states(self, kind: str) -> tuple[str, ...]:
+        return ("q", "v")
+
+    def memories(self, kind: str) -> tuple[str, ...]:
+        return ("rest",)
+
+    def unknowns(self, kind: str) -> tuple[str, ...]:
+        return ("initial_position", "initial_velocity")
+
+    def outputs(self, kind: str) -> tuple[str, ...]:
+        return ("position", "velocity")
+
+    def input_columns(self, trial: Trial) -> tuple[str, ...]:
+        return ("effort",) if "effort" in trial.columns else ()
+
+    def constant_names(self, kind: str) -> tuple[str, ...]:
+        return ("inertia", "gravity_cos", "gravity_sin")
+
+    def trial_constants(self, trial: Trial) -> dict[str, float]:
+        return {name: float(self.constants[name]) for name in self.constant_names(trial.kind)}
+
+    def initial_unknowns(self, trial: Trial) -> dict[str, float]:
+        position, rate = first_rate(trial.time, trial["position"]) if "position" in trial.columns else (0.0, 0.0)
+        if "position" in trial.columns:
+            position = float(trial["position"][0])
+        if "velocity" in trial.columns:
+            rate = float(trial["velocity"][0])
+        conditions = trial.conditions
+        return {
+            "initial_position": float(conditions.get("position0", position)),
+            "initial_velocity": float(conditions.get("velocity0", rate)),
+        }
+
+    def set_rest(self, s: Signals, z: Any) -> None:
+        s.x.q, s.x.v, s.m.rest = s.initial.initial_position, s.initial.initial_velocity, s.initial.initial_position
+        s.q = s.x.q
+
+    def rest_residual(self, s: Signals, z: Any) -> Any:
+        return z
+
+    def sample(self, s: Signals) -> dict[str, Any]:
+        return {}
+
+    def rates(self, s: Signals) -> dict[str, Any]:
+        c = s.c
+        s.q, s.v, s.act = s.x.q, s.x.v, 0.0
+        s.inertia = self.inertia_scale * c.inertia
+        tilted = s.through("gravity_angle", s.q)
+        gravity = self.gravity_scale * (c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted))
+        effort = s.through("effort", getattr(s.u, "effort", 0.0))
+        s.torque = s.through("torque", effort - gravity - self.damping * s.v)
+        s.inertia = s.through("inertia", s.inertia)
+        s.acceleration = s.through("acceleration", s.through("inertial_torque", s.torque) / s.inertia)
+        return {"q": s.v, "v": s.acceleration}
+
+    def readings(self, s: Signals) -> tuple[Any, ...]:
+        s.rest_reading, s.q, s.v = s.m.rest, s.x.q, s.x.v
+        return s.through("reading", s.x.q), s.x.v

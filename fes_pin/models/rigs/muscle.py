@@ -1,0 +1,83 @@
+"""A muscle held at constant length: stimulus in, force out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.data.trial import Trial
+from fes_pin.models.maths import clip
+from fes_pin.models.parameters import parameter
+from fes_pin.models.rigs.base import Rig
+from fes_pin.models.stage import Signals
+
+
+@dataclass(frozen=True)
+class Muscle(Rig):
+    """Isometric muscle: recruitment by pulse width, or by the pulses themselves, and a first-order lag.
+
+        r         = clip((w - threshold) / (saturation - threshold), 0, 1), or the recorded pulses
+        tau da/dt = r - a
+        F         = gain a
+
+    A recorded pulse (`stim`) is an impulse of area P, the mean pulse period of its trial: a train averages r = 1, and
+    `gain` is the mean force that the train settles to.
+    """
+
+    gain: float = parameter(30.0, unit="N", lower=1e-6, upper=1e5, scale=5.0)
+    time_constant_s: float = parameter(0.05, unit="s", lower=2e-3, upper=2.0, scale=0.01)
+
+    name = "muscle"
+
+    def states(self, kind: str) -> tuple[str, ...]:
+        return ("act",)
+
+    def memories(self, kind: str) -> tuple[str, ...]:
+        return ("r", "r_before")
+
+    def outputs(self, kind: str) -> tuple[str, ...]:
+        return ("force_n",)
+
+    def input_columns(self, trial: Trial) -> tuple[str, ...]:
+        return ("stim",) if "stim" in trial.columns else ("pulse_width_us",)
+
+    def constant_names(self, kind: str) -> tuple[str, ...]:
+        return ("threshold_us", "saturation_us", "pulse_period_s")
+
+    def trial_constants(self, trial: Trial) -> dict[str, float]:
+        period = 0.0
+        if "stim" in trial.columns:
+            times = trial.time[trial["stim"] > 0.5]
+            period = float((times[-1] - times[0]) / (len(times) - 1)) if len(times) > 1 else trial.dt
+        return {
+            "threshold_us": float(self.constants.get("threshold_us", 0.0)),
+            "saturation_us": float(self.constants.get("saturation_us", 1.0)),
+            "pulse_period_s": period,
+        }
+
+    def set_rest(self, s: Signals, z: Any) -> None:
+        s.x.act = s.m.r = s.m.r_before = 0.0
+
+    def rest_residual(self, s: Signals, z: Any) -> Any:
+        return z
+
+    def sample(self, s: Signals) -> dict[str, Any]:
+        if hasattr(s.u, "stim"):
+            r = s.u.stim * s.c.pulse_period_s / s.c.dt
+        else:
+            width = s.through("pulse_width", s.u.pulse_width_us)
+            r = clip((width - s.c.threshold_us) / (s.c.saturation_us - s.c.threshold_us), 0.0, 1.0)
+        return {"r": s.through("recruitment", r), "r_before": s.m.r}
+
+    def rates(self, s: Signals) -> dict[str, Any]:
+        s.r = s.delayed(s.m.r, s.m.r_before)
+        s.act, s.q, s.v, s.force_scale = s.x.act, 0.0, 0.0, self.gain
+        s.act_rate = (s.r - s.act) / s.through("time_constant", self.time_constant_s)
+        s.drive = s.through("activation", s.act)
+        s.force = s.through("force", s.force_scale * s.drive)
+        return {"act": s.act_rate}
+
+    def readings(self, s: Signals) -> tuple[Any, ...]:
+        self.rates(s)
+        s.rest_reading = 0.0
+        return (s.through("reading", s.force),)

@@ -1,0 +1,86 @@
+"""One-joint rigid bodies from Pinocchio: inertia and gravity as numbers that expressions can use."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from fes_pin.data.errors import InputError
+
+URDF_FOLDERS = (Path(__file__).parents[2] / "urdf", Path(__file__).parents[3] / "urdf")
+
+
+def urdf_path(name: str) -> Path:
+    """A URDF that travels with the package, in the wheel or in a checkout."""
+    for folder in URDF_FOLDERS:
+        if (folder / name).is_file():
+            return folder / name
+    raise FileNotFoundError(f"no {name} among {[str(f) for f in URDF_FOLDERS]}")
+
+
+def load_urdf(path: Path) -> pin.Model:
+    """Pinocchio's model of a URDF, with gravity along -z.
+
+    Raises
+    ------
+    InputError
+        If Pinocchio cannot read it.
+    """
+    try:
+        model = pin.buildModelFromXML(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, RuntimeError) as error:
+        raise InputError(f"Pinocchio cannot read this URDF: {' '.join(str(error).split())}", file=path) from None
+    model.gravity.linear = np.array([0.0, 0.0, -9.81])
+    return model
+
+
+@cache
+def _ankle_rig() -> pin.Model:
+    return load_urdf(urdf_path("ankle_rig.urdf"))
+
+
+def point_foot(mass_kg: float, com_distance_m: float, inertia_kgm2: float | None = None) -> pin.Model:
+    """The ankle rig's URDF with the foot's mass, its centre and, if given, its inertia about the joint.
+
+    The inertia about the joint must be at least m l^2; without it the foot is a point mass.
+    """
+    model = _ankle_rig().copy()
+    about_com = (inertia_kgm2 if inertia_kgm2 is not None else mass_kg * com_distance_m**2) - (
+        mass_kg * com_distance_m**2
+    )
+    direction = model.inertias[1].lever / np.linalg.norm(model.inertias[1].lever)
+    model.inertias[1] = pin.Inertia(mass_kg, com_distance_m * direction, about_com * np.eye(3))
+    return model
+
+
+def configuration(model: pin.Model, position: float) -> np.ndarray:
+    """Pinocchio's q of a one-joint model at a position: an angle, (cos, sin) of it for a continuous joint."""
+    return np.array([position]) if model.nq == 1 else np.array([math.cos(position), math.sin(position)])
+
+
+def _gravity(model: pin.Model, data: Any, position: float) -> float:
+    return float(pin.computeGeneralizedGravity(model, data, configuration(model, position))[0])
+
+
+def gravity_coefficients(model: pin.Model) -> tuple[float, float]:
+    """A and B of a one-joint model's gravity torque A cos(q) + B sin(q), N m; (force, 0) for a prismatic joint.
+
+    It stands on the left-hand side of M(q) a + g(q) = tau, as in Pinocchio.
+    """
+    data = model.createData()
+    return _gravity(model, data, 0.0), _gravity(model, data, math.pi / 2) if is_revolute(model) else 0.0
+
+
+def joint_inertia(model: pin.Model) -> float:
+    """The 1 x 1 mass matrix of a one-joint model, kg m2 or kg: constant."""
+    return float(pin.crba(model, model.createData(), configuration(model, 0.0))[0, 0])
+
+
+def is_revolute(model: pin.Model) -> bool:
+    """True for a revolute or continuous joint, False for a prismatic one."""
+    return "P" not in model.joints[1].shortname().removeprefix("JointModel")[:2]

@@ -1,0 +1,128 @@
+"""The signal path, and what acts on it: stages, signals, effects."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+from fes_pin.models.maths import sqrt
+from fes_pin.models.parameters import Parameter, parameters_of
+
+
+class Stage(StrEnum):
+    """Where on the path from stimulus to reading something acts."""
+
+    NERVE = "nerve"
+    MUSCLE = "muscle"
+    JOINT = "joint"
+    RIG = "rig"
+    SENSOR = "sensor"
+
+
+@dataclasses.dataclass(frozen=True)
+class Effect:
+    """One physical thing that the nominal model leaves out; it vanishes at its null.
+
+    A subclass is a frozen dataclass whose fields are parameters. It names the `signal` that it changes, and says how in
+    `apply`. If it has states of its own it lists them in `states` and gives their `rate`; what it remembers from sample
+    to sample (updated once per sample, before the rates) goes to `memories` and `update`; `rest` gives both at the
+    static equilibrium that a trial starts from. Values may be numbers or CasADi expressions alike.
+
+    Attributes
+    ----------
+    name
+        The canonical name of the cause.
+    stage
+        Where on the signal path it belongs.
+    signal
+        What it changes: see the rig's equations for the names.
+    rigs
+        The rigs it can be part of.
+    dissipative
+        True if it can only take energy from the joint.
+    """
+
+    name: ClassVar[str]
+    stage: ClassVar[Stage]
+    signal: ClassVar[str]
+    rigs: ClassVar[tuple[str, ...]]
+    states: ClassVar[tuple[str, ...]] = ()
+    memories: ClassVar[tuple[str, ...]] = ()
+    dissipative: ClassVar[bool] = False
+
+    def apply(self, value: Any, s: Any) -> Any:
+        """The signal with the effect, from the signal without it."""
+        raise NotImplementedError
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        """Time derivative of each state."""
+        return {}
+
+    def update(self, s: Any) -> Mapping[str, Any]:
+        """Next value of each memory."""
+        return {}
+
+    def rest(self, s: Any) -> Mapping[str, Any]:
+        """States and memories at rest that are not zero."""
+        return {}
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """Name and description of every parameter, in order."""
+        return parameters_of(cls)
+
+    @classmethod
+    def amplitudes(cls) -> tuple[str, ...]:
+        """The parameters whose null switches the effect off."""
+        return tuple(n for n, info in cls.parameters().items() if info.null is not None)
+
+    @classmethod
+    def shapes(cls) -> tuple[str, ...]:
+        """The parameters that exist only beside the effect."""
+        return tuple(n for n, info in cls.parameters().items() if info.null is None)
+
+    @classmethod
+    def absent(cls) -> Effect:
+        """The effect at its null."""
+        return cls(**{n: i.null for n, i in cls.parameters().items() if i.null is not None})
+
+
+class Signals(SimpleNamespace):
+    """The signals of one instant, by name: what a rig's equations and the effects read.
+
+    `own` holds the states and memories of the effect that is being evaluated.
+    """
+
+    def __init__(self, effects: Sequence[Effect], **signals: Any) -> None:
+        super().__init__(effects=tuple(effects), own=SimpleNamespace(), owned={}, **signals)
+
+    def of(self, effect: Effect) -> Signals:
+        """The same signals, with the effect's own states and memories as `own`."""
+        self.own = SimpleNamespace(**self.owned.get(effect.name, {}))
+        return self
+
+    def through(self, signal: str, value: Any) -> Any:
+        """Pass a value through every effect that acts on `signal`, in the order of the path."""
+        for effect in self.effects:
+            if effect.signal == signal:
+                value = effect.apply(value, self.of(effect))
+        return value
+
+
+def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, Any]:
+    """First-order low pass of `target` that is exact at time constant 0 and never stiff.
+
+    With e = sqrt(T^2 + h^2), h the integration step: x' = (target - x) / e, out = target - T x'.
+    The transfer function (1 + (e - T) s) / (1 + e s) has the low pass's delay T and differs from it only above 1/h.
+
+    Returns
+    -------
+    out, rate
+        The lagged signal and the time derivative of `state`.
+    """
+    e = sqrt(time_constant * time_constant + step * step)
+    rate = (target - state) / e
+    return target - time_constant * rate, rate
