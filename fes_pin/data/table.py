@@ -31,8 +31,8 @@ class Table:
         The numbers.
     header_row
         Line number of the header; the first numbers stand in the next line.
-    time_decimals
-        Decimals that the time was printed with, found only when they are needed.
+    lines, delimiter
+        The rows as text and what separates their values; None stands for white space.
     """
 
     path: Path
