@@ -1,0 +1,191 @@
+"""Numbers by named column: CSV read fast when it is clean, and slowly to say where it is not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import read_text
+
+MIN_ROWS = 3
+STEP_TOLERANCE = 0.01  # a step may vary by 1 %
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Columns of finite numbers, with the place that each row had in its file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    names
+        Column names, time first.
+    values : ndarray, shape (n, m)
+        The numbers.
+    header_row
+        Line number of the header; the first numbers stand in the next line.
+    lines, delimiter
+        The rows as text and what separates their values; None stands for white space.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    values: np.ndarray
+    header_row: int
+    lines: tuple[str, ...]
+    delimiter: str | None
+
+    def row(self, sample: int) -> int:
+        """Line number of a sample."""
+        return self.header_row + 1 + int(sample)
+
+    def column(self, name: str) -> np.ndarray:
+        """One column, shape (n,)."""
+        return self.values[:, self.names.index(name)]
+
+    def error(self, message: str, column: str, sample: int | None = None) -> InputError:
+        """The error that names this file, a sample's row (or the header's) and a column."""
+        row = self.header_row if sample is None else self.row(sample)
+        return InputError(message, file=self.path, row=row, column=column)
+
+
+def read_csv(path: str | Path) -> Table:
+    """Read comma-separated numbers under one header row.
+
+    Raises
+    ------
+    InputError
+        No header, a duplicated or nameless column, fewer than 3 rows, a ragged row, text or nothing where a number
+        belongs, a number that is not finite: with its row and column.
+    """
+    path = Path(path)
+    lines = read_text(path).split("\n")
+    if not lines[0].strip():
+        raise InputError("expected a header row of column names, found nothing", file=path, row=1)
+    names = tuple(name.strip().strip('"') for name in lines[0].split(","))
+    return parse_rows(path, names, lines[1:], header_row=1, delimiter=",")
+
+
+def parse_rows(path: Path, names: tuple[str, ...], lines: list[str], header_row: int, delimiter: str | None) -> Table:
+    """Numbers of the lines beneath a header; `delimiter` None stands for white space."""
+    _check_names(path, names, header_row)
+    while lines and not lines[-1].strip():
+        lines.pop()
+    if len(lines) < MIN_ROWS:
+        found = f"expected at least {MIN_ROWS} rows of numbers, found {len(lines)}"
+        raise InputError(found, file=path, row=header_row + len(lines), column=names[0])
+    values = _parse_fast(lines, delimiter)
+    if values is None or values.shape != (len(lines), len(names)) or not np.isfinite(values).all():
+        values = _parse_slowly(path, names, lines, header_row, delimiter)
+    return Table(path, names, values, header_row, tuple(lines), delimiter)
+
+
+def _check_names(path: Path, names: Sequence[str], header_row: int) -> None:
+    for index, name in enumerate(names):
+        if not name:
+            raise InputError("expected a column name", file=path, row=header_row, column=f"#{index + 1}")
+        if name in names[:index]:
+            raise InputError("this column is there twice", file=path, row=header_row, column=name)
+
+
+def _parse_fast(lines: list[str], delimiter: str | None) -> np.ndarray | None:
+    try:
+        return np.loadtxt(lines, dtype=float, delimiter=delimiter, comments=None, ndmin=2)
+    except ValueError:
+        return None
+
+
+def _parse_slowly(
+    path: Path, names: Sequence[str], lines: Sequence[str], header_row: int, delimiter: str | None
+) -> np.ndarray:
+    values = np.empty((len(lines), len(names)))
+    for index, line in enumerate(lines):
+        row = header_row + 1 + index
+        if not line.strip():
+            raise InputError("expected numbers, found an empty row", file=path, row=row, column=names[0])
+        fields = line.split(delimiter)
+        if len(fields) != len(names):
+            at = names[min(len(fields), len(names) - 1)]
+            message = f"expected {len(names)} values as in the header, found {len(fields)}"
+            raise InputError(message, file=path, row=row, column=at)
+        for place, (name, field) in enumerate(zip(names, fields, strict=True)):
+            values[index, place] = _number(field, path, row, name)
+    return values
+
+
+def _number(field: str, path: Path, row: int, column: str) -> float:
+    field = field.strip()
+    if not field:
+        raise InputError("expected a number, found nothing", file=path, row=row, column=column)
+    try:
+        if "_" in field:
+            raise ValueError
+        value = float(field)
+    except ValueError:
+        raise InputError(f"expected a number, found {field[:40]!r}", file=path, row=row, column=column) from None
+    if not math.isfinite(value):
+        raise InputError(f"expected a finite number, found {field[:40]!r}", file=path, row=row, column=column)
+    return value
+
+
+def check_time(table: Table) -> None:
+    """Require the first column to increase in equal steps.
+
+    A step may differ from the median step by 1 %, and besides by what printing rounds away: a time printed with three
+    decimals lies within half a millisecond of where it was taken.
+
+    Raises
+    ------
+    InputError
+        With the first row that does not increase, or whose step is another one.
+    """
+    time = table.values[:, 0]
+    steps = np.diff(time)
+    if not (steps > 0).all():
+        first = int(np.argmax(steps <= 0)) + 1
+        raise table.error("expected time to increase", table.names[0], first)
+    step = float(np.median(steps))
+    if (np.abs(steps - step) <= STEP_TOLERANCE * step * (1 + 1e-6)).all():
+        return
+    late = _first_off_grid(time, steps, step, 0.5 * 10.0 ** -_time_decimals(table))
+    if late is not None:
+        found = f"expected a fixed step of {step:.6g} s within 1 %, found {steps[late - 1]:.6g} s"
+        raise table.error(found, table.names[0], late)
+
+
+def _first_off_grid(time: np.ndarray, steps: np.ndarray, step: float, half_digit: float) -> int | None:
+    """First sample that no equally spaced times, printed with this last digit, explain."""
+    off = np.abs(steps - step) > STEP_TOLERANCE * step + 2.0 * half_digit * (1 + 1e-6)
+    if off.any():
+        return int(np.argmax(off)) + 1
+    count = np.arange(len(time), dtype=float)
+    slope = float(np.dot(count - count.mean(), time - time.mean()) / np.sum((count - count.mean()) ** 2))
+    residual = time - slope * count
+    off = np.abs(residual - np.median(residual)) > half_digit * (1 + 1e-6) + STEP_TOLERANCE * slope
+    return max(1, int(np.argmax(off))) if off.any() else None
+
+
+def _time_decimals(table: Table) -> int:
+    """Most decimals that any time was printed with."""
+    decimals = 0
+    for line in table.lines:
+        text = line.split(table.delimiter, 1)[0].strip()
+        try:
+            exponent = Decimal(text).as_tuple().exponent
+        except InvalidOperation:
+            return 17
+        decimals = max(decimals, -int(exponent))
+    return decimals
+
+
+def format_csv(columns: Mapping[str, np.ndarray]) -> str:
+    """CSV text of equally long columns; each number is the shortest text that reads back as the same number."""
+    rows = zip(*(map(repr, np.asarray(values, dtype=float).tolist()) for values in columns.values()), strict=True)
+    return "\n".join([",".join(columns), *map(",".join, rows)]) + "\n"

@@ -1,0 +1,88 @@
+"""TOML read so that an error can name the line of a key."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import read_text
+
+_TABLE = re.compile(r"^\s*(\[\[?)\s*([^\]#]+?)\s*\]\]?\s*(?:#.*)?$")
+_KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*'))*)\s*=""")
+
+
+@dataclass(frozen=True)
+class Document:
+    """A TOML file: its data, and the line of each dotted key (`rig.passive.f0_n`, `trial[2].load_kg`)."""
+
+    path: Path
+    data: dict[str, Any]
+    rows: dict[str, int]
+
+    def error(self, key: str, message: str) -> InputError:
+        """The error that names this file, the line of a key (or of its table, if it is missing) and the key."""
+        place = key
+        while place and place not in self.rows:
+            place = place.rpartition(".")[0]
+        return InputError(message, file=self.path, row=self.rows.get(place), column=key)
+
+    def table(self, key: str, data: dict[str, Any] | None = None) -> dict[str, Any]:
+        """A table by its key, empty if it is missing.
+
+        Raises
+        ------
+        InputError
+            If it is not a table.
+        """
+        value = (self.data if data is None else data).get(key.rpartition(".")[2], {})
+        if not isinstance(value, dict):
+            raise self.error(key, f"expected a table [{key}]")
+        return value
+
+
+def read_toml(path: str | Path) -> Document:
+    """Read a TOML file.
+
+    Raises
+    ------
+    InputError
+        Not a readable file, or not TOML, with the line.
+    """
+    path = Path(path)
+    text = read_text(path)
+    try:
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise InputError("not TOML that can be read: nested too deeply", file=path) from None
+    except ValueError as error:
+        found = re.search(r"\(at line (\d+), column \d+\)", str(error))
+        row = int(found[1]) if found else (text.count("\n") + 1 if "end of document" in str(error) else None)
+        message = str(error).split(" (at ")[0]
+        raise InputError(f"not TOML: {message[:1].lower() + message[1:]}", file=path, row=row) from None
+    return Document(path, data, _rows(text))
+
+
+def _rows(text: str) -> dict[str, int]:
+    rows: dict[str, int] = {}
+    count: Counter[str] = Counter()
+    prefix = ""
+    for row, line in enumerate(text.split("\n"), start=1):
+        if table := _TABLE.match(line):
+            prefix = _plain(table[2])
+            if table[1] == "[[":
+                count[prefix] += 1
+                prefix = f"{prefix}[{count[prefix] - 1}]"
+            rows.setdefault(prefix, row)
+        elif key := _KEY.match(line):
+            name = _plain(key[1])
+            rows.setdefault(f"{prefix}.{name}" if prefix else name, row)
+    return rows
+
+
+def _plain(dotted: str) -> str:
+    return ".".join(part.strip().strip("\"'") for part in dotted.split("."))

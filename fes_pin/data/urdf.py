@@ -1,0 +1,195 @@
+"""URDF files checked before anything else reads them: safe XML, a tree of links, positive masses."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from xml.etree.ElementTree import Element, ParseError
+
+import numpy as np
+from defusedxml import ElementTree
+from defusedxml.common import DefusedXmlException
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import read_bytes
+
+MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
+ONE_JOINT = ("revolute", "continuous", "prismatic")
+
+
+def moving_joints(path: str | Path) -> list[tuple[str, str]]:
+    """Joints that move by themselves, neither fixed nor mimicking another, in the file's order.
+
+    Returns
+    -------
+    list of (name, type)
+
+    Raises
+    ------
+    InputError
+        Not XML, XML with a document type or entities, not a URDF, links that make no tree, a joint without a usable
+        axis or limits, a mass that is not positive, an inertia that no body can have.
+    """
+    return [
+        (joint.get("name", ""), joint.get("type", ""))
+        for joint in _Urdf(Path(path)).joints
+        if joint.get("type") in MOVING and joint.find("mimic") is None
+    ]
+
+
+def check_one_joint(path: str | Path) -> tuple[str, str]:
+    """Name and type of the one moving joint of a `joint` rig.
+
+    Raises
+    ------
+    InputError
+        No or several moving joints, one that has more than one degree of freedom, or nothing heavy that it moves.
+    """
+    joints = moving_joints(path)
+    if len(joints) != 1:
+        names = f": {', '.join(name for name, _ in joints)}" if joints else ""
+        message = f"expected one moving joint, found {len(joints) or 'none'}{names}"
+        raise InputError(message, file=path, column="joint")
+    name, kind = joints[0]
+    if kind not in ONE_JOINT:
+        raise InputError(f"expected a revolute, continuous or prismatic joint, found {kind}", file=path, column=name)
+    urdf = _Urdf(Path(path))
+    if not urdf.moved_mass(name) > 0:
+        raise InputError("expected a link with mass beyond this joint", file=path, column=name)
+    return name, kind
+
+
+class _Urdf:
+    """The parts of one URDF, checked as they are read."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        content = read_bytes(path)
+        self.lines = content.decode("utf-8", errors="replace").split("\n")
+        self.root = self._parse(content)
+        if self.root.tag != "robot":
+            raise InputError(f"expected a URDF with the root <robot>, found <{self.root.tag[:40]}>", file=path, row=1)
+        self.links = self._named("link")
+        self.joints = list(self._named("joint").values())
+        if not self.links:
+            raise InputError("expected at least one <link>", file=path)
+        self.masses = {name: self._mass(name, link) for name, link in self.links.items()}
+        self.parent: dict[str, str] = {}
+        for joint in self.joints:
+            self._check_joint(joint)
+        self._check_tree()
+
+    def error(self, message: str, name: str) -> InputError:
+        row = next((i for i, line in enumerate(self.lines, 1) if f'name="{name}"' in line), None)
+        return InputError(message, file=self.path, row=row, column=name)
+
+    def _parse(self, content: bytes) -> Element:
+        try:
+            return ElementTree.fromstring(content, forbid_dtd=True)
+        except DefusedXmlException:
+            message = "expected XML without a document type, entities or external references"
+            raise InputError(message, file=self.path) from None
+        except ParseError as error:
+            reason = str(error).split(":")[0]
+            raise InputError(f"not XML: {reason}", file=self.path, row=error.position[0]) from None
+        except (ValueError, LookupError, RecursionError) as error:
+            raise InputError(f"not XML that can be read: {error}", file=self.path) from None
+
+    def _named(self, tag: str) -> dict[str, Element]:
+        found: dict[str, Element] = {}
+        for element in self.root.findall(tag):
+            name = element.get("name", "")
+            if not name.strip():
+                raise InputError(f"expected a name for every <{tag}>", file=self.path, column=tag)
+            if name in found:
+                raise self.error(f"this {tag} is there twice", name)
+            found[name] = element
+        return found
+
+    def _mass(self, name: str, link: Element) -> float:
+        inertial = link.find("inertial")
+        if inertial is None:
+            return 0.0
+        mass = inertial.find("mass")
+        value = math.nan if mass is None else self._numbers(mass, "value", 1, name)[0]
+        if not value > 0:
+            raise self.error(f"expected a mass above 0 kg, found {'none' if mass is None else f'{value:g}'}", name)
+        self._origin(inertial, name)
+        self._check_inertia(inertial, name)
+        return value
+
+    def _check_inertia(self, inertial: Element, name: str) -> None:
+        inertia = inertial.find("inertia")
+        if inertia is None:
+            raise self.error("expected an <inertia> beside the mass", name)
+        xx, yy, zz = (self._numbers(inertia, key, 1, name)[0] for key in ("ixx", "iyy", "izz"))
+        xy, xz, yz = (self._numbers(inertia, key, 1, name, 0.0)[0] for key in ("ixy", "ixz", "iyz"))
+        principal = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        if principal[0] < -1e-9 * abs(principal).max():
+            raise self.error(f"expected an inertia that is positive, found a principal one of {principal[0]:g}", name)
+
+    def _check_joint(self, joint: Element) -> None:
+        name, kind = joint.get("name", ""), joint.get("type")
+        if kind not in (*MOVING, "fixed"):
+            raise self.error(f"expected a joint type, one of {', '.join((*MOVING, 'fixed'))}; found {kind}", name)
+        ends = []
+        for tag in ("parent", "child"):
+            end = joint.find(tag)
+            link = "" if end is None else end.get("link", "")
+            if link not in self.links:
+                raise self.error(f"expected a <{tag}> that is a link of this file, found {link[:40]!r}", name)
+            ends.append(link)
+        if ends[1] in self.parent or ends[0] == ends[1]:
+            raise self.error(f"expected a tree, but link {ends[1]!r} has several parents or is its own", name)
+        self.parent[ends[1]] = ends[0]
+        self._origin(joint, name)
+        axis = joint.find("axis")
+        if kind in ONE_JOINT and axis is not None and not any(self._numbers(axis, "xyz", 3, name)):
+            raise self.error("expected an <axis> that is not zero", name)
+
+    def _origin(self, element: Element, name: str) -> None:
+        origin = element.find("origin")
+        if origin is not None:
+            for key in ("xyz", "rpy"):
+                self._numbers(origin, key, 3, name, 0.0)
+
+    def _check_tree(self) -> None:
+        roots = [name for name in self.links if name not in self.parent]
+        if len(roots) != 1:
+            raise InputError(f"expected one root link, found {len(roots)}", file=self.path, column="link")
+        for link in self.links:
+            seen = {link}
+            while link in self.parent:
+                link = self.parent[link]  # noqa: PLW2901
+                if link in seen:
+                    raise self.error("expected a tree of links, found a loop", link)
+                seen.add(link)
+
+    def moved_mass(self, joint: str) -> float:
+        """Mass of all links beyond a joint, kg."""
+        child = next(j for j in self.joints if j.get("name") == joint).find("child")
+        first = "" if child is None else child.get("link", "")
+        return sum(mass for link, mass in self.masses.items() if first in self._ancestry(link))
+
+    def _ancestry(self, link: str) -> set[str]:
+        found = {link}
+        while link in self.parent:
+            link = self.parent[link]
+            found.add(link)
+        return found
+
+    def _numbers(
+        self, element: Element, key: str, count: int, name: str, default: float | None = None
+    ) -> tuple[float, ...]:
+        text = element.get(key)
+        if text is None and default is not None:
+            return (default,) * count
+        try:
+            values = tuple(float(part) for part in (text or "").split())
+        except ValueError:
+            values = ()
+        if len(values) != count or not all(map(math.isfinite, values)):
+            found = "nothing" if text is None else repr(text[:40])
+            wanted = "a finite number" if count == 1 else f"{count} finite numbers"
+            raise self.error(f"expected {wanted} as {key} of <{element.tag}>, found {found}", name)
+        return values
