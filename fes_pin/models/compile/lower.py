@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 from llvmlite import ir
 
-from fes_pin.models.compile.lanes import BOOL, VECTOR, WIDTH, LaneFunctions, select_lanes, splat
+from fes_pin.models.compile.lanes import VECTOR, LaneFunctions, select_lanes, splat
 
 POINTER = ir.PointerType(VECTOR)
 _BINARY = {ca.OP_ADD: "fadd", ca.OP_SUB: "fsub", ca.OP_MUL: "fmul", ca.OP_DIV: "fdiv"}
@@ -46,8 +46,8 @@ class Lowering:
         count = function.n_in() + function.n_out()
         made = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [POINTER] * count), function.name())
         made.linkage = "internal"
-        for i, arg in enumerate(made.args):
-            arg.add_attribute("noalias" if i >= function.n_in() else "nocapture")
+        for arg in made.args[function.n_in() :]:
+            arg.add_attribute("noalias")
         builder = ir.IRBuilder(made.append_basic_block())
         self._emit(builder, function, made.args)
         builder.ret_void()
@@ -113,5 +113,3 @@ def _truth(b: ir.IRBuilder, value: ir.Value) -> ir.Value:
     """A number as a mask: true where it is not zero."""
     return b.fcmp_unordered("!=", value, splat(0.0))
 
-
-MASK = ir.VectorType(BOOL, WIDTH)
