@@ -18,6 +18,9 @@ WIDTH = 8
 DOUBLE, INT64, BOOL = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
 VECTOR, INT_VECTOR = ir.VectorType(DOUBLE, WIDTH), ir.VectorType(INT64, WIDTH)
 
+CONTRACT = ("contract",)
+"""A product and a sum may become one fused instruction."""
+
 LN2_HIGH = float.fromhex("0x1.62e42fee00000p-1")  # ln 2, its leading 33 bits
 LN2_LOW = float.fromhex("0x1.a39ef35793c76p-33")  # the rest of ln 2
 HALF_PI_HIGH = float.fromhex("0x1.921fb54400000p+0")  # pi/2, its leading 33 bits
@@ -138,7 +141,7 @@ def horner(b: ir.IRBuilder, x: ir.Value, coefficients: Sequence[float]) -> ir.Va
     """Sum of coefficients[k] x^k."""
     value: ir.Value = splat(coefficients[-1])
     for c in reversed(coefficients[:-1]):
-        value = b.fadd(b.fmul(value, x), splat(c))
+        value = b.fadd(b.fmul(value, x, flags=CONTRACT), splat(c), flags=CONTRACT)
     return value
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 from llvmlite import ir
 
-from fes_pin.models.compile.lanes import VECTOR, LaneFunctions, select_lanes, splat
+from fes_pin.models.compile.lanes import CONTRACT, VECTOR, LaneFunctions, select_lanes, splat
 
 POINTER = ir.PointerType(VECTOR)
 _BINARY = {ca.OP_ADD: "fadd", ca.OP_SUB: "fsub", ca.OP_MUL: "fmul", ca.OP_DIV: "fdiv"}
@@ -71,7 +71,7 @@ class Lowering:
     def _operation(self, b: ir.IRBuilder, op: int, a: list[ir.Value]) -> ir.Value:  # noqa: PLR0911
         one, zero = splat(1.0), splat(0.0)
         if op in _BINARY:
-            return getattr(b, _BINARY[op])(a[0], a[1])
+            return getattr(b, _BINARY[op])(a[0], a[1], flags=CONTRACT)
         if op in _COMPARE:
             compare = b.fcmp_unordered if op == ca.OP_NE else b.fcmp_ordered
             return _number(b, compare(_COMPARE[op], a[0], a[1]))

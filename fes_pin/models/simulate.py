@@ -1,0 +1,185 @@
+"""Simulation: a model's answer to the inputs of trials, with sensitivities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.models.compile.lanes import WIDTH
+from fes_pin.models.compile.program import Program, program
+from fes_pin.models.model import Model
+
+MAX_STEP_S = 2.5e-3
+"""Longest integration step, s: 1/20 of a muscle's time constant; at 1/17 s of damping RK4 errs by 1e-6 rad a swing."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """One trial as simulated.
+
+    Attributes
+    ----------
+    readings
+        Shape (n, outputs).
+    sensitivities
+        Shape (n, outputs, columns).
+    """
+
+    readings: np.ndarray
+    sensitivities: np.ndarray
+
+
+class Simulator:
+    """A model structure on a set of trials, ready to run for any parameter values.
+
+    Parameters
+    ----------
+    model
+        Its structure and constants are used; the values of its parameters are given to `run`.
+    trials
+        The trials whose inputs and conditions drive it.
+    columns
+        Parameters (and unknowns of a trial) to give sensitivities for; none by default.
+    """
+
+    def __init__(self, model: Model, trials: Sequence[Trial], columns: tuple[str, ...] = ()) -> None:
+        self.model, self.trials, self.columns = model, tuple(trials), columns
+        self.names = tuple(model.parameters())
+        self._delayed = any(e.signal == "delay" for e in model.effects)
+        self._blocks = [_Block(model, self.trials, lanes, columns) for lanes in self._groups()]
+
+    def _groups(self) -> Iterator[list[int]]:
+        """Trials that can share a block: same kind, inputs and integration steps per sample, of similar length."""
+        groups: dict[tuple, list[int]] = {}
+        for i, trial in enumerate(self.trials):
+            key = (trial.kind, self.model.rig.input_columns(trial), substeps(trial.dt))
+            groups.setdefault(key, []).append(i)
+        for members in groups.values():
+            members.sort(key=lambda i: len(self.trials[i]))
+            for start in range(0, len(members), WIDTH):
+                yield members[start : start + WIDTH]
+
+    def run(self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]] | None = None) -> list[Simulated]:
+        """Simulate every trial.
+
+        Parameters
+        ----------
+        values
+            Every parameter of the model, by name.
+        unknowns
+            For each trial its own unknowns, if the rig has any; by default as estimated from its first samples.
+        """
+        if unknowns is None:
+            unknowns = [self.model.rig.initial_unknowns(t) for t in self.trials]
+        delay = total_delay(self.model, values) if self._delayed else 0.0
+        out: list[Simulated | None] = [None] * len(self.trials)
+        for block in self._blocks:
+            for i, simulated in block.run(values, unknowns, delay):
+                out[i] = simulated
+        return [s for s in out if s is not None]
+
+
+class _Block:
+    """Up to WIDTH trials that run side by side."""
+
+    def __init__(self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...]) -> None:
+        rig, first = model.rig, trials[lanes[0]]
+        self.lanes, self.trials = lanes, [trials[i] for i in lanes]
+        self.inputs = rig.input_columns(first)
+        available = set(model.parameters()) | set(rig.unknowns(first.kind))
+        self.columns = columns
+        self.program: Program = program(
+            model, first.kind, self.inputs, tuple(c for c in columns if c in available)
+        )
+        self.layout = self.program.layout
+        self.substeps = substeps(first.dt)
+        self.count = max(len(t) for t in self.trials)
+        padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
+        constants = [{**rig.trial_constants(t), **_timing(t, self.substeps)} for t in padded]
+        self.constants = np.array([[c[n] for c in constants] for n in self.layout.constants]).reshape(-1, WIDTH)
+        self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
+        self._shifted: dict[tuple[int, ...], np.ndarray] = {}
+
+    def _driven(self, shift: tuple[int, ...]) -> np.ndarray:
+        """Inputs of all lanes, later by whole samples; before the trial begins they are as at rest: zero."""
+        if shift not in self._shifted:
+            self._shifted.clear()
+            u = np.zeros((self.count, len(self.inputs), WIDTH))
+            for lane, trial in enumerate(self.trials):
+                for j, name in enumerate(self.inputs):
+                    late = min(shift[lane], len(trial))
+                    u[late : len(trial), j, lane] = trial[name][: len(trial) - late]
+            self._shifted[shift] = u
+        return self._shifted[shift]
+
+    def run(
+        self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]], delay: float
+    ) -> Iterator[tuple[int, Simulated]]:
+        p = np.empty((len(self.layout.values), WIDTH))
+        for k, name in enumerate(self.layout.values):
+            if name in self.layout.unknowns:
+                own = [unknowns[i][name] for i in self.lanes]
+                p[k] = own + [own[-1]] * (WIDTH - len(own))
+            else:
+                p[k] = values[name]
+        shift = tuple(int(math.floor(delay / t.dt + 1e-9)) for t in self.trials)
+        constants = self.constants
+        if delay:
+            constants = constants.copy()
+            constants[self.layout.constants.index("shift"), : len(shift)] = shift
+        y, s = self.program.run(self._driven(shift), p, constants, self.guess.copy(), self.substeps)
+        for lane, (i, trial) in enumerate(zip(self.lanes, self.trials, strict=True)):
+            yield i, Simulated(y[: len(trial), :, lane], self._spread(s[: len(trial), ..., lane]))
+
+    def _spread(self, s: np.ndarray) -> np.ndarray:
+        """Sensitivities in the order asked for, zero where this kind of trial has no such unknown."""
+        if len(self.layout.columns) == len(self.columns):
+            return s
+        full = np.zeros((*s.shape[:2], len(self.columns)))
+        for k, name in enumerate(self.layout.columns):
+            full[..., self.columns.index(name)] = s[..., k]
+        return full
+
+
+def substeps(dt: float) -> int:
+    """Integration steps per sample."""
+    return max(1, math.ceil(dt / MAX_STEP_S - 1e-6))
+
+
+def _timing(trial: Trial, steps: int) -> dict[str, float]:
+    return {"t0": float(trial.time[0]), "dt": trial.dt, "step": trial.dt / steps, "shift": 0.0}
+
+
+def total_delay(model: Model, values: Mapping[str, float]) -> float:
+    """Delay from stimulus to muscle in s, all effects together."""
+    delay = 0.0
+    for effect in model.with_parameters(values).effects:
+        if effect.signal == "delay":
+            delay = effect.apply(delay, None)
+    return max(float(delay), 0.0)
+
+
+def simulate(model: Model, trial: Trial) -> Trial:
+    """What the model predicts for a trial, from its inputs, conditions and (joint) first sample alone.
+
+    Returns
+    -------
+    Trial
+        The same time and inputs, with the predicted outputs. For a joint the velocity is predicted as well.
+    """
+    (simulated,) = Simulator(model, [trial]).run(model.parameters())
+    rig = model.rig
+    columns = {name: trial[name] for name in rig.input_columns(trial)}
+    columns.update({n: simulated.readings[:, k].copy() for k, n in enumerate(rig.outputs(trial.kind))})
+    return Trial(
+        name=trial.name,
+        kind=trial.kind,
+        columns=columns,
+        time=trial.time,
+        conditions=trial.conditions,
+        role=trial.role,
+    )
