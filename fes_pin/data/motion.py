@@ -123,7 +123,7 @@ def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarra
 
 
 def _coordinate(name: str) -> str:
-    """A storage file's label as a column: `knee_angle_r` and `/jointset/knee_r/knee_angle_r/value` -> `q_knee_angle_r`."""
+    """A label as a column: `knee_angle_r` and `/jointset/knee_r/knee_angle_r/value` -> `q_knee_angle_r`."""
     parts = name.strip("/").split("/")
     if len(parts) > 1:
         prefix = {"value": "q_", "speed": "qd_"}.get(parts[-1])

@@ -10,43 +10,11 @@ from difflib import get_close_matches
 RIGS = ("ankle", "muscle", "joint", "body")
 KINDS = ("motion", "isometric")
 ROLES = ("fit", "held_out")
-UNITS = [
-    "per_rad",
-    "per_deg",
-    "kgm2",
-    "gm2",
-    "nms",
-    "nmm",
-    "nm",
-    "mps",
-    "kmh",
-    "rad",
-    "deg",
-    "degrees",
-    "degree",
-    "kg",
-    "mg",
-    "lb",
-    "mm",
-    "cm",
-    "km",
-    "m",
-    "kn",
-    "mn",
-    "n",
-    "ms",
-    "us",
-    "ns",
-    "min",
-    "s",
-    "khz",
-    "hz",
-    "ma",
-    "ua",
-    "mv",
-    "v",
-    "g",
-]
+UNITS = (
+    *("per_rad", "per_deg", "kgm2", "gm2", "nms", "nmm", "nm", "mps", "kmh", "rad", "deg", "degrees", "degree"),
+    *("kg", "mg", "lb", "mm", "cm", "km", "m", "kn", "mn", "n", "ms", "us", "ns", "min", "s", "khz", "hz"),
+    *("ma", "ua", "mv", "v", "g"),
+)
 
 
 @dataclass(frozen=True)

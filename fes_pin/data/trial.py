@@ -212,9 +212,10 @@ def _check_columns(table: Table, schema: RigSchema, kind: str, inputs_only: bool
     """Require the columns of this rig and kind; refuse another unit and what is likely a typo."""
     if table.names[0] != "time_s":
         raise table.error(f"expected time_s as the first column, found {table.names[0][:40]!r}", "time_s")
+    absent = [name for name in schema.columns if name not in table.names]
     for name in table.names:
-        if name not in schema.columns and is_like(name, schema.columns):
-            raise table.error(unknown(name, schema.columns), name)
+        if name not in schema.columns and is_like(name, absent):
+            raise table.error(unknown(name, absent), name)
     output = schema.outputs[kind]
     found = [name for name in schema.inputs if name in table.names]
     if schema.inputs_required and not found:
