@@ -11,9 +11,10 @@ RIGS = ("ankle", "muscle", "joint", "body")
 KINDS = ("motion", "isometric")
 ROLES = ("fit", "held_out")
 UNITS = (
-    "per_rad per_deg kgm2 gm2 nms nmm nm mps kmh rad deg degrees degree kg mg lb mm cm km m kn mn n ms us ns min s "
-    "khz hz ma ua mv v g"
-).split()
+    *("per_rad", "per_deg", "kgm2", "gm2", "nms", "nmm", "nm", "mps", "kmh", "rad", "deg", "degrees", "degree"),
+    *("kg", "mg", "lb", "mm", "cm", "km", "m", "kn", "mn", "n", "ms", "us", "ns", "min", "s", "khz", "hz"),
+    *("ma", "ua", "mv", "v", "g"),
+)
 
 
 @dataclass(frozen=True)
@@ -214,12 +215,11 @@ def unknown(name: str, known: Iterable[str]) -> str:
     return f"unknown; expected {'one of ' if len(known) > 1 else ''}{', '.join(known)}" if known else "unknown"
 
 
-def is_like(name: str, known: Iterable[str]) -> bool:
+def is_like(name: str, known: Iterable[str], cutoff: float = 0.8) -> bool:
     """Whether an unknown name is another unit or a likely typo of a known one."""
     known = list(known)
-    return any(quantity(name) == quantity(each) for each in known) or bool(
-        get_close_matches(name.lower(), known, n=1, cutoff=0.8)
-    )
+    same = any(quantity(name) == quantity(each) for each in known)
+    return same or bool(get_close_matches(name.lower(), known, n=1, cutoff=cutoff))
 
 
 def quantity(name: str) -> str:

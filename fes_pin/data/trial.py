@@ -1,15 +1,282 @@
-"""stub until the reader lands"""
-from dataclasses import dataclass, field
+"""A trial: one recording or one simulation, the same type, so that their residual is a subtraction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
 import numpy as np
-@dataclass(frozen=True)
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import write_text
+from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
+from fes_pin.data.schema import KINDS, RIGS, ROLES, SCHEMAS, RigSchema, check_conditions, is_like, one_of, unknown
+from fes_pin.data.table import MIN_ROWS, Table, check_time, format_csv, read_csv
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Trial:
+    """One recording or one simulation.
+
+    Parameters
+    ----------
+    name
+        Of the trial within its study, e.g. the stem of its file.
+    kind
+        "motion" or "isometric".
+    columns : mapping of str to ndarray, shape (n,)
+        Every column but the time, by its name with its unit. The arrays are copied and made read-only.
+    time : ndarray, shape (n,)
+        s, strictly increasing in equal steps.
+    conditions
+        Numbers of this trial by name: `load_kg`, `angle_rad`, `start_s`, `belt_speed_mps`.
+    role
+        "fit", "held_out", or None: not decided by the study.
+
+    Raises
+    ------
+    ValueError
+        A column that is not as long as the time.
+    """
+
     name: str
     kind: str
-    columns: dict
+    columns: Mapping[str, np.ndarray]
     time: np.ndarray
-    conditions: dict = field(default_factory=dict)
+    conditions: Mapping[str, float] = field(default_factory=dict)
     role: str | None = None
+
+    def __post_init__(self) -> None:
+        time = _frozen(self.time)
+        columns = {name: _frozen(values) for name, values in self.columns.items()}
+        for name, values in columns.items():
+            if values.shape != time.shape or time.ndim != 1:
+                raise ValueError(f"column {name} has shape {values.shape}, the time {time.shape}; expected (n,)")
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "columns", MappingProxyType(columns))
+        object.__setattr__(self, "conditions", MappingProxyType(dict(self.conditions)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Trial, (self.name, self.kind, dict(self.columns), self.time, dict(self.conditions), self.role)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, column: str) -> np.ndarray:
+        try:
+            return self.columns[column]
+        except KeyError:
+            raise KeyError(f"trial {self.name} has no column {column!r}; it has {', '.join(self.columns)}") from None
+
+    def __contains__(self, column: object) -> bool:
+        return column in self.columns
+
     @property
-    def dt(self): return float(np.median(np.diff(self.time)))
-    def __len__(self): return len(self.time)
-    def __getitem__(self, k): return self.columns[k]
+    def dt(self) -> float:
+        """Time step, s: the mean one, which printing rounds less than any single one."""
+        return float(self.time[-1] - self.time[0]) / (len(self) - 1)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample, s."""
+        return float(self.time[-1] - self.time[0])
+
+    def with_columns(self, **columns: np.ndarray) -> Trial:
+        """The same trial with columns added or replaced, each of shape (n,)."""
+        return replace(self, columns={**self.columns, **columns})
+
+    def without(self, *columns: str) -> Trial:
+        """The same trial without some columns.
+
+        Raises
+        ------
+        KeyError
+            If it has none of that name.
+        """
+        for name in columns:
+            self[name]
+        return replace(self, columns={name: self.columns[name] for name in self.columns if name not in columns})
+
+    def residual(self, simulated: Trial, column: str) -> np.ndarray:
+        """This trial, measured, minus a simulated one, in one column.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+
+        Raises
+        ------
+        KeyError
+            If either has no such column.
+        ValueError
+            If they were not sampled at the same times.
+        """
+        if len(self) != len(simulated) or not np.allclose(self.time, simulated.time, rtol=0.0, atol=1e-3 * self.dt):
+            raise ValueError(f"trials {self.name} and {simulated.name} were not sampled at the same times")
+        return self[column] - simulated[column]
+
+    def __repr__(self) -> str:
+        conditions = "".join(f", {name} = {value:g}" for name, value in self.conditions.items())
+        rate = f", {self.duration:.4g} s at {1.0 / self.dt:.4g} Hz" if len(self) > 1 else ""
+        columns = ", ".join(self.columns)
+        role = f", {self.role}" if self.role else ""
+        return f"Trial {self.name} ({self.kind}{role}): {len(self)} samples{rate}{conditions}; {columns}"
+
+
+def _frozen(values: Any) -> np.ndarray:
+    array = np.array(values, dtype=float)
+    array.setflags(write=False)
+    return array
+
+
+def read_trial(
+    path: str | Path,
+    *,
+    rig: str,
+    kind: str | None = None,
+    conditions: Mapping[str, float] | None = None,
+    role: str | None = None,
+    inputs_only: bool = False,
+    name: str | None = None,
+) -> Trial:
+    """Read one trial from its CSV file.
+
+    Parameters
+    ----------
+    path
+        The file; for a body one that holds the coordinates and the ground reaction, or a .mot or .sto file.
+    rig
+        "ankle", "muscle", "joint" or "body".
+    kind
+        "motion" or "isometric"; without it "isometric" for a muscle, else "motion".
+    conditions, role
+        As a `[[trial]]` table gives them.
+    inputs_only
+        Do not require the measured outputs, to predict them; they are kept if they are there.
+    name
+        Of the trial; without it the stem of the file.
+
+    Raises
+    ------
+    InputError
+        For anything that is not as the study format says: with file, row and column.
+    """
+    path = Path(path)
+
+    def error(key: str, message: str) -> InputError:
+        return InputError(message, file=path, column=key)
+
+    kind = checked_kind(_checked("rig", rig, RIGS, error), kind, error)
+    if role is not None:
+        _checked("role", role, ROLES, error)
+    numbers = check_conditions(rig, kind, conditions or {}, error)
+    columns, time = _body_columns(path, inputs_only) if rig == "body" else _columns(path, rig, kind, inputs_only)
+    return Trial(name or path.stem, kind, columns, time, numbers, role)
+
+
+def checked_kind(rig: str, kind: object, error: Callable[[str, str], InputError]) -> str:
+    """The kind of a trial of this rig; the rig's default if it names none.
+
+    Raises
+    ------
+    InputError
+        Made by `error` from the key and a message, for a kind that does not exist, or not for this rig.
+    """
+    if kind is None:
+        return SCHEMAS[rig].default_kind
+    known = _checked("kind", kind, KINDS, error)
+    if known not in SCHEMAS[rig].outputs:
+        raise error("kind", f"expected {' or '.join(SCHEMAS[rig].outputs)} for rig {rig}, found {known}")
+    return known
+
+
+def _checked(key: str, value: object, known: tuple[str, ...], error: Callable[[str, str], InputError]) -> str:
+    try:
+        return one_of(value, known)
+    except ValueError as problem:
+        raise error(key, str(problem)) from None
+
+
+def _columns(path: Path, rig: str, kind: str, inputs_only: bool) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    table, schema = read_csv(path), SCHEMAS[rig]
+    _check_columns(table, schema, kind, inputs_only)
+    check_time(table)
+    _check_stimulus(table)
+    return {name: table.column(name) for name in table.names[1:]}, table.values[:, 0]
+
+
+def _check_columns(table: Table, schema: RigSchema, kind: str, inputs_only: bool) -> None:
+    """Require the columns of this rig and kind; refuse another unit and what is likely a typo."""
+    if table.names[0] != "time_s":
+        raise table.error(f"expected time_s as the first column, found {table.names[0][:40]!r}", "time_s")
+    absent = [name for name in schema.columns if name not in table.names]
+    for name in table.names:
+        if name not in schema.columns and is_like(name, absent):
+            raise table.error(unknown(name, absent), name)
+    output = schema.outputs[kind]
+    found = [name for name in schema.inputs if name in table.names]
+    if schema.inputs_required and not found:
+        raise table.error(f"missing; this rig needs {' or '.join(schema.inputs)}", schema.inputs[0])
+    if len(found) > 1:
+        raise table.error(f"expected one of {' and '.join(found)}, found both", found[1])
+    if output not in table.names and not inputs_only:
+        raise table.error(f"missing; a trial of kind {kind} measures it", output)
+
+
+def _check_stimulus(table: Table) -> None:
+    if "pulse_width_us" in table.names and (negative := table.column("pulse_width_us") < 0).any():
+        sample = int(np.argmax(negative))
+        width = table.column("pulse_width_us")[sample]
+        raise table.error(f"expected a pulse width of at least 0 us, found {width:g}", "pulse_width_us", sample)
+    if "stim" in table.names and (other := ~np.isin(table.column("stim"), (0.0, 1.0))).any():
+        sample = int(np.argmax(other))
+        raise table.error(f"expected 0 or 1, found {table.column('stim')[sample]:g}", "stim", sample)
+
+
+def _body_columns(path: Path, inputs_only: bool) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    table, in_degrees = read_motion(path)
+    columns = coordinates_of(table, in_degrees)
+    if not inputs_only or "r_Fx" in table.names:
+        columns |= ground_reaction_of(table)
+    return columns, table.values[:, 0]
+
+
+def read_body_trial(
+    coordinates: Path, ground_reaction: Path, *, name: str, conditions: Mapping[str, float], role: str | None
+) -> Trial:
+    """Read a walking trial from its two files, on the coordinates' times.
+
+    Raises
+    ------
+    InputError
+        As `read_coordinates`, `read_ground_reaction`; the two were not recorded at the same time.
+    """
+    moves, in_degrees = read_motion(coordinates)
+    pushes, _ = read_motion(ground_reaction)
+    time, columns = on_common_time(
+        moves.values[:, 0], coordinates_of(moves, in_degrees), pushes.values[:, 0], ground_reaction_of(pushes)
+    )
+    if len(time) < MIN_ROWS:
+        message = f"expected at least {MIN_ROWS} samples in the time of {coordinates.name}, found {len(time)}"
+        raise pushes.error(message, pushes.names[0], 0)
+    return Trial(name, "motion", columns, time, conditions, role)
+
+
+def write_trial(trial: Trial, path: str | Path) -> None:
+    """Write a trial's time and columns as CSV, whole or not at all; reading gives the same numbers.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    write_text(path, trial_csv(trial))
+
+
+def trial_csv(trial: Trial, columns: tuple[str, ...] | None = None) -> str:
+    """CSV text of a trial's time and all or some of its columns."""
+    names = trial.columns if columns is None else columns
+    return format_csv({"time_s": trial.time, **{name: trial[name] for name in names}})

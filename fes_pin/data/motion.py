@@ -1,0 +1,199 @@
+"""Walking data: joint coordinates and ground reactions from CSV and from OpenSim's .mot and .sto files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import read_text
+from fes_pin.data.schema import is_like, unknown
+from fes_pin.data.table import Table, check_time, parse_rows, read_csv
+
+TRANSLATIONS = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
+LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle", "ankle_angle")
+REQUIRED = (
+    *("pelvis_tilt", "pelvis_list", "pelvis_rotation"),
+    *TRANSLATIONS,
+    *(f"{joint}_{side}" for side in "rl" for joint in LEG),
+)
+OPTIONAL = (
+    *(f"{joint}_{side}" for side in "rl" for joint in ("subtalar_angle", "mtp_angle")),
+    *("lumbar_extension", "lumbar_bending", "lumbar_rotation"),
+)
+GROUND_REACTION = tuple(f"{side}_{kind}{axis}" for side in "rl" for kind in ("F", "cop", "T") for axis in "xyz")
+
+_OPENSIM_GROUND = re.compile(
+    r"^(?P<before>1_|r_|l_|)ground_(?P<what>force|torque|moment)_(?:(?P<foot>[rl]|calcn_[rl])_)?(?P<kind>[vpm]?)(?P<axis>[xyz])$"
+)
+
+
+def read_motion(path: str | Path) -> tuple[Table, bool | None]:
+    """Read a CSV, .mot or .sto file whose first column is the time.
+
+    Returns
+    -------
+    table : Table
+        The numbers as they stand in the file.
+    in_degrees : bool or None
+        What the header of a .mot or .sto file says of its angles; None where it says nothing. CSV is in rad: False.
+
+    Raises
+    ------
+    InputError
+        As `read_csv` and `check_time`; a header without `endheader`, or that promises another number of rows.
+    """
+    path = Path(path)
+    table, in_degrees = _read_storage(path) if path.suffix.lower() in (".mot", ".sto") else (read_csv(path), False)
+    if table.names[0] not in ("time", "time_s"):
+        raise table.error(f"expected time_s or time as the first column, found {table.names[0][:40]}", "time_s")
+    check_time(table)
+    return table, in_degrees
+
+
+def _read_storage(path: Path) -> tuple[Table, bool | None]:
+    lines = read_text(path).split("\n")
+    end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
+    if end is None:
+        raise InputError("expected a line endheader, as OpenSim writes it", file=path, row=len(lines))
+    header = end + 1
+    while header < len(lines) and not lines[header].strip():
+        header += 1
+    if header == len(lines):
+        raise InputError("expected column labels after endheader", file=path, row=header)
+    table = parse_rows(path, tuple(lines[header].split()), lines[header + 1 :], header_row=header + 1, delimiter=None)
+    keys = _storage_keys(lines[:end])
+    rows = keys.get("nrows", keys.get("datarows"))
+    if rows is not None and rows != str(len(table.values)):
+        message = f"expected {rows} rows as the header says, found {len(table.values)}"
+        raise table.error(message, table.names[0], len(table.values) - 1)
+    return table, {"yes": True, "no": False}.get(keys.get("indegrees", "").lower())
+
+
+def _storage_keys(lines: list[str]) -> dict[str, str]:
+    keys = {}
+    for line in lines:
+        key, _, value = line.partition("=") if "=" in line else line.strip().partition(" ")
+        keys[key.strip().lower()] = value.strip()
+    return keys
+
+
+def read_coordinates(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Joint coordinates by OpenSim's names, in rad and m.
+
+    Returns
+    -------
+    time : ndarray, shape (n,)
+        s.
+    columns : dict of ndarray, shape (n,)
+        `q_<coordinate>`, and `qd_`, `qdd_` (rad/s, rad/s2, m/s, m/s2) if the file has them.
+
+    Raises
+    ------
+    InputError
+        As `read_motion`; a required coordinate is missing or in another unit; a .mot or .sto file that does not say
+        whether its angles are in degrees.
+    """
+    table, in_degrees = read_motion(path)
+    return table.column(table.names[0]), coordinates_of(table, in_degrees)
+
+
+def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarray]:
+    """The coordinates that a table holds, in rad and m; see `read_coordinates`."""
+    storage = table.delimiter is None
+    names = {(_coordinate(name) if storage else name): name for name in table.names[1:]}
+    known = [f"q_{name}" for name in (*REQUIRED, *OPTIONAL)]
+    for name in known[: len(REQUIRED)]:
+        if name not in names:
+            raise _missing(table, name.removeprefix("q_") if storage else name, table.names)
+    for name, original in names.items():
+        if name.startswith("q_") and name not in known and is_like(name, known, cutoff=0.92):
+            raise table.error(unknown(name, known), original)
+    if in_degrees is None:
+        raise InputError("expected inDegrees=yes or inDegrees=no in the header", file=table.path, row=1)
+    columns = {}
+    for name, original in names.items():
+        if name.startswith(("q_", "qd_", "qdd_")):
+            angle = name.split("_", 1)[1] not in TRANSLATIONS
+            columns[name] = table.column(original) * (np.pi / 180.0 if in_degrees and angle else 1.0)
+    return columns
+
+
+def _coordinate(name: str) -> str:
+    """A label as a column: `knee_angle_r` and `/jointset/knee_r/knee_angle_r/value` -> `q_knee_angle_r`."""
+    parts = name.strip("/").split("/")
+    if len(parts) > 1:
+        prefix = {"value": "q_", "speed": "qd_"}.get(parts[-1])
+        return f"{prefix}{parts[-2]}" if prefix else name
+    return name if name.startswith(("q_", "qd_", "qdd_")) else f"q_{name}"
+
+
+def read_ground_reaction(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Ground reaction of both feet at its own sample rate.
+
+    A .mot or .sto file may name its columns as OpenSim does. Where it names no foot, `ground_force_...` is the right
+    one and `1_ground_force_...` the left one, as in OpenSim's gait examples.
+
+    Returns
+    -------
+    time : ndarray, shape (n,)
+        s.
+    columns : dict of ndarray, shape (n,)
+        `r_` and `l_`: `F[xyz]` N, `cop[xyz]` m, `T[xyz]` N m about the centre of pressure.
+
+    Raises
+    ------
+    InputError
+        As `read_motion`; a column is missing.
+    """
+    table, _ = read_motion(path)
+    return table.column(table.names[0]), ground_reaction_of(table)
+
+
+def ground_reaction_of(table: Table) -> dict[str, np.ndarray]:
+    """The ground reaction that a table holds; see `read_ground_reaction`."""
+    names = {(_ground(name) if table.delimiter is None else name): name for name in table.names[1:]}
+    for name in GROUND_REACTION:
+        if name not in names:
+            raise _missing(table, name, table.names)
+    return {name: table.column(names[name]) for name in GROUND_REACTION}
+
+
+def _ground(name: str) -> str:
+    found = _OPENSIM_GROUND.match(name)
+    if not found:
+        return name
+    foot = found["foot"] or found["before"]
+    side = foot.strip("_")[-1:] if foot not in ("", "1_") else ("r" if not foot else "l")
+    kind = "T" if found["what"] != "force" or found["kind"] == "m" else {"p": "cop"}.get(found["kind"], "F")
+    return f"{side}_{kind}{found['axis']}"
+
+
+def _missing(table: Table, name: str, names: tuple[str, ...]) -> InputError:
+    like = next((each for each in names if is_like(each, [name], cutoff=0.92)), None)
+    return table.error("missing" + (f"; found {like[:40]}, which is another name or unit" if like else ""), name)
+
+
+def on_common_time(
+    time: np.ndarray, columns: Mapping[str, np.ndarray], other_time: np.ndarray, other: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Two recordings on the first one's times, where both were recorded.
+
+    The second is interpolated linearly and not filtered: what it holds above half the first one's sample rate folds
+    back. Where that matters, read the file by itself (`read_ground_reaction`) and filter both.
+
+    Returns
+    -------
+    time : ndarray, shape (n,)
+    columns : dict of ndarray, shape (n,)
+    """
+    both = (time >= other_time[0]) & (time <= other_time[-1])
+    shared = time[both]
+    joined = {name: values[both] for name, values in columns.items()}
+    same = len(shared) == len(other_time) and np.array_equal(shared, other_time)
+    for name, values in other.items():
+        joined[name] = values if same else np.interp(shared, other_time, values)
+    return shared, joined

@@ -1,0 +1,340 @@
+"""A study: one rig, the model that is believed of it, and the trials measured on it."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from types import MappingProxyType
+from typing import Any
+
+import tomli_w
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import inside, read_bytes, read_text, write_files
+from fes_pin.data.motion import GROUND_REACTION
+from fes_pin.data.schema import RIGS, ROLES, SCHEMAS, Number, check_conditions, one_of, unknown
+from fes_pin.data.toml import Document, read_toml
+from fes_pin.data.trial import Trial, checked_kind, read_body_trial, read_trial, trial_csv
+from fes_pin.data.urdf import check_one_joint, moving_joints
+
+BODY_FILES = ("coordinates", "ground_reaction")
+NOTES = ("description", "subject", "source", "licence", "license", "date", "notes")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Study:
+    """One rig and its trials.
+
+    Parameters
+    ----------
+    name
+        Of the study.
+    rig
+        "ankle", "muscle", "joint" or "body".
+    constants
+        Numbers of `[rig]` and `[rig.passive]`, by key: known, never fitted.
+    start
+        Numbers of `[start]`, by key: start values of what the nominal model fits.
+    trials
+        Measured trials, in the order of the study.
+    folder
+        That the study was read from.
+    files
+        Other files of the study by key: `urdf`, `segments`; for a body also `<trial>.coordinates` and
+        `<trial>.ground_reaction`, which hold the recordings at their own sample rates.
+    """
+
+    name: str
+    rig: str
+    constants: Mapping[str, float]
+    start: Mapping[str, float]
+    trials: tuple[Trial, ...]
+    folder: Path = Path()
+    files: Mapping[str, Path] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "trials", tuple(self.trials))
+        for name in ("constants", "start", "files"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        tables = (dict(self.constants), dict(self.start))
+        return Study, (self.name, self.rig, *tables, self.trials, self.folder, dict(self.files))
+
+    @property
+    def urdf(self) -> Path | None:
+        """The rig's URDF, if the study has one."""
+        return self.files.get("urdf")
+
+    def trial(self, name: str) -> Trial:
+        """One trial by its name.
+
+        Raises
+        ------
+        KeyError
+            If there is none of that name.
+        """
+        for trial in self.trials:
+            if trial.name == name:
+                return trial
+        raise KeyError(f"study {self.name} has no trial {name!r}; it has {', '.join(t.name for t in self.trials)}")
+
+    def __repr__(self) -> str:
+        kinds = Counter(trial.kind for trial in self.trials)
+        counts = " and ".join(f"{count} {kind}" for kind, count in kinds.items())
+        seconds = sum(trial.duration for trial in self.trials)
+        return f"Study {self.name} ({self.rig}): {counts} trials, {seconds:.4g} s"
+
+
+def read_study(path: str | Path) -> Study:
+    """Read a study with all its trials.
+
+    Parameters
+    ----------
+    path
+        Its folder, or the `study.toml` in it.
+
+    Raises
+    ------
+    InputError
+        For anything that is not as the study format says: with file, row, and column or dotted key.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError("no such study; expected a folder with study.toml", file=path)
+    document = read_toml(path / "study.toml" if path.is_dir() else path)
+    return _Reader(document).study()
+
+
+class _Reader:
+    """One reading of a study.toml; every error that it raises names the line and the key."""
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.folder = document.path.parent
+        self.error = document.error
+        for key in document.data:
+            if key not in (known := ("study", "rig", "start", "trial")):
+                raise self.error(key, unknown(key, known))
+        self.name, self.rig = self._study_table()
+        self.schema = SCHEMAS[self.rig]
+
+    def study(self) -> Study:
+        constants, files = self._rig_table()
+        start = self._start_table(constants)
+        names = self._trial_names()
+        trials = []
+        for index, table in enumerate(self._trial_tables()):
+            trials.append(self._trial(f"trial[{index}]", table, names[index], files))
+        self._check_together(trials, constants)
+        return Study(self.name, self.rig, constants, start, tuple(trials), self.folder, files)
+
+    def _study_table(self) -> tuple[str, str]:
+        if "study" not in self.document.data:
+            raise self.error("study", "missing; expected a table [study] with name and rig")
+        table = self.document.table("study")
+        for key in table:
+            if key not in ("name", "rig", *NOTES):
+                raise self.error(f"study.{key}", unknown(key, ("name", "rig", *NOTES)))
+        for key in ("name", "rig"):
+            if key not in table:
+                raise self.error(f"study.{key}", "missing")
+        name = table["name"]
+        if not isinstance(name, str) or not name.strip() or not name.isprintable():
+            raise self.error("study.name", "expected a name, one line of text")
+        try:
+            return name, one_of(table["rig"], RIGS)
+        except ValueError as problem:
+            raise self.error("study.rig", str(problem)) from None
+
+    def _rig_table(self) -> tuple[dict[str, float], dict[str, Path]]:
+        table = dict(self.document.table("rig"))
+        passive = self.document.table("rig.passive", table) if self.schema.passive else {}
+        if self.schema.passive:
+            table.pop("passive", None)
+        paths = {key: table.pop(key) for key in self.schema.files or {} if key in table}
+        known = dict(self.schema.constants)
+        if self.rig == "joint":
+            known |= {key: Number(n.unit, n.lower, n.strict, False) for key, n in self.schema.start.items()}
+        constants = self._numbers("rig", table, known, also=(*(self.schema.files or {}),))
+        constants |= self._numbers("rig.passive", passive, self.schema.passive or {})
+        for key, required in (self.schema.files or {}).items():
+            if required and key not in paths:
+                raise self.error(f"rig.{key}", "missing; expected the path of a file inside the study")
+        self._check_constants(constants, paths)
+        files = {key: self._path(f"rig.{key}", value) for key, value in paths.items()}
+        self._check_files(files)
+        return constants, files
+
+    def _check_constants(self, constants: Mapping[str, float], paths: Mapping[str, object]) -> None:
+        threshold, saturation = constants.get("threshold_us"), constants.get("saturation_us")
+        if (threshold is None) != (saturation is None):
+            key = "threshold_us" if threshold is None else "saturation_us"
+            raise self.error(f"rig.{key}", "missing; threshold_us and saturation_us go together")
+        if threshold is not None and saturation is not None and saturation <= threshold:
+            message = f"expected a saturation above the threshold of {threshold:g} us, found {saturation:g}"
+            raise self.error("rig.saturation_us", message)
+        if self.rig == "body" and not paths and not {"mass_kg", "height_m"} <= set(constants):
+            key = "height_m" if "mass_kg" in constants else "mass_kg"
+            raise self.error(f"rig.{key}", "missing; expected mass_kg and height_m, or segments, or urdf")
+
+    def _check_files(self, files: Mapping[str, Path]) -> None:
+        if self.rig == "joint":
+            check_one_joint(files["urdf"])
+        elif "urdf" in files:
+            moving_joints(files["urdf"])
+        if "segments" in files:
+            try:
+                json.loads(read_text(files["segments"]))
+            except (ValueError, RecursionError) as error:
+                if isinstance(error, InputError):
+                    raise
+                row = getattr(error, "lineno", None)
+                raise InputError("expected JSON", file=files["segments"], row=row) from None
+
+    def _start_table(self, constants: Mapping[str, float]) -> dict[str, float]:
+        table = self.document.table("start")
+        known = dict(self.schema.start)
+        for key in set(known) & set(constants):
+            if key in table:
+                raise self.error(f"start.{key}", "is also in [rig]; expected it in one of them")
+            del known[key]
+        return self._numbers("start", table, known)
+
+    def _numbers(
+        self, where: str, table: Mapping[str, Any], known: Mapping[str, Number], also: tuple[str, ...] = ()
+    ) -> dict[str, float]:
+        numbers = {}
+        for key, value in table.items():
+            if key not in known:
+                raise self.error(f"{where}.{key}", unknown(key, (*known, *also)))
+            try:
+                numbers[key] = known[key].check(value)
+            except ValueError as problem:
+                raise self.error(f"{where}.{key}", str(problem)) from None
+        for key, number in known.items():
+            if number.required and key not in numbers:
+                unit = f" in {number.unit}" if number.unit else ""
+                raise self.error(f"{where}.{key}", f"missing; expected a number{unit}")
+        return numbers
+
+    def _path(self, key: str, value: object) -> Path:
+        try:
+            path = inside(self.folder, value)
+        except ValueError as problem:
+            raise self.error(key, str(problem)) from None
+        if not path.is_file():
+            found = "a folder" if path.is_dir() else ("a special file" if path.exists() else "nothing")
+            raise self.error(key, f"expected a file at {value!r}, found {found}")
+        return self.folder / str(value)
+
+    def _trial_tables(self) -> list[dict[str, Any]]:
+        tables = self.document.data.get("trial", [])
+        if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+            raise self.error("trial", "expected tables [[trial]]")
+        if not tables:
+            raise self.error("trial", "missing; expected at least one table [[trial]]")
+        return tables
+
+    def _trial_names(self) -> list[str]:
+        """Stems of the trials' files; their paths without the suffix where stems are the same."""
+        main = BODY_FILES[0] if self.rig == "body" else "file"
+        paths, seen = [], {}
+        for index, table in enumerate(self._trial_tables()):
+            key = f"trial[{index}].{main}"
+            if main not in table:
+                raise self.error(key, "missing; expected the path of a file inside the study")
+            path = self._path(key, table[main]).resolve()
+            if path in seen:
+                raise self.error(key, f"the same file as {seen[path]}")
+            seen[path] = key
+            paths.append(PurePosixPath(table[main].replace("\\", "/")))
+        stems = Counter(path.stem for path in paths)
+        return [path.stem if stems[path.stem] == 1 else str(path.with_suffix("")) for path in paths]
+
+    def _trial(self, where: str, table: Mapping[str, Any], name: str, files: dict[str, Path]) -> Trial:
+        def error(key: str, message: str) -> InputError:
+            return self.error(f"{where}.{key}", message)
+
+        named = BODY_FILES if self.rig == "body" else ("file",)
+        kind = checked_kind(self.rig, table.get("kind"), error)
+        role = table.get("role")
+        if role is not None:
+            try:
+                one_of(role, ROLES)
+            except ValueError as problem:
+                raise error("role", str(problem)) from None
+        rest = {key: value for key, value in table.items() if key not in (*named, "kind", "role")}
+        numbers = check_conditions(self.rig, kind, rest, error)
+        if self.rig != "body":
+            path = self._path(f"{where}.file", table["file"])
+            return read_trial(path, rig=self.rig, kind=kind, conditions=numbers, role=role, name=name)
+        for key in BODY_FILES:
+            if key not in table:
+                raise error(key, "missing; expected the path of a file inside the study")
+            files[f"{name}.{key}"] = self._path(f"{where}.{key}", table[key])
+        moves, pushes = (files[f"{name}.{key}"] for key in BODY_FILES)
+        return read_body_trial(moves, pushes, name=name, conditions=numbers, role=role)
+
+    def _check_together(self, trials: list[Trial], constants: Mapping[str, float]) -> None:
+        """What only all trials together show: the same inputs in each, and a recruitment curve for pulse widths."""
+        for index, trial in enumerate(trials):
+            for column in self.schema.inputs if self.rig != "body" else ():
+                if (column in trial) != (column in trials[0]):
+                    there, first = ("has", "has not") if column in trial else ("lacks", "has it")
+                    message = f"this trial {there} the column {column} and the first {first}; expected all or none"
+                    raise self.error(f"trial[{index}].file", message)
+        if "pulse_width_us" in trials[0] and "threshold_us" not in constants:
+            raise self.error("rig.threshold_us", "missing; trials with pulse_width_us need threshold and saturation")
+
+
+def write_study(study: Study, folder: str | Path) -> None:
+    """Write a study as a folder that `read_study` reads: all of its files, or none.
+
+    A body's recordings are written on the times of its trials.
+
+    Parameters
+    ----------
+    study
+        To write; the files it names are copied.
+    folder
+        Made if it is missing. Files of the same names in it are replaced, others stay.
+
+    Raises
+    ------
+    InputError
+        If a file of the study cannot be read, or the folder cannot be written.
+    """
+    contents: dict[str, str | bytes] = {}
+    rig: dict[str, Any] = {}
+    passive = SCHEMAS[study.rig].passive or {}
+    for key, value in study.constants.items():
+        (rig.setdefault("passive", {}) if key in passive else rig)[key] = float(value)
+    for key, path in study.files.items():
+        if key in (SCHEMAS[study.rig].files or {}):
+            rig[key] = f"{key}{path.suffix}"
+            contents[rig[key]] = read_bytes(path)
+    tables = []
+    for trial in study.trials:
+        named = _trial_files(study.rig, trial)
+        contents |= named
+        keys = BODY_FILES if study.rig == "body" else ("file",)
+        role = {"role": trial.role} if trial.role else {}
+        conditions = {key: float(value) for key, value in trial.conditions.items()}
+        tables.append({**dict(zip(keys, named, strict=True)), "kind": trial.kind, **conditions, **role})
+    document = {"study": {"name": study.name, "rig": study.rig}, "rig": rig, "start": dict(study.start)}
+    contents["study.toml"] = tomli_w.dumps({**document, "trial": tables})
+    write_files(folder, contents)
+
+
+def _trial_files(rig: str, trial: Trial) -> dict[str, str | bytes]:
+    if rig != "body":
+        return {f"trials/{trial.name}.csv": trial_csv(trial)}
+    moves = tuple(name for name in trial.columns if name not in GROUND_REACTION)
+    return {
+        f"coordinates/{trial.name}.csv": trial_csv(trial, moves),
+        f"ground_reaction/{trial.name}.csv": trial_csv(trial, GROUND_REACTION),
+    }
