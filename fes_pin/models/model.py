@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from fes_pin.models.parameters import Parameter
 from fes_pin.models.rigs.base import Rig
-from fes_pin.models.stage import Effect
+from fes_pin.models.stage import Effect, Stage
 
 
 @dataclass(frozen=True)
 class Model:
-    """A rig and its effects; immutable. `model + effect` is the extended model.
+    """A rig and its effects, in the order of the signal path; immutable. `model + effect` is the extended model.
 
     A parameter's name is its path: `gain`, `coulomb_friction.torque_nm`.
     """
@@ -26,7 +26,8 @@ class Model:
             raise ValueError(f"the model has {effect.name} already")
         if self.rig.name not in effect.rigs:
             raise ValueError(f"{effect.name} is not for the rig {self.rig.name}")
-        return Model(self.rig, (*self.effects, effect))
+        ordered = sorted((*self.effects, effect), key=lambda e: (list(Stage).index(e.stage), e.name))
+        return Model(self.rig, tuple(ordered))
 
     def __sub__(self, name: str) -> Model:
         return Model(self.rig, tuple(e for e in self.effects if e.name != name))

@@ -63,7 +63,9 @@ class Simulator:
             for start in range(0, len(members), WIDTH):
                 yield members[start : start + WIDTH]
 
-    def run(self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]] | None = None) -> list[Simulated]:
+    def run(
+        self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]] | None = None
+    ) -> list[Simulated]:
         """Simulate every trial.
 
         Parameters
@@ -92,9 +94,7 @@ class _Block:
         self.inputs = rig.input_columns(first)
         available = set(model.parameters()) | set(rig.unknowns(first.kind))
         self.columns = columns
-        self.program: Program = program(
-            model, first.kind, self.inputs, tuple(c for c in columns if c in available)
-        )
+        self.program: Program = program(model, first.kind, self.inputs, tuple(c for c in columns if c in available))
         self.layout = self.program.layout
         self.substeps = substeps(first.dt)
         self.count = max(len(t) for t in self.trials)
@@ -126,7 +126,7 @@ class _Block:
                 p[k] = own + [own[-1]] * (WIDTH - len(own))
             else:
                 p[k] = values[name]
-        shift = tuple(int(math.floor(delay / t.dt + 1e-9)) for t in self.trials)
+        shift = tuple(math.floor(delay / t.dt + 1e-9) for t in self.trials)
         constants = self.constants
         if delay:
             constants = constants.copy()

@@ -8,6 +8,8 @@ from enum import StrEnum
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from fes_pin.models.maths import sqrt
 from fes_pin.models.parameters import Parameter, parameters_of
 
@@ -83,6 +85,17 @@ class Effect:
     def shapes(cls) -> tuple[str, ...]:
         """The parameters that exist only beside the effect."""
         return tuple(n for n, info in cls.parameters().items() if info.null is None)
+
+    @classmethod
+    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """Start values of each parameter for a search, most likely first.
+
+        Parameters
+        ----------
+        measured
+            Every measured column, all trials end to end, by name.
+        """
+        return {n: info.grid or (getattr(cls, n),) for n, info in cls.parameters().items()}
 
     @classmethod
     def absent(cls) -> Effect:

@@ -106,8 +106,7 @@ class _Symbols:
             step=self.c["step"],
         )
         s.owned = {
-            e.name: {n: states[f"{e.name}.{n}"] for n in e.states}
-            | {n: memories[f"{e.name}.{n}"] for n in e.memories}
+            e.name: {n: states[f"{e.name}.{n}"] for n in e.states} | {n: memories[f"{e.name}.{n}"] for n in e.memories}
             for e in self.model.effects
         }
         s.delayed = lambda now, before: self._delayed(s, now, before)

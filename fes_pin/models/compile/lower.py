@@ -68,7 +68,7 @@ class Lowering:
             else:
                 work[out[0]] = self._operation(b, op, [work[i] for i in arguments])
 
-    def _operation(self, b: ir.IRBuilder, op: int, a: list[ir.Value]) -> ir.Value:  # noqa: PLR0911
+    def _operation(self, b: ir.IRBuilder, op: int, a: list[ir.Value]) -> ir.Value:
         one, zero = splat(1.0), splat(0.0)
         if op in _BINARY:
             return getattr(b, _BINARY[op])(a[0], a[1], flags=CONTRACT)
@@ -112,4 +112,3 @@ def _number(b: ir.IRBuilder, mask: ir.Value) -> ir.Value:
 def _truth(b: ir.IRBuilder, value: ir.Value) -> ir.Value:
     """A number as a mask: true where it is not zero."""
     return b.fcmp_unordered("!=", value, splat(0.0))
-

@@ -5,14 +5,14 @@ from __future__ import annotations
 import ctypes
 import json
 from dataclasses import asdict, dataclass
-from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from llvmlite import ir
 
 from fes_pin.models.compile.equations import Equations, Layout, derive, make_layout
 from fes_pin.models.compile.lanes import DOUBLE, INT64, VECTOR, WIDTH, select_lanes, splat
-from fes_pin.models.compile.lower import POINTER, Lowering
+from fes_pin.models.compile.lower import Lowering
 from fes_pin.models.compile.machine import MachineCode, cached_path, compile_object, read_cached, write_cached
 from fes_pin.models.compile.signature import source_signature
 from fes_pin.models.model import Model
@@ -86,9 +86,7 @@ class _Loop:
         self.module, self.parts, self.equations = module, parts, equations
         self.sizes = sizes_of(equations)
         double = ir.PointerType(VECTOR)
-        function = ir.Function(
-            module, ir.FunctionType(ir.VoidType(), [INT64, INT64] + [double] * 6), "simulate"
-        )
+        function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INT64, INT64] + [double] * 6), "simulate")
         self.n, self.substeps, self.u, self.p, self.c, self.z, self.y, scratch = function.args
         self.b = ir.IRBuilder(function.append_basic_block())
         self._carve(scratch)
@@ -213,23 +211,10 @@ class _Loop:
 
 def sizes_of(equations: Equations) -> Sizes:
     """Lengths of a program's vectors."""
-    return Sizes(
-        equations.start.numel_out(0), equations.start.numel_out(1), equations.output.numel_out(0)
-    )
+    return Sizes(equations.start.numel_out(0), equations.start.numel_out(1), equations.output.numel_out(0))
 
 
-@lru_cache(maxsize=512)
-def _program(model: Model, layout: Layout) -> Program:
-    key = json.dumps([source_signature(), model.structure(), asdict(layout)])
-    path = cached_path(key, ".program")
-    stored = read_cached(path)
-    if stored is not None:
-        head, _, body = stored.partition(b"\n")
-        return Program(layout, Sizes(**json.loads(head)), body)
-    equations = derive(model, layout)
-    body, sizes = compile_object(emit(equations)), sizes_of(equations)
-    write_cached(path, json.dumps(asdict(sizes)).encode() + b"\n" + body)
-    return Program(layout, sizes, body)
+_PROGRAMS: dict[tuple[tuple[str, ...], Layout], Program] = {}
 
 
 def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...]) -> Program:
@@ -245,9 +230,26 @@ def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str
         Parameters and unknowns to give sensitivities for.
     """
     layout = make_layout(model, kind, inputs, columns)
-    return _program(_skeleton(model), layout)
+    key = (model.structure(), layout)
+    if key not in _PROGRAMS:
+        _PROGRAMS[key] = _stored(model, layout) or _compiled(model, layout)
+    return _PROGRAMS[key]
 
 
-def _skeleton(model: Model) -> Model:
-    """The model without its values: what the machine code depends on."""
-    return Model(type(model.rig)(), tuple(type(e)() for e in model.effects))
+def _path(model: Model, layout: Layout) -> Path:
+    return cached_path(json.dumps([source_signature(), model.structure(), asdict(layout)]), ".program")
+
+
+def _stored(model: Model, layout: Layout) -> Program | None:
+    stored = read_cached(_path(model, layout))
+    if stored is None:
+        return None
+    head, _, body = stored.partition(b"\n")
+    return Program(layout, Sizes(**json.loads(head)), body)
+
+
+def _compiled(model: Model, layout: Layout) -> Program:
+    equations = derive(model, layout)
+    body, sizes = compile_object(emit(equations)), sizes_of(equations)
+    write_cached(_path(model, layout), json.dumps(asdict(sizes)).encode() + b"\n" + body)
+    return Program(layout, sizes, body)

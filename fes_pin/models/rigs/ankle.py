@@ -77,14 +77,15 @@ class Ankle(Rig):
         s.m.r = s.m.r_before = 0.0
         if s.kind == "motion":
             s.x.q, s.x.v, s.m.rest = z, 0.0, z
-        s.q = z
+        s.q = s.sensed = z
 
     def rest_residual(self, s: Signals, z: Any) -> Any:
         return s.torque if s.kind == "motion" else z
 
     def sample(self, s: Signals) -> dict[str, Any]:
         c = s.c
-        width = s.through("pulse_width", s.u.pulse_width_us)
+        s.commanded = s.u.pulse_width_us
+        width = s.through("pulse_width", s.commanded)
         r = clip((width - c.threshold_us) / (c.saturation_us - c.threshold_us), 0.0, 1.0)
         r = s.through("recruitment", r)
         return {"r": r, "r_before": s.m.r}
@@ -95,8 +96,9 @@ class Ankle(Rig):
         s.force_scale = self.gain * c.force_scale_n
         s.r = s.delayed(s.m.r, s.m.r_before)
         s.q, s.v = (s.x.q, s.x.v) if s.kind == "motion" else (c.angle_rad, 0.0)
-        s.act = s.x.act
-        s.act_rate = (s.r - s.act) / s.through("time_constant", self.time_constant_s)
+        s.act, s.sensed = s.x.act, s.q
+        s.time_constant = s.through("time_constant", self.time_constant_s)
+        s.act_rate = (s.r - s.act) / s.time_constant
         s.drive = s.through("activation", s.act)
         s.force = s.through("force", s.force_scale * s.drive)
         rates = {"act": s.act_rate}
@@ -115,12 +117,13 @@ class Ankle(Rig):
         cable = c.moment_arm_m * force - c.com_distance_m * (antagonist - s.load * GRAVITY)
         s.torque = s.through("torque", cable * sin(q) - gravity - self.damping_nms * v)
         s.inertia = s.through("inertia", self.inertia_kgm2)
-        s.acceleration = s.through("acceleration", s.through("inertial_torque", s.torque) / s.inertia)
+        s.driving = s.torque / s.inertia
+        s.acceleration = s.through("acceleration", s.driving)
         return {"q": v, "v": s.acceleration}
 
     def readings(self, s: Signals) -> tuple[Any, ...]:
         if s.kind == "motion":
-            s.rest_reading, s.q, s.v = s.m.rest, s.x.q, s.x.v
+            s.rest_reading, s.sensed = s.m.rest, s.x.q
             return (s.through("reading", s.x.q),)
         self.rates(s)
         return (s.force,)

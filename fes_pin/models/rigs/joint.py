@@ -64,7 +64,7 @@ class Joint(Rig):
 
     def set_rest(self, s: Signals, z: Any) -> None:
         s.x.q, s.x.v, s.m.rest = s.initial.initial_position, s.initial.initial_velocity, s.initial.initial_position
-        s.q = s.x.q
+        s.q = s.sensed = s.x.q
 
     def rest_residual(self, s: Signals, z: Any) -> Any:
         return z
@@ -74,16 +74,17 @@ class Joint(Rig):
 
     def rates(self, s: Signals) -> dict[str, Any]:
         c = s.c
-        s.q, s.v, s.act = s.x.q, s.x.v, 0.0
+        s.q, s.v, s.act, s.sensed = s.x.q, s.x.v, 0.0, s.x.q
         s.inertia = self.inertia_scale * c.inertia
         tilted = s.through("gravity_angle", s.q)
         gravity = self.gravity_scale * (c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted))
         effort = s.through("effort", getattr(s.u, "effort", 0.0))
         s.torque = s.through("torque", effort - gravity - self.damping * s.v)
         s.inertia = s.through("inertia", s.inertia)
-        s.acceleration = s.through("acceleration", s.through("inertial_torque", s.torque) / s.inertia)
+        s.driving = s.torque / s.inertia
+        s.acceleration = s.through("acceleration", s.driving)
         return {"q": s.v, "v": s.acceleration}
 
     def readings(self, s: Signals) -> tuple[Any, ...]:
-        s.rest_reading, s.q, s.v = s.m.rest, s.x.q, s.x.v
+        s.rest_reading, s.sensed = s.m.rest, s.x.q
         return s.through("reading", s.x.q), s.x.v

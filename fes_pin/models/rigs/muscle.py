@@ -57,6 +57,7 @@ class Muscle(Rig):
 
     def set_rest(self, s: Signals, z: Any) -> None:
         s.x.act = s.m.r = s.m.r_before = 0.0
+        s.q = s.sensed = 0.0
 
     def rest_residual(self, s: Signals, z: Any) -> Any:
         return z
@@ -65,16 +66,18 @@ class Muscle(Rig):
         if hasattr(s.u, "stim"):
             r = s.u.stim * s.c.pulse_period_s / s.c.dt
         else:
-            width = s.through("pulse_width", s.u.pulse_width_us)
+            s.commanded = s.u.pulse_width_us
+            width = s.through("pulse_width", s.commanded)
             r = clip((width - s.c.threshold_us) / (s.c.saturation_us - s.c.threshold_us), 0.0, 1.0)
         return {"r": s.through("recruitment", r), "r_before": s.m.r}
 
     def rates(self, s: Signals) -> dict[str, Any]:
         s.r = s.delayed(s.m.r, s.m.r_before)
         s.act, s.q, s.v, s.force_scale = s.x.act, 0.0, 0.0, self.gain
-        s.act_rate = (s.r - s.act) / s.through("time_constant", self.time_constant_s)
+        s.time_constant = s.through("time_constant", self.time_constant_s)
+        s.act_rate = (s.r - s.act) / s.time_constant
         s.drive = s.through("activation", s.act)
-        s.force = s.through("force", s.force_scale * s.drive)
+        s.force = s.sensed = s.through("force", s.force_scale * s.drive)
         return {"act": s.act_rate}
 
     def readings(self, s: Signals) -> tuple[Any, ...]:

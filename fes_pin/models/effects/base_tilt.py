@@ -1,0 +1,27 @@
+"""Gravity acts at another angle than believed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class BaseTilt(Effect):
+    """Gravity acts at another angle than believed.
+
+        g(q) -> g(q + tilt)
+
+    Tell-tale: rest angles are off in a way that depends on the angle; motion about them is nearly right.
+    Source: a rotation of the URDF's base about the joint's axis.
+    """
+
+    tilt_rad: float = parameter(0.05, unit="rad", null=0.0, lower=-1.0, upper=1.0, scale=0.02)
+
+    name, stage, signal, rigs = "base_tilt", Stage.RIG, "gravity_angle", ("ankle", "joint")
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value + self.tilt_rad

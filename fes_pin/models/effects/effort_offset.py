@@ -1,0 +1,28 @@
+"""A constant effort beside the commanded one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class EffortOffset(Effect):
+    """A constant effort beside the commanded one.
+
+        effort + offset
+
+    Tell-tale: the joint drifts or rests to one side though nothing is commanded.
+    Source: Khalil and Dombre, Modeling, Identification and Control of Robots, 2002: the offset of a drive's current
+    loop.
+    """
+
+    offset: float = parameter(0.01, unit="N m", null=0.0, lower=-1000.0, upper=1000.0, scale=0.01)
+
+    name, stage, signal, rigs = "effort_offset", Stage.JOINT, "effort", ("joint",)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value + self.offset

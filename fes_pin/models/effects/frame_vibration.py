@@ -1,0 +1,47 @@
+"""The frame that holds the joint swings as a lightly damped mode driven by the joint's reaction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+TURN = 6.283185307179586
+"""2 pi, rad per turn."""
+
+
+@dataclass(frozen=True)
+class FrameVibration(Effect):
+    """The frame that holds the joint swings as a lightly damped mode driven by the joint's reaction.
+
+        phi'' = -omega^2 phi - 2 zeta omega phi' - coupling torque / J
+        q''   = torque / J - phi''
+
+    Tell-tale: after each sudden change the angle rings at one frequency of its own, whatever the load.
+    Source: Dombre, Fournier and Coiffet, section II-3-2: mechanical vibrations of the metallic frame. coupling = J
+    / J_frame.
+    """
+
+    coupling: float = parameter(0.1, null=0.0, lower=0.0, upper=5.0, scale=0.05)
+    frequency_hz: float = parameter(
+        10.0, unit="Hz", lower=1.0, upper=60.0, scale=1.0, grid=(3.0, 4.5, 6.5, 9.0, 11.0, 13.5, 17.0, 22.0, 30.0)
+    )
+    damping_ratio: float = parameter(0.05, lower=0.002, upper=0.7, scale=0.02)
+
+    name, stage, signal, rigs = "frame_vibration", Stage.RIG, "acceleration", ("ankle", "joint")
+    states = ("angle", "rate")
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value - self._swing(s, value)
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        # the joint's own acceleration is torque / J = q'' + phi'', solved for it
+        return {"angle": s.own.rate, "rate": self._swing(s, s.driving)}
+
+    def _swing(self, s: Any, driving: Any) -> Any:
+        omega = TURN * self.frequency_hz
+        spring = omega * omega * s.own.angle + 2.0 * self.damping_ratio * omega * s.own.rate
+        return -spring - self.coupling * driving

@@ -1,0 +1,42 @@
+"""A stiff limit beyond an angle that the motion reaches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fes_pin.models.maths import ramp
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class JointStop(Effect):
+    """A stiff limit beyond an angle that the motion reaches.
+
+        torque - side stiffness ramp(side (q - angle))
+
+    Tell-tale: the motion turns back at one angle more sharply than modelled, and only there.
+    Source: Dombre, Fournier and Coiffet, section I, which names it among what must be identified.
+    """
+
+    stiffness: float = parameter(0.1, unit="N m/rad", null=0.0, lower=0.0, upper=1000.0, scale=0.1)
+    angle_rad: float = parameter(1.9, unit="rad", scale=0.05)
+    side: float = parameter(1.0, grid=(1.0, -1.0), fitted=False)
+
+    name, stage, signal, rigs = "joint_stop", Stage.JOINT, "torque", ("ankle", "joint")
+
+    @classmethod
+    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """Angles at the ends of the measured range, where a stop can be."""
+        angles = measured.get("angle_rad", measured.get("position"))
+        if angles is None:
+            return super().grids(measured)
+        quantiles = np.quantile(angles, (0.98, 0.93, 0.85, 0.7, 0.5, 0.3, 0.15, 0.07, 0.02))
+        return {**super().grids(measured), "angle_rad": tuple(float(a) for a in quantiles)}
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value - self.side * self.stiffness * ramp(self.side * (s.q - self.angle_rad))

@@ -1,0 +1,27 @@
+"""The load is heavier or lighter than recorded, in proportion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class LoadError(Effect):
+    """The load is heavier or lighter than recorded, in proportion.
+
+        M -> (1 + error) M
+
+    Tell-tale: rest angles are off, the more the heavier the load.
+    Source: a balance or a list of weights that is off by a factor.
+    """
+
+    error: float = parameter(0.01, null=0.0, lower=-0.9, upper=5.0, scale=0.01)
+
+    name, stage, signal, rigs = "load_error", Stage.RIG, "load", ("ankle",)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value * (1.0 + self.error)

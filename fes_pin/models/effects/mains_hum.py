@@ -1,0 +1,34 @@
+"""A sinusoid at the mains frequency in the measured output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.maths import cos, sin
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+TURN = 6.283185307179586
+"""2 pi, rad per turn."""
+
+
+@dataclass(frozen=True)
+class MainsHum(Effect):
+    """A sinusoid at the mains frequency in the measured output.
+
+        y + in_phase sin(2 pi f t) + quadrature cos(2 pi f t)
+
+    Tell-tale: a steady ripple at 50 or 60 Hz (or where sampling folds it to) that is there at rest as well.
+    Source: capacitive pick-up from the mains; the frequency is 50 or 60 Hz by country.
+    """
+
+    in_phase: float = parameter(0.001, unit="rad", null=0.0, lower=-100.0, upper=100.0, scale=0.001)
+    quadrature: float = parameter(0.0, unit="rad", null=0.0, lower=-100.0, upper=100.0, scale=0.001)
+    frequency_hz: float = parameter(50.0, unit="Hz", grid=(50.0, 60.0), fitted=False)
+
+    name, stage, signal, rigs = "mains_hum", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
+
+    def apply(self, value: Any, s: Any) -> Any:
+        phase = TURN * self.frequency_hz * s.time
+        return value + self.in_phase * sin(phase) + self.quadrature * cos(phase)

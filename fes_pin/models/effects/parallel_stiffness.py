@@ -1,0 +1,42 @@
+"""An extra spring across the joint."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class ParallelStiffness(Effect):
+    """An extra spring across the joint.
+
+        torque - stiffness (q - rest_angle)
+
+    Tell-tale: the joint is held too softly, at all speeds and activations alike, around some angle of its own.
+    Source: Winters, in Multiple Muscle Systems, Springer 1990: passive joint elasticity.
+    """
+
+    stiffness_nm_per_rad: float = parameter(0.05, unit="N m/rad", null=0.0, lower=-1.0, upper=1000.0, scale=0.05)
+    rest_angle_rad: float = parameter(1.6, unit="rad", lower=-20.0, upper=20.0, scale=0.1)
+
+    name, stage, signal, rigs = "parallel_stiffness", Stage.JOINT, "torque", ("ankle", "joint")
+
+    @classmethod
+    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """A spring at rest in the middle of the measured motion, or at an end of it."""
+        angles = measured.get("angle_rad", measured.get("position"))
+        if angles is None:
+            return super().grids(measured)
+        return {
+            **super().grids(measured),
+            "rest_angle_rad": tuple(float(np.quantile(angles, q)) for q in (0.5, 0.0, 1.0)),
+        }
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value - self.stiffness_nm_per_rad * (s.q - self.rest_angle_rad)

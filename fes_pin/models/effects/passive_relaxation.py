@@ -1,0 +1,38 @@
+"""A spring and damper in series across the joint: passive torque depends on history."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class PassiveRelaxation(Effect):
+    """A spring and damper in series across the joint: passive torque depends on history.
+
+        relaxation y' = q - y
+        torque - stiffness (q - y)
+
+    Tell-tale: after a fast change of angle the joint creeps on for a while; slow motion is as modelled.
+    Source: Maxwell's element; for muscle Proske and Morgan, J. Biomech. 32 (1999), thixotropy and passive tension.
+    """
+
+    stiffness_nm_per_rad: float = parameter(0.05, unit="N m/rad", null=0.0, lower=0.0, upper=1000.0, scale=0.05)
+    relaxation_s: float = parameter(0.3, unit="s", lower=0.02, upper=30.0, scale=0.1, grid=(0.3, 0.08, 1.2, 5.0))
+
+    name, stage, signal, rigs = "passive_relaxation", Stage.JOINT, "torque", ("ankle", "joint")
+    states = ("relaxed",)
+    dissipative = True
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value - self.stiffness_nm_per_rad * (s.q - s.own.relaxed)
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        return {"relaxed": (s.q - s.own.relaxed) / self.relaxation_s}
+
+    def rest(self, s: Any) -> Mapping[str, Any]:
+        return {"relaxed": s.q}

@@ -1,0 +1,42 @@
+"""A slow periodic external torque, as of breathing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.maths import cos, sin
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+TURN = 6.283185307179586
+"""2 pi, rad per turn."""
+
+
+@dataclass(frozen=True)
+class PeriodicTorque(Effect):
+    """A slow periodic external torque, as of breathing.
+
+        torque + in_phase sin(2 pi f t) + quadrature cos(2 pi f t)
+
+    Tell-tale: the rest angle sways in time with nothing that was commanded.
+    Source: a Fourier component at the breathing rate of a dog or a person, 0.1 to 1 Hz; the phase is that of the
+    trial's first sample.
+    """
+
+    in_phase: float = parameter(0.01, unit="N m", null=0.0, lower=-100.0, upper=100.0, scale=0.005)
+    quadrature: float = parameter(0.0, unit="N m", null=0.0, lower=-100.0, upper=100.0, scale=0.005)
+    frequency_hz: float = parameter(
+        0.4,
+        unit="Hz",
+        lower=0.05,
+        upper=3.0,
+        scale=0.02,
+        grid=(0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0),
+    )
+
+    name, stage, signal, rigs = "periodic_torque", Stage.RIG, "torque", ("ankle", "joint")
+
+    def apply(self, value: Any, s: Any) -> Any:
+        phase = TURN * self.frequency_hz * s.time
+        return value + self.in_phase * sin(phase) + self.quadrature * cos(phase)

@@ -1,0 +1,38 @@
+"""Recruitment depends on the direction in which the pulse width came."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.maths import clip
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class RecruitmentHysteresis(Effect):
+    """Recruitment depends on the direction in which the pulse width came.
+
+        b+    = clip(b, w - half_width, w + half_width)      play, once per sample
+        w_eff = b+
+
+    Tell-tale: the same pulse width gives less force on the way up than on the way down, however slowly it changes.
+    Source: Dombre, Fournier and Coiffet, section I, which names it among what must be identified. Play:
+    Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
+    """
+
+    half_width_us: float = parameter(10.0, unit="us", null=0.0, lower=0.0, upper=400.0, scale=10.0)
+
+    name, stage, signal, rigs = "recruitment_hysteresis", Stage.NERVE, "pulse_width", ("ankle", "muscle")
+    memories = ("followed",)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return self._play(value, s)
+
+    def update(self, s: Any) -> Mapping[str, Any]:
+        return {"followed": self._play(s.commanded, s)}
+
+    def _play(self, width: Any, s: Any) -> Any:
+        return clip(s.own.followed, width - self.half_width_us, width + self.half_width_us)

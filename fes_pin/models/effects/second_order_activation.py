@@ -1,0 +1,33 @@
+"""A second lag in series with the activation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage, lag
+
+
+@dataclass(frozen=True)
+class SecondOrderActivation(Effect):
+    """A second lag in series with the activation.
+
+        second a2' = act - a2,   a2 replaces act
+
+    Tell-tale: the first moments after a step of the stimulus are answered too softly: the force starts with no
+    slope.
+    Source: Baratta and Solomonow, IEEE Trans. Biomed. Eng. 37 (1990): muscle as a second-order low pass.
+    """
+
+    second_s: float = parameter(0.005, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.005, grid=(0.005, 0.02))
+
+    name, stage, signal, rigs = "second_order_activation", Stage.MUSCLE, "activation", ("ankle", "muscle")
+    states = ("lagged",)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return lag(value, s.own.lagged, self.second_s, s.step)[0]
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        return {"lagged": lag(s.act, s.own.lagged, self.second_s, s.step)[1]}

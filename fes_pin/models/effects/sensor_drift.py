@@ -1,0 +1,27 @@
+"""A ramp in time added to the measured output of a trial."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class SensorDrift(Effect):
+    """A ramp in time added to the measured output of a trial.
+
+        y + rate t,   t from the first sample of the trial
+
+    Tell-tale: readings at equal states move apart steadily within a trial, whatever happens.
+    Source: the warming of a bridge or of its amplifier.
+    """
+
+    rate_per_s: float = parameter(0.001, unit="rad/s", null=0.0, lower=-100.0, upper=100.0, scale=0.0005)
+
+    name, stage, signal, rigs = "sensor_drift", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value + self.rate_per_s * s.time

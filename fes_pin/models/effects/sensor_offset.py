@@ -1,0 +1,27 @@
+"""A constant added to the measured output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class SensorOffset(Effect):
+    """A constant added to the measured output.
+
+        y + offset
+
+    Tell-tale: every reading is off by the same amount, at rest and in motion.
+    Source: a potentiometer or bridge that was not zeroed.
+    """
+
+    offset: float = parameter(0.01, unit="rad", null=0.0, lower=-1000.0, upper=1000.0, scale=0.005)
+
+    name, stage, signal, rigs = "sensor_offset", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value + self.offset

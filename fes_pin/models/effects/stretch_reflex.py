@@ -1,0 +1,41 @@
+"""A torque against fast motion in one direction, some tens of milliseconds late."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.maths import ramp
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class StretchReflex(Effect):
+    """A torque against fast motion in one direction, some tens of milliseconds late.
+
+        torque - side gain ramp(side v(t - delay))
+
+    Tell-tale: fast motion in one direction is braked, but late, so that it rings.
+    Source: Matthews, Trends Neurosci. 14 (1991): short-latency reflex. The delay is a chain of three lags of a
+    third each.
+    """
+
+    gain_nms: float = parameter(0.01, unit="N m s", null=0.0, lower=0.0, upper=10.0, scale=0.005)
+    delay_s: float = parameter(0.045, unit="s", lower=0.01, upper=0.2, scale=0.01, grid=(0.045, 0.025, 0.08))
+    side: float = parameter(1.0, grid=(1.0, -1.0), fitted=False)
+
+    name, stage, signal, rigs = "stretch_reflex", Stage.JOINT, "torque", ("ankle",)
+    states = ("first", "second", "third")
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value - self.side * self.gain_nms * ramp(self.side * s.own.third)
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        own, rate = s.own, 3.0 / self.delay_s
+        return {
+            "first": rate * (s.v - own.first),
+            "second": rate * (own.first - own.second),
+            "third": rate * (own.second - own.third),
+        }

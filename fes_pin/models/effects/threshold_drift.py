@@ -1,0 +1,29 @@
+"""The threshold moves with time within a trial, stimulated or not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class ThresholdDrift(Effect):
+    """The threshold moves with time within a trial, stimulated or not.
+
+        w_eff = w - rate t,   t from the first sample of the trial
+
+    Tell-tale: equal stimuli are answered ever more weakly (or strongly) within a trial, the more so near the
+    threshold, and rest does not help.
+    Source: Popovic and Sinkjaer, Control of Movement for the Physically Disabled, Springer 2000: electrodes that
+    move or dry.
+    """
+
+    rate_us_per_s: float = parameter(2.0, unit="us/s", null=0.0, lower=-100.0, upper=100.0, scale=2.0)
+
+    name, stage, signal, rigs = "threshold_drift", Stage.NERVE, "pulse_width", ("ankle", "muscle")
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value - self.rate_us_per_s * s.time
