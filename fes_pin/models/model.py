@@ -73,6 +73,11 @@ class Model:
             effects.append(dataclasses.replace(effect, **own))
         return Model(rig, tuple(effects))
 
+    def acting(self, kind: str) -> Model:
+        """The same model without the effects that a kind of trial cannot feel."""
+        signals = self.rig.signals(kind)
+        return Model(self.rig, tuple(e for e in self.effects if e.signal in signals))
+
     def structure(self) -> tuple[str, ...]:
         """What compiled code depends on: the rig and the effects, not their values."""
         return (self.rig.name, *(e.name for e in self.effects))

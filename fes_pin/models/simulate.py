@@ -89,7 +89,8 @@ class _Block:
     """Up to WIDTH trials that run side by side."""
 
     def __init__(self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...]) -> None:
-        rig, first = model.rig, trials[lanes[0]]
+        first = trials[lanes[0]]
+        rig, model = model.rig, model.acting(first.kind)
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
         self.inputs = rig.input_columns(first)
         available = set(model.parameters()) | set(rig.unknowns(first.kind))

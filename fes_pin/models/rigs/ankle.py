@@ -47,6 +47,11 @@ class Ankle(Rig):
 
     name = "ankle"
 
+    def signals(self, kind: str) -> tuple[str, ...]:
+        muscle = ("pulse_width", "recruitment", "delay", "time_constant", "activation", "force")
+        joint = ("load", "net_force", "gravity_angle", "torque", "inertia", "acceleration", "reading")
+        return muscle + joint if kind == "motion" else muscle
+
     def states(self, kind: str) -> tuple[str, ...]:
         return ("act", "q", "v") if kind == "motion" else ("act",)
 

@@ -40,6 +40,10 @@ class Rig:
         """The parameters that a nominal fit moves."""
         return tuple(self.parameters()) if self.fitted is None else self.fitted
 
+    def signals(self, kind: str) -> tuple[str, ...]:
+        """Names of the signals that effects can change, in the order of the path."""
+        raise NotImplementedError
+
     def states(self, kind: str) -> tuple[str, ...]:
         """Names of the continuous states."""
         raise NotImplementedError

@@ -29,6 +29,9 @@ class Joint(Rig):
 
     name = "joint"
 
+    def signals(self, kind: str) -> tuple[str, ...]:
+        return ("gravity_angle", "effort", "torque", "inertia", "acceleration", "reading")
+
     def states(self, kind: str) -> tuple[str, ...]:
         return ("q", "v")
 

@@ -29,6 +29,9 @@ class Muscle(Rig):
 
     name = "muscle"
 
+    def signals(self, kind: str) -> tuple[str, ...]:
+        return ("pulse_width", "recruitment", "delay", "time_constant", "activation", "force", "reading")
+
     def states(self, kind: str) -> tuple[str, ...]:
         return ("act",)
 

@@ -1,0 +1,291 @@
+"""Fits: Levenberg-Marquardt with exact sensitivities, bounds, and each trial's own unknowns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.stats
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.noise import Noise, NoiseModel, estimate_noise
+from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
+from fes_pin.models.model import Model
+
+TOLERANCE = 0.01
+"""A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
+MAX_ITERATIONS = 60
+CONFIDENCE_95 = float(scipy.stats.norm.ppf(0.975))
+UNIDENTIFIED = 1e-10
+"""Eigenvalue of the scaled information matrix, relative to the largest, below which a direction is not identified."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model with fitted parameters; it can prove its own quality.
+
+    Attributes
+    ----------
+    model
+        With the fitted values.
+    trials
+        What it was fitted to.
+    noise
+        By output column, as assumed in the fit.
+    free
+        Names of the fitted parameters.
+    covariance
+        Shape (free, free); infinite where the data identify nothing.
+    sse
+        Sum of squared whitened residuals: minus twice the log-likelihood, but for a constant.
+    samples
+        Number of whitened residuals.
+    gradient_norm
+        Largest Newton decrement of a single free parameter at the end: 0 at an optimum.
+    unknowns
+        Of each trial.
+    parts
+        Whitened residuals and sensitivities at the optimum, by trial.
+    """
+
+    model: Model
+    trials: tuple[Trial, ...]
+    noise: NoiseModel
+    free: tuple[str, ...]
+    covariance: np.ndarray
+    sse: float
+    samples: int
+    converged: bool
+    gradient_norm: float
+    unknowns: Unknowns
+    at_bound: tuple[str, ...]
+    parts: tuple[Linearized, ...] = field(repr=False)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter by name."""
+        return self.model.parameters()
+
+    def std(self, name: str) -> float:
+        """Standard deviation of a fitted parameter."""
+        k = self.free.index(name)
+        return float(np.sqrt(self.covariance[k, k]))
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """95 % interval of a fitted parameter, cut at its bounds."""
+        value, half = self.values[name], CONFIDENCE_95 * self.std(name)
+        info = self.model.parameter_info()[name]
+        return max(value - half, info.lower), min(value + half, info.upper)
+
+    def is_optimal(self, tolerance: float = 0.1) -> bool:
+        """True if no free parameter's Newton step would gain more than `tolerance` in twice the log-likelihood."""
+        return self.converged and self.gradient_norm <= tolerance
+
+    def not_identified(self) -> tuple[str, ...]:
+        """Parameters that these data say nothing about."""
+        return tuple(n for n in self.free if not math.isfinite(self.std(n)))
+
+    def __str__(self) -> str:
+        info = self.model.parameter_info()
+        lines = [f"{' + '.join(self.model.structure())}: {self.samples} samples, reduced chi2 {self.reduced:.3f}"]
+        for name in self.free:
+            note = " (not identified)" if name in self.not_identified() else ""
+            note += " (at its bound)" if name in self.at_bound else ""
+            lines.append(f"  {name:40s} {self.values[name]:12.6g} +- {self.std(name):9.2g} {info[name].unit}{note}")
+        return "\n".join(lines)
+
+    @property
+    def reduced(self) -> float:
+        """Sum of squares over degrees of freedom: 1 where the noise model is right and the model adequate."""
+        return self.sse / max(self.samples - len(self.free), 1)
+
+
+class _Search:
+    """The state of one Levenberg-Marquardt search."""
+
+    def __init__(self, problem: Problem, start: Mapping[str, float], unknowns: Unknowns | None) -> None:
+        info = problem.model.parameter_info()
+        self.problem, self.names = problem, problem.free
+        self.lower = np.array([info[n].lower for n in self.names])
+        self.upper = np.array([info[n].upper for n in self.names])
+        self.fixed = dict(start)
+        self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
+        self.unknowns = unknowns if unknowns is not None else problem.start_unknowns()
+        self.damping = 1e-4
+        self.parts = self._linearize(self.x, self.unknowns)
+        self.sse = whitened_sse(self.parts)
+
+    def _linearize(self, x: np.ndarray, unknowns: Unknowns) -> list[Linearized]:
+        with np.errstate(all="ignore"):
+            return self.problem.linearize(self.values(x), unknowns)
+
+    def values(self, x: np.ndarray) -> dict[str, float]:
+        return {**self.fixed, **dict(zip(self.names, (float(v) for v in x), strict=True))}
+
+    def free_now(self, gradient: np.ndarray) -> np.ndarray:
+        """Parameters that are not held by a bound."""
+        held = ((self.x <= self.lower) & (gradient < 0)) | ((self.x >= self.upper) & (gradient > 0))
+        return ~held
+
+    def step(self) -> bool:
+        """Go down once; True when there is nothing left to gain."""
+        for _ in range(12):
+            system = normal_equations(self.parts, self.damping)
+            if not np.isfinite(system.sse):
+                return True
+            free = self.free_now(system.gradient)
+            move = np.zeros(len(self.x))
+            move[free] = _damped(system.hessian[np.ix_(free, free)], system.gradient[free], self.damping)
+            new_x = np.clip(self.x + move, self.lower, self.upper)
+            move = new_x - self.x
+            promised = 2.0 * system.gradient @ move - move @ system.hessian @ move
+            locals_ = self._moved(system.local_steps(move))
+            if promised < TOLERANCE and not system.eliminated:
+                return True
+            parts = self._linearize(new_x, locals_)
+            sse = whitened_sse(parts)
+            if np.isfinite(sse) and sse <= self.sse:
+                gained = self.sse - sse
+                self.x, self.unknowns, self.parts, self.sse = new_x, locals_, parts, sse
+                self.damping = max(self.damping * 0.2, 1e-9)
+                return gained < TOLERANCE
+            self.damping = max(self.damping * 10.0, 1e-4)
+        return True
+
+    def _moved(self, steps: list[np.ndarray]) -> Unknowns:
+        if not steps:
+            return self.unknowns
+        names = self.problem.unknown_names
+        return [
+            {n: u[n] + float(d) for n, d in zip(names, step, strict=True)}
+            for u, step in zip(self.unknowns, steps, strict=True)
+        ]
+
+
+def fit_problem(
+    problem: Problem,
+    start: Mapping[str, float],
+    unknowns: Unknowns | None = None,
+    max_iterations: int = MAX_ITERATIONS,
+) -> Fit:
+    """Fit a problem from a start value of every parameter.
+
+    Returns
+    -------
+    Fit
+        Also if it did not converge: then `converged` is False.
+    """
+    search = _Search(problem, start, unknowns)
+    done = False
+    for _ in range(max_iterations):
+        done = search.step()
+        if done:
+            break
+    system = normal_equations(search.parts)
+    free = search.free_now(system.gradient)
+    model = problem.model.with_parameters(search.values(search.x))
+    return Fit(
+        model=model,
+        trials=problem.trials,
+        noise=problem.noise,
+        free=problem.free,
+        covariance=_covariance(system.hessian, free),
+        sse=search.sse,
+        samples=sum(len(p.residual) for p in search.parts),
+        converged=bool(done and np.isfinite(search.sse)),
+        gradient_norm=_decrement(system.hessian, system.gradient, free),
+        unknowns=search.unknowns,
+        at_bound=tuple(n for n, f in zip(problem.free, free, strict=True) if not f),
+        parts=tuple(search.parts),
+    )
+
+
+def fit(
+    model: Model,
+    trials: Sequence[Trial],
+    noise: NoiseModel | None = None,
+    max_iterations: int = MAX_ITERATIONS,
+) -> Fit:
+    """Fit a model's parameters to trials, from the model's own values.
+
+    Parameters
+    ----------
+    model
+        Start values and structure.
+    trials
+        What was measured.
+    noise
+        By output column. Without it the noise is taken for white, fitted, and estimated from the residuals; then the
+        fit is repeated with it.
+
+    Returns
+    -------
+    Fit
+    """
+    if noise is not None:
+        return fit_problem(Problem(model, trials, noise), model.parameters(), max_iterations=max_iterations)
+    first = fit_problem(Problem(model, trials, rough_noise(model, trials)), model.parameters())
+    return fit(first.model, trials, noise_of(first), max_iterations)
+
+
+def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
+    """White noise at the level of the second differences of each measured column: all that is known before a fit."""
+    columns: dict[str, list[np.ndarray]] = {}
+    for trial in trials:
+        for name in model.rig.outputs(trial.kind):
+            if name in trial.columns:
+                columns.setdefault(name, []).append(trial[name])
+    out = {}
+    for name, pieces in columns.items():
+        bend = np.concatenate([np.diff(p, 2) for p in pieces])
+        level = 1.4826 * float(np.median(np.abs(bend))) / math.sqrt(6.0)
+        floor = 1e-6 * max(float(np.ptp(np.concatenate(pieces))), 1e-9)
+        out[name] = Noise(max(level, floor), (), max(level, floor))
+    return out
+
+
+def noise_of(fitted: Fit) -> dict[str, Noise]:
+    """The noise that a fit's residuals show, by output column."""
+    problem = Problem(fitted.model, fitted.trials, fitted.noise, free=())
+    columns: dict[str, list[np.ndarray]] = {}
+    for residuals in problem.residuals(fitted.values, fitted.unknowns):
+        for name, residual in residuals.items():
+            columns.setdefault(name, []).append(residual)
+    return {name: estimate_noise(pieces, used=len(fitted.free)) for name, pieces in columns.items()}
+
+
+def _damped(hessian: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:
+    """Marquardt's step in parameters scaled by the information that the data have of them."""
+    if not len(gradient):
+        return gradient
+    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    scaled = hessian / np.outer(scale, scale) + damping * np.eye(len(scale))
+    values, vectors = np.linalg.eigh(scaled)
+    inverse = np.where(values > UNIDENTIFIED, 1.0 / np.maximum(values, UNIDENTIFIED), 0.0)
+    return (vectors @ (inverse * (vectors.T @ (gradient / scale)))) / scale
+
+
+def _covariance(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Inverse information of the free parameters; infinite variance along what is not identified, 0 at a bound."""
+    out = np.zeros_like(hessian)
+    inner = hessian[np.ix_(free, free)]
+    diagonal = np.diag(inner).copy()
+    seen = diagonal > 0
+    scale = np.sqrt(np.where(seen, diagonal, 1.0))
+    values, vectors = np.linalg.eigh(inner / np.outer(scale, scale) + np.diag(np.where(seen, 0.0, 1.0)))
+    weak = values <= UNIDENTIFIED * max(values.max(initial=0.0), 1e-300)
+    inverse = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, values))
+    covariance = (vectors * inverse) @ vectors.T / np.outer(scale, scale)
+    lost = ~seen | (np.abs(vectors[:, weak]) > 1e-3).any(axis=1)
+    covariance[np.diag_indices_from(covariance)] = np.where(lost, np.inf, np.diag(covariance))
+    out[np.ix_(free, free)] = covariance
+    return out
+
+
+def _decrement(hessian: np.ndarray, gradient: np.ndarray, free: np.ndarray) -> float:
+    """Largest gain in twice the log-likelihood that a step of one free parameter alone still promises."""
+    diagonal = np.diag(hessian)
+    good = free & (diagonal > 0)
+    return float(np.max(gradient[good] ** 2 / diagonal[good], initial=0.0))

@@ -1,0 +1,134 @@
+"""Whitened residuals and sensitivities of a model on trials, and their normal equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.models.model import Model
+from fes_pin.models.simulate import Simulator
+
+Unknowns = list[dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Linearized:
+    """One trial near a parameter value: whitened residual and sensitivities, all channels end to end.
+
+    Attributes
+    ----------
+    residual
+        Shape (m,).
+    jacobian
+        Shape (m, parameters): derivative of the simulation, so the residual falls along it.
+    local
+        Shape (m, unknowns of the trial).
+    """
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    local: np.ndarray
+
+
+class Problem:
+    """A model structure on trials, with the noise that weighs them.
+
+    Parameters
+    ----------
+    model
+        Its structure; values are given to the methods.
+    trials
+        What was measured.
+    noise
+        By output column; a column that is missing here weighs nothing.
+    free
+        The parameters that sensitivities are wanted for; the model's fitted ones by default.
+    """
+
+    def __init__(
+        self, model: Model, trials: Sequence[Trial], noise: NoiseModel, free: tuple[str, ...] | None = None
+    ) -> None:
+        self.model, self.trials, self.noise = model, tuple(trials), noise
+        self.free = model.fitted_parameters() if free is None else free
+        self.unknown_names = model.rig.unknowns(self.trials[0].kind) if self.trials else ()
+        self.simulator = Simulator(model, self.trials, (*self.free, *self.unknown_names))
+
+    def start_unknowns(self) -> Unknowns:
+        """The unknowns of each trial as its first samples suggest."""
+        return [dict(self.model.rig.initial_unknowns(t)) for t in self.trials]
+
+    def residuals(self, values: Mapping[str, float], unknowns: Unknowns) -> list[dict[str, np.ndarray]]:
+        """Measured minus simulated, for each trial by output column; not whitened."""
+        out = []
+        for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
+            names = self.model.rig.outputs(trial.kind)
+            out.append({n: trial[n] - simulated.readings[:, k] for k, n in enumerate(names) if n in trial.columns})
+        return out
+
+    def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
+        """Whitened residuals and sensitivities at a parameter value."""
+        out, split = [], len(self.free)
+        for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
+            pieces = []
+            for k, name in enumerate(self.model.rig.outputs(trial.kind)):
+                if name not in trial.columns or name not in self.noise:
+                    continue
+                residual = trial[name] - simulated.readings[:, k]
+                stacked = np.concatenate([residual[:, None], simulated.sensitivities[:, k]], axis=1)
+                pieces.append(self.noise[name].whiten(stacked))
+            rows = np.concatenate(pieces) if len(pieces) > 1 else pieces[0]
+            out.append(Linearized(rows[:, 0], rows[:, 1 : 1 + split], rows[:, 1 + split :]))
+        return out
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """Gauss-Newton system with the unknowns of each trial eliminated.
+
+    Attributes
+    ----------
+    sse
+        Sum of squared whitened residuals.
+    gradient, hessian
+        Of half of it, shape (parameters,) and (parameters, parameters), after elimination.
+    """
+
+    sse: float
+    gradient: np.ndarray
+    hessian: np.ndarray
+    eliminated: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    def local_steps(self, step: np.ndarray) -> list[np.ndarray]:
+        """Steps of each trial's unknowns that go with a step of the parameters."""
+        return [constant - slope @ step for constant, slope in self.eliminated]
+
+
+def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> NormalEquations:
+    """Sum the trials; each trial's unknowns are eliminated by its Schur complement, damped as Marquardt does."""
+    size = parts[0].jacobian.shape[1]
+    sse, gradient, hessian = 0.0, np.zeros(size), np.zeros((size, size))
+    eliminated = []
+    for part in parts:
+        r, j, local = part.residual, part.jacobian, part.local
+        sse += float(r @ r)
+        g, h = j.T @ r, j.T @ j
+        if local.shape[1]:
+            own = local.T @ local
+            own[np.diag_indices_from(own)] *= 1.0 + damping
+            own[np.diag_indices_from(own)] += 1e-300
+            constant = np.linalg.solve(own, local.T @ r)
+            slope = np.linalg.solve(own, local.T @ j)
+            g, h = g - j.T @ (local @ constant), h - j.T @ (local @ slope)
+            eliminated.append((constant, slope))
+        gradient += g
+        hessian += h
+    return NormalEquations(sse, gradient, hessian, tuple(eliminated))
+
+
+def whitened_sse(parts: Sequence[Linearized]) -> float:
+    """Sum of squared whitened residuals."""
+    return float(sum(p.residual @ p.residual for p in parts))
