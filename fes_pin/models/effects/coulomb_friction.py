@@ -9,7 +9,7 @@ from fes_pin.models.maths import tanh
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 
-V_SMOOTH = 0.02
+V_SMOOTH = 0.005
 """Speed below which dry friction fades, rad/s; far below the speeds of a limb's motion (1 rad/s)."""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.maths import sin
+from fes_pin.models.maths import cos, sin
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 
@@ -23,8 +23,10 @@ class LoadInertia(Effect):
 
     share: float = parameter(0.5, null=0.0, lower=0.0, upper=3.0, scale=0.1)
 
-    name, stage, signal, rigs = "load_inertia", Stage.JOINT, "inertia", ("ankle",)
+    name, stage, signal, rigs = "load_inertia", Stage.JOINT, "acceleration", ("ankle",)
 
     def apply(self, value: Any, s: Any) -> Any:
-        lever = s.lever * sin(s.q)
-        return value + self.share * s.load * lever * lever
+        moved = self.share * s.load * s.lever * s.lever
+        sine, cosine = sin(s.q), cos(s.q)
+        torque = value * s.inertia - moved * sine * cosine * s.v * s.v
+        return torque / (s.inertia + moved * sine * sine)
