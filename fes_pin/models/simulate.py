@@ -44,19 +44,27 @@ class Simulator:
         The trials whose inputs and conditions drive it.
     columns
         Parameters (and unknowns of a trial) to give sensitivities for; none by default.
+    max_step_s
+        Longest integration step; by default what the model needs.
     """
 
-    def __init__(self, model: Model, trials: Sequence[Trial], columns: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        columns: tuple[str, ...] = (),
+        max_step_s: float | None = None,
+    ) -> None:
         self.model, self.trials, self.columns = model, tuple(trials), columns
-        self.names = tuple(model.parameters())
+        self.max_step_s = max_step(model) if max_step_s is None else max_step_s
         self._delayed = any(e.signal == "delay" for e in model.effects)
-        self._blocks = [_Block(model, self.trials, lanes, columns) for lanes in self._groups()]
+        self._blocks = [_Block(model, self.trials, lanes, columns, self.max_step_s) for lanes in self._groups()]
 
     def _groups(self) -> Iterator[list[int]]:
         """Trials that can share a block: same kind, inputs and integration steps per sample, of similar length."""
         groups: dict[tuple, list[int]] = {}
         for i, trial in enumerate(self.trials):
-            key = (trial.kind, self.model.rig.input_columns(trial), substeps(trial.dt))
+            key = (trial.kind, self.model.rig.input_columns(trial), substeps(trial.dt, self.max_step_s))
             groups.setdefault(key, []).append(i)
         for members in groups.values():
             members.sort(key=lambda i: len(self.trials[i]))
@@ -88,7 +96,9 @@ class Simulator:
 class _Block:
     """Up to WIDTH trials that run side by side."""
 
-    def __init__(self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...]) -> None:
+    def __init__(
+        self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...], max_step_s: float
+    ) -> None:
         first = trials[lanes[0]]
         rig, model = model.rig, model.acting(first.kind)
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
@@ -97,7 +107,7 @@ class _Block:
         self.columns = columns
         self.program: Program = program(model, first.kind, self.inputs, tuple(c for c in columns if c in available))
         self.layout = self.program.layout
-        self.substeps = substeps(first.dt)
+        self.substeps = substeps(first.dt, max_step_s)
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
         constants = [{**rig.trial_constants(t), **_timing(t, self.substeps)} for t in padded]
@@ -146,9 +156,14 @@ class _Block:
         return full
 
 
-def substeps(dt: float) -> int:
+def max_step(model: Model) -> float:
+    """Longest integration step that resolves the model, s."""
+    return min([MAX_STEP_S, *(e.max_step_s for e in model.effects)])
+
+
+def substeps(dt: float, max_step_s: float) -> int:
     """Integration steps per sample."""
-    return max(1, math.ceil(dt / MAX_STEP_S - 1e-6))
+    return max(1, math.ceil(dt / max_step_s - 1e-6))
 
 
 def _timing(trial: Trial, steps: int) -> dict[str, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from types import SimpleNamespace
@@ -45,6 +46,8 @@ class Effect:
         The rigs it can be part of.
     dissipative
         True if it can only take energy from the joint.
+    max_step_s
+        Longest integration step that resolves it, s.
     """
 
     name: ClassVar[str]
@@ -54,6 +57,7 @@ class Effect:
     states: ClassVar[tuple[str, ...]] = ()
     memories: ClassVar[tuple[str, ...]] = ()
     dissipative: ClassVar[bool] = False
+    max_step_s: ClassVar[float] = math.inf
 
     def apply(self, value: Any, s: Any) -> Any:
         """The signal with the effect, from the signal without it."""

@@ -9,17 +9,20 @@ from fes_pin.models.maths import tanh
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 
-V_SMOOTH = 0.005
+V_SMOOTH = 0.002
 """Speed below which dry friction fades, rad/s; far below the speeds of a limb's motion (1 rad/s)."""
+
+STIFFEST = 2.5
+"""Largest rate of decay times step that it may show; RK4 is stable to 2.78 (Hairer and Wanner, Solving ODEs II, IV.2)."""
 
 
 @dataclass(frozen=True)
 class CoulombFriction(Effect):
     """Dry friction at the joint.
 
-        torque - T tanh(v / (V_SMOOTH + T h / J))
+        torque - T tanh(v / (V_SMOOTH + T h / (STIFFEST J)))
 
-    The slope at rest is held below J / h (h the integration step), so that sticking is never stiff.
+    h is the integration step: a joint that sticks creeps, as slowly as the step allows.
 
     Tell-tale: the joint comes to rest at other angles from above than from below; free swings shrink by equal steps.
     Source: Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation,
@@ -30,6 +33,8 @@ class CoulombFriction(Effect):
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "torque", ("ankle", "joint")
     dissipative = True
+    max_step_s = 6.25e-4
 
     def apply(self, value: Any, s: Any) -> Any:
-        return value - self.torque_nm * tanh(s.v / (V_SMOOTH + self.torque_nm * s.step / s.inertia))
+        creep = V_SMOOTH + self.torque_nm * s.step / (STIFFEST * s.inertia)
+        return value - self.torque_nm * tanh(s.v / creep)
