@@ -242,7 +242,8 @@ class _Reader:
     def _trial_names(self) -> list[str]:
         """Stems of the trials' files; their paths without the suffix where stems are the same."""
         main = BODY_FILES[0] if self.rig == "body" else "file"
-        paths, seen = [], {}
+        paths: list[PurePosixPath] = []
+        seen: dict[Path, str] = {}
         for index, table in enumerate(self._trial_tables()):
             key = f"trial[{index}].{main}"
             if main not in table:
