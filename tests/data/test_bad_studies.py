@@ -141,6 +141,10 @@ def test_bad_bytes(tmp_path):
 def test_nothing_there(tmp_path):
     check(tmp_path / "none", tmp_path / "none", None, None, "no such study")
     check(tmp_path, tmp_path / "study.toml", None, None, "no such file")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_study("a" * 5000)
+    with pytest.raises(InputError, match="no such study|cannot be read"):
+        read_study("a\0b")
 
 
 JOINT = {  # file, old text, new text, blamed file, row, key, words
