@@ -143,7 +143,7 @@ def test_nothing_there(tmp_path):
     check(tmp_path, tmp_path / "study.toml", None, None, "no such file")
     with pytest.raises(InputError, match="cannot be read"):
         read_study("a" * 5000)
-    with pytest.raises(InputError, match="no such study|cannot be read"):
+    with pytest.raises(InputError, match=r"no such study|cannot be read"):
         read_study("a\0b")
 
 
