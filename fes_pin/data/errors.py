@@ -20,7 +20,7 @@ class InputError(ValueError):
         self, message: str, *, file: str | Path | None = None, row: int | None = None, column: str | None = None
     ) -> None:
         self.message, self.file, self.row, self.column = message, file, row, column
-        super().__init__(" ".join(str(self).split()))
+        super().__init__(str(self))
 
     def __str__(self) -> str:
         place = [str(self.file)] if self.file is not None else []
@@ -28,4 +28,5 @@ class InputError(ValueError):
             place.append(f"row {self.row}")
         if self.column is not None:
             place.append(f"column {self.column}" if self.row is not None else str(self.column))
-        return f"{', '.join(place)}: {self.message}" if place else self.message
+        line = f"{', '.join(place)}: {self.message}" if place else self.message
+        return line if line.isprintable() else "".join(each if each.isprintable() else " " for each in line)

@@ -173,7 +173,8 @@ def _ground(name: str) -> str:
 
 
 def _missing(table: Table, name: str, names: tuple[str, ...]) -> InputError:
-    like = next((each for each in names if is_like(each, [name], cutoff=0.92)), None)
+    known = {*REQUIRED, *OPTIONAL, *(f"q_{each}" for each in (*REQUIRED, *OPTIONAL)), *GROUND_REACTION}
+    like = next((each for each in names if each not in known and is_like(each, [name], cutoff=0.85)), None)
     return table.error("missing" + (f"; found {like[:40]}, which is another name or unit" if like else ""), name)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import tomli_w
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import inside, read_bytes, read_text, write_files
+from fes_pin.data.files import read_bytes, read_text, write_files
 from fes_pin.data.motion import GROUND_REACTION
 from fes_pin.data.schema import RIGS, ROLES, SCHEMAS, Number, check_conditions, one_of, unknown
 from fes_pin.data.toml import Document, read_toml
@@ -103,10 +103,13 @@ def read_study(path: str | Path) -> Study:
         For anything that is not as the study format says: with file, row, and column or dotted key.
     """
     path = Path(path)
-    if not path.exists():
-        raise InputError("no such study; expected a folder with study.toml", file=path)
-    document = read_toml(path / "study.toml" if path.is_dir() else path)
-    return _Reader(document).study()
+    try:
+        if not path.exists():
+            raise InputError("no such study; expected a folder with study.toml", file=path)
+        folder = path.is_dir()
+    except (OSError, ValueError) as error:
+        raise error if isinstance(error, InputError) else InputError(f"cannot be read: {error}", file=path) from error
+    return _Reader(read_toml(path / "study.toml" if folder else path)).study()
 
 
 class _Reader:
@@ -159,13 +162,13 @@ class _Reader:
         known = dict(self.schema.constants)
         if self.rig == "joint":
             known |= {key: Number(n.unit, n.lower, n.strict, False) for key, n in self.schema.start.items()}
-        constants = self._numbers("rig", table, known, also=(*(self.schema.files or {}),))
-        constants |= self._numbers("rig.passive", passive, self.schema.passive or {})
+        constants = self.document.numbers("rig", table, known, also=(*(self.schema.files or {}),))
+        constants |= self.document.numbers("rig.passive", passive, self.schema.passive or {})
         for key, required in (self.schema.files or {}).items():
             if required and key not in paths:
                 raise self.error(f"rig.{key}", "missing; expected the path of a file inside the study")
         self._check_constants(constants, paths)
-        files = {key: self._path(f"rig.{key}", value) for key, value in paths.items()}
+        files = {key: self.document.path_of(f"rig.{key}", value) for key, value in paths.items()}
         self._check_files(files)
         return constants, files
 
@@ -202,34 +205,7 @@ class _Reader:
             if key in table:
                 raise self.error(f"start.{key}", "is also in [rig]; expected it in one of them")
             del known[key]
-        return self._numbers("start", table, known)
-
-    def _numbers(
-        self, where: str, table: Mapping[str, Any], known: Mapping[str, Number], also: tuple[str, ...] = ()
-    ) -> dict[str, float]:
-        numbers = {}
-        for key, value in table.items():
-            if key not in known:
-                raise self.error(f"{where}.{key}", unknown(key, (*known, *also)))
-            try:
-                numbers[key] = known[key].check(value)
-            except ValueError as problem:
-                raise self.error(f"{where}.{key}", str(problem)) from None
-        for key, number in known.items():
-            if number.required and key not in numbers:
-                unit = f" in {number.unit}" if number.unit else ""
-                raise self.error(f"{where}.{key}", f"missing; expected a number{unit}")
-        return numbers
-
-    def _path(self, key: str, value: object) -> Path:
-        try:
-            path = inside(self.folder, value)
-        except ValueError as problem:
-            raise self.error(key, str(problem)) from None
-        if not path.is_file():
-            found = "a folder" if path.is_dir() else ("a special file" if path.exists() else "nothing")
-            raise self.error(key, f"expected a file at {value!r}, found {found}")
-        return self.folder / str(value)
+        return self.document.numbers("start", table, known)
 
     def _trial_tables(self) -> list[dict[str, Any]]:
         tables = self.document.data.get("trial", [])
@@ -242,12 +218,13 @@ class _Reader:
     def _trial_names(self) -> list[str]:
         """Stems of the trials' files; their paths without the suffix where stems are the same."""
         main = BODY_FILES[0] if self.rig == "body" else "file"
-        paths, seen = [], {}
+        paths: list[PurePosixPath] = []
+        seen: dict[Path, str] = {}
         for index, table in enumerate(self._trial_tables()):
             key = f"trial[{index}].{main}"
             if main not in table:
                 raise self.error(key, "missing; expected the path of a file inside the study")
-            path = self._path(key, table[main]).resolve()
+            path = self.document.path_of(key, table[main]).resolve()
             if path in seen:
                 raise self.error(key, f"the same file as {seen[path]}")
             seen[path] = key
@@ -270,12 +247,12 @@ class _Reader:
         rest = {key: value for key, value in table.items() if key not in (*named, "kind", "role")}
         numbers = check_conditions(self.rig, kind, rest, error)
         if self.rig != "body":
-            path = self._path(f"{where}.file", table["file"])
+            path = self.document.path_of(f"{where}.file", table["file"])
             return read_trial(path, rig=self.rig, kind=kind, conditions=numbers, role=role, name=name)
         for key in BODY_FILES:
             if key not in table:
                 raise error(key, "missing; expected the path of a file inside the study")
-            files[f"{name}.{key}"] = self._path(f"{where}.{key}", table[key])
+            files[f"{name}.{key}"] = self.document.path_of(f"{where}.{key}", table[key])
         moves, pushes = (files[f"{name}.{key}"] for key in BODY_FILES)
         return read_body_trial(moves, pushes, name=name, conditions=numbers, role=role)
 

@@ -138,8 +138,9 @@ def _number(field: str, path: Path, row: int, column: str) -> float:
 def check_time(table: Table) -> None:
     """Require the first column to increase in equal steps.
 
-    A step may differ from the median step by 1 %, and besides by what printing rounds away: a time printed with three
-    decimals lies within half a millisecond of where it was taken.
+    A step may differ from the median step by 1 %. Where times were printed with few decimals (1/60 s as 0.017, 0.033,
+    0.050), they must lie as rounding leaves them about equally spaced times: within half of the last digit, with the
+    odd steps spread over the record. One odd step among equal ones is not rounding.
 
     Raises
     ------
@@ -162,14 +163,17 @@ def check_time(table: Table) -> None:
 
 def _first_off_grid(time: np.ndarray, steps: np.ndarray, step: float, half_digit: float) -> int | None:
     """First sample that no equally spaced times, printed with this last digit, explain."""
-    off = np.abs(steps - step) > STEP_TOLERANCE * step + 2.0 * half_digit * (1 + 1e-6)
-    if off.any():
-        return int(np.argmax(off)) + 1
+    odd = np.abs(steps - step) > STEP_TOLERANCE * step
+    off = odd & (np.abs(steps - step) > STEP_TOLERANCE * step + 2.0 * half_digit)
+    if off.any() or np.count_nonzero(odd) < max(2.0, 0.02 * len(steps)):
+        return int(np.argmax(off if off.any() else odd)) + 1
     count = np.arange(len(time), dtype=float)
     slope = float(np.dot(count - count.mean(), time - time.mean()) / np.sum((count - count.mean()) ** 2))
     residual = time - slope * count
-    off = np.abs(residual - np.median(residual)) > half_digit * (1 + 1e-6) + STEP_TOLERANCE * slope
-    return max(1, int(np.argmax(off))) if off.any() else None
+    off = np.abs(residual - np.median(residual)) > 1.5 * half_digit
+    if not off.any():
+        return None
+    return max(1, int(np.argmax(off))) if np.count_nonzero(odd) > 0.1 * len(steps) else int(np.argmax(odd)) + 1
 
 
 def _time_decimals(table: Table) -> int:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 import tomllib
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_text
+from fes_pin.data.files import inside, read_text
+from fes_pin.data.schema import Number, unknown
 
 _TABLE = re.compile(r"^\s*(\[\[?)\s*([^\]#]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*'))*)\s*=""")
@@ -43,6 +45,58 @@ class Document:
         if not isinstance(value, dict):
             raise self.error(key, f"expected a table [{key}]")
         return value
+
+    def numbers(
+        self, where: str, table: Mapping[str, Any], known: Mapping[str, Number], also: tuple[str, ...] = ()
+    ) -> dict[str, float]:
+        """Numbers of a table by key.
+
+        Parameters
+        ----------
+        where
+            Dotted key of the table.
+        table
+            Its values.
+        known
+            What it may hold.
+        also
+            Other keys that it might hold, named when a key is unknown.
+
+        Raises
+        ------
+        InputError
+            An unknown key, a missing one, or a value that is not the number it must be.
+        """
+        numbers = {}
+        for key, value in table.items():
+            if key not in known:
+                raise self.error(f"{where}.{key}", unknown(key, (*known, *also)))
+            try:
+                numbers[key] = known[key].check(value)
+            except ValueError as problem:
+                raise self.error(f"{where}.{key}", str(problem)) from None
+        for key, number in known.items():
+            if number.required and key not in numbers:
+                unit = f" in {number.unit}" if number.unit else ""
+                raise self.error(f"{where}.{key}", f"missing; expected a number{unit}")
+        return numbers
+
+    def path_of(self, key: str, value: object) -> Path:
+        """Path of a file that a key names relative to this one.
+
+        Raises
+        ------
+        InputError
+            Not a path inside this file's folder, or no file there.
+        """
+        try:
+            path = inside(self.path.parent, value)
+        except ValueError as problem:
+            raise self.error(key, str(problem)) from None
+        if not path.is_file():
+            found = "a folder" if path.is_dir() else ("a special file" if path.exists() else "nothing")
+            raise self.error(key, f"expected a file at {value!r}, found {found}")
+        return self.path.parent / str(value)
 
 
 def read_toml(path: str | Path) -> Document:
