@@ -1,0 +1,38 @@
+"""The model that a study believes: its rig with the start values."""
+
+from __future__ import annotations
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.study import Study
+from fes_pin.models.model import Model
+from fes_pin.models.rigs import Ankle, Joint, Muscle
+from fes_pin.models.rigs.rigid import gravity_coefficients, is_revolute, joint_inertia, load_urdf
+
+
+def nominal_model(study: Study) -> Model:
+    """The nominal model of a study, with its start values.
+
+    Raises
+    ------
+    InputError
+        If the rig has no model of trials.
+    """
+    constants, start = dict(study.constants), dict(study.start)
+    if study.rig == "ankle":
+        return Model(Ankle(constants=constants, **start))
+    if study.rig == "muscle":
+        return Model(Muscle(constants=constants, **start))
+    if study.rig == "joint":
+        return Model(_joint(study, constants, start))
+    raise InputError(f"the rig {study.rig} has no model of single trials", file=study.folder)
+
+
+def _joint(study: Study, constants: dict[str, float], start: dict[str, float]) -> Joint:
+    assert study.urdf is not None
+    body = load_urdf(study.urdf)
+    cosine, sine = gravity_coefficients(body)
+    known = {n: constants[n] for n in Joint.parameters() if n in constants}
+    read = {"inertia": joint_inertia(body), "gravity_cos": cosine, "gravity_sin": sine}
+    read["revolute"] = float(is_revolute(body))
+    fitted = tuple(n for n in Joint.parameters() if n in start)
+    return Joint(constants=read, fitted=fitted, **{**known, **start})
