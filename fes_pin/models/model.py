@@ -47,10 +47,10 @@ class Model:
         return info
 
     def fitted_parameters(self) -> tuple[str, ...]:
-        """What a fit moves: the rig's fitted parameters and all of the effects' but discrete choices."""
+        """What a fit moves: the rig's fitted parameters and all of the effects' but discrete choices and unused refinements."""
         names = list(self.rig.fitted_parameters())
         for effect in self.effects:
-            names += [f"{effect.name}.{n}" for n, i in effect.parameters().items() if i.fitted]
+            names += [f"{effect.name}.{n}" for n in effect.fitted_parameters()]
         return tuple(names)
 
     def with_parameters(self, values: Mapping[str, float]) -> Model:

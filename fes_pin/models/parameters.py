@@ -29,6 +29,8 @@ class Parameter:
         Start values for a search, in order; for a shape parameter also what a screen tries.
     fitted
         False for a discrete choice, which a search enumerates and never moves.
+    optional
+        True for a refinement of the form: it stays at its null (or default) until data demand it.
     """
 
     unit: str = ""
@@ -38,6 +40,7 @@ class Parameter:
     scale: float = 1.0
     grid: tuple[float, ...] = ()
     fitted: bool = True
+    optional: bool = False
 
 
 def parameter(
@@ -50,9 +53,10 @@ def parameter(
     scale: float = 1.0,
     grid: tuple[float, ...] = (),
     fitted: bool = True,
+    optional: bool = False,
 ) -> Any:
     """A dataclass field that is a parameter; see `Parameter`."""
-    info = Parameter(unit, null, lower, upper, scale, grid, fitted)
+    info = Parameter(unit, null, lower, upper, scale, grid, fitted, optional)
     return dataclasses.field(default=default, metadata={_KEY: info})
 
 

@@ -83,12 +83,28 @@ class Effect:
     @classmethod
     def amplitudes(cls) -> tuple[str, ...]:
         """The parameters whose null switches the effect off."""
-        return tuple(n for n, info in cls.parameters().items() if info.null is not None)
+        return tuple(n for n, info in cls.parameters().items() if info.null is not None and not info.optional)
 
     @classmethod
     def shapes(cls) -> tuple[str, ...]:
         """The parameters that exist only beside the effect."""
-        return tuple(n for n, info in cls.parameters().items() if info.null is None)
+        return tuple(n for n, info in cls.parameters().items() if info.null is None and not info.optional)
+
+    @classmethod
+    def refinements(cls) -> tuple[str, ...]:
+        """The optional parameters, which refine the effect's form."""
+        return tuple(n for n, info in cls.parameters().items() if info.optional)
+
+    def refined(self) -> bool:
+        """True if a refinement of the form is switched on."""
+        return any(
+            i.optional and i.null is not None and getattr(self, n) != i.null for n, i in self.parameters().items()
+        )
+
+    def fitted_parameters(self) -> tuple[str, ...]:
+        """What a fit moves: all but discrete choices, and but refinements that are switched off."""
+        refined = self.refined()
+        return tuple(n for n, i in self.parameters().items() if i.fitted and (refined or not i.optional))
 
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:

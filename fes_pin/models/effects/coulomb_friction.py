@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.maths import tanh
+from fes_pin.models.maths import exp, tanh
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 
@@ -18,9 +18,9 @@ STIFFEST = 2.5
 
 @dataclass(frozen=True)
 class CoulombFriction(Effect):
-    """Dry friction at the joint.
+    """Dry friction at the joint, with or without more of it at rest (Stribeck).
 
-        torque - T tanh(v / (V_SMOOTH + T h / (STIFFEST J)))
+        torque - T (1 + stiction exp(-(v / stribeck_speed)^2)) tanh(v / (V_SMOOTH + T h / (STIFFEST J)))
 
     h is the integration step: a joint that sticks creeps, as slowly as the step allows.
 
@@ -30,6 +30,10 @@ class CoulombFriction(Effect):
     """
 
     torque_nm: float = parameter(0.01, unit="N m", null=0.0, lower=0.0, upper=100.0, scale=0.01)
+    stiction: float = parameter(0.0, null=0.0, lower=-1.0, upper=10.0, scale=0.1, optional=True, grid=(0.3, 1.0))
+    stribeck_speed: float = parameter(
+        1.0, unit="rad/s", lower=1e-2, upper=30.0, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
+    )
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "torque", ("ankle", "joint")
     dissipative = True
@@ -37,4 +41,5 @@ class CoulombFriction(Effect):
 
     def apply(self, value: Any, s: Any) -> Any:
         creep = V_SMOOTH + self.torque_nm * s.step / (STIFFEST * s.inertia)
-        return value - self.torque_nm * tanh(s.v / creep)
+        ratio = s.v / self.stribeck_speed
+        return value - self.torque_nm * (1.0 + self.stiction * exp(-ratio * ratio)) * tanh(s.v / creep)
