@@ -12,6 +12,10 @@ MAX_ORDER = 12
 """Highest order tried; ARMA noise needs about 8 to be whitened well enough for a test (measured: DESIGN)."""
 
 
+COEFFICIENT_PRICE = 4.0
+"""Twice the log-likelihood that one more coefficient must earn: two standard deviations; Akaike's 2 keeps too many."""
+
+
 @dataclass(frozen=True)
 class Noise:
     """Autoregressive noise e_t = ar_1 e_(t-1) + ... + ar_p e_(t-p) + innovation, Gaussian.
@@ -51,7 +55,7 @@ class Noise:
 
 
 def estimate_noise(residuals: Sequence[np.ndarray], max_order: int = MAX_ORDER, used: int = 0) -> Noise:
-    """Fit autoregressive noise to the residuals of one channel, by least squares, order by Akaike's criterion.
+    """Fit autoregressive noise to the residuals of one channel, by least squares.
 
     Parameters
     ----------
@@ -75,7 +79,7 @@ def estimate_noise(residuals: Sequence[np.ndarray], max_order: int = MAX_ORDER, 
             else np.zeros(0)
         )
         rss = max(float(gram[0, 0] - gram[0, 1 : p + 1] @ ar), 1e-300)
-        criterion = count * np.log(rss / count) + 2.0 * p
+        criterion = count * np.log(rss / count) + COEFFICIENT_PRICE * p
         if best is None or criterion < best[0]:
             best = (criterion, p, ar, rss)
     assert best is not None
