@@ -147,26 +147,53 @@ class Projection:
         out = self._without_locals(columns)
         return out - self._basis @ (self._basis.T @ out)
 
-    def score(self, probe: Probe) -> Scored:
-        """The promise of a probe."""
-        columns = self(probe.columns)
-        before, after = np.linalg.norm(probe.columns), np.linalg.norm(columns)
-        names, info = probe.effect.amplitudes(), probe.effect.parameters()
-        amplitudes = np.zeros(len(names))
-        gain = 0.0
-        if after > 1e-9 * max(before, 1e-300) and np.isfinite(after):
-            amplitudes = np.linalg.lstsq(columns, self.residual, rcond=1e-6)[0]
-            nulls = np.array([info[n].null for n in names], dtype=float)
-            amplitudes = np.clip(
-                amplitudes,
-                [info[n].lower - z for n, z in zip(names, nulls, strict=True)],
-                [info[n].upper - z for n, z in zip(names, nulls, strict=True)],
-            )
-            predicted = columns @ amplitudes
-            gain = float(2.0 * self.residual @ predicted - predicted @ predicted)
-            amplitudes = amplitudes + nulls
-        kept = float(after / before) if before > 0 and np.isfinite(after) else 0.0
-        return Scored(probe, gain, dict(zip(names, (float(a) for a in amplitudes), strict=True)), kept)
+    def score(self, probes: Sequence[Probe]) -> Scores:
+        """The promises of probes, and the Gram matrix of what is left of them."""
+        stacked = np.concatenate([p.columns for p in probes], axis=1)
+        stacked = np.where(np.isfinite(stacked), stacked, 0.0)
+        left = self(stacked)
+        before, gram, along = np.einsum("mi,mi->i", stacked, stacked), left.T @ left, left.T @ self.residual
+        out, blocks, at = [], [], 0
+        for probe in probes:
+            block = slice(at, at + probe.columns.shape[1])
+            at = block.stop
+            blocks.append(block)
+            out.append(_score(probe, gram[block, block], along[block], float(before[block].sum())))
+        return Scores(out, gram, blocks)
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Probes, scored together.
+
+    Attributes
+    ----------
+    scored
+        One for each probe.
+    gram
+        Shape (k, k): inner products of what the fit leaves of all columns.
+    blocks
+        The rows of `gram` that belong to each probe.
+    """
+
+    scored: list[Scored]
+    gram: np.ndarray
+    blocks: list[slice]
+
+
+def _score(probe: Probe, gram: np.ndarray, along: np.ndarray, before: float) -> Scored:
+    names, info = probe.effect.amplitudes(), probe.effect.parameters()
+    after = float(np.trace(gram))
+    if not after > 1e-18 * max(before, 1e-300):
+        return Scored(probe, 0.0, {n: float(info[n].null or 0.0) for n in names}, 0.0)
+    nulls = np.array([info[n].null for n in names], dtype=float)
+    lower, upper = np.array([[info[n].lower, info[n].upper] for n in names]).T
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    amplitudes = scale * np.linalg.lstsq(gram * np.outer(scale, scale), along * scale, rcond=1e-10)[0]
+    amplitudes = np.clip(amplitudes, lower - nulls, upper - nulls)
+    gain = float(2.0 * along @ amplitudes - amplitudes @ gram @ amplitudes)
+    values = dict(zip(names, (float(a) for a in amplitudes + nulls), strict=True))
+    return Scored(probe, gain, values, float(np.sqrt(after / before)))
 
 
 def _scaled(columns: np.ndarray) -> np.ndarray:

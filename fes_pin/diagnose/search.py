@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.library import Library, Projection, Scored, best_by_effect
+from fes_pin.diagnose.library import Library, Projection, Scored, Scores, best_by_effect
 from fes_pin.diagnose.noise_floor import rich_noise, whiteless
 from fes_pin.diagnose.open_set import features
 from fes_pin.diagnose.significance import Family
@@ -94,11 +94,9 @@ class Search:
             starts.append(base.model + effect)
         return self.fit_from(starts, base.unknowns)
 
-    def scores(self, base: Fit) -> dict[str, list[Scored]]:
+    def scores(self, base: Fit) -> Scores:
         """Promise of every effect that a fit does not have."""
-        probes = self.library.probes(base, self.noise, exclude=_names(base))
-        projection = Projection(base.parts)
-        return dict(best_by_effect([projection.score(p) for p in probes]))
+        return Projection(base.parts).score(self.library.probes(base, self.noise, exclude=_names(base)))
 
     def learn_noise(self, base: Fit) -> None:
         """Estimate the noise beside everything that the library or smooth features could explain."""
@@ -152,8 +150,8 @@ class Search:
     def _singles(self) -> Family:
         base = self.fits[()]
         self.progress(0.08, "screening")
-        scored = self.scores(base)
-        family = Family(Projection(base.parts), [s.probe for v in scored.values() for s in v], self.seed)
+        scores = self.scores(base)
+        family, scored = Family(scores, self.seed), best_by_effect(scores.scored)
         self.progress(0.12, "every cause, fitted jointly")
         fitted = in_parallel(lambda v: self.extend(base, v), scored.values())
         for name, one in zip(scored, fitted, strict=True):
@@ -164,7 +162,7 @@ class Search:
         promised: dict[Names, tuple[float, Names, list[Scored]]] = {}
         for names in self.ranked(size - 1)[:BEAM]:
             base = self.fits[names]
-            for name, scored in self.scores(base).items():
+            for name, scored in best_by_effect(self.scores(base).scored).items():
                 key = tuple(sorted((*names, name)))
                 promise = base.sse - scored[0].gain
                 if key not in self.fits and (key not in promised or promise < promised[key][0]):
@@ -195,7 +193,7 @@ class Search:
         """Fit the sets in which another cause takes the place of `name`; returns their names."""
         rest = tuple(n for n in names if n != name)
         base = self.base(rest, names)
-        scored = {n: v for n, v in self.scores(base).items() if n != name}
+        scored = {n: v for n, v in best_by_effect(self.scores(base).scored).items() if n != name}
         order = sorted(scored, key=lambda n: (-scored[n][0].gain, n))[:count]
         keys = [tuple(sorted((*rest, n))) for n in order]
         missing = [(k, n) for k, n in zip(keys, order, strict=True) if k not in self.fits]
@@ -235,7 +233,7 @@ class Search:
             rivals[name] = sorted((self.fits[k] for k in keys), key=lambda f: f.sse)
             degrees = max(len(best.free) - len(without[name].free), 1)
             p_values[name] = family.p_value(without[name].sse - best.sse, degrees)
-        scored = [v[0] for v in self.scores(self.fits[()]).values()]
+        scored = self.scores(self.fits[()]).scored
         return Searched(self.fits[()], best, p_values, rivals, without, family, scored)
 
     def _siblings(self, names: Names, name: str) -> list[Names]:
