@@ -12,7 +12,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel
-from fes_pin.identify.problem import Linearized, Problem
+from fes_pin.identify.problem import Linearized, Problem, measured_columns
 from fes_pin.models.effects import effects_for
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -45,15 +45,10 @@ class Probe:
 class Library:
     """The causes that a rig can have, ready to be linearized on trials."""
 
-    def __init__(self, rig_name: str, trials: Sequence[Trial], outputs: Sequence[str]) -> None:
-        self.effects = effects_for(rig_name)
+    def __init__(self, model: Model, trials: Sequence[Trial]) -> None:
+        self.effects = effects_for(model.rig.name)
         self.trials = tuple(trials)
-        measured: dict[str, list[np.ndarray]] = {}
-        for trial in trials:
-            for name in outputs:
-                if name in trial.columns:
-                    measured.setdefault(name, []).append(trial[name])
-        self.measured = {n: np.concatenate(v) for n, v in measured.items()}
+        self.measured = measured_columns(model, trials)
         self._problems: dict[str, Problem] = {}
 
     def grid(self, effect: type[Effect]) -> list[Effect]:

@@ -18,6 +18,9 @@ from fes_pin.models.simulate import Simulator
 
 REMAINDER_LEVEL = 0.01
 """Level of the test of the remainder; see `search.CLAIM_LEVEL`."""
+STRONG_LEVEL = 1e-12
+"""Level at which a remainder counts although it differs from trial to trial: a spasm, not noise."""
+SIGN_DRAWS = 400
 
 
 @dataclass(frozen=True)
@@ -128,8 +131,12 @@ def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
     return scipy.signal.lfilter([1.0 - pole], [1.0, -pole], x)
 
 
-def remainder(fitted: Fit) -> Remainder:
-    """Test whether smooth features explain anything that a fit leaves."""
+def remainder(fitted: Fit, seed: int = 0) -> Remainder:
+    """Test whether smooth features explain anything that a fit leaves.
+
+    The chi-square of the features is divided by the inflation that it shows when each trial's features change sign at
+    random: then only what is not coherent between trials is left, which noise that is not quite whitened has as well.
+    """
     projection = Projection(fitted.parts)
     made = features(fitted.model, fitted.trials, fitted.noise)
     columns = projection(made.columns)
@@ -139,13 +146,31 @@ def remainder(fitted: Fit) -> Remainder:
     values, vectors = np.linalg.eigh(columns.T @ columns)
     kept = values > 1e-4 * values.max(initial=1e-300)
     basis = (columns @ vectors[:, kept]) / np.sqrt(values[kept])
-    statistic = float(np.sum((basis.T @ projection.residual) ** 2))
-    p_value = float(scipy.stats.chi2.sf(statistic, int(kept.sum())))
-    unexplained = p_value < REMAINDER_LEVEL
-    where = None
-    if unexplained:
-        scores: dict[str, float] = {}
-        for name, z in zip(names, columns.T @ projection.residual, strict=True):
-            scores[name] = max(scores.get(name, 0.0), float(z**2))
-        where = max(scores, key=lambda n: scores[n])
-    return Remainder(unexplained, p_value, where)
+    shares = _trial_shares(basis, projection.residual, fitted)
+    rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
+    plain = float(scipy.stats.chi2.sf(statistic, rank))
+    p_value = float(scipy.stats.chi2.sf(statistic / _inflation(shares, rank, seed), rank))
+    unexplained = p_value < REMAINDER_LEVEL or plain < STRONG_LEVEL
+    scores: dict[str, float] = {}
+    for name, z in zip(names, columns.T @ projection.residual, strict=True):
+        scores[name] = max(scores.get(name, 0.0), float(z**2))
+    where = max(scores, key=lambda n: scores[n]) if unexplained else None
+    return Remainder(bool(unexplained), p_value if p_value < REMAINDER_LEVEL or not unexplained else plain, where)
+
+
+def _trial_shares(basis: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.ndarray:
+    """Each trial's part of the inner products of basis and residual, shape (trials, rank)."""
+    out, at = [], 0
+    for part in fitted.parts:
+        rows = slice(at, at + len(part.residual))
+        at = rows.stop
+        out.append(basis[rows].T @ residual[rows])
+    return np.array(out)
+
+
+def _inflation(shares: np.ndarray, rank: int, seed: int) -> float:
+    """How much larger than its rank the statistic is with random signs of the trials; 1 with fewer than 4 trials."""
+    if len(shares) < 4 or not rank:
+        return 1.0
+    signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(SIGN_DRAWS, len(shares)))
+    return max(1.0, float(np.mean(np.sum((signs @ shares) ** 2, axis=1))) / rank)
