@@ -46,6 +46,8 @@ class Remainder:
     unexplained: bool
     p_value: float
     where: str | None
+    excess: float = 0.0
+    """By how much the statistic exceeds its 97.5 % quantile."""
 
 
 def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Features:
@@ -155,7 +157,10 @@ def remainder(fitted: Fit, seed: int = 0) -> Remainder:
     for name, z in zip(names, columns.T @ projection.residual, strict=True):
         scores[name] = max(scores.get(name, 0.0), float(z**2))
     where = max(scores, key=lambda n: scores[n]) if unexplained else None
-    return Remainder(bool(unexplained), p_value if p_value < REMAINDER_LEVEL or not unexplained else plain, where)
+    inflation = _inflation(shares, rank, seed)
+    excess = max(0.0, statistic / inflation - float(scipy.stats.chi2.ppf(0.975, rank)))
+    shown = plain if unexplained and p_value >= REMAINDER_LEVEL else p_value
+    return Remainder(bool(unexplained), shown, where, excess)
 
 
 def _trial_shares(basis: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.ndarray:

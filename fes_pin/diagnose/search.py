@@ -12,6 +12,7 @@ import scipy.stats
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.library import Library, Projection, Scored, Scores, best_by_effect
 from fes_pin.diagnose.noise_floor import rich_noise, whiteless
+from fes_pin.diagnose.open_set import remainder
 from fes_pin.diagnose.significance import Family, coherence_p_value
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import Fit, fit_problem, noise_of, rough_noise
@@ -26,6 +27,8 @@ room for noise that is not quite autoregressive."""
 FORM_SHARE = 0.02
 """A further cause must explain at least this share of what all causes do: a real cause differs from its equation, and
 an error of 14 % in its form leaves 2 % of its likelihood to whatever else comes near."""
+HOPE_LEVEL = 0.1
+"""A round of joint fits is left out only if neither a linear promise nor smooth features reach this level."""
 REFINE_LEVEL = 1e-3
 """Level at which a refinement of an effect's form is adopted."""
 MOST_CAUSES = 3
@@ -65,6 +68,7 @@ class Searched:
     without: dict[str, Fit]
     family: Family
     scored: list[Scored]
+    singles: list[Fit]
 
 
 class Search:
@@ -133,8 +137,8 @@ class Search:
         best: Names = ()
         for size in range(1, MOST_CAUSES + 1):
             self.progress(0.35 + 0.15 * size, f"sets of {size}")
-            if size > 1:
-                self._extend_beam(size)
+            if size > 1 and not self._extend_beam(size, family):
+                break
             ranked = self.ranked(size)
             if not ranked or not self._better(ranked[0], best, family):
                 break
@@ -164,7 +168,8 @@ class Search:
             self.fits[(name,)] = one
         return family
 
-    def _extend_beam(self, size: int) -> None:
+    def _extend_beam(self, size: int, family: Family) -> bool:
+        """Fit the most promising sets of a size; False if nothing at all is left to find."""
         promised: dict[Names, tuple[float, Names, list[Scored]]] = {}
         for names in self.ranked(size - 1)[:BEAM]:
             base = self.fits[names]
@@ -174,9 +179,20 @@ class Search:
                 if key not in self.fits and (key not in promised or promise < promised[key][0]):
                     promised[key] = (promise, names, scored)
         chosen = sorted(promised.items(), key=lambda item: (item[1][0], item[0]))[:JOINT_FITS]
+        if not chosen or not (self._hopeful(size, chosen[0][1][0], family)):
+            return False
         fitted = in_parallel(lambda item: self.extend(self.fits[item[1][1]], item[1][2]), chosen)
         for (key, _), one in zip(chosen, fitted, strict=True):
             self.fits[key] = one
+        return True
+
+    def _hopeful(self, size: int, promise: float, family: Family) -> bool:
+        """True unless both the linear promise and the smooth features say that the best smaller set is complete."""
+        best, none = self.fits[self.ranked(size - 1)[0]], self.fits[()]
+        gain = best.sse - promise
+        if gain > 0.5 * FORM_SHARE * (none.sse - best.sse) and family.p_value(gain, 1) < HOPE_LEVEL:
+            return True
+        return remainder(best, self.seed).p_value < HOPE_LEVEL
 
     def _better(self, names: Names, best: Names, family: Family) -> bool:
         """True if a larger set earns its place beside the best smaller one."""
@@ -271,7 +287,9 @@ class Search:
             rivals[name] = sorted((self.fits[k] for k in keys), key=lambda f: f.sse)
             p_values[name] = self.p_value(best, without[name], family)
         scored = self.scores(self.fits[()]).scored
-        return Searched(self.fits[()], best, p_values, rivals, without, family, scored)
+        return Searched(
+            self.fits[()], best, p_values, rivals, without, family, scored, [self.fits[k] for k in self.ranked(1)]
+        )
 
     def _siblings(self, names: Names, name: str) -> list[Names]:
         """Sets fitted already that differ from `names` in `name` alone."""

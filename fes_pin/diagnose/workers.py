@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
+
+from threadpoolctl import threadpool_limits
 
 In = TypeVar("In")
 Out = TypeVar("Out")
@@ -15,6 +18,13 @@ def threads() -> int:
     """How many threads to use: `FES_PIN_THREADS`, else one a core, at most 8."""
     chosen = os.environ.get("FES_PIN_THREADS", "")
     return max(1, int(chosen)) if chosen.isdigit() else max(1, min(8, os.cpu_count() or 1))
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Linear algebra on one thread: the fits are what runs in parallel, and sums keep their order."""
+    with threadpool_limits(1):
+        yield
 
 
 def in_parallel(function: Callable[[In], Out], items: Iterable[In]) -> list[Out]:
