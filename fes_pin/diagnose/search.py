@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -141,7 +142,9 @@ class Search:
                 break
             ranked = self.ranked(size)
             if not ranked or not self._better(ranked[0], best, family):
-                break
+                if best or size > 1 or not self._hopeful(2, math.inf, family):
+                    break
+                continue  # two causes may be needed where each alone does not help
             best = self._swap(ranked[0])
             self._refine(best)
             keep = [(), best, *self.ranked(1)[:6], *self.ranked(size)[:6], *_subsets(best)]
@@ -189,6 +192,8 @@ class Search:
     def _hopeful(self, size: int, promise: float, family: Family) -> bool:
         """True unless both the linear promise and the smooth features say that the best smaller set is complete."""
         best, none = self.fits[self.ranked(size - 1)[0]], self.fits[()]
+        if not math.isfinite(promise):
+            return remainder(none, self.seed).unexplained
         gain = best.sse - promise
         if gain > 0.5 * FORM_SHARE * (none.sse - best.sse) and family.p_value(gain, 1) < HOPE_LEVEL:
             return True

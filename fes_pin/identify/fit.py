@@ -10,7 +10,7 @@ import numpy as np
 import scipy.stats
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import Noise, NoiseModel, estimate_noise
+from fes_pin.identify.noise import Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
 
@@ -237,22 +237,29 @@ def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
             if name in trial.columns:
                 columns.setdefault(name, []).append(trial[name])
     out = {}
+    step = noise_step([t.dt for t in trials])
     for name, pieces in columns.items():
         bend = np.concatenate([np.diff(p, 2) for p in pieces])
         level = 1.4826 * float(np.median(np.abs(bend))) / math.sqrt(6.0)
         floor = 1e-6 * max(float(np.ptp(np.concatenate(pieces))), 1e-9)
-        out[name] = Noise(max(level, floor), (), max(level, floor))
+        out[name] = Noise(max(level, floor), (), max(level, floor), step)
     return out
 
 
 def noise_of(fitted: Fit) -> dict[str, Noise]:
     """The noise that a fit's residuals show, by output column."""
     problem = Problem(fitted.model, fitted.trials, fitted.noise, free=())
+    step = noise_step([t.dt for t in fitted.trials])
     columns: dict[str, list[np.ndarray]] = {}
-    for residuals in problem.residuals(fitted.values, fitted.unknowns):
+    squares: dict[str, list[float]] = {}
+    for trial, residuals in zip(fitted.trials, problem.residuals(fitted.values, fitted.unknowns), strict=True):
         for name, residual in residuals.items():
-            columns.setdefault(name, []).append(residual)
-    return {name: estimate_noise(pieces, used=len(fitted.free)) for name, pieces in columns.items()}
+            columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
+            squares.setdefault(name, []).append(float(np.mean(residual**2)))
+    return {
+        name: estimate_noise(pieces, len(fitted.free), math.sqrt(float(np.mean(squares[name]))), step)
+        for name, pieces in columns.items()
+    }
 
 
 def _damped(hessian: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:

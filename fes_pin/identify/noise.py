@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -28,26 +29,32 @@ class Noise:
     ar
         Coefficients, shape (p,).
     std
-        Standard deviation of the noise itself.
+        Standard deviation of the noise of a single sample.
+    step_s
+        Time step of the coefficients, s: trials sampled faster are averaged to it. 0 takes samples as they are.
     """
 
     innovation_std: float
     ar: tuple[float, ...] = ()
     std: float = 0.0
+    step_s: float = 0.0
 
-    def whiten(self, values: np.ndarray) -> np.ndarray:
+    def whiten(self, values: np.ndarray, dt: float) -> np.ndarray:
         """Innovations in units of their standard deviation.
 
         Parameters
         ----------
         values
             Shape (n, ...): residuals, or sensitivities that go with them.
+        dt
+            Their time step, s.
 
         Returns
         -------
         ndarray
-            Shape (n - p, ...): the first p samples only start the filter.
+            Shape (n / thinning - p, ...): the first p samples only start the filter.
         """
+        values = thin(values, thinning(dt, self.step_s))
         p = len(self.ar)
         out = values[p:] / self.innovation_std
         for lag, coefficient in enumerate(self.ar, start=1):
@@ -55,7 +62,9 @@ class Noise:
         return out
 
 
-def estimate_noise(residuals: Sequence[np.ndarray], used: int = 0) -> Noise:
+def estimate_noise(
+    residuals: Sequence[np.ndarray], used: int = 0, std: float | None = None, step_s: float = 0.0
+) -> Noise:
     """Fit autoregressive noise to the residuals of one channel, by least squares.
 
     Parameters
@@ -64,6 +73,10 @@ def estimate_noise(residuals: Sequence[np.ndarray], used: int = 0) -> Noise:
         One array of shape (n,) for each trial.
     used
         Degrees of freedom that a fit has taken out of the residuals already.
+    std
+        Standard deviation of single samples, where the residuals are averages.
+    step_s
+        Time step of the residuals, if they are averages.
     """
     total = sum(len(r) for r in residuals)
     shortest = min(len(r) for r in residuals)
@@ -85,8 +98,31 @@ def estimate_noise(residuals: Sequence[np.ndarray], used: int = 0) -> Noise:
             best = (criterion, p, ar, rss)
     assert best is not None
     innovation = float(np.sqrt(best[3] / max(count - best[1] - used, 1)))
-    std = float(np.sqrt(sum(float(r @ r) for r in residuals) / max(total - used, 1)))
-    return Noise(max(innovation, 1e-12), tuple(float(a) for a in best[2]), std)
+    own = float(np.sqrt(sum(float(r @ r) for r in residuals) / max(total - used, 1)))
+    return Noise(max(innovation, 1e-12), tuple(float(a) for a in best[2]), own if std is None else std, step_s)
+
+
+FASTEST_S = 4e-3
+"""Shortest time step that noise is modelled at, s: 250 Hz keeps the mains, and 48 coefficients reach back 0.2 s."""
+
+
+def thinning(dt: float, step_s: float) -> int:
+    """How many samples are averaged into one."""
+    return max(1, round(step_s / dt)) if step_s > 0 else 1
+
+
+def noise_step(steps: Sequence[float]) -> float:
+    """Time step that the noise of trials with these sample steps is modelled at, s."""
+    slowest = max(steps)
+    return max(1, math.floor(FASTEST_S / slowest + 1e-6)) * slowest
+
+
+def thin(values: np.ndarray, count: int) -> np.ndarray:
+    """Means of `count` samples in a row along the first axis; what is left over at the end is dropped."""
+    if count == 1:
+        return values
+    n = len(values) // count
+    return values[: n * count].reshape(n, count, *values.shape[1:]).mean(axis=1)
 
 
 def _lags(residual: np.ndarray, order: int) -> np.ndarray:

@@ -84,7 +84,7 @@ class Problem:
                     continue
                 residual = trial[name] - simulated.readings[:, k]
                 stacked = np.concatenate([residual[:, None], simulated.sensitivities[:, k]], axis=1)
-                pieces.append(self.noise[name].whiten(stacked))
+                pieces.append(self.noise[name].whiten(stacked, trial.dt))
             rows = np.concatenate(pieces) if len(pieces) > 1 else pieces[0]
             out.append(Linearized(rows[:, 0], rows[:, 1 : 1 + split], rows[:, 1 + split :]))
         return out
