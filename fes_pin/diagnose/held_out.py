@@ -150,3 +150,14 @@ def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Tr
 
 def _joined(errors: Sequence[Errors]) -> Errors:
     return Errors(*(np.concatenate([getattr(e, name) for e in errors]) for name in ("squares", "spread", "counts")))
+
+
+def predictive_error(fitted: Fit) -> float:
+    """Sum of squared open-loop errors on trials left out in turn, in units of the noise variance."""
+    total = 0.0
+    for held in folds_of(fitted.trials):
+        train = [i for i in range(len(fitted.trials)) if i not in held]
+        problem = Problem(fitted.model, [fitted.trials[i] for i in train], fitted.noise)
+        again = fit_problem(problem, fitted.values, [fitted.unknowns[i] for i in train])
+        total += float(errors_of(again.model, [fitted.trials[i] for i in held], fitted.noise).squares.sum())
+    return total
