@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import Fit, fit_problem
-from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
@@ -153,11 +154,18 @@ def _joined(errors: Sequence[Errors]) -> Errors:
 
 
 def predictive_error(fitted: Fit) -> float:
-    """Sum of squared open-loop errors on trials left out in turn, in units of the noise variance."""
-    total = 0.0
+    """Logarithm of the mean squared error on trials left out in turn, averaged over trials.
+
+    Each trial's own unknowns are estimated from it; the logarithm keeps one large motion from deciding alone.
+    """
+    logarithms = []
     for held in folds_of(fitted.trials):
         train = [i for i in range(len(fitted.trials)) if i not in held]
         problem = Problem(fitted.model, [fitted.trials[i] for i in train], fitted.noise)
         again = fit_problem(problem, fitted.values, [fitted.unknowns[i] for i in train])
-        total += float(errors_of(again.model, [fitted.trials[i] for i in held], fitted.noise).squares.sum())
-    return total
+        white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in fitted.noise.items()}
+        for i in held:
+            alone = Problem(again.model, [fitted.trials[i]], white, ())
+            own = fit_problem(alone, again.values, [fitted.unknowns[i]])
+            logarithms.append(math.log(max(own.sse / max(own.samples, 1), 1e-12)))
+    return float(np.mean(logarithms))

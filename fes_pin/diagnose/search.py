@@ -145,6 +145,9 @@ class Search:
             if size > 1 and not self._extend_beam(size, family):
                 break
             first = self._swap(self.ranked(size)[0])
+            if size == 2 and not self._complete(first):
+                self._extend_beam(size, family, every=True)
+                first = self._swap(self.ranked(size)[0])
             if self._better(first, best, family):
                 self._refine(first)
                 best = first
@@ -185,8 +188,8 @@ class Search:
             self.fits[(name,)] = one
         return family
 
-    def _extend_beam(self, size: int, family: Family) -> bool:
-        """Fit the most promising sets of a size; False if nothing at all is left to find."""
+    def _extend_beam(self, size: int, family: Family, every: bool = False) -> bool:
+        """Fit the most promising sets of a size, or every one; False if nothing at all is left to find."""
         promised: dict[Names, tuple[float, Names, list[Scored]]] = {}
         for names in self.ranked(size - 1)[:BEAM]:
             base = self.fits[names]
@@ -197,8 +200,10 @@ class Search:
                     promised[key] = (promise, names, scored)
         if size == 2:
             self._plant(promised)
-        chosen = sorted(promised.items(), key=lambda item: (item[1][0], item[0]))[:JOINT_FITS]
-        if not chosen or not (self._hopeful(size, chosen[0][1][0], family)):
+        chosen = sorted(promised.items(), key=lambda item: (item[1][0], item[0]))
+        if not every:
+            chosen = chosen[:JOINT_FITS]
+        if not chosen or not (every or self._hopeful(size, chosen[0][1][0], family)):
             return False
         fitted = in_parallel(lambda item: self.extend(self.fits[item[1][1]], item[1][2]), chosen)
         for (key, _), one in zip(chosen, fitted, strict=True):
@@ -324,7 +329,7 @@ class Search:
         errors = {n: predictive_error(self.fits[n]) for n in pool if n}
         errors[()] = predictive_error(self.fits[()])
         best = min(errors, key=lambda n: (errors[n], n))
-        good = [n for n in errors if errors[n] <= (1.0 + FORM_SHARE) * errors[best]]
+        good = [n for n in errors if errors[n] <= errors[best] + FORM_SHARE]
         return min(good, key=lambda n: (len(n), errors[n], n))
 
     def _finish(self, names: Names, family: Family) -> Searched:
