@@ -159,7 +159,8 @@ class Search:
                 break
         best = self._backward(best, family)
         if not self._complete(best):
-            best = self._by_prediction(best)
+            best = self._backward(self._by_prediction(best), family)
+            self._refine(best)
         self.refit([(), best, *self.ranked(1), *self.ranked(len(best) or 1)[:JOINT_FITS], *_subsets(best)], best)
         return self._finish(best, family)
 
@@ -256,15 +257,18 @@ class Search:
 
     def _refine(self, names: Names) -> None:
         """Adopt refinements of the effects' forms that the data demand."""
-        for name in names:
-            base = self.fits[names]
-            starts = _refined(base.model, name)
-            if not starts:
-                continue
-            fitted = self.fit_from(starts, base.unknowns)
-            degrees = len(fitted.free) - len(base.free)
-            if degrees > 0 and scipy.stats.chi2.sf(base.sse - fitted.sse, degrees) < REFINE_LEVEL:
-                self.fits[names] = fitted
+        refined, base = self._refinement(names), self.fits[names]
+        if refined is not None:
+            degrees = max(len(refined.free) - len(base.free), 1)
+            if scipy.stats.chi2.sf(base.sse - refined.sse, degrees) < REFINE_LEVEL:
+                self.fits[names] = refined
+
+    def _refinement(self, names: Names) -> Fit | None:
+        """The best fit of a set with the form of one of its effects refined."""
+        base = self.fits[names]
+        starts = [s for name in names if (s := _refined(base.model, name))]
+        fitted = in_parallel(lambda s: self.fit_from(s, base.unknowns), starts)
+        return min(fitted, key=lambda f: f.sse, default=None)
 
     def _swap(self, names: Names) -> Names:
         """Replace single causes as long as that helps."""
@@ -323,11 +327,11 @@ class Search:
         pool = dict.fromkeys(
             [names, *_subsets(names), *(n for k in range(1, MOST_CAUSES + 1) for n in self.ranked(k)[:POOL])]
         )
-        for one in list(pool):
-            if one:
-                self._refine(one)
-        errors = {n: predictive_error(self.fits[n]) for n in pool if n}
-        errors[()] = predictive_error(self.fits[()])
+        errors = dict(zip(pool, in_parallel(lambda n: predictive_error(self.fits[n]), pool), strict=True))
+        for one in sorted(errors, key=lambda n: (errors[n], n))[:POOL]:
+            refined = self._refinement(one)
+            if refined is not None and (error := predictive_error(refined)) < errors[one]:
+                self.fits[one], errors[one] = refined, error
         best = min(errors, key=lambda n: (errors[n], n))
         good = [n for n in errors if errors[n] <= errors[best] + FORM_SHARE]
         return min(good, key=lambda n: (len(n), errors[n], n))

@@ -139,9 +139,9 @@ class _Search:
             move[free] = _damped(system.hessian[np.ix_(free, free)], system.gradient[free], self.damping)
             new_x = np.clip(self.x + move, self.lower, self.upper)
             move = new_x - self.x
-            promised = 2.0 * system.gradient @ move - move @ system.hessian @ move
+            promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
             locals_ = self._moved(system.local_steps(move))
-            if promised < TOLERANCE and not system.eliminated:
+            if promised < TOLERANCE:
                 return True
             parts = self._linearize(new_x, locals_)
             sse = whitened_sse(parts)

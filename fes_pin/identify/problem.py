@@ -121,11 +121,14 @@ class NormalEquations:
         Sum of squared whitened residuals.
     gradient, hessian
         Of half of it, shape (parameters,) and (parameters, parameters), after elimination.
+    local_gain
+        What steps of the trials' unknowns alone promise.
     """
 
     sse: float
     gradient: np.ndarray
     hessian: np.ndarray
+    local_gain: float
     eliminated: tuple[tuple[np.ndarray, np.ndarray], ...]
 
     def local_steps(self, step: np.ndarray) -> list[np.ndarray]:
@@ -136,7 +139,7 @@ class NormalEquations:
 def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> NormalEquations:
     """Sum the trials; each trial's unknowns are eliminated by its Schur complement, damped as Marquardt does."""
     size = parts[0].jacobian.shape[1]
-    sse, gradient, hessian = 0.0, np.zeros(size), np.zeros((size, size))
+    sse, gradient, hessian, local_gain = 0.0, np.zeros(size), np.zeros((size, size)), 0.0
     eliminated = []
     for part in parts:
         r, j, local = part.residual, part.jacobian, part.local
@@ -150,9 +153,10 @@ def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> Norma
             slope = np.linalg.solve(own, local.T @ j)
             g, h = g - j.T @ (local @ constant), h - j.T @ (local @ slope)
             eliminated.append((constant, slope))
+            local_gain += float(r @ (local @ constant))
         gradient += g
         hessian += h
-    return NormalEquations(sse, gradient, hessian, tuple(eliminated))
+    return NormalEquations(sse, gradient, hessian, local_gain, tuple(eliminated))
 
 
 def whitened_sse(parts: Sequence[Linearized]) -> float:

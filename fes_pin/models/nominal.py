@@ -35,4 +35,8 @@ def _joint(study: Study, constants: dict[str, float], start: dict[str, float]) -
     read = {"inertia": joint_inertia(body), "gravity_cos": cosine, "gravity_sin": sine}
     read["revolute"] = float(is_revolute(body))
     fitted = tuple(n for n in Joint.parameters() if n in start)
+    if "gravity_scale" in fitted and not any("effort" in t.columns for t in study.trials):
+        fitted = tuple(
+            n for n in fitted if n != "inertia_scale"
+        )  # free motion shows only ratios: hold the URDF's inertia
     return Joint(constants=read, fitted=fitted, **{**known, **start})
