@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.stats
@@ -161,8 +161,19 @@ class Search:
         if not self._complete(best):
             best = self._backward(self._by_prediction(best), family)
             self._refine(best)
+        complete = self._complete(best)
         self.refit([(), best, *self.ranked(1), *self.ranked(len(best) or 1)[:JOINT_FITS], *_subsets(best)], best)
-        return self._finish(best, family)
+        searched = self._finish(best, family)
+        return searched if complete or not best else self._for_prediction(searched)
+
+    def _for_prediction(self, searched: Searched) -> Searched:
+        """Fit for least open-loop error where the best set leaves more than noise: what is left is no noise to whiten."""
+        self.noise = whiteless(noise_of(searched.best))
+        again = lambda f: self.fit_from([f.model], f.unknowns)  # noqa: E731
+        nominal, best = again(searched.nominal), again(searched.best)
+        without = {n: again(f) for n, f in searched.without.items()}
+        rivals = {n: in_parallel(again, fits) for n, fits in searched.rivals.items()}
+        return replace(searched, nominal=nominal, best=best, without=without, rivals=rivals)
 
     def _complete(self, names: Names) -> bool:
         """True if a set leaves only noise, as far as its own noise can tell."""
