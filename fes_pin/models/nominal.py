@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
@@ -17,7 +19,8 @@ def nominal_model(study: Study) -> Model:
     InputError
         If the rig has no model of trials.
     """
-    constants, start = dict(study.constants), dict(study.start)
+    constants: dict[str, Any] = dict(study.constants)
+    start: dict[str, Any] = dict(study.start)
     if study.rig == "ankle":
         return Model(Ankle(constants=constants, **start))
     if study.rig == "muscle":
@@ -27,7 +30,7 @@ def nominal_model(study: Study) -> Model:
     raise InputError(f"the rig {study.rig} has no model of single trials", file=study.folder)
 
 
-def _joint(study: Study, constants: dict[str, float], start: dict[str, float]) -> Joint:
+def _joint(study: Study, constants: dict[str, Any], start: dict[str, Any]) -> Joint:
     assert study.urdf is not None
     body = load_urdf(study.urdf)
     cosine, sine = gravity_coefficients(body)

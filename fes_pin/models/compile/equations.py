@@ -125,8 +125,8 @@ class _Symbols:
         return share * before + (1.0 - share) * now
 
     def rig(self) -> Any:
-        names = [n for n in self.layout.parameters if "." not in n]
-        return dataclasses.replace(self.model.rig, **{n: self.p[n] for n in names})
+        nominal: dict[str, Any] = {n: self.p[n] for n in self.layout.parameters if "." not in n}
+        return dataclasses.replace(self.model.rig, **nominal)
 
     def at_rest(self) -> tuple[dict[str, Any], dict[str, Any], Any]:
         """States, memories and residual of the static equilibrium as expressions in z."""

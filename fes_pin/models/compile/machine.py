@@ -7,6 +7,7 @@ import hashlib
 import os
 import sys
 import threading
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -56,7 +57,7 @@ class MachineCode:
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(object_code))
             self._engine.finalize_object()
 
-    def function(self, name: str, *argument_types: type) -> ctypes._CFuncPtr:
+    def function(self, name: str, *argument_types: type) -> Callable[..., None]:
         """The function of that name as a ctypes callable; ctypes releases the interpreter lock while it runs."""
         return ctypes.CFUNCTYPE(None, *argument_types)(self._engine.get_function_address(name))
 

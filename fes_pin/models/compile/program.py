@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +31,11 @@ class Sizes:
     state: int
     memory: int
     reading: int
+
+    @property
+    def scratch(self) -> int:
+        """Vectors that a run works in: states four times, memories twice, each with one to spare."""
+        return 4 * (self.state + 1) + 2 * (self.memory + 1)
 
 
 class Program:
@@ -66,7 +73,7 @@ class Program:
         n, outputs = inputs.shape[0], len(self.layout.outputs)
         out = np.empty((n, self.sizes.reading, WIDTH))
         arguments = [np.ascontiguousarray(a, dtype=float) for a in (inputs, values, constants, guess)]
-        scratch = np.zeros((2 * (self.sizes.state + 1) * 3 + 2 * (self.sizes.memory + 1), WIDTH))
+        scratch = np.zeros((self.sizes.scratch, WIDTH))
         self._run(n, substeps, *[a.ctypes.data for a in (*arguments, out, scratch)])
         return out[:, :outputs], out[:, outputs:].reshape(n, outputs, len(self.layout.columns), WIDTH)
 
@@ -97,17 +104,9 @@ class _Loop:
 
     def _carve(self, scratch: ir.Value) -> None:
         """Vectors in the scratch memory: states, stage states, stage rates, their sum, memories old and new."""
-        at = 0
-        for name, size in (
-            ("state", self.sizes.state),
-            ("stage", self.sizes.state),
-            ("rate", self.sizes.state),
-            ("total", self.sizes.state),
-            ("memory", self.sizes.memory),
-            ("after", self.sizes.memory),
-        ):
-            setattr(self, name, self._at(scratch, at))
-            at += size + 1
+        state, memory = self.sizes.state + 1, self.sizes.memory + 1
+        self.state, self.stage, self.rate, self.total = (self._at(scratch, k * state) for k in range(4))
+        self.memory, self.after = (self._at(scratch, 4 * state + k * memory) for k in range(2))
         self.t = self.b.alloca(VECTOR)
         self.since = self.b.alloca(VECTOR)
         self.g = self.b.alloca(VECTOR, ir.Constant(INT64, 2))
@@ -125,7 +124,7 @@ class _Loop:
         names = self.equations.layout.constants
         self.t0, self.dt, self.step = (self._load(self.c, names.index(n)) for n in ("t0", "dt", "step"))
 
-    def _count(self, end: ir.Value, body: object) -> None:
+    def _count(self, end: ir.Value, body: Callable[[ir.Value], None]) -> None:
         """for k in range(end): body(k)."""
         b = self.b
         before, loop, done = b.block, b.append_basic_block(), b.append_basic_block()
@@ -133,7 +132,7 @@ class _Loop:
         b.position_at_end(loop)
         k = b.phi(INT64)
         k.add_incoming(ir.Constant(INT64, 0), before)
-        body(k)  # type: ignore[operator]
+        body(k)
         following = b.add(k, ir.Constant(INT64, 1))
         k.add_incoming(following, b.block)
         b.cbranch(b.icmp_signed("<", following, end), loop, done)
@@ -194,9 +193,9 @@ class _Loop:
             b.store(b.fadd(begin, b.fmul(self.step, splat(at))), self.t, align=8)
             b.call(self.parts["rates"], [source, self.memory, u, self.t, self.since, self.p, self.c, self.rate])
             share, forward = b.fmul(self.step, splat(weight)), b.fmul(self.step, splat(ahead))
-            self._count(size, lambda i, a=at, w=weight, s=share, f=forward: self._advance(i, a, w, s, f))
+            self._count(size, partial(self._advance, at=at, share=share, forward=forward))
 
-    def _advance(self, i: ir.Value, at: float, weight: float, share: ir.Value, forward: ir.Value) -> None:
+    def _advance(self, i: ir.Value, at: float, share: ir.Value, forward: ir.Value) -> None:
         """Add a stage to the sum, and go to the next stage or, after the last, to the next step."""
         b = self.b
         rate, state = self._load(self.rate, i), self._load(self.state, i)
