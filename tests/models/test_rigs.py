@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 from fes_pin.data.errors import InputError
-from fes_pin.models.compile.equations import derive, make_layout
+from fes_pin.models.compile.equations import derive
+from fes_pin.models.compile.layout import make_layout
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import joint_model
 from fes_pin.models.rigs import Ankle
