@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from fes_pin.models.parameters import Parameter
 from fes_pin.models.rigs.base import Rig
@@ -47,7 +48,7 @@ class Model:
         return info
 
     def fitted_parameters(self) -> tuple[str, ...]:
-        """What a fit moves: the rig's fitted parameters and all of the effects' but discrete choices and unused refinements."""
+        """What a fit moves: the rig's fitted parameters, and of the effects' all but choices and unused forms."""
         names = list(self.rig.fitted_parameters())
         for effect in self.effects:
             names += [f"{effect.name}.{n}" for n in effect.fitted_parameters()]
@@ -65,7 +66,8 @@ class Model:
         for name in values:
             if name not in known:
                 raise KeyError(f"no parameter {name}; there are {', '.join(known)}")
-        rig = dataclasses.replace(self.rig, **{n: float(v) for n, v in values.items() if "." not in n})
+        nominal: dict[str, Any] = {n: float(v) for n, v in values.items() if "." not in n}
+        rig = dataclasses.replace(self.rig, **nominal)
         effects = []
         for effect in self.effects:
             prefix = f"{effect.name}."
