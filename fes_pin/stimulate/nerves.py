@@ -78,6 +78,9 @@ class Nerves:
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "members", members.astype(float))
 
+    def __hash__(self) -> int:
+        return hash((self.names, self.strength, self.length, self.force_length, tuple(sorted(self.fatigue.items()))))
+
     @classmethod
     def of_subject(cls, mass_kg: float, height_m: float, names: Iterable[str] = (), **options) -> Nerves:
         """Nerves of an adult of other size: strength as mass, arms as height.
