@@ -250,7 +250,12 @@ class Allocator:
         if solver not in qpsolvers.available_solvers:
             known = ", ".join(["pivot", *qpsolvers.available_solvers])
             raise InputError(f"solver {solver!r} is not installed; there are {known}")
-        r = qpsolvers.solve_qp(self.H, f, lb=lower, ub=upper, solver=solver)
+        H: Any = self.H
+        if solver in qpsolvers.sparse_solvers:
+            from scipy.sparse import csc_matrix
+
+            H = csc_matrix(H)
+        r = qpsolvers.solve_qp(H, f, lb=lower, ub=upper, solver=solver, raise_error=False)
         if r is None:
             raise InputError(f"solver {solver!r} found no answer")
         return np.clip(r, lower, upper)

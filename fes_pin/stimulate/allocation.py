@@ -118,24 +118,22 @@ class Allocation:
     def cause(self, j: int, direction: float) -> str:
         """What keeps joint j from more torque in a direction."""
         program = self.allocator
-        help_ = program.matrix[j] * direction
+        help_ = program.nominal[j] * direction
         by_name = [name.replace("_", " ") for name in self.names]
         words = [self.limit(i) for i in range(len(self.names))]
+        if not help_.any():
+            weak = [name for name, column in zip(by_name, program.nominal.T, strict=True) if not column.any()]
+            return "no stimulated nerve turns it" + (f" ({', '.join(weak)} without strength)" if weak else "")
         stuck = {"saturated", "limited", "rising", "dead"}
-        held = [i for i in np.argsort(-help_) if help_[i] > 0.0 and words[i] in stuck]
-        held += [i for i in np.argsort(help_) if help_[i] < 0.0 and words[i] in {"falling"}]
-        if not program.matrix[j].any() and not any(program.nominal[j]):
-            return "no stimulated nerve turns it"
-        if not held and not (help_ > 0.0).any():
-            dead = [i for i in range(len(by_name)) if program.nominal[j, i] * direction > 0.0 and words[i] == "dead"]
-            if dead:
-                return ", ".join(f"{by_name[i]} dead" for i in dead)
-            return "no stimulated nerve pulls that way"
+        held = [int(i) for i in np.argsort(-help_) if help_[i] > 0.0 and words[i] in stuck]
+        held += [int(i) for i in np.argsort(help_) if help_[i] < 0.0 and words[i] == "falling"]
         if held:
-            strongest = max(abs(program.nominal[j, i]) for i in held)
-            named = [i for i in held if abs(program.nominal[j, i]) >= WORTH_NAMING * strongest]
+            strongest = max(abs(help_[i]) for i in held)
+            named = [i for i in held if abs(help_[i]) >= WORTH_NAMING * strongest]
             return ", ".join(f"{by_name[i]} {words[i]}" for i in named[:3])
-        return self.conflict(j, int(np.argmax(help_ * (help_ > 0.0))), by_name)
+        if not (help_ > 0.0).any():
+            return "no stimulated nerve pulls that way"
+        return self.conflict(j, int(np.argmax(help_)), by_name)
 
     def conflict(self, j: int, i: int, by_name: list[str]) -> str:
         """What a little more of channel i, which would help joint j, would spoil."""

@@ -12,6 +12,10 @@ NEARNESS = 1e-6
 """Weight of the distance to the last iterate, of the strongest channel's square: it fades as the iterates settle."""
 
 
+PRESSED = 1e-10
+"""A limit with a larger multiplier than this holds its channel in the second stage, too."""
+
+
 def natural_residual(gradient, r, lower, upper) -> float:
     """Greatest `|r - clip(r - gradient)|`."""
     return float(np.abs(r - np.clip(r - gradient, lower, upper)).max())
@@ -61,7 +65,8 @@ def error_then_effort(squares, f, prices, lower, upper) -> tuple[np.ndarray, str
             break
     relative = prices / prices.max() * NEARNESS
     second = BoxProgram(squares + np.diag(relative))
-    second.lower[:], second.upper[:] = lower, upper
+    pressed = np.abs(squares @ r + f) > PRESSED  # f is in the range of S: equal torque leaves these at their limit
+    second.lower[:], second.upper[:] = np.where(pressed, r, lower), np.where(pressed, r, upper)
     held = squares @ r
     pull = held.copy()
     for _ in range(STEPS):

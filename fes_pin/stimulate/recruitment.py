@@ -15,7 +15,7 @@ import numpy as np
 from fes_pin.data.errors import InputError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinearRecruitment:
     """Straight from threshold to saturation; the defaults are the paper's (section II: 180 us, 1 ms).
 
@@ -42,6 +42,15 @@ class LinearRecruitment:
         if (self.threshold_us < 0.0).any() or (self.saturation_us <= self.threshold_us).any():
             raise InputError("a recruitment curve needs 0 <= threshold_us < saturation_us")
 
+    def _values(self) -> tuple:
+        return type(self), *(getattr(self, f.name).tobytes() for f in fields(self))
+
+    def __eq__(self, other) -> bool:
+        return isinstance(other, LinearRecruitment) and self._values() == other._values()
+
+    def __hash__(self) -> int:
+        return hash(self._values())
+
     def shape(self, x: np.ndarray) -> np.ndarray:
         """Recruitment at the fraction x of the way from threshold to saturation."""
         return x
@@ -64,7 +73,7 @@ class LinearRecruitment:
         return (r > 0.0) * np.minimum(width, self.saturation_us)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SaturatingRecruitment(LinearRecruitment):
     """Steep first: `(1 - exp(-k x)) / (1 - exp(-k))` (Ding 2007, Muscle Nerve 36:214-222)."""
 
@@ -84,7 +93,7 @@ class SaturatingRecruitment(LinearRecruitment):
         return -np.log1p(r * np.expm1(-self.curvature)) / self.curvature
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SigmoidRecruitment(LinearRecruitment):
     """Logistic about `middle` (a fraction of the way), scaled to be 0 at threshold and 1 at saturation."""
 
@@ -114,7 +123,7 @@ class SigmoidRecruitment(LinearRecruitment):
         return self.middle + np.log(y / (1.0 - y)) / self.steepness
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GompertzRecruitment(LinearRecruitment):
     """Gompertz: slow start, slower end, `exp(-b exp(-k x))` scaled to be 0 at threshold and 1 at saturation."""
 
