@@ -251,11 +251,12 @@ class Allocator:
             known = ", ".join(["pivot", *qpsolvers.available_solvers])
             raise InputError(f"solver {solver!r} is not installed; there are {known}")
         H: Any = self.H
+        quiet = {"raise_error": False} if solver == "osqp" else {}  # it warns of a default that will change
         if solver in qpsolvers.sparse_solvers:
             from scipy.sparse import csc_matrix
 
             H = csc_matrix(H)
-        r = qpsolvers.solve_qp(H, f, lb=lower, ub=upper, solver=solver, raise_error=False)
+        r = qpsolvers.solve_qp(H, f, lb=lower, ub=upper, solver=solver, **quiet)
         if r is None:
             raise InputError(f"solver {solver!r} found no answer")
         return np.clip(r, lower, upper)

@@ -30,7 +30,7 @@ def random_problem(rng):
     return matrix, rng.normal(size=m) * rng.choice([0.0, 5.0, 100.0]), options
 
 
-def within_limits(a, curve, lower=0.0):
+def within_limits(a, curve):
     widths = np.asarray(a.pulse_width_us)
     on = widths > 0.0
     assert ((widths == 0.0) | ((widths >= curve.threshold_us) & (widths <= curve.saturation_us))).all()
@@ -46,7 +46,7 @@ def test_two_thousand_random_problems_are_optimal_and_within_threshold_and_satur
         assert ((options["lower"] <= a.recruitment) & (a.recruitment <= options["upper"])).all()
         within_limits(a, curve)
         np.testing.assert_allclose(a.achieved, matrix @ a.recruitment, atol=1e-9)
-        assert isinstance(str(a), str)
+    assert "optimal to" in str(a)
 
 
 @pytest.mark.parametrize("solver", ["daqp", "osqp"])
@@ -173,15 +173,32 @@ def test_dead_limb_gives_zero_pulses_and_no_error():
     assert a.pulse_width_us.tolist() == [0.0] and "left femoral without strength" in a.reasons[0]
 
 
-def test_effort_kinds_and_lexicographic_keep_their_promises():
+def test_redundant_muscles_share_as_arm_under_squares_and_as_its_root_under_cubes():
+    for arms in ([40.0, 10.0], [30.0, 20.0, 5.0]):
+        squares = allocate([15.0], [arms]).recruitment
+        cubes = allocate([15.0], [arms], effort_kind="cubes")
+        assert cubes.certificate.is_optimal(1e-10) and cubes.note == ""
+        np.testing.assert_allclose(squares / squares[0], np.array(arms) / arms[0], rtol=1e-9)
+        np.testing.assert_allclose(
+            cubes.recruitment / cubes.recruitment[0], np.sqrt(np.array(arms) / arms[0]), rtol=1e-6
+        )
+
+
+def test_cubes_on_random_problems_are_optimal():
+    rng = np.random.default_rng(7)
+    for _ in range(150):
+        matrix, torque, options = random_problem(rng)
+        a = allocate(torque, matrix, effort_kind="cubes", **options)
+        assert a.certificate.is_optimal(1e-10) and a.note == ""
+
+
+def test_lexicographic_reaches_the_least_error_then_the_least_effort():
     rng = np.random.default_rng(5)
     muscles = Nerves.muscles("left_tibial", "left_femoral", "left_hamstrings")
     for _ in range(10):
         torque = muscles.torque_matrix() @ rng.uniform(0, 0.6, muscles.n) + rng.normal(size=19)
-        squares, cubes = allocate(torque, muscles), allocate(torque, muscles, effort_kind="cubes")
+        squares = allocate(torque, muscles)
         lexicographic = allocate(torque, muscles, lexicographic=True)
-        assert cubes.certificate.is_optimal(1e-10) and cubes.note == ""
-        assert cubes.recruitment.max() <= squares.recruitment.max() + 1e-3  # cubes spread the load
         assert lexicographic.certificate.is_optimal(1e-11)  # of the error alone
         error = [float(((a.shortfall) ** 2).sum()) for a in (lexicographic, squares)]
         assert error[0] <= error[1]
