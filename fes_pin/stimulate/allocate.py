@@ -251,7 +251,9 @@ class Allocator:
             known = ", ".join(["pivot", *qpsolvers.available_solvers])
             raise InputError(f"solver {solver!r} is not installed; there are {known}")
         H: Any = self.H
-        quiet = {"raise_error": False} if solver == "osqp" else {}  # it warns of a default that will change
+        quiet: dict[str, Any] = (
+            {"raise_error": False} if solver == "osqp" else {}
+        )  # it warns of a default that will change
         if solver in qpsolvers.sparse_solvers:
             from scipy.sparse import csc_matrix
 
