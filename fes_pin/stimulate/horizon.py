@@ -159,8 +159,7 @@ class Horizon:
         held = self.T + (DAMPING + PENALTY) * np.eye(steps) + PENALTY * step[1:].T @ step[1:]
         inverses = np.linalg.inv(np.maximum(values, 0.0)[:, None, None] * self.S + held)
         self.fixed = [
-            np.ascontiguousarray(a)
-            for a in (self.S, self.T, self.G, vectors, vectors.T, np.moveaxis(inverses, 0, -1))
+            np.ascontiguousarray(a) for a in (self.S, self.T, self.G, vectors, vectors.T, np.moveaxis(inverses, 0, -1))
         ]
         self.work, self.out = np.empty(16 * steps * n), np.zeros(2)
 
