@@ -49,9 +49,7 @@ def attained(result, joints):
 
 
 print(f"{len(walk.time)} samples, {walk.time[-1] - walk.time[0]:.2f} s; joints within 10 % of their peak torque")
-print(
-    f"{'nerves':22s} {'samples: all sagittal':>24s} {'samples: all 3-D':>20s} {'joint samples':>16s}   (weak - table - strong)"
-)
+print(f"{'nerves':22s} {'all sagittal':>24s} {'all in 3-D':>20s} {'joint samples':>16s}   (weak, table, strong)")
 results = {}
 for name, nerves in SETS.items():
     row = []
@@ -159,9 +157,7 @@ figure.savefig(out / "allocate_walking.png", dpi=110)
 
 # %% The number
 share = {name: attained(sagittal, SAGITTAL)[0] for name, (sagittal, _) in results.items()}
-print(
-    f"Four nerves a leg make {100 * share[chosen]:.0f} % of the samples of walking (hip, knee, ankle in the sagittal plane)."
-)
+print(f"Four nerves a leg make {100 * share[chosen]:.0f} % of the samples of walking (sagittal hip, knee and ankle).")
 example = allocate(
     dict(zip(JOINTS, walk.torque[60], strict=True)), Nerves(both_sides(SETS[chosen])), walk.q[60], weights=weights
 )

@@ -82,7 +82,7 @@ class Attainable:
         return -self.support({joint: -1.0}), self.support({joint: 1.0})
 
     def nearest(self, torque) -> Nearest:
-        """The attainable torque nearest to one wanted (by joint name, absent 0, or array over the joints that count)."""
+        """The attainable torque nearest to one wanted (by joint name, absent 0, or array over those that count)."""
         from fes_pin.stimulate.box import BoxProgram
 
         wanted = by_name(torque, self.joints, "torque", 0.0)

@@ -1,4 +1,4 @@
-"""Allocation through time: muscles that follow with a lag and a delay, pulses that may not jump, strength that tires."""
+"""Allocation through time: muscles that lag, pulses that may not jump, strength that tires."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate.allocate import EFFORT, Allocator
 from fes_pin.stimulate.native import address
+from fes_pin.stimulate.polish import polish
 from fes_pin.stimulate.splitting import compiled
 
 ITERATIONS = 2000
@@ -23,7 +24,7 @@ REFRESH = 0.005
 
 @dataclass(frozen=True)
 class Fatigue:
-    """Strength that falls with use and comes back with rest (Riener, Quintern and Schmidt 1996, J. Biomech. 29:1157-1167).
+    """Strength falls with use, comes back with rest (Riener, Quintern and Schmidt 1996, J. Biomech. 29:1157-1167).
 
         d left / dt = (least - left) act / fatigue_s + (1 - left) (1 - act) / recovery_s
 
@@ -77,11 +78,11 @@ class Plan:
     achieved
         (steps, joints) torque that the muscles will make, N m.
     primal, dual
-        Residuals of the program, recomputed: distance of the splitting's answer from the limits, slope that no limit explains.
+        Residuals, recomputed: distance of the solver's answer from the limits, slope that no limit explains.
     gap
         No plan costs less than this one by more (of the cost divided by `scale`).
-    iterations
-        Of the splitting.
+    iterations, rounds
+        Of the splitting; guesses that made its answer exact, 0 if none did.
     """
 
     recruitment: np.ndarray
@@ -91,6 +92,7 @@ class Plan:
     dual: float
     gap: float
     iterations: int
+    rounds: int
 
 
 @dataclass
@@ -161,7 +163,8 @@ class Horizon:
         self.fixed = [
             np.ascontiguousarray(a) for a in (self.S, self.T, self.G, vectors, vectors.T, np.moveaxis(inverses, 0, -1))
         ]
-        self.work, self.out = np.empty(16 * steps * n), np.zeros(2)
+        self.whole = np.kron(self.G, self.S) + np.kron(np.eye(n), self.T)
+        self.work, self.out = np.empty(7 * steps * n), np.zeros(2)
 
     def plan(self, torques) -> Plan:
         """Stimulation for the torques ahead, from the present state.
@@ -169,7 +172,7 @@ class Horizon:
         Parameters
         ----------
         torques
-            (steps, joints) N m: wanted when the coming pulses act, `delay_steps` + 1 ... `delay_steps` + steps pulses ahead.
+            (steps, joints) N m: wanted at the pulses `delay_steps` + 1 ... `delay_steps` + steps ahead.
 
         Raises
         ------
@@ -203,10 +206,14 @@ class Horizon:
             ITERATIONS,
             TOLERANCE,
         )
+        exact = polish(self.whole, f, low, high, self.y)
+        if exact is not None:
+            self.x[:], self.y[:] = exact.u, exact.y
+            self.z[:] = np.vstack([exact.u, np.diff(exact.u, axis=0)])
         u = self.feasible(low, high)
         primal, dual, gap = self.proof(u, f, low, high)
         achieved = (free + self.response @ u) @ self.matrix.T
-        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, count)
+        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, count, exact.rounds if exact else 0)
 
     def feasible(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """The splitting's answer, moved into limits and rate step by step."""

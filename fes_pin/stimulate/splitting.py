@@ -1,15 +1,17 @@
-"""The horizon's quadratic program by operator splitting (ADMM as in Stellato et al. 2020, OSQP, Math. Prog. Comp. 12:637-672).
+"""The horizon's quadratic program by operator splitting (ADMM: Stellato et al. 2020, Math. Prog. Comp. 12:637).
 
     min 1/2 u'Hu + f'u,  H = S x G + T x 1,  lower <= u_k <= upper,  |u_k - u_(k-1)| <= rate
 
 u stacks the steps' n channels, x is the Kronecker product: S and T couple steps, G channels. The eigenvectors of G
-decouple the linear system of every iteration into n systems as small as the number of steps; their inverses are kept.
+decouple the linear system of every iteration into n systems as small as the number of steps; their inverses are
+kept.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
 
+from fes_pin.stimulate.box import add_rows
 from fes_pin.stimulate.native import Native, Reals
 
 
@@ -18,10 +20,7 @@ def couple(n: int, steps: int, S: Reals, T: Reals, G: Reals, u: Reals, work: Rea
     for k in range(steps):
         for i in range(n):
             work[k * n + i] = 0.0
-        for j in range(n):
-            a = u[k * n + j]
-            for i in range(n):
-                work[k * n + i] += a * G[j * n + i]
+        add_rows(n, n, u[k * n :], G, work[k * n :])
     for k in range(steps * n):
         out[k] = 0.0
     for k in range(steps):
@@ -38,10 +37,7 @@ def backsolve(n: int, steps: int, V: Reals, Vt: Reals, inverse: Reals, b: Reals,
     for k in range(steps):
         for e in range(n):
             work[k * n + e] = 0.0
-        for i in range(n):
-            a = b[k * n + i]
-            for e in range(n):
-                work[k * n + e] += a * V[i * n + e]
+        add_rows(n, n, b[k * n :], V, work[k * n :])
     for k in range(steps):
         for e in range(n):
             b[k * n + e] = 0.0
@@ -51,10 +47,7 @@ def backsolve(n: int, steps: int, V: Reals, Vt: Reals, inverse: Reals, b: Reals,
     for k in range(steps):
         for i in range(n):
             out[k * n + i] = 0.0
-        for e in range(n):
-            a = b[k * n + e]
-            for i in range(n):
-                out[k * n + i] += a * Vt[e * n + i]
+        add_rows(n, n, b[k * n :], Vt, out[k * n :])
     return 0
 
 
@@ -100,7 +93,7 @@ def split(
     limit: int,
     tolerance: float,
 ):
-    """Iterate from x, z, y; `work` holds 6 * (2 steps n) numbers; `out` gets both residuals. The number of iterations."""
+    """Iterate from x, z, y; `work` holds 7 steps n numbers, `out` gets both residuals; the number of iterations."""
     size = n * steps
     rows = n * (2 * steps - 1)
     count = 0
@@ -143,4 +136,4 @@ def split(
 @lru_cache(maxsize=1)
 def compiled() -> Native:
     """The functions above as machine code."""
-    return Native(couple, backsolve, differences, gather, split)
+    return Native(add_rows, couple, backsolve, differences, gather, split)

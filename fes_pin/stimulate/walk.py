@@ -1,8 +1,9 @@
-"""Allocation over a motion: another posture, so other moment arms, at every sample; and the rules of thumb to compare with."""
+"""Allocation over a motion: another posture, so other moment arms, at every sample; the rules of thumb beside it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,13 @@ class WalkAllocation:
     def at(self, k: int) -> Allocation:
         """Sample k with its reasons in words."""
         p = self.allocator
-        options = {"weights": p.weights, "effort": p.effort, "lower": p.lower, "upper": p.upper, "change": p.change}
+        options: dict[str, Any] = {
+            "weights": p.weights,
+            "effort": p.effort,
+            "lower": p.lower,
+            "upper": p.upper,
+            "change": p.change,
+        }
         one = Allocator(self.matrices[k], recruitment=p.curves.curves, **options)
         one.names, one.joints = p.names, p.joints
         before = self.recruitment[k - 1] if k else np.zeros(p.n)
@@ -78,8 +85,7 @@ def allocate_walk(torques, nerves, q, **options) -> WalkAllocation:
         raise InputError(f"torques of shape {wanted.shape} do not fit moment arms of shape {matrices.shape}")
     if not np.isfinite(wanted).all() or not np.isfinite(matrices).all():
         raise InputError("torques and moment arms along the motion must be finite numbers")
-    p = Allocator(matrices[0], **options)
-    p.names = tuple(nerves.names) if named else p.names
+    p = Allocator(nerves, np.asarray(q)[0], **options) if named else Allocator(matrices[0], **options)
     if p.choosy or p.cubes or p.lexicographic or p.rate < np.inf:
         raise InputError("least recruitments, cubes, lexicographic and rate are allocated one torque at a time")
     matrices = matrices * (p.upper > 0.0)
