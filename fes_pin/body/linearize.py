@@ -40,8 +40,8 @@ class LinearBody:
         Minus the joint torques that hold the posture, N m: (n,).
     E
         Torque per joint rate, N m s/rad: (n, n); zero at rest without damping.
-    body, slope, braced
-        Where it was taken: the body, the ground's (alpha, beta), the joints that braces hold.
+    body, slope, braced, held
+        Where it was taken: the body, the ground's (alpha, beta), the joints that braces hold and their angles, rad.
     """
 
     joint_names: tuple[str, ...]
@@ -53,6 +53,7 @@ class LinearBody:
     body: Body = field(repr=False)
     slope: tuple[float, float] = (0.0, 0.0)
     braced: tuple[str, ...] = ()
+    held: dict[str, float] = field(default_factory=dict, repr=False)
 
     @property
     def n(self) -> int:
@@ -89,6 +90,11 @@ class LinearBody:
         """Angles of the joints that move, rad by name."""
         return dict(zip(self.joint_names, self.q.tolist(), strict=True))
 
+    @property
+    def whole_posture(self) -> dict[str, float]:
+        """Angles of all joints, braced ones too, rad by name."""
+        return {**self.held, **self.posture}
+
     def modes(self):
         """The n eigenpairs of A^-1 B (see `fes_pin.body.modes.modes`)."""
         from fes_pin.body.modes import modes
@@ -120,6 +126,7 @@ class LinearBody:
             body=self.body,
             slope=self.slope,
             braced=(*self.braced, *joints),
+            held={**self.held, **{name: self.posture[name] for name in joints}},
         )
 
     def __str__(self) -> str:
