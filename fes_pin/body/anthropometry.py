@@ -107,7 +107,9 @@ class Subject:
         ):
             number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
             if not (number and low <= value <= high):
-                raise InputError(f"must be between {low:g} and {high:g} {unit} (an adult's), got {value!r}", column=label)
+                raise InputError(
+                    f"must be between {low:g} and {high:g} {unit} (an adult's), got {value!r}", column=label
+                )
         if self.sex not in _DE_LEVA:
             raise InputError(f"must be 'male' or 'female' (the two segment tables), got {self.sex!r}", column="sex")
 

@@ -136,7 +136,9 @@ class Body:
         """Smallest and greatest joint angles: two arrays (19,), rad."""
         return self.model.lowerPositionLimit.copy(), self.model.upperPositionLimit.copy()
 
-    def angles(self, posture: str | Mapping[str, float] | Sequence[float] | np.ndarray, check: bool = True) -> np.ndarray:
+    def angles(
+        self, posture: str | Mapping[str, float] | Sequence[float] | np.ndarray, check: bool = True
+    ) -> np.ndarray:
         """A posture as Pinocchio's q: (19,) rad.
 
         Parameters
@@ -198,7 +200,9 @@ class Body:
 
     def __str__(self) -> str:
         height = "" if self.height_m is None else f", {self.height_m:.2f} m"
-        return f"Body ({self.label}): {self.mass_kg:.1f} kg{height}, 10 segments, 19 joints, on the {self.stance} forefoot"
+        return (
+            f"Body ({self.label}): {self.mass_kg:.1f} kg{height}, 10 segments, 19 joints, on the {self.stance} forefoot"
+        )
 
 
 def _odd(name: str, names: set[str]) -> str:

@@ -64,16 +64,16 @@ def _turn(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
     return np.eye(3) + s * cross + (1.0 - c) * (cross @ cross)
 
 
-def _ball_angles(rotation: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def ankle_angles(rotation: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Dorsiflexion, inversion and rotation, in this order from the shank, that give rotations (N, 3, 3)."""
-    mirror_sign = 1.0 if side == "right" else -1.0
-    inversion = np.arcsin(np.clip(rotation[:, 2, 1], -1.0, 1.0))
-    dorsiflexion = -np.arctan2(-rotation[:, 2, 0], rotation[:, 2, 2])
-    rotated = np.arctan2(-rotation[:, 0, 1], rotation[:, 1, 1])
-    return dorsiflexion, mirror_sign * inversion, mirror_sign * rotated
+    sign = 1.0 if side == "right" else -1.0
+    inversion = -np.arcsin(np.clip(rotation[:, 1, 2], -1.0, 1.0))
+    dorsiflexion = -np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
+    rotated = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])
+    return dorsiflexion, sign * inversion, sign * rotated
 
 
-def joint_rotation(side: str, dorsiflexion: np.ndarray, inversion: np.ndarray, rotated: np.ndarray) -> np.ndarray:
+def ankle_rotation(side: str, dorsiflexion: np.ndarray, inversion: np.ndarray, rotated: np.ndarray) -> np.ndarray:
     """Rotation of the hindfoot in the shank's frame, (N, 3, 3), of ankle angles, rad (N,)."""
     sign = 1.0 if side == "right" else -1.0
     forward, left, up = np.eye(3)
@@ -83,7 +83,8 @@ def joint_rotation(side: str, dorsiflexion: np.ndarray, inversion: np.ndarray, r
 def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_foot: bool = True) -> np.ndarray:
     """Measured OpenSim coordinates as postures of our body: (N, 19) rad, in the order of `JOINT_NAMES`.
 
-    Hips, knees, MTP and lumbar angles are the measured ones. OpenSim's oblique ankle and subtalar axes become the three
+    Hips, knees, MTP and lumbar angles are the measured ones. (OpenSim's torso frame leans 9 degrees against the line from hips to
+    shoulders in this recording: a lumbar extension of -19 degrees is nearly upright walking.) OpenSim's oblique ankle and subtalar axes become the three
     angles of our ball of an ankle with the same rotation. Our stance forefoot lies flat on the ground, the measured one
     nearly so: with `flat_foot` the stance ankle takes up the difference, so that shank, pelvis and trunk stand in space as
     measured.
@@ -124,7 +125,7 @@ def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_fo
         if side == stance and flat_foot:
             foot = _flat_ankle(angles, measured, side, foot)
         for joint, value in zip(
-            ("ankle_dorsiflexion", "ankle_inversion", "ankle_rotation"), _ball_angles(foot, side), strict=True
+            ("ankle_dorsiflexion", "ankle_inversion", "ankle_rotation"), ankle_angles(foot, side), strict=True
         ):
             angles[f"{side}_{joint}"] = value
     for joint in JOINT_NAMES[16:]:

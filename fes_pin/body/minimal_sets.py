@@ -176,7 +176,9 @@ def _smallest(
     cuts, needs = _in_turn(wanted, inputs, lean_deg)
     everything = np.ones(inputs.n, dtype=bool)
     k = len(wanted.falling)
-    cases = [wanted.target, *(wanted.leaning(i, s * lean_deg) for i in range(k) for s in (1.0, -1.0))] if together else []
+    cases = (
+        [wanted.target, *(wanted.leaning(i, s * lean_deg) for i in range(k) for s in (1.0, -1.0))] if together else []
+    )
     if not np.all(cuts.sum(axis=1) >= needs) or not all(_met(wanted, inputs, everything, case) for case in cases):
         return []
     rows, bounds = list(cuts), list(needs)

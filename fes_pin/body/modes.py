@@ -229,5 +229,5 @@ def _name(value: float, share: np.ndarray, names: tuple[str, ...], stance: str) 
     text = f"{_VERBS[kind, _plane(share, names)]} about the {where}"
     rate = np.sqrt(abs(value))
     if kind == "fall":
-        return f"{text}, {np.log(2.0) / rate:.2f} s to double"
+        return f"{text}, {np.log(2.0) / rate:.2g} s to double"
     return f"{text}, {rate / (2.0 * np.pi):.2f} Hz" if kind == "swing" else text

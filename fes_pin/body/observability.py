@@ -43,7 +43,9 @@ class Observability:
     def __str__(self) -> str:
         lines = ["goniometers: " + ", ".join(self.sensors)]
         for mode, row, seen in zip(self.modes, self.gains, self.observable, strict=True):
-            lines.append(f"  {mode.name:66s} {'seen' if seen else 'NOT seen':9s} {np.linalg.norm(row):8.2g} deg per deg")
+            lines.append(
+                f"  {mode.name:66s} {'seen' if seen else 'NOT seen':9s} {np.linalg.norm(row):8.2g} deg per deg"
+            )
         return "\n".join(lines)
 
 
