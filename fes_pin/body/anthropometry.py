@@ -2,16 +2,18 @@
 
 Sources
 -------
-Segment masses, lengths, centres of mass and radii of gyration: P. de Leva, "Adjustments to Zatsiorsky-Seluyanov's segment
-inertia parameters", J. Biomech. 29(9):1223-1230, 1996, table 4 (100 men and 15 women, young adults). The figures here were
-compared with three independent public transcriptions (a MATLAB look-up table by R. Gurchiek, biobuddy's `de_leva.py`, and
-pyomech); they agree on every figure used here but for one misprint in one of them; the article itself was not at hand.
-Heights and breadths that de Leva does not give: D. A. Winter, "Biomechanics and Motor Control of Human Movement", figure 4.1
-(after Drillis and Contini 1966): ankle 0.039 H (compared with public code that cites it), half biacromial breadth 0.129 H,
-foot breadth 0.055 H.
-Hip joint centres 0.095 H apart, MTP centre 0.011 H above the ground, ankle at 0.26 and MTP at 0.72 of the foot's length from
-the heel, forefoot 0.138 of the foot's mass: rounded from the measured and scaled adult of `walking_subject01`
-(hips 0.171 m at 1.80 m; heel markers against joint centres: 0.25-0.27 and 0.70-0.74; toes 0.209 kg of 1.513 kg).
+Segment masses, lengths, centres of mass and radii of gyration: P. de Leva, "Adjustments to Zatsiorsky-Seluyanov's
+segment inertia parameters", J. Biomech. 29(9):1223-1230, 1996, table 4 (100 men and 15 women, young adults). The
+figures were compared with public transcriptions: a MATLAB look-up table by R. Gurchiek (all of them), biobuddy's
+`de_leva.py` (trunk, head, arms) and pyomech (head, arms, thigh, foot). They agree but for slips in one at a time (female
+head 6.69 %, male shank 4.32 %, decimal points); the knee-to-ankle shank of women and the shoulder height rest on one. The
+article itself was not at hand. Heights and breadths that de Leva does not give: D. A. Winter, "Biomechanics and Motor
+Control of Human Movement", figure 4.1 (after Drillis and Contini 1966): ankle 0.039 H (compared with public code that
+cites it), half biacromial breadth 0.129 H, foot breadth 0.055 H.
+Hip joint centres 0.095 H apart, MTP centre 0.011 H above the ground, ankle at 0.26 and MTP at 0.72 of the foot's
+length from the heel, forefoot 0.138 of the foot's mass: rounded from the measured and scaled adult of
+`walking_subject01` (hips 0.171 m at 1.80 m; heel markers against joint centres: 0.25-0.27 and 0.70-0.74; toes 0.209 kg
+of 1.513 kg).
 """
 
 from __future__ import annotations
@@ -50,9 +52,10 @@ class _Row:
     radii: tuple[float, float, float]
 
 
-# Ends: head vertex-C7; upper trunk C7-xiphoid; middle trunk xiphoid-navel; lower trunk navel-mid-hip; arm shoulder-elbow-
-# wrist-tip of the middle finger; thigh hip-knee; shank knee-ankle; foot heel-toe tip. The columns "sagittal" and
-# "transverse" are about the forward and the leftward axis: a wide upper trunk has the greater radius about the forward one.
+# Ends: head vertex-C7; upper trunk C7-xiphoid; middle trunk xiphoid-navel; lower trunk navel-mid-hip; arm
+# shoulder-elbow- wrist-tip of the middle finger; thigh hip-knee; shank knee-ankle; foot heel-toe tip. The columns
+# "sagittal" and "transverse" are about the forward and the leftward axis: a wide upper trunk has the greater radius
+# about the forward one.
 _DE_LEVA = {
     "male": {
         "head": _Row(6.94, 242.9, 50.02, (30.3, 31.5, 26.1)),

@@ -13,15 +13,17 @@ from fes_pin.body.modes import Mode, modes
 from fes_pin.data.errors import InputError
 
 SETTLE_DEG = 10.0
-"""How far a swinging mode may hang from the posture and still count as the posture: ours; linear models reach no further."""
+"""How far a swinging mode may hang from the posture and still count as the posture: ours; linear models reach no
+further."""
 
 
 @dataclass(frozen=True)
 class Demands:
     """What an input must do, one row a mode, scaled so that the largest gain of a row is 1.
 
-    Falling modes must be balanced: gains u = target (minus `load` for one degree of lean). Swinging modes may settle anywhere
-    within `SETTLE_DEG` of the posture: settle_low <= settle_gains u <= settle_high. Neutral modes are let drift.
+    Falling modes must be balanced: gains u = target (minus `load` for one degree of lean). Swinging modes may settle
+    anywhere within `SETTLE_DEG` of the posture: settle_low <= settle_gains u <= settle_high. Neutral modes are let
+    drift.
     """
 
     falling: tuple[Mode, ...]
@@ -85,13 +87,14 @@ class Attainable:
     falling
         The falling modes.
     holds
-        Whether some constant input balances gravity in every falling mode at once while the others settle near the posture.
+        Whether some constant input balances gravity in every falling mode at once while the others settle near the
+        posture.
     effort
         That input with the least greatest share of its bounds: by name; empty if it does not hold.
     lean_deg
-        Greatest lean in each mode, with every other fall balanced, that inputs can still hold against gravity: degrees of
-        the mode's greatest joint, in the positive and in the negative direction of the shape; (k, 2). From a greater lean at
-        rest the body is lost. NaN where the posture cannot be held at all.
+        Greatest lean in each mode, with every other fall balanced, that inputs can still hold against gravity: degrees
+        of the mode's greatest joint, in the positive and in the negative direction of the shape; (k, 2). From a
+        greater lean at rest the body is lost. NaN where the posture cannot be held at all.
     """
 
     falling: tuple[Mode, ...] = field(repr=False)

@@ -1,9 +1,9 @@
 """Which inputs control which modes, and at what price.
 
 With A-orthonormal mode shapes, mode i obeys eta'' = mu_i eta + phi_i' (C + Q u). Its row b_i = phi_i' Q is what the
-Popov-Belevitch-Hautus (PBH) test looks at, for +sqrt(mu_i) and -sqrt(mu_i) alike. Inputs that only pull control a body only if,
-besides, every real left eigenvector of F sees pulls of both signs (R. F. Brammer, "Controllability in linear autonomous systems
-with positive controllers", SIAM J. Control 10:339-353, 1972).
+Popov-Belevitch-Hautus (PBH) test looks at, for +sqrt(mu_i) and -sqrt(mu_i) alike. Inputs that only pull control a body
+only if, besides, every real left eigenvector of F sees pulls of both signs (R. F. Brammer, "Controllability in linear
+autonomous systems with positive controllers", SIAM J. Control 10:339-353, 1972).
 """
 
 from __future__ import annotations
@@ -39,8 +39,9 @@ class Controllability:
     both_ways
         Inputs within their bounds push it both ways.
     energy
-        Least integral of u'u that brings 1 degree in this mode alone back to rest within the horizon, the other modes let go: s
-        for nerves (u = 0..1), (N m)2 s for torques; infinite if the mode is out of reach. Bounds are not looked at.
+        Least integral of u'u that brings 1 degree in this mode alone back to rest within the horizon, the other modes
+        let go: s for nerves (u = 0..1), (N m)2 s for torques; infinite if the mode is out of reach. Bounds are not
+        looked at.
     mode_influence
         Acceleration of the mode's greatest joint per unit of input: (modes, inputs) rad/s2.
     joint_influence
@@ -156,14 +157,15 @@ def _both_ways(gains: np.ndarray, inputs: Inputs) -> np.ndarray:
     plus, minus = gains > 0.0, gains < 0.0
     up = (plus & (inputs.upper > 0.0)) | (minus & (inputs.lower < 0.0))
     down = (minus & (inputs.upper > 0.0)) | (plus & (inputs.lower < 0.0))
-    return up.any(axis=1) & down.any(axis=1)
+    return np.logical_and(up.any(axis=1), down.any(axis=1))
 
 
 def mode_price(values: np.ndarray, horizon: float) -> np.ndarray:
     """Least integral of w2 that brings eta'' = mu eta + w from eta = 1 at rest to rest at 0 within the horizon: 1/s3.
 
     The finite-horizon Gramian of one mode in closed form; with a = sqrt(|mu|) T it is mu^(3/2) (2 a + sinh 2 a) /
-    (sinh(a)^2 - a^2) for a fall, the same with sin for a swing, 12 / T^3 between. It tends to 2 mu^(3/2) for long horizons.
+    (sinh(a)^2 - a^2) for a fall, the same with sin for a swing, 12 / T^3 between. It tends to 2 mu^(3/2) for long
+    horizons.
     """
     values = np.asarray(values, dtype=float)
     rate = np.sqrt(np.abs(values))
@@ -181,8 +183,8 @@ def mode_price(values: np.ndarray, horizon: float) -> np.ndarray:
 def stabilizing_price(values: np.ndarray, gains: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, float]:
     """Least energy that catches all falling modes together, each from 1 degree, and the condition of the task.
 
-    The growing part z = eta + eta'/rate of mode i obeys z' = rate z + b u / rate; with the Gramian of the reversed system,
-    W_ij = b_i.b_j / (rate_i rate_j (rate_i + rate_j)), catching z costs z' W^-1 z, whatever the time.
+    The growing part z = eta + eta'/rate of mode i obeys z' = rate z + b u / rate; with the Gramian of the reversed
+    system, W_ij = b_i.b_j / (rate_i rate_j (rate_i + rate_j)), catching z costs z' W^-1 z, whatever the time.
 
     Parameters
     ----------
@@ -210,8 +212,8 @@ def stabilizing_price(values: np.ndarray, gains: np.ndarray, scale: np.ndarray) 
 def gramian(linear: LinearBody, inputs, horizon: float) -> np.ndarray:
     """Controllability Gramian, the integral of e^(Fs) G G' e^(F's) over 0..horizon with G = R Q: (2n, 2n).
 
-    By Van Loan's block exponential (IEEE Trans. Autom. Control 23:395-404, 1978); works with damping and rates. A body falls
-    fast, so over long horizons its condition exceeds double precision.
+    By Van Loan's block exponential (IEEE Trans. Autom. Control 23:395-404, 1978); works with damping and rates. A body
+    falls fast, so over long horizons its condition exceeds double precision.
     """
     G = linear.R @ Inputs.of(inputs, linear).on(linear)
     n = len(linear.F)

@@ -7,6 +7,7 @@ internal, bending right, lumbar rotation left).
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -137,8 +138,6 @@ def known_joint(name: str) -> str:
         It is not; the message names the nearest.
     """
     if name not in JOINT_NAMES:
-        import difflib
-
         near = difflib.get_close_matches(str(name), JOINT_NAMES, n=1, cutoff=0.0)[0]
         raise InputError(f"unknown joint {name!r}; did you mean {near!r}?")
     return name

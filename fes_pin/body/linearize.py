@@ -4,10 +4,10 @@ Signs, stated here once. With Pinocchio's A(q) a + c(q, v) + g(q) = tau and U th
 
     A = CRBA(q0),   B = -d g / d q = -Hessian of U,   C = -g(q0),
 
-Gamma the small deviation from q0 and D the joint torques. An upright posture then has positive eigenvalues of A^-1 B (it
-falls), a hanging limb negative ones (it swings). Passive joints add their torque to C and take their stiffness off B. Around a
-moving posture (v0, a0) the same equation holds for the deviation with C = -(A a0 + c + g), B = -d(A a + c + g)/d q and a rate
-matrix, E = d c / d v: A Gamma'' + E Gamma' - B Gamma - C = D; B is then symmetric no longer.
+Gamma the small deviation from q0 and D the joint torques. An upright posture then has positive eigenvalues of A^-1 B
+(it falls), a hanging limb negative ones (it swings). Passive joints add their torque to C and take their stiffness off
+B. Around a moving posture (v0, a0) the same equation holds for the deviation with C = -(A a0 + c + g), B = -d(A a + c
++ g)/d q and a rate matrix, E = d c / d v: A Gamma'' + E Gamma' - B Gamma - C = D; B is then symmetric no longer.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class LinearBody:
 
     def modes(self):
         """The n eigenpairs of A^-1 B (see `fes_pin.body.modes.modes`)."""
-        from fes_pin.body.modes import modes
+        from fes_pin.body.modes import modes  # noqa: PLC0415 (modes reads what is here)
 
         return modes(self)
 

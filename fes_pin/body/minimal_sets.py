@@ -26,7 +26,8 @@ ORTHOSES: dict[str, tuple[str, ...]] = {
     }.items()},
     "corset": ("lumbar_extension", "lumbar_bending", "lumbar_rotation"),
 }  # fmt: skip
-"""What an orthosis locks. A hip guide leaves flexion free, as a hip guidance orthosis does; a corset joins trunk and pelvis."""
+"""What an orthosis locks. A hip guide leaves flexion free, as a hip guidance orthosis does; a corset joins trunk and
+pelvis."""
 
 _CUTS_A_ROUND = 4
 
@@ -64,8 +65,9 @@ class MinimalSet:
         low, high = self.lean_band_deg
         braces = ", ".join(self.braces) or "none"
         return (
-            f"{len(self.inputs):2d} nerves, {len(self.braces)} braces ({self.falls} falls): {', '.join(self.inputs) or '-'}; "
-            f"braces: {braces}; energy {self.energy:.2g} s, condition {self.condition:.1e}, "
+            f"{len(self.inputs):2d} nerves, {len(self.braces)} braces ({self.falls} falls): "
+            f"{', '.join(self.inputs) or '-'}; braces: {braces}; "
+            f"energy {self.energy:.2g} s, condition {self.condition:.1e}, "
             f"holds a lean of {lean_text(self.lean_deg)} [{lean_text(low)}, {lean_text(high)}] deg"
         )
 
@@ -112,8 +114,8 @@ def minimal_sets(
     Returns
     -------
     list of MinimalSet
-        One or more per choice of braces for which a set exists; fewest nerves first, then fewest braces, then least energy. Exact:
-        no smaller set meets the demands (integer programs by HiGHS, each proved optimal).
+        One or more per choice of braces for which a set exists; fewest nerves first, then fewest braces, then least
+        energy. Exact: no smaller set meets the demands (integer programs by HiGHS, each proved optimal).
 
     Raises
     ------
@@ -136,8 +138,17 @@ def minimal_sets(
                 continue
             braced = linear.brace(list(dict.fromkeys(locked))) if locked else linear
             wanted = demands(braced, inputs, gravity, settle_deg)
-            for names in _smallest(braced, inputs, wanted, lean_deg, together, alternatives):
-                found.append(_priced(braced, inputs.select(names), chosen, gravity, settle_deg, strength_factor))
+            for names in _smallest(inputs, wanted, lean_deg, together, alternatives):
+                found.append(
+                    _priced(
+                        braced,
+                        inputs.select(names),
+                        chosen,
+                        gravity=gravity,
+                        settle_deg=settle_deg,
+                        strength_factor=strength_factor,
+                    )
+                )
     return sorted(found, key=lambda s: (len(s.inputs), len(s.braces), s.energy, s.inputs, s.braces))
 
 
@@ -164,12 +175,13 @@ def _orthoses(braces: Iterable[str] | Mapping[str, Sequence[str]]) -> dict[str, 
 
 
 def _smallest(
-    linear: LinearBody, inputs: Inputs, wanted: Demands, lean_deg: float, together: bool, alternatives: int
+    inputs: Inputs, wanted: Demands, lean_deg: float, together: bool, alternatives: int
 ) -> list[tuple[str, ...]]:
     """Smallest sets: a covering program in z (input chosen or not), to which demands add the rows that they lack.
 
-    Where the chosen inputs fail a demand, inputs are added as long as it still fails: of what is then left out every set must
-    hold at least one. Such rows hold for every answer, so the first choice that meets all demands is a smallest one.
+    Where the chosen inputs fail a demand, inputs are added as long as it still fails: of what is then left out every
+    set must hold at least one. Such rows hold for every answer, so the first choice that meets all demands is a
+    smallest one.
     """
     if not wanted.falling:
         return [()]
@@ -246,7 +258,8 @@ def _met(wanted: Demands, inputs: Inputs, chosen: np.ndarray, target: np.ndarray
 
 
 def _still_lacking(wanted: Demands, inputs: Inputs, chosen: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Inputs of which at least one is needed: (m,) 0 or 1. The chosen are grown to a largest set that fails the demand."""
+    """Inputs of which at least one is needed: (m,) 0 or 1. The chosen are grown to a largest set that fails the
+    demand."""
     grown = chosen.copy()
     for j in np.flatnonzero(~chosen):
         grown[j] = True
@@ -259,6 +272,7 @@ def _priced(
     linear: LinearBody,
     inputs: Inputs,
     chosen: tuple[str, ...],
+    *,
     gravity: bool,
     settle_deg: float,
     strength_factor: float,

@@ -1,8 +1,8 @@
 """Modes of a linearized body: how it falls and swings when nothing acts on it.
 
-The 19 eigenpairs of A^-1 B come from the symmetric generalized problem B phi = mu A phi with phi' A phi = 1. The paper's three
-properties follow: the 38 eigenvalues of F are +-sqrt(mu); its eigenvectors are (phi, +-sqrt(mu) phi); and A^-1 B is similar to
-the symmetric Q = A^(-1/2) B A^(-1/2), which Jacobi's rotations diagonalize.
+The 19 eigenpairs of A^-1 B come from the symmetric generalized problem B phi = mu A phi with phi' A phi = 1. The
+paper's three properties follow: the 38 eigenvalues of F are +-sqrt(mu); its eigenvectors are (phi, +-sqrt(mu) phi);
+and A^-1 B is similar to the symmetric Q = A^(-1/2) B A^(-1/2), which Jacobi's rotations diagonalize.
 """
 
 from __future__ import annotations
@@ -155,8 +155,8 @@ def modes(linear: LinearBody) -> Modes:
     Parameters
     ----------
     linear
-        From `linearize`. Damping and rates are left out (with them see `poles`); of a B that is not symmetric (moving posture)
-        the symmetric part is taken.
+        From `linearize`. Damping and rates are left out (with them see `poles`); of a B that is not symmetric (moving
+        posture) the symmetric part is taken.
     """
     B = 0.5 * (linear.B + linear.B.T)
     values, shapes = linalg.eigh(B, linear.A)

@@ -86,10 +86,10 @@ _DEGREE = 180.0 / np.pi
 class PassiveLegs:
     """Passive elastic moments of hip, knee and ankle in the sagittal plane, with the coupling of two-joint muscles.
 
-    Sums of exponentials fitted to ten healthy adults: R. Riener, T. Edrich, "Identification of passive elastic joint moments
-    in the lower extremities", J. Biomech. 32:539-544, 1999 (coefficients compared with public code that cites it; the article
-    was not at hand). Paralysed legs differ: scale them with `factor`. The fitted moments are not the gradient of a potential;
-    `stiffness` is the symmetric part of their derivative, so that B stays symmetric.
+    Sums of exponentials fitted to ten healthy adults: R. Riener, T. Edrich, "Identification of passive elastic joint
+    moments in the lower extremities", J. Biomech. 32:539-544, 1999 (coefficients compared with public code that cites
+    it; the article was not at hand). Paralysed legs differ: scale them with `factor`. The fitted moments are not the
+    gradient of a potential; `stiffness` is the symmetric part of their derivative, so that B stays symmetric.
 
     Parameters
     ----------

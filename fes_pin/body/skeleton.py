@@ -37,7 +37,8 @@ class Segment:
         Raises
         ------
         InputError
-            Mass not positive, inertia not symmetric positive definite, or a principal moment above the sum of the others.
+            Mass not positive, inertia not symmetric positive definite, or a principal moment above the sum of the
+            others.
         """
         if not (np.isfinite(self.mass) and self.mass > 0.0):
             raise InputError(f"the mass must be positive, got {self.mass} kg", column=name)

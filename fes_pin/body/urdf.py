@@ -119,12 +119,13 @@ def _link(name: str, skeleton: Skeleton, origin: np.ndarray) -> list[str]:
         f'  <link name="{name}">',
         f'    <inertial><origin xyz="{_numbers(segment.com - origin)}"/><mass value="{segment.mass!r}"/>',
         f"      <inertia {moments}/></inertial>",
-        *(_visual(*shape, origin) for shape in shapes_of(name, skeleton)),
+        *(_visual(shape, origin) for shape in shapes_of(name, skeleton)),
         "  </link>",
     ]
 
 
-def _visual(kind: str, size: tuple, centre: np.ndarray, rpy: tuple, colour: str, origin: np.ndarray) -> str:
+def _visual(shape: tuple, origin: np.ndarray) -> str:
+    kind, size, centre, rpy, colour = shape
     text = {
         "sphere": lambda: f'<sphere radius="{size[0]:.5f}"/>',
         "cylinder": lambda: f'<cylinder radius="{size[0]:.5f}" length="{size[1]:.5f}"/>',

@@ -104,7 +104,8 @@ def test_long_horizons_cost_what_catching_costs():
 
 
 def test_stabilizing_price_is_the_riccati_solution(standing):
-    """min integral u'u that brings X to rest over all time is x' P x, P the stabilizing Riccati solution without state cost."""
+    """min integral u'u that brings X to rest over all time is x' P x, P the stabilizing Riccati solution without state
+    cost."""
     inputs = Inputs.of(Nerves(), standing)
     result = controllability(standing, inputs)
     rows = result.falling
@@ -150,7 +151,8 @@ def test_all_nerves_reach_every_fall_of_the_stance(standing):
 
 
 def test_influence_of_nerves_knows_biarticular_muscles(standing):
-    """The paper's closing question in one row: the femoral nerve turns knee and hip, the hamstring branches both too."""
+    """The paper's closing question in one row: the femoral nerve turns knee and hip, the hamstring branches both
+    too."""
     torque = Inputs.of(Nerves(("right_femoral", "right_hamstrings")), standing).on(standing)
     knee, hip = (standing.joint_names.index(f"right_{n}") for n in ("knee_flexion", "hip_flexion"))
     assert torque[knee, 0] < -100.0 < 10.0 < torque[hip, 0]

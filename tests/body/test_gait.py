@@ -44,7 +44,8 @@ def test_the_table_is_the_measured_walk(walk):
 @pytest.mark.shared
 @pytest.mark.parametrize("stance", ["left", "right"])
 def test_trunk_and_legs_stand_in_space_as_measured(walk, measured_body, stance):
-    """In single support, with the forefoot laid flat: tilts of the trunk and of every leg segment as Simbody has them."""
+    """In single support, with the forefoot laid flat: tilts of the trunk and of every leg segment as Simbody has
+    them."""
     import csv
 
     import pinocchio as pin

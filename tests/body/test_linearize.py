@@ -85,7 +85,8 @@ def test_a_slope_is_the_whole_body_tilted_with_its_ground(slope):
 
 
 def test_uphill_makes_the_upright_body_lean_back(body):
-    """Ground that rises ahead has a normal that points back; the body, square to it, must be held against falling back."""
+    """Ground that rises ahead has a normal that points back; the body, square to it, must be held against falling
+    back."""
     level, uphill = (linearize(body, "neutral", s).holding_torque for s in ((0.0, 0.0), (-0.05, 0.0)))
     change = uphill["right_ankle_dorsiflexion"] - level["right_ankle_dorsiflexion"]
     assert change == pytest.approx(0.05 * body.mass_kg * GRAVITY * 0.95, rel=0.1)  # dorsiflexion pulls it forward again
@@ -135,7 +136,8 @@ def test_passive_legs_have_the_stiffness_of_their_torque(body, passive):
 
 
 def test_passive_legs_pull_back_from_the_ends():
-    """Riener and Edrich: a stretched hip flexes, a bent ankle lets go, a hyperextended knee flexes; some N m near rest."""
+    """Riener and Edrich: a stretched hip flexes, a bent ankle lets go, a hyperextended knee flexes; some N m near
+    rest."""
     legs, names = PassiveLegs(), JOINT_NAMES
     index = {n: i for i, n in enumerate(names)}
 

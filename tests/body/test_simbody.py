@@ -33,7 +33,8 @@ class FreeBody:
         self.index = {n: i for i, n in enumerate(self.model.names[2:])}
 
     def state(self, q, qd, pelvis_centre):
-        """Pinocchio's q and v for OpenSim coordinates; `pelvis_centre` is the pelvis link's origin in OpenSim's pelvis."""
+        """Pinocchio's q and v for OpenSim coordinates; `pelvis_centre` is the pelvis link's origin in OpenSim's
+        pelvis."""
         names = [f"q_{n}" for n in q]
         columns = np.array([[q[n], q[n] + 1e-6 * qd[n], q[n] - 1e-6 * qd[n]] for n in q])
         angles = postures_of_walk(dict(zip(names, columns, strict=True)), self.stance, flat_foot=False)
@@ -129,16 +130,17 @@ def test_energy_and_momenta_of_the_walk_are_simbodys(free, walk, hip_centre):
         ours.append([energy, *momentum.vector, *free.data.com[0]])
     ours = np.array(ours)
     turned = {key: np.array([whole[f"{key}_{c}"] for c in "xyz"]).T @ TO_WORLD.T for key in ("p", "Lcom", "com")}
-    # What differs, and so how far the centre of mass may: OpenSim's knee slides (shank and foot, 5.1 of 72.6 kg), its foot
-    # turns in inversion 0.072 m from the ankle's centre (1.42 kg), its toes about an oblique axis (0.62 rad; 0.21 kg, 0.04 m).
+    # What differs, and so how far the centre of mass may: OpenSim's knee slides (shank and foot, 5.1 of 72.6 kg), its
+    # foot turns in inversion 0.072 m from the ankle's centre (1.42 kg), its toes about an oblique axis (0.62 rad; 0.21
+    # kg, 0.04 m).
     off = np.linalg.norm(ours[:, 7:10] - turned["com"], axis=1)
     angle = {
         n: np.abs(coordinates[f"q_{n}_r"]) + np.abs(coordinates[f"q_{n}_l"]) for n in ("subtalar_angle", "mtp_angle")
     }
     may = 5.1 * knee_slide(walk) + 1.42 * 0.072 * angle["subtalar_angle"] + 0.21 * 0.04 * 0.62 * angle["mtp_angle"]
     assert np.all(off <= may / 72.6 + 1e-6)
-    # The sliding knee, cm/s on a leg that swings at m/s, costs energy and momenta more: a check of signs and of the tree, not
-    # of inertias; those follow segment by segment below.
+    # The sliding knee, cm/s on a leg that swings at m/s, costs energy and momenta more: a check of signs and of the
+    # tree, not of inertias; those follow segment by segment below.
     assert np.sqrt(np.mean((ours[:, 0] - whole["KE"]) ** 2)) < 0.05 * whole["KE"].mean()
     for columns, key in ((slice(1, 4), "p"), (slice(4, 7), "Lcom")):
         size = np.sqrt(np.mean(np.sum(turned[key] ** 2, axis=1)))
