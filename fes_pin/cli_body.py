@@ -38,11 +38,13 @@ def _said_in_one_line(command: Callable) -> Callable:
     return run
 
 
-def _linear(subject: tuple, segments: Path | None, urdf: Path | None, posture: str, slope, braces: list[str] | None):
+def _linear(subject: tuple, segments: Path | None, urdf: Path | None, *where):
+    """The linearized body of the common options: `where` is posture, slope and braces."""
     from fes_pin.body.build import Body  # noqa: PLC0415
     from fes_pin.body.linearize import linearize  # noqa: PLC0415
     from fes_pin.body.minimal_sets import ORTHOSES  # noqa: PLC0415
 
+    posture, slope, braces = where
     if segments is not None and urdf is not None:
         raise InputError("give a table of segments or a URDF, not both")
     if urdf is not None:
@@ -58,7 +60,7 @@ def _linear(subject: tuple, segments: Path | None, urdf: Path | None, posture: s
 
 @app.command()
 @_said_in_one_line
-def modes(
+def modes(  # noqa: PLR0917
     posture: Posture = "mid_stance",
     mass: Mass = 72.6,
     height: Height = 1.80,
@@ -76,7 +78,7 @@ def modes(
 
 @app.command()
 @_said_in_one_line
-def nerves(
+def nerves(  # noqa: PLR0917
     name: Annotated[list[str] | None, typer.Argument(help="nerves to use; all of the table if none is named")] = None,
     posture: Posture = "mid_stance",
     mass: Mass = 72.6,
@@ -112,12 +114,14 @@ def nerves(
     if fewest:
         found = minimal_sets(linear, chosen, lean_deg=lean, alternatives=3)
         typer.echo(f"\nFewest nerves that hold the posture and a lean of {lean:g} degrees in every fall:")
-        typer.echo("\n".join(map(str, found)) or "none of these nerves' sets does; brace more joints (--brace corset ...)")
+        typer.echo(
+            "\n".join(map(str, found)) or "none of these nerves' sets does; brace more joints (--brace corset ...)"
+        )
 
 
 @app.command()
 @_said_in_one_line
-def view(
+def view(  # noqa: PLR0917
     out: Annotated[Path, typer.Argument(help="HTML page to write")],
     posture: Posture = "mid_stance",
     mass: Mass = 72.6,
@@ -166,10 +170,11 @@ def _walking(body, path: Path):
 
     try:
         table = np.genfromtxt(path, delimiter=",", names=True)
-        time = table["time"] if "time" in table.dtype.names else table["time_s"]
+        columns = {name: table[name] for name in table.dtype.names or ()}
+        time = table["time"] if "time" in columns else table["time_s"]
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"cannot be read as coordinates: {str(error).splitlines()[0]}", file=path) from None
-    postures = postures_of_walk({name: table[name] for name in table.dtype.names}, body.stance)
+    postures = postures_of_walk(columns, body.stance)
     order = [JOINT_NAMES.index(name) for name in body.joint_names]
     rate = int(np.clip(round(1.0 / float(np.median(np.diff(time)))), 1, 120))
     return show_walk(body, postures[:, order], fps=rate, caption=f"{path.name}, standing on the {body.stance} foot")

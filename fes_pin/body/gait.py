@@ -83,8 +83,8 @@ def ankle_rotation(side: str, dorsiflexion: np.ndarray, inversion: np.ndarray, r
 def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_foot: bool = True) -> np.ndarray:
     """Measured OpenSim coordinates as postures of our body: (N, 19) rad, in the order of `JOINT_NAMES`.
 
-    Hips, knees, MTP and lumbar angles are the measured ones. (OpenSim's torso frame leans some 9 degrees against the line
-    from hips to shoulders in this recording: a lumbar extension of -19 degrees is nearly upright walking.) OpenSim's
+    Hips, knees, MTP and lumbar angles are the measured ones. (OpenSim's torso frame leans some 9 degrees against the
+    line from hips to shoulders in this recording: a lumbar extension of -19 degrees is nearly upright.) OpenSim's
     oblique ankle and subtalar axes become the three angles of our ball of an ankle with the same rotation. Our stance
     forefoot lies flat on the ground, the measured one nearly so: with `flat_foot` the stance ankle takes up the
     difference, so that shank, pelvis and trunk stand in space as measured.

@@ -266,14 +266,13 @@ def linearize_batch(
     if A.shape != (size, n, n) or B.shape != (size, n, n) or C.shape != (size, n):
         raise InputError(f"`out` must have the shapes ({size}, {n}, {n}), ({size}, {n}, {n}), ({size}, {n})")
     data = model.createData()
-    inertia, gravity = data.M.T.reshape(-1), data.g  # views of what Pinocchio writes
+    inertia, gravity = data.M, data.g  # views of what Pinocchio writes
     crba, stiffness = pin.crba, pin.computeGeneralizedGravityDerivatives
-    rows_A, rows_B = A.reshape(size, n * n), B.reshape(size, n * n)
-    for posture, row_A, row_B, row_C in zip(q, rows_A, rows_B, C, strict=True):
+    for posture, a, b, c in zip(q, A.transpose(0, 2, 1), B.transpose(0, 2, 1), C, strict=True):
         crba(model, data, posture)
-        row_A[:] = inertia
-        row_B[:] = stiffness(model, data, posture).ravel("K")
-        row_C[:] = gravity
+        a[...] = inertia  # both symmetric, and laid out as Pinocchio's
+        b[...] = stiffness(model, data, posture)
+        c[...] = gravity
     return A, B, C
 
 

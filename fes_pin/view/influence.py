@@ -58,7 +58,7 @@ def plot_influence(result: Controllability, path: str | Path, on: str = "joints"
     figure = Figure(figsize=(3.6 + 0.34 * values.shape[1] + 0.05 * max(map(len, rows)), 2.4 + 0.27 * len(rows)))
     axes = figure.subplots()
     top = np.abs(values).max(initial=1.0)
-    image = axes.imshow(values, cmap="RdBu_r", norm=SymLogNorm(1.0, vmin=-top, vmax=top), aspect="auto")
+    image = axes.imshow(values, cmap="RdBu_r", norm=SymLogNorm(1e-3 * top, vmin=-top, vmax=top), aspect="auto")
     axes.set_xticks(range(values.shape[1]), result.inputs.names, rotation=60, ha="right", fontsize=8)
     axes.set_yticks(range(len(rows)), rows, fontsize=8)
     axes.set_title(f"What each input does to each of the {on}, at first", fontsize=10)

@@ -1,13 +1,14 @@
 """The body to look at: poses, gait, modes in motion, and what a nerve turns, as one HTML page that needs no server.
 
-Pages hold meshcat's own viewer and the drawing commands; they open in any browser, without a network. With `#t=0.4` at the
-end of its address a page stands still at that many seconds.
+Pages hold meshcat's own viewer and the drawing commands; they open in any browser, without a network. With `#t=0.4` at
+the end of its address a page stands still at that many seconds.
 """
 
 from __future__ import annotations
 
 import base64
 import html
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -71,6 +72,8 @@ class Scene:
     def commands(self) -> list[bytes]:
         """meshcat's drawing commands, packed."""
         import umsgpack  # noqa: PLC0415
+
+        _import_meshcat()
         from meshcat.animation import Animation  # noqa: PLC0415
         from meshcat.commands import SetAnimation, SetObject, SetProperty, SetTransform  # noqa: PLC0415
         from meshcat.geometry import Box, MeshLambertMaterial, Sphere  # noqa: PLC0415
@@ -117,9 +120,7 @@ class Scene:
 
     def html(self) -> str:
         """The page."""
-        import meshcat  # noqa: PLC0415
-
-        script = (Path(meshcat.__file__).parent / "viewer/dist/main.min.js").read_text()
+        script = (Path(_import_meshcat().__file__).parent / "viewer/dist/main.min.js").read_text()
         packed = ",\n".join(f'"{base64.b64encode(command).decode()}"' for command in self.commands())
         return _PAGE.format(script=script, commands=packed, caption=html.escape(self.caption))
 
@@ -195,6 +196,14 @@ def _moved(translation: Sequence[float] | np.ndarray) -> np.ndarray:
     matrix = np.eye(4)
     matrix[:3, 3] = translation
     return matrix
+
+
+def _import_meshcat():
+    """meshcat, without the warning that its import of an old pyzmq module raises (its server is not used here)."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        import meshcat  # noqa: PLC0415
+    return meshcat
 
 
 def _meshcat_geometry(shape):

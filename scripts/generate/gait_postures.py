@@ -70,11 +70,11 @@ def table(walk: Path) -> str:
     postures = np.degrees(postures_of_walk({n: coordinates[n] for n in coordinates.dtype.names}, "right"))
     lines = [
         "# Named postures of a walk, on the right forefoot; degrees, rounded to 0.1; time_s in the recording.",
-        "# Measured: treadmill walking of one adult, 72.6 kg, 1.135 m/s (opensim-org/opensim-models, Gait2354_Simbody,",
-        "# CC BY 3.0: Delp, Loan, Hoy, Zajac, Topp, Rosen, Thelen, Anderson, Seth); inverse kinematics of OpenSim 4.6,",
-        "# MTP joints free. Instants: the right foot's load passes 20 N; middle of the first double support; left ankle",
+        "# Measured: treadmill walking of one adult, 72.6 kg, 1.135 m/s (opensim-org/opensim-models: Gait2354_Simbody;",
+        "# CC BY 3.0: Delp, Loan, Hoy, Zajac, Topp, Rosen, Thelen, Anderson, Seth); inverse kinematics by OpenSim 4.6,",
+        "# MTP joints free. Instants: the right foot's load passes 20 N; middle of first double support; left ankle",
         "# passes the right; left shank vertical; halfway from passing to left contact; middle of the second double",
-        "# support. The stance ankle is set so that the forefoot lies flat and the rest stands in space as measured.",
+        "# support. The stance ankle is set so that the forefoot lies flat, the rest stands in space as measured.",
         "# Made by scripts/generate/gait_postures.py.",
         ",".join(["posture", "time_s", *JOINT_NAMES]),
     ]
