@@ -97,6 +97,7 @@ def nerves(  # noqa: PLR0917
     """Which nerves control which modes, what they can hold, and the fewest that do."""
     from fes_pin.body.attainable import attainable  # noqa: PLC0415
     from fes_pin.body.controllability import controllability  # noqa: PLC0415
+    from fes_pin.body.inputs import Inputs  # noqa: PLC0415
     from fes_pin.body.minimal_sets import minimal_sets  # noqa: PLC0415
     from fes_pin.stimulate.nerves import Nerves  # noqa: PLC0415
 
@@ -105,7 +106,13 @@ def nerves(  # noqa: PLR0917
     chosen = Nerves.of_subject(body.mass_kg, body.height_m or height, tuple(name or ()))
     result = controllability(linear, chosen, horizon)
     typer.echo(f"{linear}\n\n{result}\n")
-    typer.echo(f"Strengths are known to a factor of 1.8; at nominal strength {attainable(linear, chosen)}")
+    weak, strong = (
+        attainable(linear, Inputs.of(chosen, linear).scaled(f)).least_lean_deg for f in chosen.strength_band
+    )
+    typer.echo(f"With these nerves {attainable(linear, chosen)}")
+    typer.echo(
+        f"Strengths are known to a factor of 1.8: the least of these leans is {weak:.1f} to {strong:.1f} degrees."
+    )
     if map_to is not None:
         from fes_pin.view.influence import plot_influence  # noqa: PLC0415
 
