@@ -41,8 +41,8 @@ for label, values in rows.items():
     print(f"{label:26s} ankle {per_percent:+6.2f} N m for each percent; slowest fall's rate +-{spread:.1f} %")
 square = np.gradient(rows["square to the ground"][:, 0], 100 * grades)[flat]
 print(
-    f"\nA slope changes what must be held (C), not how the body falls (A, B): {abs(square):.1f} N m at the ankle for each "
-    "percent\nif the body leans with the ground, nothing if the ankle turns with it."
+    f"\nA slope changes what must be held (C), not how the body falls (A, B): {abs(square):.1f} N m at the ankle "
+    "for each percent\nif the body leans with the ground, nothing if the ankle turns with it."
 )
 
 # %% Picture
@@ -56,7 +56,7 @@ left.set(
 )
 left.legend(fontsize=7)
 right.set(xlabel="grade, %", ylabel="rate of the slowest fall, 1/s", title="How it falls (A⁻¹B)")
-right.set_ylim(0, None)
+right.set_ylim(0, 4)
 right.legend(fontsize=7)
 figure.tight_layout()
 Path("out").mkdir(exist_ok=True)

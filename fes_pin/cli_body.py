@@ -70,10 +70,16 @@ def modes(  # noqa: PLR0917
     urdf: Urdf = None,
     slope: Slope = (0.0, 0.0),
     brace: Brace = None,
+    goniometers: Annotated[bool, typer.Option("--goniometers", help="also the fewest that see every fall")] = False,
 ) -> None:
     """How the body falls and swings at a posture: the eigenpairs of A^-1 B."""
     linear = _linear((mass, height, sex, stance), segments, urdf, posture, slope, brace)
     typer.echo(f"{linear}\n\n{linear.modes()}")
+    if goniometers:
+        from fes_pin.body.observability import fewest_goniometers  # noqa: PLC0415
+
+        best = fewest_goniometers(linear)
+        typer.echo(f"\nFewest goniometers that see every fall ({len(best)} such sets; the best):\n{best[0]}")
 
 
 @app.command()
@@ -90,6 +96,7 @@ def nerves(  # noqa: PLR0917
     slope: Slope = (0.0, 0.0),
     brace: Brace = None,
     horizon: Annotated[float, typer.Option(help="time allowed to bring a mode back, s")] = 0.3,
+    influence: Annotated[str | None, typer.Option(help="table of influence on `joints` or `modes`")] = None,
     map_to: Annotated[Path | None, typer.Option("--map", help="heat map of influence: image file")] = None,
     fewest: Annotated[bool, typer.Option("--fewest", help="search the fewest nerves (with the braces given)")] = False,
     lean: Annotated[float, typer.Option(help="lean that the fewest nerves must hold, degrees")] = 1.0,
@@ -99,11 +106,11 @@ def nerves(  # noqa: PLR0917
     from fes_pin.body.controllability import controllability  # noqa: PLC0415
     from fes_pin.body.inputs import Inputs  # noqa: PLC0415
     from fes_pin.body.minimal_sets import minimal_sets  # noqa: PLC0415
-    from fes_pin.stimulate.nerves import Nerves  # noqa: PLC0415
+    from fes_pin.stimulate.nerve_inputs import subject_nerves  # noqa: PLC0415
+    from fes_pin.view.influence import influence_table, plot_influence  # noqa: PLC0415
 
     linear = _linear((mass, height, sex, stance), segments, urdf, posture, slope, brace)
-    body = linear.body
-    chosen = Nerves.of_subject(body.mass_kg, body.height_m or height, tuple(name or ()))
+    chosen = subject_nerves(linear.body, name or ())
     result = controllability(linear, chosen, horizon)
     typer.echo(f"{linear}\n\n{result}\n")
     weak, strong = (
@@ -113,9 +120,9 @@ def nerves(  # noqa: PLR0917
     typer.echo(
         f"Strengths are known to a factor of 1.8: the least of these leans is {weak:.1f} to {strong:.1f} degrees."
     )
+    if influence is not None:
+        typer.echo(f"\n{influence_table(result, influence)}")
     if map_to is not None:
-        from fes_pin.view.influence import plot_influence  # noqa: PLC0415
-
         plot_influence(result, map_to)
         typer.echo(f"wrote {map_to}")
     if fewest:
@@ -144,7 +151,7 @@ def view(  # noqa: PLR0917
     walk: Annotated[Path | None, typer.Option(help="play OpenSim coordinates (CSV with q_<coordinate>, rad)")] = None,
 ) -> None:
     """A page with the body: a posture, a mode in motion, a nerve's influence, or measured walking."""
-    from fes_pin.stimulate.nerves import Nerves  # noqa: PLC0415
+    from fes_pin.stimulate.nerve_inputs import subject_nerves  # noqa: PLC0415
     from fes_pin.view.viewer import Scene, show_influence, show_mode  # noqa: PLC0415
 
     if sum(choice is not None for choice in (mode, nerve, walk)) > 1:
@@ -156,7 +163,7 @@ def view(  # noqa: PLR0917
             raise InputError(f"must be between 1 and {len(found)}, got {mode}", column="--mode")
         scene = show_mode(linear, found[mode - 1])
     elif nerve is not None:
-        scene = show_influence(linear, Nerves((nerve,)), nerve)
+        scene = show_influence(linear, subject_nerves(linear.body, [nerve]), nerve)
     elif walk is not None:
         scene = _walking(linear.body, walk)
     else:

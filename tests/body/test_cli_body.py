@@ -37,6 +37,13 @@ def test_nerves_with_braces_and_the_fewest(tmp_path):
     assert "brace more joints" in nobody.output
 
 
+def test_goniometers_and_influence():
+    assert "goniometers: " in run("modes", "--goniometers").output
+    output = run("nerves", "femoral", "--influence", "joints").output
+    assert "1 left_femoral, 2 right_femoral" in output
+    assert run("nerves", "femoral", "--influence", "bones").exit_code == 2
+
+
 def test_view_writes_pages(tmp_path):
     for arguments in ((), ("--mode", "3"), ("--nerve", "right_tibial")):
         page = tmp_path / "page.html"
