@@ -178,7 +178,7 @@ def view(  # noqa: PLR0917
 def _walking(body, path: Path):
     import numpy as np  # noqa: PLC0415
 
-    from fes_pin.body.gait import postures_of_walk  # noqa: PLC0415
+    from fes_pin.body.gait import pelvis_turns, postures_of_walk  # noqa: PLC0415
     from fes_pin.body.joints import JOINT_NAMES  # noqa: PLC0415
     from fes_pin.view.viewer import show_walk  # noqa: PLC0415
 
@@ -188,7 +188,7 @@ def _walking(body, path: Path):
         time = table["time"] if "time" in columns else table["time_s"]
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"cannot be read as coordinates: {str(error).splitlines()[0]}", file=path) from None
-    postures = postures_of_walk(columns, body.stance)
+    postures = postures_of_walk(columns, body.stance, flat_foot=False)
     order = [JOINT_NAMES.index(name) for name in body.joint_names]
     rate = int(np.clip(round(1.0 / float(np.median(np.diff(time)))), 1, 120))
-    return show_walk(body, postures[:, order], fps=rate, caption=f"{path.name}, standing on the {body.stance} foot")
+    return show_walk(body, postures[:, order], rate, f"{path.name} ({body.label})", pelvis_turns(columns))

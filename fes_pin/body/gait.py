@@ -134,15 +134,33 @@ def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_fo
     return np.stack([angles[name] for name in JOINT_NAMES], axis=1)
 
 
+def pelvis_turns(coordinates: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Orientation of the measured pelvis in the world: (N, 3, 3).
+
+    Parameters
+    ----------
+    coordinates
+        `q_pelvis_tilt`, `q_pelvis_list` and `q_pelvis_rotation`, rad, (N,).
+
+    Raises
+    ------
+    InputError
+        One of them is missing.
+    """
+    forward, left, up = np.eye(3)
+    turns = []
+    for name, axis in (("tilt", -left), ("list", forward), ("rotation", up)):
+        if f"q_pelvis_{name}" not in coordinates:
+            raise InputError("the coordinate is missing", column=f"q_pelvis_{name}")
+        turns.append(_turn(axis, np.asarray(coordinates[f"q_pelvis_{name}"], dtype=float)))
+    return turns[0] @ turns[1] @ turns[2]
+
+
 def _flat_ankle(angles: Mapping[str, np.ndarray], measured, side: str, foot: np.ndarray) -> np.ndarray:
     """Rotation shank -> hindfoot that keeps the shank upright as measured, and the foot's heading, forefoot flat."""
     forward, left, up = np.eye(3)
     sign = 1.0 if side == "right" else -1.0
-    pelvis = (
-        _turn(-left, measured("pelvis_tilt"))
-        @ _turn(forward, measured("pelvis_list"))
-        @ _turn(up, measured("pelvis_rotation"))
-    )
+    pelvis = pelvis_turns({f"q_pelvis_{n}": measured(f"pelvis_{n}") for n in ("tilt", "list", "rotation")})
     shank = (
         pelvis
         @ _turn(-left, angles[f"{side}_hip_flexion"])

@@ -45,7 +45,7 @@ def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> Control
     linear
         From `linearize`.
     inputs
-        Names of nerves (`left_femoral`, or `femoral` for both sides), of joints with a motor each, `Nerves` or `Inputs`.
+        Names of nerves (`left_femoral`, or `femoral` for both sides), of joints with a motor, `Nerves` or `Inputs`.
     horizon
         Time allowed to bring a mode back, s.
 

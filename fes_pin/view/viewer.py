@@ -48,6 +48,7 @@ class Scene:
     caption: str = ""
     fps: int = FRAMES_A_SECOND
     frames: list[np.ndarray] = field(default_factory=list)
+    roots: list[pin.SE3] = field(default_factory=list)
     balls: list[tuple[np.ndarray, float, int]] = field(default_factory=list)
 
     def pose(self, posture) -> Scene:
@@ -67,6 +68,19 @@ class Scene:
         if postures.ndim != 2 or postures.shape[1] != self.body.model.nq or not len(postures):
             raise InputError(f"frames must be of shape (T, {self.body.model.nq}), got {postures.shape}")
         self.frames = list(postures)
+        return self
+
+    def carry(self, roots: Sequence[pin.SE3]) -> Scene:
+        """Move the whole body, frame by frame, as a walk does that takes the foot off the ground.
+
+        Raises
+        ------
+        InputError
+            Not one placement a frame.
+        """
+        if len(roots) != len(self.frames):
+            raise InputError(f"{len(self.frames)} frames need as many placements, got {len(roots)}")
+        self.roots = list(roots)
         return self
 
     def commands(self) -> list[bytes]:
@@ -106,13 +120,14 @@ class Scene:
             pin.updateGeometryPlacements(self.body.model, data, shapes, geometry_data, q)
             for k, shape in enumerate(shapes.geometryObjects):
                 _, turn = _meshcat_geometry(shape.geometry)
-                matrix = geometry_data.oMg[k].homogeneous.copy()
+                place = geometry_data.oMg[k]
+                matrix = (self.roots[t] * place if self.roots else place).homogeneous.copy()
                 matrix[:3, :3] = matrix[:3, :3] @ turn
-                place = Place(("meshcat", "body", str(k)))
+                path = Place(("meshcat", "body", str(k)))
                 if t == 0:
-                    out.append(SetTransform(matrix, place))
+                    out.append(SetTransform(matrix, path))
                 if len(self.frames) > 1:
-                    _key(animation, place, t, matrix)
+                    _key(animation, path, t, matrix)
         out += [SetTransform(_moved(c), Place(("meshcat", "ball", str(k)))) for k, (c, _, _) in enumerate(self.balls)]
         if len(self.frames) > 1:
             out.append(SetAnimation(animation, play=True, repetitions=1_000_000))
@@ -144,9 +159,61 @@ def show_mode(linear: LinearBody, mode: Mode) -> Scene:
     return Scene(body, caption=mode.name).play(q + phases[:, None] * shape)
 
 
-def show_walk(body: Body, postures: np.ndarray, fps: int = FRAMES_A_SECOND, caption: str = "Walking") -> Scene:
-    """Gait: postures (T, 19) in the order of `body.joint_names`."""
-    return Scene(body, caption=caption, fps=fps).play(postures)
+def show_walk(
+    body: Body,
+    postures: np.ndarray,
+    fps: int = FRAMES_A_SECOND,
+    caption: str = "Walking",
+    pelvis: np.ndarray | None = None,
+) -> Scene:
+    """Gait playback.
+
+    Parameters
+    ----------
+    body
+        The body.
+    postures
+        Joint angles, (T, 19) rad, in the order of `body.joint_names`.
+    fps
+        Postures a second.
+    caption
+        Text on the page.
+    pelvis
+        Orientation of the pelvis in the world, (T, 3, 3). With it the body walks on the spot, either foot on the
+        ground: it is turned as measured and put down on its lowest foot, hips above the middle of the floor. Without it
+        the stance foot stays where it is.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit.
+    """
+    scene = Scene(body, caption=caption, fps=fps).play(postures)
+    if pelvis is None:
+        return scene
+    if np.shape(pelvis) != (len(scene.frames), 3, 3):
+        raise InputError(f"the pelvis needs shape ({len(scene.frames)}, 3, 3), got {np.shape(pelvis)}")
+    shapes = pin.buildGeomFromUrdfString(body.model, body.urdf, pin.GeometryType.VISUAL)
+    return scene.carry([_put_down(body, shapes, q, turn) for q, turn in zip(scene.frames, pelvis, strict=True)])
+
+
+def _put_down(body: Body, shapes: pin.GeometryModel, q: np.ndarray, turn: np.ndarray) -> pin.SE3:
+    """Where the stance foot's ground must go: the pelvis is turned as given, the lowest sole touches the floor."""
+    data = body.model.createData()
+    pin.framesForwardKinematics(body.model, data, q)
+    pelvis = data.oMf[body.model.getFrameId("pelvis")]
+    other = data.oMi[body.model.getJointId("left_hip_flexion" if body.stance == "right" else "right_hip_flexion")]
+    rotation = turn @ pelvis.rotation.T
+    middle = rotation @ (0.5 * (pelvis.translation + other.translation))
+    placed = shapes.createData()
+    pin.updateGeometryPlacements(body.model, data, shapes, placed, q)
+    lowest = np.inf
+    for k, shape in enumerate(shapes.geometryObjects):
+        if "foot" in shape.name and hasattr(shape.geometry, "halfSide"):
+            corners = shape.geometry.halfSide * np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
+            points = placed.oMg[k].rotation @ corners.T + placed.oMg[k].translation[:, None]
+            lowest = min(lowest, float((rotation @ points)[2].min()))
+    return pin.SE3(rotation, np.array([-middle[0], -middle[1], -lowest if np.isfinite(lowest) else 0.0]))
 
 
 def show_influence(linear: LinearBody, inputs, name: str) -> Scene:

@@ -99,6 +99,21 @@ def test_walking_has_a_frame_a_posture(body):
         show_walk(body, np.zeros((5, 18)))
 
 
+def test_a_walk_on_the_spot_puts_a_foot_on_the_ground(body):
+    """With the pelvis upright and level, the straight body stands on its sole; with it pitched, on toe or heel."""
+    import pinocchio as pin
+
+    frames = np.zeros((2, 19))
+    tilted = pin.exp3(np.array([0.0, 0.3, 0.0]))
+    scene = show_walk(body, frames, pelvis=np.array([np.eye(3), tilted]))
+    level, pitched = scene.roots
+    assert level.translation[2] == pytest.approx(0.0, abs=1e-5)
+    assert np.allclose(pitched.rotation, tilted)
+    assert pitched.translation[2] > 0.02
+    with pytest.raises(InputError, match="pelvis"):
+        show_walk(body, frames, pelvis=np.eye(3))
+
+
 def test_heat_map_and_table(body, tmp_path):
     from matplotlib import image
 
