@@ -51,6 +51,15 @@ print(f"of their size at most; rates of falling change by up to {100 * drift:.0f
 print(f"Over the whole step, double support too, it misses by up to {100 * everywhere:.0f} %.")
 print(f"The paper's claim of one linear model {'holds' if worst < 0.1 else 'does not hold'} for single support.")
 
+# %% Does the foot's division matter, as the paper says? Lock the toe joints.
+TOES = ("left_mtp_extension", "right_mtp_extension")
+for name in ("mid_stance", "pre_swing"):
+    whole_foot = linearize(body, name).brace(TOES).modes()
+    split = linearize(body, name).modes()
+    torque = linearize(body, name).holding_torque[TOES[1]]
+    print(f"{name}: {len(split.falling)} falls with toe joints, {len(whole_foot.falling)} without them;", end=" ")
+    print(f"the stance toe joint carries {torque:+.0f} N m if that foot carries all")
+
 # %% Picture
 figure, (top, bottom) = plt.subplots(2, 1, figsize=(7.5, 7), sharex=True)
 for k, m in enumerate(modes):

@@ -78,6 +78,8 @@ class Controllability:
 
     def __str__(self) -> str:
         out = [f"{self.inputs.n} inputs, horizon {self.horizon:g} s: " + ", ".join(self.inputs.names)]
+        if not self.linear.conservative:
+            out.append("(of the modes without damping and rates: see pbh)")
         out.append(f"{'mode':70s} PBH  both ways  energy of 1 deg  strongest input")
         for i, mode in enumerate(self.modes):
             strongest = self.inputs.names[int(np.abs(self.mode_influence[i]).argmax())] if self.inputs.n else "-"
