@@ -6,9 +6,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from fes_pin.diagnose.diagnosis import Diagnosis
 
 app = typer.Typer(
     help="Functional electrical stimulation on Pinocchio: what a simulation gets wrong, and its cause by name.",
@@ -88,7 +91,7 @@ def _settings(pairs: list[str]) -> tuple[str | None, dict[str, float]]:
     return kind, numbers
 
 
-def _print_verdict(diagnosis: object) -> None:
+def _print_verdict(diagnosis: Diagnosis) -> None:
     from rich import box  # noqa: PLC0415
     from rich.console import Console  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
@@ -97,15 +100,15 @@ def _print_verdict(diagnosis: object) -> None:
     from fes_pin.diagnose.text import cause_row, footnotes, headline  # noqa: PLC0415
 
     console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=not sys.stdout.isatty(), highlight=False)
-    console.print(Text(f"{diagnosis.study.name}: {headline(diagnosis)}", style="bold"))  # type: ignore[attr-defined]
-    if diagnosis.causes:  # type: ignore[attr-defined]
+    console.print(Text(f"{diagnosis.study.name}: {headline(diagnosis)}", style="bold"))
+    if diagnosis.causes:
         table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
         for title in ("cause", "stage", "parameters", "held-out gain", "cannot be told from"):
             table.add_column(title)
-        for cause in diagnosis.causes:  # type: ignore[attr-defined]
+        for cause in diagnosis.causes:
             table.add_row(*(Text(cell) for cell in cause_row(cause)))
         console.print(table)
-    for note in footnotes(diagnosis):  # type: ignore[arg-type]
+    for note in footnotes(diagnosis):
         console.print(Text(note))
 
 

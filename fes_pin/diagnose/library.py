@@ -90,7 +90,7 @@ class Library:
 def _near_null(effect: type[Effect], name: str) -> float:
     info = effect.parameters()[name]
     assert info.null is not None
-    one_sided = info.lower == info.null or info.upper == info.null
+    one_sided = info.null in {info.lower, info.upper}
     return info.null + (TINY * info.scale if one_sided else 0.0)
 
 

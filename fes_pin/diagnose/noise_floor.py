@@ -29,7 +29,8 @@ def rich_noise(fitted: Fit, white: dict[str, Noise], columns: Sequence[np.ndarra
     explain = [np.concatenate([p.jacobian for p in parts]), *columns, _local_columns(parts)]
     basis = _span(np.concatenate([c for c in explain if c.shape[1]], axis=1))
     left = residual - basis @ (basis.T @ residual)
-    at, channels = 0, {}
+    at = 0
+    channels: dict[str, list[np.ndarray]] = {}
     for trial in fitted.trials:
         for name in fitted.model.rig.outputs(trial.kind):
             if name in trial.columns and name in white:

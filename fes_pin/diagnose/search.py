@@ -167,9 +167,12 @@ class Search:
         return searched if complete or not best else self._for_prediction(searched)
 
     def _for_prediction(self, searched: Searched) -> Searched:
-        """Fit for least open-loop error where the best set leaves more than noise: what is left is no noise to whiten."""
+        """Fit for least open-loop error: what the best set leaves is more than noise, and not to be whitened."""
         self.noise = whiteless(noise_of(searched.best))
-        again = lambda f: self.fit_from([f.model], f.unknowns)  # noqa: E731
+
+        def again(fitted: Fit) -> Fit:
+            return self.fit_from([fitted.model], fitted.unknowns)
+
         nominal, best = again(searched.nominal), again(searched.best)
         without = {n: again(f) for n, f in searched.without.items()}
         rivals = {n: in_parallel(again, fits) for n, fits in searched.rivals.items()}

@@ -10,16 +10,16 @@ import numpy as np
 import scipy.linalg
 
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
-"""Orders tried. Sensor noise is whitened by a few; random torque under white sensor noise is slow and needs 24 to 48: on
-the ankle, order 12 leaves 2.2 times too much power below 0.5 Hz, order 24 none, and a test would take it for a cause."""
+"""Orders tried. Sensor noise is whitened by a few; random torque under white sensor noise is slow and needs 24 to 48:
+on the ankle, order 12 leaves 2.2 times too much power below 0.5 Hz, order 24 none; a test would take it for a cause."""
 
 
 COEFFICIENT_PRICE = 4.0
 """Twice the log-likelihood that one more coefficient must earn: two standard deviations; Akaike's 2 keeps too many."""
 
 WHITE_SHARE = 0.003
-"""Share of the residual's variance that is taken for white on top of it. It keeps a filter from becoming a resonator that
-swallows what a model gets wrong: the range of its spectrum is held to about 300. Slow noise is weighed as before."""
+"""Share of the residual's variance that is taken for white on top of it. It keeps a filter from becoming a resonator
+that swallows what a model gets wrong: the range of its spectrum stays within about 300. Slow noise weighs as before."""
 
 
 @dataclass(frozen=True)

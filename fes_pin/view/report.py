@@ -2,4 +2,9 @@
 
 
 def report_html(d):
+    """Stub."""
+    return "<html></html>"
+
+
+def _(d):
     return "<html></html>"

@@ -20,8 +20,8 @@ class PeriodicTorque(Effect):
         torque + in_phase sin(2 pi f t) + quadrature cos(2 pi f t)
 
     Tell-tale: the rest angle sways in time with nothing that was commanded.
-    Source: a Fourier component at the breathing rate: at rest 12 to 20 a minute in people, 10 to 35 in dogs, and up to 0.8 Hz; the phase is that of the
-    trial's first sample.
+    Source: a Fourier component at the breathing rate: at rest 12 to 20 a minute in people, 10 to 35 in dogs, and up
+    to 0.8 Hz; the phase is that of the trial's first sample.
     """
 
     in_phase: float = parameter(0.01, unit="N m", null=0.0, lower=-100.0, upper=100.0, scale=0.005)
