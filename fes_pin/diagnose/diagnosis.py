@@ -17,6 +17,7 @@ from fes_pin.diagnose.open_set import Remainder, remainder
 from fes_pin.diagnose.search import PARAMETER_PRICE, Search, Searched
 from fes_pin.diagnose.workers import one_thread_each
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.noise import noise_step, thin, thinning
 from fes_pin.models.effects import effect
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -140,12 +141,26 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
 
 
 def split(study: Study) -> tuple[list[Trial], list[Trial]]:
-    """Trials to fit and trials that the study holds out."""
+    """Trials to fit and trials that the study holds out.
+
+    Free motion is fitted at the rate that its noise is modelled at: without an input there is nothing faster to follow.
+    """
     test = [t for t in study.trials if t.role == "held_out"]
-    train = [t for t in study.trials if t.role != "held_out"]
+    train = [
+        t if {"pulse_width_us", "stim", "effort"} & set(t.columns) else thinned(t)
+        for t in study.trials
+        if t.role != "held_out"
+    ]
     if not train:
         raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)
     return train, test
+
+
+def thinned(trial: Trial) -> Trial:
+    """Means of samples in a row, at the time step that noise is modelled at."""
+    count = thinning(trial.dt, noise_step([trial.dt]))
+    columns = {n: thin(values, count) for n, values in trial.columns.items()}
+    return Trial(trial.name, trial.kind, columns, thin(trial.time, count), trial.conditions, trial.role)
 
 
 def _judge(study: Study, searched: Searched, test: Sequence[Trial], seed: int) -> Diagnosis:

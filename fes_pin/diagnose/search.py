@@ -30,6 +30,8 @@ FORM_SHARE = 0.02
 an error of 14 % in its form leaves 2 % of its likelihood to whatever else comes near."""
 HOPE_LEVEL = 0.1
 """A round of joint fits is left out only if neither a linear promise nor smooth features reach this level."""
+PROMISING = 25.0
+"""Linear promise of a further cause, in twice the log-likelihood, that keeps a set from being complete: 5 sigma."""
 REFINE_LEVEL = 1e-3
 """Level at which a refinement of an effect's form is adopted."""
 MOST_CAUSES = 3
@@ -179,8 +181,14 @@ class Search:
         return replace(searched, nominal=nominal, best=best, without=without, rivals=rivals)
 
     def _complete(self, names: Names) -> bool:
-        """True if a set leaves only noise, as far as its own noise can tell."""
-        fitted = self.fits[names]
+        """True if a set leaves only noise: no further cause promises anything, and neither do smooth features.
+
+        The promise is judged by the present noise; noise learned from the set itself can swallow a slow cause.
+        """
+        fitted, none = self.fits[names], self.fits[()]
+        promise = max(s.gain for s in self.scores(fitted).scored)
+        if promise > max(PROMISING, FORM_SHARE * (none.sse - fitted.sse)):
+            return False
         own = fit_problem(Problem(fitted.model, self.trials, noise_of(fitted)), fitted.values, fitted.unknowns)
         return not remainder(own, self.seed).unexplained
 
