@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate.allocation import Allocation, AllocationSequence
-from fes_pin.stimulate.box import BoxProgram, solve_sequence
+from fes_pin.stimulate.box import BoxProgram, by_daqp, solve_sequence
 from fes_pin.stimulate.certificate import Certifier, residuals, slopes
 from fes_pin.stimulate.efforts import error_then_effort, least_cubes
 from fes_pin.stimulate.muscles import JOINTS
@@ -218,7 +218,7 @@ class Allocator:
         note = ""
         if not self.program.solve(f):
             note = "pivoting gave up, DAQP answered"
-            self.program.r[:] = self.ask("daqp", f, lower, upper)
+            self.program.r[:] = by_daqp(self.H, f, lower, upper)
         return self.result(self.program.r.copy(), wanted, lower, upper, before, note=note)
 
     def limits(self, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -299,7 +299,7 @@ class Allocator:
             raise InputError("least recruitments, cubes and lexicographic are allocated one torque at a time")
         start = np.zeros(self.n) if previous is None else by_name(previous, self.names, "previous recruitment", 0.0)
         F = wanted @ self._from_torque
-        r, _, failed, _, _ = solve_sequence(
+        r = solve_sequence(
             self.H,
             F,
             self.lower,
@@ -308,9 +308,6 @@ class Allocator:
             rate=self.rate,
             previous=start,
         )
-        for k in np.flatnonzero(failed):
-            before = r[k - 1] if k else start
-            r[k] = self(wanted[k], before, solver="daqp").recruitment
         return self.certified(r, wanted, start)
 
     def certified(self, r, wanted, start) -> AllocationSequence:
