@@ -15,6 +15,8 @@ from fes_pin.stimulate.efforts import error_then_effort, least_cubes
 from fes_pin.stimulate.muscles import JOINTS
 from fes_pin.stimulate.recruitment import ChannelRecruitment, LinearRecruitment
 
+LEAST_EFFORT = 1e-10
+"""Below this price double precision cannot tell choices apart."""
 LEAST_LEFT = 0.05
 """A channel with less strength left than this costs as if it had this much."""
 EFFORT = 1e-4
@@ -122,8 +124,10 @@ class Allocator:
         self._efforts(effort_kind, lexicographic, getattr(nerves, "left_over", np.ones(self.n)))
         if (self.weights < 0.0).any():
             raise InputError(f"weight of {self.joints[int(np.argmin(self.weights))]} is negative")
-        if (self.effort <= 0.0).any():
-            raise InputError("effort must cost more than 0, or the choice is not unique")
+        if (self.effort < LEAST_EFFORT).any():
+            raise InputError(
+                f"effort must cost {LEAST_EFFORT:g} or more; for torque before any effort ask lexicographic"
+            )
         if not (np.isfinite(change) and change >= 0.0):
             raise InputError(f"change must cost 0 or more, got {change}")
         if not rate > 0.0:
