@@ -10,6 +10,7 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate.allocation import Allocation, AllocationSequence
 from fes_pin.stimulate.box import BoxProgram, by_daqp, solve_sequence
+from fes_pin.stimulate.branch import NODES, branch_and_bound, rounded
 from fes_pin.stimulate.certificate import Certifier, residuals, slopes
 from fes_pin.stimulate.efforts import error_then_effort, least_cubes
 from fes_pin.stimulate.muscles import JOINTS
@@ -77,6 +78,9 @@ class Allocator:
         Limits of recruitment within 0 and 1, by name or (n,); upper 0 is a channel that is not to be used.
     least
         Least recruitment at which a channel is reliable: r is 0 or at least this; None: any.
+    rounding, nodes
+        With `least`: only round the answer without it, cheaply; else stop the search after so many subproblems. The
+        allocation's `gap` says how much better another choice could be.
     rate
         Greatest change of a recruitment from one call to the next.
     dead
@@ -102,6 +106,8 @@ class Allocator:
         lower=0.0,
         upper=1.0,
         least=None,
+        rounding: bool = False,
+        nodes: int = NODES,
         rate: float = np.inf,
         dead: Sequence[str] = (),
     ) -> None:
@@ -133,6 +139,7 @@ class Allocator:
         if not rate > 0.0:
             raise InputError(f"rate must be more than 0, got {rate}")
         self.change, self.rate = float(change), float(rate)
+        self.rounding, self.nodes = bool(rounding), int(nodes)
         self._assemble()
 
     def _efforts(self, kind: str, lexicographic: bool, left_over: np.ndarray) -> None:
@@ -269,10 +276,11 @@ class Allocator:
 
     def choose(self, f, wanted, lower, upper, before) -> Allocation:
         """Solve with channels that are off or at least at their least; the certificate is of the choice made."""
-        from fes_pin.stimulate.branch import branch_and_bound
-
         assert self.least is not None
-        choice = branch_and_bound(self.H, f, lower, upper, self.least)
+        if self.rounding:
+            choice = rounded(self.H, f, lower, upper, self.least)
+        else:
+            choice = branch_and_bound(self.H, f, lower, upper, self.least, nodes=self.nodes)
         on = choice.r > 0.0
         held = np.where(on, np.maximum(lower, self.least), 0.0), np.where(on, upper, 0.0)
         note = f"{choice.nodes} choices compared"
