@@ -118,7 +118,7 @@ class Horizon:
     fatigue
         How strength falls with use; None: it does not.
     rounds
-        Guesses at what is active, of about 0.3 ms each for 30 channels, to make the plan exact; more succeed more often.
+        Guesses at what is active, some 0.4 ms each for 30 channels, to make the plan exact; more succeed more often.
 
     Raises
     ------
