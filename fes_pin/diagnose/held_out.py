@@ -156,14 +156,15 @@ def _joined(errors: Sequence[Errors]) -> Errors:
 def predictive_error(fitted: Fit) -> float:
     """Logarithm of the mean squared error on trials left out in turn, averaged over trials.
 
-    Each trial's own unknowns are estimated from it; the logarithm keeps one large motion from deciding alone.
+    Fits are for least open-loop error, and each trial's own unknowns are estimated from it; the logarithm keeps one
+    large motion from deciding alone.
     """
+    white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in fitted.noise.items()}
     logarithms = []
     for held in folds_of(fitted.trials):
         train = [i for i in range(len(fitted.trials)) if i not in held]
-        problem = Problem(fitted.model, [fitted.trials[i] for i in train], fitted.noise)
+        problem = Problem(fitted.model, [fitted.trials[i] for i in train], white)
         again = fit_problem(problem, fitted.values, [fitted.unknowns[i] for i in train])
-        white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in fitted.noise.items()}
         for i in held:
             alone = Problem(again.model, [fitted.trials[i]], white, ())
             own = fit_problem(alone, again.values, [fitted.unknowns[i]])
