@@ -1,6 +1,5 @@
 """Small rigs, trials and model structures that the tests of the engine share."""
 
-
 import numpy as np
 
 from fes_pin.data.trial import Trial
