@@ -29,11 +29,12 @@ def nominal_model(study: Study) -> Model:
         return Model(Muscle(constants=constants, **start))
     if study.rig == "joint":
         assert study.urdf is not None
-        return Model(joint_model(study.urdf, constants, start))
+        driven = any("effort" in t.columns for t in study.trials)
+        return Model(joint_model(study.urdf, constants, start, driven))
     raise InputError(f"the rig {study.rig} has no model of single trials", file=study.folder)
 
 
-def joint_model(urdf: Path, constants: Mapping[str, Any], start: Mapping[str, Any]) -> Joint:
+def joint_model(urdf: Path, constants: Mapping[str, Any], start: Mapping[str, Any], driven: bool = True) -> Joint:
     """A one-joint rig from its URDF.
 
     Parameters
@@ -42,6 +43,8 @@ def joint_model(urdf: Path, constants: Mapping[str, Any], start: Mapping[str, An
         Parameters of the nominal model that are known.
     start
         Those that are fitted, with their start values.
+    driven
+        False for free motion, without an effort.
 
     Raises
     ------
@@ -54,4 +57,6 @@ def joint_model(urdf: Path, constants: Mapping[str, Any], start: Mapping[str, An
     read = {"inertia": joint_inertia(body), "gravity_cos": cosine, "gravity_sin": sine}
     read["revolute"] = float(is_revolute(body))
     fitted = tuple(n for n in Joint.parameters() if n in start)
+    if not driven and "gravity_scale" in fitted:  # free motion shows only ratios: the URDF's inertia holds
+        fitted = tuple(n for n in fitted if n != "inertia_scale")
     return Joint(constants=read, fitted=fitted, **{**known, **start})
