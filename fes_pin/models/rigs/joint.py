@@ -30,7 +30,7 @@ class Joint(Rig):
     name = "joint"
 
     def signals(self, kind: str) -> tuple[str, ...]:
-        return ("gravity_angle", "effort", "torque", "inertia", "acceleration", "reading")
+        return ("gravity_angle", "effort", "torque", "driving", "acceleration", "reading")
 
     def states(self, kind: str) -> tuple[str, ...]:
         return ("q", "v")
@@ -83,8 +83,7 @@ class Joint(Rig):
         gravity = self.gravity_scale * (c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted))
         effort = s.through("effort", getattr(s.u, "effort", 0.0))
         s.torque = s.through("torque", effort - gravity - self.damping * s.v)
-        s.inertia = s.through("inertia", s.inertia)
-        s.driving = s.torque / s.inertia
+        s.driving = s.through("driving", s.torque / s.inertia)
         s.acceleration = s.through("acceleration", s.driving)
         return {"q": s.v, "v": s.acceleration}
 
