@@ -121,9 +121,13 @@ def joint_torque(x, q, v, t, causes):
     total = 0.0
     if "coulomb_friction" in causes:
         p = causes["coulomb_friction"]
-        sharp = p.get("sharp", 0.002)
         more = 1.0 + p.get("stiction", 0.0) * math.exp(-((v / p.get("stribeck_speed", 1.0)) ** 2))
-        total -= p["torque_nm"] * more * math.tanh(v / sharp)
+        if p.get("form") == "tanh":
+            share = math.tanh(v / p["sharp"])
+        else:
+            ratio = v / p.get("creep_speed", 0.004)
+            share = ratio / (1.0 + ratio**8) ** 0.125
+        total -= p["torque_nm"] * more * share
     if "quadratic_damping" in causes:
         p = causes["quadratic_damping"]
         total -= p["coefficient"] * math.copysign(abs(v) ** p.get("power", 2.0), v)
