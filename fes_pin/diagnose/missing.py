@@ -1,19 +1,19 @@
 """The torque that a model lacks: a smoothed estimate of the input that would have made it right.
 
-Let q_n be the angle that the nominal rig predicts and d the smoothed residual, so that q_n + d is the motion as measured.
-With the rig's inertia J and its torque tau_n(q, v, act, u) the torque that is missing at each instant is
+Let q_n be the angle that the nominal rig predicts and d the smoothed residual, so that q_n + d is the motion as
+measured. With the rig's inertia J and its torque tau_n(q, v, act, u) the torque that is missing at each instant is
 
     missing = J d'' - [tau_n(q_n + d, v_n + d') - tau_n(q_n, v_n)]
 
-which to first order is J d'' + damping d' + stiffness d, with the nominal inertia, damping and local stiffness; it is not
-cut at first order. It is in N m for a revolute joint, in N for a prismatic one. Where nothing moves the missing force is
-the smoothed residual itself, N.
+which to first order is J d'' + damping d' + stiffness d, with the nominal inertia, damping and local stiffness; it is
+not cut at first order. It is in N m for a revolute joint, in N for a prismatic one. Where nothing moves the missing
+force is the smoothed residual itself, N.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -33,6 +33,8 @@ MAX_POINTS = 1200
 PENALTIES = (-2.0, 10.0)
 """Range of the logarithm of the penalty; above it the system is singular in double precision."""
 STEPS = 24
+FEW = 6
+"""Values that a bin needs."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,7 @@ def _penalised(values: np.ndarray, penalty: float) -> np.ndarray:
     return scipy.linalg.solveh_banded(bands, values)
 
 
-def explained(value: np.ndarray, against: np.ndarray, bins: int = 12) -> float:
+def explained(value: np.ndarray, against: np.ndarray, bins: int = 16) -> float:
     """Share of the variance of a quantity that is a function of one variable alone: its correlation ratio, 0 to 1.
 
     Parameters
@@ -169,16 +171,25 @@ def explained(value: np.ndarray, against: np.ndarray, bins: int = 12) -> float:
     value, against
         Shape (n,).
     bins
-        Bins of equal counts, within which the function is taken as constant.
+        Bins of equal width, within which the function is taken as constant.
     """
-    total = float(np.sum((value - value.mean()) ** 2))
-    groups = binned(value, against, bins)
-    between = sum(len(g) * float(g.mean() - value.mean()) ** 2 for _, g in groups)
+    groups = [g for _, g in binned(value, against, bins)]
+    seen = np.concatenate(groups)
+    total = float(np.sum((seen - seen.mean()) ** 2))
+    between = sum(len(g) * float(g.mean() - seen.mean()) ** 2 for g in groups)
     return between / total if total > 0 else 0.0
 
 
-def binned(value: np.ndarray, against: np.ndarray, bins: int = 12) -> Sequence[tuple[float, np.ndarray]]:
-    """The values in bins of equal counts of one variable: its median in each bin, and the values there."""
-    order = np.argsort(against, kind="stable")
-    groups = [g for g in np.array_split(order, bins) if len(g)]
-    return [(float(np.median(against[g])), value[g]) for g in groups]
+def binned(value: np.ndarray, against: np.ndarray, bins: int = 16) -> list[tuple[float, np.ndarray]]:
+    """The values in bins of equal width of one variable: its median in each bin, and the values there.
+
+    The outermost hundredth of the variable's values on either side goes to the outermost bins; bins with fewer than
+    `FEW` values are left out.
+    """
+    low, high = np.quantile(against, (0.01, 0.99))
+    if high - low < 1e-9 * max(1.0, abs(high)):
+        return [(float(np.median(against)), value)]
+    index = np.clip(((against - low) / (high - low) * bins).astype(int), 0, bins - 1)
+    chosen = [np.flatnonzero(index == k) for k in range(bins)]
+    made = [(float(np.median(against[g])), value[g]) for g in chosen if len(g) >= FEW]
+    return made or [(float(np.median(against)), value)]

@@ -1,7 +1,7 @@
 """Figures of a diagnosis: trials with their residuals, missing torque, ranking of the causes.
 
-Each takes results and returns a matplotlib `Figure` of its own, without pyplot's state. No text of the study stands in a
-figure: its words belong to the page around it.
+Each takes results and returns a matplotlib `Figure` of its own, without pyplot's state. No text of the study stands in
+a figure: its words belong to the page around it.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as MplPath
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.missing import Missing, binned, explained
@@ -32,7 +34,7 @@ from fes_pin.view.style import (
     unit_of,
 )
 
-DOTS = 700
+DOTS = 500
 """Dots of one panel."""
 PULSES = 400
 """Single pulses that are drawn; more of them become a grey band."""
@@ -127,7 +129,7 @@ def _strip(axes: Axes, trial: Trial, name: str) -> None:
 def missing_figure(before: Sequence[Missing], after: Sequence[Missing], position_unit: str = "rad") -> Figure:
     """Missing torque (or force) against angle, rate, activation, stimulus and time.
 
-    Dots are instants of all trials; the line joins the medians of bins of equal counts. The percentage says how much of
+    Dots are instants of all trials; the line joins the medians of bins of equal width. The percentage says how much of
     the variance is a function of that variable alone.
 
     Parameters
@@ -143,9 +145,8 @@ def missing_figure(before: Sequence[Missing], after: Sequence[Missing], position
     with styled():
         figure = Figure(figsize=(2 * WIDTH, 0.45 + 2.45 * rows))
         height = figure.get_figheight()
-        grid = figure.add_gridspec(
-            rows, columns, left=0.085, right=0.985, top=1 - 0.62 / height, bottom=0.55 / height, hspace=0.48, wspace=0.24
-        )
+        margins = {"left": 0.085, "right": 0.985, "top": 1 - 0.62 / height, "bottom": 0.55 / height}
+        grid = figure.add_gridspec(rows, columns, **margins, hspace=0.48, wspace=0.24)
         limit = _limit(before)
         for k, name in enumerate(names):
             axes = figure.add_subplot(grid[k // columns, k % columns])
@@ -171,17 +172,37 @@ def _limit(many: Sequence[Missing]) -> float:
 
 def _against(axes: Axes, before: Sequence[Missing], after: Sequence[Missing], name: str) -> None:
     x, value = _joined(before, name)
-    chosen = np.linspace(0, len(x) - 1, min(DOTS, len(x))).astype(int)
     axes.axhline(0.0, color=FAINT, lw=0.7)
-    axes.plot(x[chosen], value[chosen], ".", color=NOMINAL, ms=2.6, mew=0, alpha=0.55, label="nominal, instants")
+    chosen = _spread(x, value)
+    _dots(axes, x[chosen], value[chosen])
     axes.plot(*_medians(x, value), color=MEASURED, lw=1.8, marker="o", ms=3.2, label="nominal, median")
     if after:
         axes.plot(*_medians(*_joined(after, name)), color=EXTENDED, lw=2.4, label="extended, median")
     axes.set_title(f"{100 * explained(value, x):.0f} % of its variance", fontsize=9.5, loc="right", pad=3)
 
 
+def _spread(x: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """Instants at about equal distances along the curve in a panel: rest is drawn once, motion in full."""
+    steps = np.abs(np.diff(x)) / max(float(np.ptp(x)), 1e-300) + np.abs(np.diff(value)) / max(
+        float(np.ptp(value)), 1e-300
+    )
+    along = np.concatenate([[0.0], np.cumsum(steps + 0.3 * steps.mean() + 1e-12)])
+    return np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], min(DOTS, len(x)))))
+
+
+def _dots(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
+    """Dots as one path of round pen-downs: a tenth of the size of single markers."""
+    ends = np.stack([x, x + 1e-6 * max(float(np.ptp(x)), 1e-12)], axis=1)
+    vertices = np.stack([ends, np.stack([y, y], axis=1)], axis=2).reshape(-1, 2)
+    path = MplPath(vertices, np.tile([MplPath.MOVETO, MplPath.LINETO], len(x)))
+    path.should_simplify = False
+    pen = {"lw": 2.4, "edgecolor": NOMINAL, "alpha": 0.6, "capstyle": "round"}
+    axes.add_patch(PathPatch(path, fill=False, **pen))
+    axes.plot([], [], ".", color=NOMINAL, ms=5, mew=0, label="nominal, instants")
+
+
 def _medians(x: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    groups = binned(value, x, 16)
+    groups = binned(value, x)
     return np.array([at for at, _ in groups]), np.array([float(np.median(v)) for _, v in groups])
 
 

@@ -6,6 +6,7 @@ under which a page may give it another shade on a dark ground.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -108,7 +109,7 @@ def unit_of(column: str, position_unit: str = "rad") -> str:
     return text.partition("(")[2].rstrip(")")
 
 
-def thin_curve(time: np.ndarray, values: np.ndarray, points: int = 500) -> tuple[np.ndarray, np.ndarray]:
+def thin_curve(time: np.ndarray, values: np.ndarray, points: int = 350) -> tuple[np.ndarray, np.ndarray]:
     """A curve drawn with few points that keeps every extreme: the least and the greatest of each stretch.
 
     Parameters
@@ -121,18 +122,16 @@ def thin_curve(time: np.ndarray, values: np.ndarray, points: int = 500) -> tuple
     if len(values) <= 2 * points:
         return time, values
     edges = np.linspace(0, len(values), points + 1).astype(int)
-    pairs = [sorted((a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b])))) for a, b in _stretches(edges)]
-    kept = np.unique(np.array([0, *(i for pair in pairs for i in pair), len(values) - 1]))
-    return time[kept], values[kept]
-
-
-def _stretches(edges: np.ndarray) -> list[tuple[int, int]]:
-    return [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    kept = {0, len(values) - 1}
+    for a, b in itertools.pairwise(edges):
+        kept |= {int(a + np.argmin(values[a:b])), int(a + np.argmax(values[a:b]))}
+    chosen = np.array(sorted(kept))
+    return time[chosen], values[chosen]
 
 
 def bare(axes: Axes) -> None:
-    """Take the numbers off the horizontal axis: another one beneath has them."""
-    axes.tick_params(labelbottom=False)
+    """Take the horizontal axis off: another one beneath has it."""
+    axes.xaxis.set_visible(False)
 
 
 def legend_above(figure: Figure, handles: list[Any], names: list[str]) -> None:

@@ -9,9 +9,13 @@ import re
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from fes_pin.view.style import COLOURS
+from fes_pin.view.style import COLOURS, styled
 
 _PRECISION = re.compile(r"(\d\.\d{2})\d+")
+_PATH = re.compile(r' d="[^"]*"')
+_TENTH = re.compile(r"(\d\.\d)\d+")
+"""Curves are drawn to a tenth of a point."""
+_SPACE = re.compile(r" ?\n?([MLQCz]) ?")
 _COLOUR = re.compile("|".join(COLOURS.values()))
 _NAMES = {colour: name for name, colour in COLOURS.items()}
 
@@ -24,12 +28,13 @@ def inline_svg(figure: Figure, description: str) -> str:
     Parameters
     ----------
     figure
-        Drawn within `style.styled`.
+        With the colours of `style`.
     description
         What the figure shows, for those who cannot see it.
     """
     stream = io.StringIO()
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": description}):
+    with styled():
+        mpl.rcParams["svg.hashsalt"] = description
         figure.savefig(stream, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Type")))
     text = stream.getvalue()
     text = text[text.index("<svg") :]
@@ -40,6 +45,7 @@ def inline_svg(figure: Figure, description: str) -> str:
     body = re.sub(r'<g id="[^"]*"', "<g", body)
     body = _PRECISION.sub(r"\1", body)
     body = _COLOUR.sub(lambda found: f"var(--{_NAMES[found[0]]}, {found[0]})", body)
+    body = _PATH.sub(lambda found: _SPACE.sub(r"\1", _TENTH.sub(r"\1", found[0])), body)
     body = re.sub(r"\n\s*", "\n", body)
     label = html.escape(description, quote=True)
     return (
