@@ -163,14 +163,17 @@ class Search:
         if not self._complete(best):
             best = self._backward(self._by_prediction(best), family)
             self._refine(best)
-        complete = self._complete(best)
         self.refit([(), best, *self.ranked(1), *self.ranked(len(best) or 1)[:JOINT_FITS], *_subsets(best)], best)
-        searched = self._finish(best, family)
-        return searched if complete or not best else self._for_prediction(searched)
+        return self.settle(best)
+
+    def settle(self, names: Names) -> Searched:
+        """Everything that is to be said of a set of causes: its rivals, and each cause's part in it."""
+        searched = self._finish(names, self.family)
+        return searched if self._complete(names) or not names else self._for_prediction(searched)
 
     def _for_prediction(self, searched: Searched) -> Searched:
         """Fit for least open-loop error: what the best set leaves is more than noise, and not to be whitened."""
-        self.noise = whiteless(noise_of(searched.best))
+        learned, self.noise = self.noise, whiteless(noise_of(searched.best))
 
         def again(fitted: Fit) -> Fit:
             return self.fit_from([fitted.model], fitted.unknowns)
@@ -178,6 +181,7 @@ class Search:
         nominal, best = again(searched.nominal), again(searched.best)
         without = {n: again(f) for n, f in searched.without.items()}
         rivals = {n: in_parallel(again, fits) for n, fits in searched.rivals.items()}
+        self.noise = learned
         return replace(searched, nominal=nominal, best=best, without=without, rivals=rivals)
 
     def _complete(self, names: Names) -> bool:
@@ -204,6 +208,7 @@ class Search:
         self.progress(0.08, "screening")
         scores = self.scores(base)
         family, scored = Family(scores, self.seed), best_by_effect(scores.scored)
+        self.family = family
         self._seeds = best_pairs(scores, SEEDS)
         self.progress(0.12, "every cause, fitted jointly")
         fitted = in_parallel(lambda v: self.extend(base, v), scored.values())
