@@ -1,0 +1,243 @@
+"""Recruitment curves, pulse width to the fraction of fibres that answer, and their exact inverses.
+
+Every curve is 0 up to its threshold, 1 from its saturation on, and rises strictly between; curves differ in the shape
+between. The inverse gives pulse width 0 for recruitment 0, else one between threshold and saturation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class LinearRecruitment:
+    """Straight from threshold to saturation; the defaults are the paper's (section II: 180 us, 1 ms).
+
+    Parameters
+    ----------
+    threshold_us, saturation_us
+        Pulse widths, us: numbers, or arrays with one per channel.
+
+    Raises
+    ------
+    InputError
+        Negative threshold, saturation not above threshold, or not a number.
+    """
+
+    threshold_us: Any = 180.0
+    saturation_us: Any = 1000.0
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = np.asarray(getattr(self, item.name), dtype=float)
+            if not np.isfinite(value).all():
+                raise InputError(f"{item.name} of a recruitment curve must be a finite number")
+            object.__setattr__(self, item.name, value)
+        if (self.threshold_us < 0.0).any() or (self.saturation_us <= self.threshold_us).any():
+            raise InputError("a recruitment curve needs 0 <= threshold_us < saturation_us")
+
+    def _values(self) -> tuple:
+        return type(self), *(getattr(self, f.name).tobytes() for f in fields(self))
+
+    def __eq__(self, other) -> bool:
+        return isinstance(other, LinearRecruitment) and self._values() == other._values()
+
+    def __hash__(self) -> int:
+        return hash(self._values())
+
+    def shape(self, x: np.ndarray) -> np.ndarray:
+        """Recruitment at the fraction x of the way from threshold to saturation."""
+        return x
+
+    def inverse_shape(self, r: np.ndarray) -> np.ndarray:
+        """Fraction of the way at recruitment r."""
+        return r
+
+    def recruitment(self, pulse_width_us) -> np.ndarray:
+        """Recruitment, 0 to 1, at pulse widths in us."""
+        x = (np.asarray(pulse_width_us, dtype=float) - self.threshold_us) / (self.saturation_us - self.threshold_us)
+        x = np.minimum(np.maximum(x, 0.0), 1.0)
+        return np.where(x <= 0.0, 0.0, np.where(x >= 1.0, 1.0, self.shape(x)))
+
+    def pulse_width_us(self, recruitment) -> np.ndarray:
+        """Pulse width in us for a recruitment: 0 for 0 and below, saturation for 1 and above."""
+        r = np.minimum(np.maximum(recruitment, 0.0), 1.0)
+        width = self.threshold_us + self.inverse_shape(r) * (self.saturation_us - self.threshold_us)
+        width = np.where(r < 1.0, np.maximum(width, self.threshold_us), self.saturation_us)
+        return (r > 0.0) * np.minimum(width, self.saturation_us)
+
+
+@dataclass(frozen=True, eq=False)
+class SaturatingRecruitment(LinearRecruitment):
+    """Steep first: `(1 - exp(-k x)) / (1 - exp(-k))` (Ding 2007, Muscle Nerve 36:214-222)."""
+
+    curvature: Any = 3.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.curvature == 0.0).any():
+            raise InputError("curvature 0 is the straight line: use LinearRecruitment")
+
+    def shape(self, x):
+        """See the class."""
+        return np.expm1(-self.curvature * x) / np.expm1(-self.curvature)
+
+    def inverse_shape(self, r):
+        """See the class."""
+        return -np.log1p(r * np.expm1(-self.curvature)) / self.curvature
+
+
+@dataclass(frozen=True, eq=False)
+class SigmoidRecruitment(LinearRecruitment):
+    """Logistic about `middle` (a fraction of the way), scaled to be 0 at threshold and 1 at saturation."""
+
+    steepness: Any = 10.0
+    middle: Any = 0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.steepness <= 0.0).any():
+            raise InputError("steepness of a sigmoid must be more than 0")
+
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """The logistic at threshold and at saturation."""
+        return 1.0 / (1.0 + np.exp(self.steepness * self.middle)), 1.0 / (
+            1.0 + np.exp(-self.steepness * (1.0 - self.middle))
+        )
+
+    def shape(self, x):
+        """See the class."""
+        low, high = self.ends()
+        return (1.0 / (1.0 + np.exp(-self.steepness * (x - self.middle))) - low) / (high - low)
+
+    def inverse_shape(self, r):
+        """See the class."""
+        low, high = self.ends()
+        y = low + r * (high - low)
+        return self.middle + np.log(y / (1.0 - y)) / self.steepness
+
+
+@dataclass(frozen=True, eq=False)
+class GompertzRecruitment(LinearRecruitment):
+    """Gompertz: slow start, slower end, `exp(-b exp(-k x))` scaled to be 0 at threshold and 1 at saturation."""
+
+    delay: Any = 5.0
+    growth: Any = 6.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.delay <= 0.0).any() or (self.growth <= 0.0).any():
+            raise InputError("delay and growth of a Gompertz curve must be more than 0")
+
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """The curve at threshold and at saturation, unscaled."""
+        return np.exp(-self.delay), np.exp(-self.delay * np.exp(-self.growth))
+
+    def shape(self, x):
+        """See the class."""
+        low, high = self.ends()
+        return (np.exp(-self.delay * np.exp(-self.growth * x)) - low) / (high - low)
+
+    def inverse_shape(self, r):
+        """See the class."""
+        low, high = self.ends()
+        return -np.log(-np.log(low + r * (high - low)) / self.delay) / self.growth
+
+
+class MeasuredRecruitment:
+    """Straight lines between measured points (pulse width, recruitment).
+
+    Parameters
+    ----------
+    pulse_widths_us, recruitments
+        At least two points; both must rise strictly; recruitments from 0 to 1.
+
+    Raises
+    ------
+    InputError
+        The points are not of that kind.
+    """
+
+    def __init__(self, pulse_widths_us: Sequence[float], recruitments: Sequence[float]) -> None:
+        self.widths_us, self.values = np.array(pulse_widths_us, dtype=float), np.array(recruitments, dtype=float)
+        good = self.widths_us.shape == self.values.shape and self.widths_us.ndim == 1 and len(self.values) >= 2
+        if not good or not (np.diff(self.widths_us) > 0).all() or not (np.diff(self.values) > 0).all():
+            raise InputError("a measured recruitment curve needs two or more points that rise in both columns")
+        if self.values[0] != 0.0 or self.values[-1] != 1.0 or self.widths_us[0] < 0.0:
+            raise InputError("a measured recruitment curve must begin at recruitment 0 and end at 1")
+        self.threshold_us, self.saturation_us = self.widths_us[0], self.widths_us[-1]
+
+    def recruitment(self, pulse_width_us) -> np.ndarray:
+        """Recruitment, 0 to 1, at pulse widths in us."""
+        return np.interp(pulse_width_us, self.widths_us, self.values)
+
+    def pulse_width_us(self, recruitment) -> np.ndarray:
+        """Pulse width in us for a recruitment: 0 for 0 and below, saturation for 1 and above."""
+        return np.where(np.asarray(recruitment) > 0.0, np.interp(recruitment, self.values, self.widths_us), 0.0)
+
+
+class ChannelRecruitment:
+    """One curve per channel, curves of one kind evaluated together.
+
+    Parameters
+    ----------
+    curves
+        One for all channels, or a sequence with one per channel.
+    n
+        Number of channels.
+
+    Raises
+    ------
+    InputError
+        The number of curves is not n.
+    """
+
+    def __init__(self, curves, n: int) -> None:
+        self.curves = list(curves) if isinstance(curves, Sequence) else [curves] * n
+        if len(self.curves) != n:
+            raise InputError(f"expected one recruitment curve or {n}, got {len(self.curves)}")
+        self.n = n
+        self.threshold_us = self._each("threshold_us")
+        self.saturation_us = self._each("saturation_us")
+        self.groups: list[tuple[Any, Any]] = []
+        if not isinstance(curves, Sequence):
+            self.groups.append((slice(None), curves))
+            return
+        for curve in self.curves:
+            if all(curve is not g and type(curve) is not type(g) for _, g in self.groups):
+                self._group(curve)
+
+    def _each(self, name: str) -> np.ndarray:
+        values = [np.asarray(getattr(curve, name)) for curve in self.curves]
+        return np.array([float(v if v.ndim == 0 else v[i]) for i, v in enumerate(values)])
+
+    def _group(self, like) -> None:
+        kind = type(like)
+        where = [i for i, c in enumerate(self.curves) if type(c) is kind]
+        if kind is MeasuredRecruitment:
+            self.groups += [([i], self.curves[i]) for i in where]
+        else:
+            values = {f.name: np.array([float(getattr(self.curves[i], f.name)) for i in where]) for f in fields(kind)}
+            self.groups.append((slice(None) if len(where) == self.n else where, kind(**values)))
+
+    def recruitment(self, pulse_width_us: np.ndarray) -> np.ndarray:
+        """Recruitments (..., n) at pulse widths (..., n) in us."""
+        return self._fill(np.asarray(pulse_width_us, dtype=float), "recruitment")
+
+    def pulse_width_us(self, recruitment: np.ndarray) -> np.ndarray:
+        """Pulse widths in us (..., n) for recruitments (..., n)."""
+        return self._fill(np.asarray(recruitment, dtype=float), "pulse_width_us")
+
+    def _fill(self, values: np.ndarray, method: str) -> np.ndarray:
+        if len(self.groups) == 1:
+            return getattr(self.groups[0][1], method)(values)
+        result = np.empty_like(values)
+        for where, curve in self.groups:
+            result[..., where] = getattr(curve, method)(values[..., where])
+        return result
