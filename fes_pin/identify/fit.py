@@ -106,10 +106,9 @@ class _Search:
     """The state of one Levenberg-Marquardt search."""
 
     def __init__(self, problem: Problem, start: Mapping[str, float], unknowns: Unknowns | None) -> None:
-        info = problem.model.parameter_info()
         self.problem, self.names = problem, problem.free
-        self.lower = np.array([info[n].lower for n in self.names])
-        self.upper = np.array([info[n].upper for n in self.names])
+        self.lower = np.array([problem.limits[n][0] for n in self.names])
+        self.upper = np.array([problem.limits[n][1] for n in self.names])
         self.fixed = dict(start)
         self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
         self.unknowns = unknowns if unknowns is not None else problem.start_unknowns()

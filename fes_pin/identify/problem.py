@@ -50,10 +50,15 @@ class Problem:
     """
 
     def __init__(
-        self, model: Model, trials: Sequence[Trial], noise: NoiseModel, free: tuple[str, ...] | None = None
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        noise: NoiseModel,
+        free: tuple[str, ...] | None = None,
     ) -> None:
         self.model, self.trials, self.noise = model, tuple(trials), noise
         self.free = model.fitted_parameters() if free is None else free
+        self.limits = limits_of(model, self.trials)
         self.unknown_names = model.rig.unknowns(self.trials[0].kind) if self.trials else ()
         self.simulator = Simulator(model, self.trials, (*self.free, *self.unknown_names))
 
@@ -83,6 +88,27 @@ class Problem:
             rows = np.concatenate(pieces) if len(pieces) > 1 else pieces[0]
             out.append(Linearized(rows[:, 0], rows[:, 1 : 1 + split], rows[:, 1 + split :]))
         return out
+
+
+def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
+    """Every measured output, all trials end to end, by column name."""
+    out: dict[str, list[np.ndarray]] = {}
+    for trial in trials:
+        for name in model.rig.outputs(trial.kind):
+            if name in trial.columns:
+                out.setdefault(name, []).append(trial[name])
+    return {n: np.concatenate(v) for n, v in out.items()}
+
+
+def limits_of(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, float]]:
+    """Bounds of every parameter on these trials, by name."""
+    limits = {n: (i.lower, i.upper) for n, i in model.parameter_info().items()}
+    measured = measured_columns(model, trials) if model.effects else {}
+    for effect in model.effects:
+        for n, (low, high) in effect.limits(measured).items():
+            name = f"{effect.name}.{n}"
+            limits[name] = (max(limits[name][0], low), min(limits[name][1], high))
+    return limits
 
 
 @dataclass(frozen=True)

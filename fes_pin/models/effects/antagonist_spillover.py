@@ -8,7 +8,7 @@ from typing import Any
 
 from fes_pin.models.maths import clip, maximum
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Effect, Stage, lag
 
 
 @dataclass(frozen=True)
@@ -16,29 +16,30 @@ class AntagonistSpillover(Effect):
     """Above some pulse width the stimulus also recruits the antagonist.
 
         r_s     = clip((w - onset) / (saturation - onset), 0, 1)
-        tau b'  = r_s - b
+        lag b'  = r_s - b
         F_net   = F_M - share K F_ref b
 
     Tell-tale: the strongest stimuli move the joint less than weaker ones promise, though the muscle alone pulls as
     modelled.
     Source: Popovic and Sinkjaer, Control of Movement for the Physically Disabled, Springer 2000: spread of current
-    to neighbouring nerves.
+    to neighbouring nerves. The antagonist answers at once unless data show its lag.
     """
 
     share: float = parameter(0.05, null=0.0, lower=0.0, upper=2.0, scale=0.05)
     onset_us: float = parameter(
         600.0, unit="us", lower=0.0, upper=2000.0, scale=50.0, grid=(300.0, 450.0, 600.0, 750.0, 900.0)
     )
+    lag_s: float = parameter(0.0, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.02, optional=True, grid=(0.05,))
 
     name, stage, signal, rigs = "antagonist_spillover", Stage.NERVE, "net_force", ("ankle",)
     states = ("act",)
     memories = ("recruited",)
 
     def apply(self, value: Any, s: Any) -> Any:
-        return value - self.share * s.force_scale * s.own.act
+        return value - self.share * s.force_scale * lag(s.own.recruited, s.own.act, self.lag_s, s.step)[0]
 
     def rate(self, s: Any) -> Mapping[str, Any]:
-        return {"act": (s.own.recruited - s.own.act) / s.time_constant}
+        return {"act": lag(s.own.recruited, s.own.act, self.lag_s, s.step)[1]}
 
     def update(self, s: Any) -> Mapping[str, Any]:
         room = maximum(s.c.saturation_us - self.onset_us, 1.0)

@@ -38,5 +38,13 @@ class JointStop(Effect):
         quantiles = np.quantile(angles, (0.98, 0.93, 0.85, 0.7, 0.5, 0.3, 0.15, 0.07, 0.02))
         return {**super().grids(measured), "angle_rad": tuple(float(a) for a in quantiles)}
 
+    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+        """A stop is inside the measured range, and out of touch for a third of the time; else it would be a spring."""
+        angles = measured.get("angle_rad", measured.get("position"))
+        if angles is None:
+            return {}
+        low, high = (0.35, 0.999) if self.side > 0 else (0.001, 0.65)
+        return {"angle_rad": (float(np.quantile(angles, low)), float(np.quantile(angles, high)))}
+
     def apply(self, value: Any, s: Any) -> Any:
         return value - self.side * self.stiffness * ramp(self.side * (s.q - self.angle_rad))

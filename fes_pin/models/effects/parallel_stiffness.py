@@ -38,5 +38,13 @@ class ParallelStiffness(Effect):
             "rest_angle_rad": tuple(float(np.quantile(angles, q)) for q in (0.5, 0.0, 1.0)),
         }
 
+    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+        """The spring rests at an angle that the joint comes near; elsewhere it would be a constant torque."""
+        angles = measured.get("angle_rad", measured.get("position"))
+        if angles is None:
+            return {}
+        low, high = float(np.min(angles)), float(np.max(angles))
+        return {"rest_angle_rad": (low - 0.5 * (high - low), high + 0.5 * (high - low))}
+
     def apply(self, value: Any, s: Any) -> Any:
         return value - self.stiffness_nm_per_rad * (s.q - self.rest_angle_rad)

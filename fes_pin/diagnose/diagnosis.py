@@ -1,0 +1,295 @@
+"""The verdict: which causes are named, how sure, with what gain, and what stays open."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.experiment import NextExperiment, next_experiment
+from fes_pin.diagnose.held_out import Errors, Gain, HeldOut, cross_validate, errors_of, gain, separate
+from fes_pin.diagnose.library import best_by_effect
+from fes_pin.diagnose.open_set import Remainder, remainder
+from fes_pin.diagnose.search import PARAMETER_PRICE, Search, Searched
+from fes_pin.diagnose.workers import one_thread_each
+from fes_pin.identify.fit import Fit
+from fes_pin.models.effects import effect
+from fes_pin.models.model import Model
+from fes_pin.models.nominal import nominal_model
+
+ABSORBED_BELOW = 0.04
+"""Share of its norm that an effect's sensitivity must keep beside the nominal parameters to be testable."""
+SEPARABLE = 2.71
+"""Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: 1.645 squared (DESIGN 6.5)."""
+CONTENDERS = 4
+"""Sets that each fold chooses among anew."""
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """A value with its standard deviation (infinite: not identified) and unit."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One named cause; see contract: `equivalents` cannot be told from it by these data."""
+
+    name: str
+    stage: str
+    parameters: dict[str, ParameterEstimate]
+    equivalents: tuple[str, ...]
+    p_value: float
+    gain_fit: float
+    gain_held_out: Gain
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A candidate beside the others: how far the whole fit falls short of the best with it in the cause's place."""
+
+    names: tuple[str, ...]
+    shortfall: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a simulation gets wrong.
+
+    Attributes
+    ----------
+    verdict
+        "adequate", "causes_found" or "unexplained".
+    causes
+        By held-out gain, largest first.
+    model
+        The extended model: it can be simulated, fitted and diagnosed again.
+    absorbed
+        Causes that these data could not show.
+    ranking
+        For each cause, its rivals by shortfall in twice the log-likelihood.
+    """
+
+    study: Study
+    verdict: str
+    causes: tuple[Cause, ...]
+    remainder: Remainder
+    absorbed: tuple[str, ...]
+    nominal: Fit
+    extended: Fit
+    nominal_error: tuple[float, float | None]
+    extended_error: tuple[float, float | None]
+    ceiling_percent: float
+    next_experiment: NextExperiment | None
+    ranking: dict[str, tuple[Ranked, ...]]
+    held_out_by: str
+    wall_s: float = field(compare=False)
+
+    @property
+    def model(self) -> Model:
+        """The extended model."""
+        return self.extended.model
+
+    def __str__(self) -> str:
+        from fes_pin.diagnose.text import verdict_text  # noqa: PLC0415
+
+        return verdict_text(self)
+
+
+Progress = Callable[[float, str], None]
+
+
+def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -> Diagnosis:
+    """Find out what the nominal model of a study gets wrong.
+
+    Parameters
+    ----------
+    study
+        Rig, start values and trials. Trials with the role "held_out" take no part but in the gain; without such roles
+        the gain is cross-validated over all trials.
+    seed
+        Of what is simulated: critical values and bootstrap intervals.
+    progress
+        Called with a share done and a few words.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    InputError
+        If the study has no trial to fit, or a rig without a model of trials.
+    """
+    began = time.perf_counter()
+    tell = progress or (lambda _share, _words: None)
+    train, test = split(study)
+    with one_thread_each():
+        searched = Search(nominal_model(study), train, seed, tell).run()
+        tell(0.88, "held-out gain")
+        diagnosis = _judge(study, searched, test, seed)
+    tell(1.0, "done")
+    return replace(diagnosis, wall_s=time.perf_counter() - began)
+
+
+def split(study: Study) -> tuple[list[Trial], list[Trial]]:
+    """Trials to fit and trials that the study holds out."""
+    test = [t for t in study.trials if t.role == "held_out"]
+    train = [t for t in study.trials if t.role != "held_out"]
+    if not train:
+        raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)
+    return train, test
+
+
+def _judge(study: Study, searched: Searched, test: Sequence[Trial], seed: int) -> Diagnosis:
+    left = remainder(searched.best, seed)
+    causes, held = _causes(searched, left, test, seed)
+    weak = [c.name for c in causes if c.gain_held_out.low <= 0.0]
+    if weak:
+        searched = _without(searched, weak)
+        left = remainder(searched.best, seed)
+        causes, held = _causes(searched, left, test, seed)
+    causes.sort(key=lambda c: -c.gain_held_out.percent)
+    nominal, best = searched.nominal, searched.best
+    verdict = "causes_found" if causes else ("unexplained" if left.unexplained else "adequate")
+    in_sample = errors_of(best.model, best.trials, best.noise)
+    return Diagnosis(
+        study=study,
+        verdict=verdict,
+        causes=tuple(causes),
+        remainder=left,
+        absorbed=_absorbed(searched),
+        nominal=nominal,
+        extended=best,
+        nominal_error=(_error(nominal), held.nominal.error_percent() if held else None),
+        extended_error=(in_sample.error_percent(), held.extended.error_percent() if held else None),
+        ceiling_percent=100.0 * float(in_sample.counts.sum() / max(in_sample.spread.sum(), 1e-300)),
+        next_experiment=_experiment(searched, causes, study),
+        ranking=_ranking(searched),
+        held_out_by="the study's held-out trials" if test else "cross-validation over trials",
+        wall_s=0.0,
+    )
+
+
+def _error(fitted: Fit) -> float:
+    return errors_of(fitted.model, fitted.trials, fitted.noise).error_percent()
+
+
+def _held_out(searched: Searched, test: Sequence[Trial]) -> HeldOut | None:
+    if test:
+        return separate(searched.nominal, searched.best, searched.without, test)
+    if len(searched.nominal.trials) < 2:
+        return None
+    contenders = sorted((f for fits in searched.rivals.values() for f in fits), key=lambda f: f.sse)[:CONTENDERS]
+    return cross_validate(searched.nominal, searched.best, searched.without, contenders)
+
+
+def _causes(
+    searched: Searched, left: Remainder, test: Sequence[Trial], seed: int
+) -> tuple[list[Cause], HeldOut | None]:
+    best, nominal = searched.best, searched.nominal
+    held = _held_out(searched, test)
+    inside = {n: errors_of(f.model, f.trials, best.noise) for n, f in searched.without.items()}
+    inside_nominal = errors_of(nominal.model, nominal.trials, best.noise)
+    inside_best = errors_of(best.model, best.trials, best.noise)
+    out = []
+    for one in best.model.effects:
+        name = one.name
+        measured = held or HeldOut(inside_nominal, inside_best, inside)
+        out.append(
+            Cause(
+                name=name,
+                stage=str(one.stage),
+                parameters=_estimates(best, name),
+                equivalents=_equivalents(searched, name, left),
+                p_value=searched.p_values[name],
+                gain_fit=gain(inside_nominal, inside[name], inside_best, seed).percent,
+                gain_held_out=gain(measured.nominal, measured.without[name], measured.extended, seed),
+            )
+        )
+    return out, held
+
+
+def _estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
+    info, values, out = fitted.model.parameter_info(), fitted.values, {}
+    (one,) = (e for e in fitted.model.effects if e.name == name)
+    refined = one.refined()
+    for n in effect(name).parameters():
+        key = f"{name}.{n}"
+        if info[key].optional and not refined:
+            continue
+        std = fitted.std(key) if key in fitted.free else 0.0
+        out[n] = ParameterEstimate(values[key], std, info[key].unit)
+    return out
+
+
+def _equivalents(searched: Searched, name: str, left: Remainder) -> tuple[str, ...]:
+    """Causes that could stand in the place of one: rivals that do not fall short by what separates at 95 %.
+
+    Where the best set itself leaves something unexplained, its order among its rivals is no surer than that.
+    """
+    best = searched.best
+    others = {e.name for e in best.model.effects} - {name}
+    margin = SEPARABLE + left.excess
+    out = []
+    for rival in searched.rivals[name]:
+        (instead,) = {e.name for e in rival.model.effects} - others
+        price = PARAMETER_PRICE * (len(rival.free) - len(best.free))
+        if rival.sse + price - best.sse < margin:
+            out.append(instead)
+    return tuple(sorted(set(out)))
+
+
+def _without(searched: Searched, names: Sequence[str]) -> Searched:
+    """The search's result with some causes withdrawn: none is left, or the best set that lacks them."""
+    kept = [e.name for e in searched.best.model.effects if e.name not in names]
+    if len(kept) == 1 and len(names) == 1:
+        best = searched.without[names[0]]
+        return replace(
+            searched,
+            best=best,
+            without={kept[0]: searched.nominal},
+            rivals={kept[0]: [f for f in searched.singles if f.model.effects[0].name != kept[0]]},
+            p_values={kept[0]: searched.p_values[kept[0]]},
+        )
+    return replace(searched, best=searched.nominal, without={}, rivals={}, p_values={})
+
+
+def _absorbed(searched: Searched) -> tuple[str, ...]:
+    found = {e.name for e in searched.best.model.effects}
+    by_effect = best_by_effect(searched.scored)
+    return tuple(
+        sorted(n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < ABSORBED_BELOW)
+    )
+
+
+def _ranking(searched: Searched) -> dict[str, tuple[Ranked, ...]]:
+    best = searched.best.sse
+    return {
+        name: tuple(Ranked(tuple(e.name for e in f.model.effects), f.sse - best) for f in rivals)
+        for name, rivals in searched.rivals.items()
+    }
+
+
+def _experiment(searched: Searched, causes: Sequence[Cause], study: Study) -> NextExperiment | None:
+    for cause in causes:
+        for other in cause.equivalents:
+            for rival in searched.rivals[cause.name]:
+                if other in {e.name for e in rival.model.effects}:
+                    return next_experiment(searched.best, rival, (cause.name, other), study)
+    return None
+
+
+def finite(value: float) -> float | None:
+    """A number as JSON can hold it."""
+    return value if math.isfinite(value) else None
+
+
+__all__ = ["Cause", "Diagnosis", "Errors", "ParameterEstimate", "Ranked", "diagnose", "finite", "split"]

@@ -1,0 +1,152 @@
+"""Gain on trials that took no part in choosing or fitting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.workers import in_parallel
+from fes_pin.identify.fit import Fit, fit_problem
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.problem import Problem
+from fes_pin.models.model import Model
+from fes_pin.models.simulate import Simulator
+
+FOLDS = 5
+RESAMPLES = 2000
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Share, in percent, of the nominal model's squared error above the noise that an extension removes."""
+
+    percent: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Squared errors of one model, by unit of evidence (trial, or second of a trial where there are few).
+
+    Attributes
+    ----------
+    squares
+        Shape (units,): sums of squares in units of the noise variance, all channels.
+    spread
+        The same of the measurement about its trial's mean.
+    counts
+        Samples in each unit.
+    """
+
+    squares: np.ndarray
+    spread: np.ndarray
+    counts: np.ndarray
+
+    def error_percent(self) -> float:
+        """E of eq. (2), pooled."""
+        return 100.0 * float(self.squares.sum() / max(self.spread.sum(), 1e-300))
+
+
+def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
+    """Open-loop errors of a model that starts each trial as a prediction does."""
+    simulated = Simulator(model, trials).run(model.parameters())
+    squares, spread, counts = [], [], []
+    pieces = 1 if len(trials) >= 5 else 10
+    for trial, one in zip(trials, simulated, strict=True):
+        total, around = np.zeros(len(trial)), np.zeros(len(trial))
+        channels = 0
+        for k, name in enumerate(model.rig.outputs(trial.kind)):
+            if name in trial.columns and name in noise:
+                variance = noise[name].std ** 2
+                total += (trial[name] - one.readings[:, k]) ** 2 / variance
+                around += (trial[name] - trial[name].mean()) ** 2 / variance
+                channels += 1
+        for a, b in zip(np.array_split(total, pieces), np.array_split(around, pieces), strict=True):
+            squares.append(float(a.sum()))
+            spread.append(float(b.sum()))
+            counts.append(channels * len(a))
+    return Errors(np.array(squares), np.array(spread), np.array(counts, dtype=float))
+
+
+def gain(nominal: Errors, without: Errors, extended: Errors, seed: int) -> Gain:
+    """What the step from `without` to `extended` removes of the nominal model's error above the noise.
+
+    The interval is a bootstrap over the units of evidence.
+    """
+    draws = np.random.default_rng(seed).integers(len(nominal.squares), size=(RESAMPLES, len(nominal.squares)))
+    many = _share(*(e[draws].sum(axis=1) for e in (nominal.squares, without.squares, extended.squares, nominal.counts)))
+    one = _share(nominal.squares.sum(), without.squares.sum(), extended.squares.sum(), nominal.counts.sum())
+    low, high = np.quantile(many, (0.025, 0.975))
+    return Gain(float(one), float(low), float(high))
+
+
+def _share(nominal: np.ndarray, without: np.ndarray, extended: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Percent; the error above the noise is at least what the extension removes."""
+    excess = np.maximum(np.maximum(nominal - count, nominal - extended), 1e-9 * count)
+    return 100.0 * (without - extended) / excess
+
+
+def folds_of(trials: Sequence[Trial], count: int = FOLDS) -> list[list[int]]:
+    """Trials to hold out together: every kind and every load dealt round."""
+    order = sorted(range(len(trials)), key=lambda i: (trials[i].kind, sorted(trials[i].conditions.items()), i))
+    count = min(count, len(trials))
+    return [sorted(order[k::count]) for k in range(count)]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors on held-out trials of the nominal model, the chosen extension, and it without each of its causes."""
+
+    nominal: Errors
+    extended: Errors
+    without: dict[str, Errors]
+
+
+def cross_validate(nominal: Fit, best: Fit, without: dict[str, Fit], contenders: Sequence[Fit]) -> HeldOut:
+    """Leave trials out in turn, choose among the contenders again on the others, fit, and predict.
+
+    Parameters
+    ----------
+    contenders
+        Fits of all sets of causes that came near on the whole; each fold chooses anew among them and `best`.
+    """
+    folds = [f for f in folds_of(nominal.trials) if len(f) < len(nominal.trials)]
+    results = in_parallel(lambda f: _fold(f, nominal, best, without, contenders), folds)
+    keys = list(without)
+    return HeldOut(
+        _joined([r[0] for r in results]),
+        _joined([r[1] for r in results]),
+        {k: _joined([r[2][k] for r in results]) for k in keys},
+    )
+
+
+def _fold(
+    held: list[int], nominal: Fit, best: Fit, without: dict[str, Fit], contenders: Sequence[Fit]
+) -> tuple[Errors, Errors, dict[str, Errors]]:
+    train = [i for i in range(len(nominal.trials)) if i not in held]
+    test = [nominal.trials[i] for i in held]
+
+    def fitted(fit: Fit) -> Fit:
+        problem = Problem(fit.model, [fit.trials[i] for i in train], fit.noise)
+        return fit_problem(problem, fit.values, [fit.unknowns[i] for i in train])
+
+    chosen = min((fitted(c) for c in (best, *contenders)), key=lambda f: f.sse + 3.84 * len(f.free))
+    rest = {n: errors_of(fitted(f).model, test, best.noise) for n, f in without.items()}
+    return errors_of(fitted(nominal).model, test, best.noise), errors_of(chosen.model, test, best.noise), rest
+
+
+def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Trial]) -> HeldOut:
+    """Errors on trials that the study itself holds out."""
+    return HeldOut(
+        errors_of(nominal.model, test, best.noise),
+        errors_of(best.model, test, best.noise),
+        {n: errors_of(f.model, test, best.noise) for n, f in without.items()},
+    )
+
+
+def _joined(errors: Sequence[Errors]) -> Errors:
+    return Errors(*(np.concatenate([getattr(e, name) for e in errors]) for name in ("squares", "spread", "counts")))

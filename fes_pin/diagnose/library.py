@@ -1,0 +1,215 @@
+"""The candidate causes near a fitted model: sensitivities to each effect at its null, over its shapes."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.workers import in_parallel
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.problem import Linearized, Problem, measured_columns
+from fes_pin.models.effects import effects_for
+from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
+
+TINY = 0.02
+"""Share of an amplitude's scale at which a one-sided effect is linearized: next to its null, on its own side."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One effect with one choice of shapes, linearized at its null.
+
+    Attributes
+    ----------
+    effect
+        The effect at (or next to) its null, with its shapes.
+    columns
+        Shape (m, amplitudes): whitened sensitivities, all trials end to end.
+    """
+
+    effect: Effect
+    columns: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """Of the cause."""
+        return self.effect.name
+
+
+class Library:
+    """The causes that a rig can have, ready to be linearized on trials."""
+
+    def __init__(self, model: Model, trials: Sequence[Trial]) -> None:
+        self.effects = effects_for(model.rig.name)
+        self.trials = tuple(trials)
+        self.measured = measured_columns(model, trials)
+        self._problems: dict[str, Problem] = {}
+
+    def grid(self, effect: type[Effect]) -> list[Effect]:
+        """The effect at its null with every combination of its shapes."""
+        grids = effect.grids(self.measured)
+        shapes = effect.shapes()
+        start = {n: _near_null(effect, n) for n in effect.amplitudes()}
+        return [
+            effect(**start, **dict(zip(shapes, values, strict=True)))
+            for values in itertools.product(*(grids[n] for n in shapes))
+        ]
+
+    def probes(self, fitted: Fit, noise: NoiseModel, exclude: Sequence[str] = ()) -> list[Probe]:
+        """Every effect, linearized at the nominal parameters of a fit.
+
+        The effects that the fit has already are left out of the linearization, as `exclude` is of the result: their
+        influence on another effect's sensitivity is of second order.
+        """
+        nominal = Model(fitted.model.rig)
+        wanted = [e for e in self.effects if e.name not in exclude and self._acts(e, nominal)]
+        return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
+
+    def _acts(self, effect: type[Effect], nominal: Model) -> bool:
+        return any(effect.signal in nominal.rig.signals(t.kind) for t in self.trials)
+
+    def _probe(self, effect: type[Effect], nominal: Model, fitted: Fit, noise: NoiseModel) -> list[Probe]:
+        free = tuple(f"{effect.name}.{n}" for n in effect.amplitudes())
+        if effect.name not in self._problems:
+            self._problems[effect.name] = Problem(nominal + effect.absent(), self.trials, noise, free)
+        problem = self._problems[effect.name]
+        problem.noise = noise
+        out = []
+        for one in self.grid(effect):
+            parts = problem.linearize((nominal + one).parameters(), fitted.unknowns)
+            out.append(Probe(one, np.concatenate([p.jacobian for p in parts])))
+        return out
+
+
+def _near_null(effect: type[Effect], name: str) -> float:
+    info = effect.parameters()[name]
+    assert info.null is not None
+    one_sided = info.lower == info.null or info.upper == info.null
+    return info.null + (TINY * info.scale if one_sided else 0.0)
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A probe, measured against a fit.
+
+    Attributes
+    ----------
+    gain
+        Drop in the sum of squares that the linearized effect promises.
+    amplitudes
+        The linear estimate of its amplitudes.
+    kept
+        Share of the sensitivity's norm that the fitted parameters do not take up.
+    """
+
+    probe: Probe
+    gain: float
+    amplitudes: dict[str, float]
+    kept: float
+
+
+class Projection:
+    """What is left of whitened vectors beside a fit's own parameters and its trials' unknowns."""
+
+    def __init__(self, parts: Sequence[Linearized]) -> None:
+        self.residual = np.concatenate([p.residual for p in parts])
+        self._bases, self._slices = [], []
+        at = 0
+        for part in parts:
+            rows = slice(at, at + len(part.residual))
+            at = rows.stop
+            if part.local.shape[1]:
+                self._bases.append(np.linalg.qr(_scaled(part.local))[0])
+                self._slices.append(rows)
+        jacobian = np.concatenate([p.jacobian for p in parts])
+        self._basis = _basis(self._without_locals(jacobian))
+        self.residual = self(self.residual[:, None])[:, 0]
+
+    def _without_locals(self, columns: np.ndarray) -> np.ndarray:
+        out = np.array(columns, dtype=float)
+        for basis, rows in zip(self._bases, self._slices, strict=True):
+            out[rows] -= basis @ (basis.T @ out[rows])
+        return out
+
+    def __call__(self, columns: np.ndarray) -> np.ndarray:
+        """Columns of shape (m, k) without the part that the fit could take up."""
+        out = self._without_locals(columns)
+        return out - self._basis @ (self._basis.T @ out)
+
+    def score(self, probes: Sequence[Probe]) -> Scores:
+        """The promises of probes, and the Gram matrix of what is left of them."""
+        stacked = np.concatenate([p.columns for p in probes], axis=1)
+        stacked = np.where(np.isfinite(stacked), stacked, 0.0)
+        left = self(stacked)
+        before, gram, along = np.einsum("mi,mi->i", stacked, stacked), left.T @ left, left.T @ self.residual
+        out, blocks, at = [], [], 0
+        for probe in probes:
+            block = slice(at, at + probe.columns.shape[1])
+            at = block.stop
+            blocks.append(block)
+            out.append(_score(probe, gram[block, block], along[block], float(before[block].sum())))
+        return Scores(out, gram, blocks)
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Probes, scored together.
+
+    Attributes
+    ----------
+    scored
+        One for each probe.
+    gram
+        Shape (k, k): inner products of what the fit leaves of all columns.
+    blocks
+        The rows of `gram` that belong to each probe.
+    """
+
+    scored: list[Scored]
+    gram: np.ndarray
+    blocks: list[slice]
+
+
+def _score(probe: Probe, gram: np.ndarray, along: np.ndarray, before: float) -> Scored:
+    names, info = probe.effect.amplitudes(), probe.effect.parameters()
+    after = float(np.trace(gram))
+    if not after > 1e-18 * max(before, 1e-300):
+        return Scored(probe, 0.0, {n: float(info[n].null or 0.0) for n in names}, 0.0)
+    nulls = np.array([info[n].null for n in names], dtype=float)
+    lower, upper = np.array([[info[n].lower, info[n].upper] for n in names]).T
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    amplitudes = scale * np.linalg.lstsq(gram * np.outer(scale, scale), along * scale, rcond=1e-10)[0]
+    amplitudes = np.clip(amplitudes, lower - nulls, upper - nulls)
+    gain = float(2.0 * along @ amplitudes - amplitudes @ gram @ amplitudes)
+    values = dict(zip(names, (float(a) for a in amplitudes + nulls), strict=True))
+    return Scored(probe, gain, values, float(np.sqrt(after / before)))
+
+
+def _scaled(columns: np.ndarray) -> np.ndarray:
+    norms = np.linalg.norm(columns, axis=0)
+    return columns / np.where(norms > 0, norms, 1.0)
+
+
+def _basis(columns: np.ndarray, tolerance: float = 1e-7) -> np.ndarray:
+    """Orthonormal basis of the span of columns, shape (m, rank)."""
+    if not columns.shape[1]:
+        return columns
+    scaled = _scaled(columns)
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    good = values > tolerance**2 * max(values[-1], 1e-300) * 1e4
+    rough = (scaled @ vectors[:, good]) / np.sqrt(values[good])
+    return np.linalg.qr(rough)[0] if good.any() else columns[:, :0]
+
+
+def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
+    """For each effect its scored shapes, best first."""
+    out: dict[str, list[Scored]] = {}
+    for s in scored:
+        out.setdefault(s.probe.name, []).append(s)
+    return {n: sorted(v, key=lambda s: -s.gain) for n, v in out.items()}

@@ -1,0 +1,78 @@
+"""The noise that is left when everything that a library could explain is taken out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.noise import Noise, estimate_noise
+from fes_pin.identify.problem import Problem
+
+
+def channel_rows(fitted: Fit) -> list[tuple[int, str, slice]]:
+    """Trial, output column and rows of each channel among a fit's whitened residuals, end to end."""
+    out, at = [], 0
+    for i, trial in enumerate(fitted.trials):
+        for name in fitted.model.rig.outputs(trial.kind):
+            if name in trial.columns and name in fitted.noise:
+                count = len(trial) - len(fitted.noise[name].ar)
+                out.append((i, name, slice(at, at + count)))
+                at += count
+    return out
+
+
+def rich_noise(fitted: Fit, white: dict[str, Noise], columns: Sequence[np.ndarray]) -> dict[str, Noise]:
+    """Autoregressive noise of the residuals without any part that the columns could explain.
+
+    Parameters
+    ----------
+    fitted
+        A fit under any noise.
+    white
+        White noise by output column, which the columns are scaled with.
+    columns
+        Sensitivities scaled with `white`, shape (m, k) each, all trials end to end.
+    """
+    problem = Problem(fitted.model, fitted.trials, white, fitted.free)
+    parts = problem.linearize(fitted.values, fitted.unknowns)
+    residual = np.concatenate([p.residual for p in parts])
+    explain = [np.concatenate([p.jacobian for p in parts]), *columns, _local_columns(parts)]
+    basis = _span(np.concatenate([c for c in explain if c.shape[1]], axis=1))
+    left = residual - basis @ (basis.T @ residual)
+    at, channels = 0, {}
+    for trial in fitted.trials:
+        for name in fitted.model.rig.outputs(trial.kind):
+            if name in trial.columns and name in white:
+                piece = left[at : at + len(trial)] * white[name].innovation_std
+                at += len(trial)
+                channels.setdefault(name, []).append(piece)
+    share = {n: basis.shape[1] * sum(map(len, v)) // max(len(left), 1) for n, v in channels.items()}
+    return {name: estimate_noise(pieces, used=share[name]) for name, pieces in channels.items()}
+
+
+def whiteless(noise: dict[str, Noise]) -> dict[str, Noise]:
+    """The same noise, taken for white."""
+    return {n: Noise(max(m.std, 1e-12), (), m.std) for n, m in noise.items()}
+
+
+def _local_columns(parts: Sequence) -> np.ndarray:
+    """Each trial's unknowns as columns of their own, shape (m, all unknowns)."""
+    rows, width = sum(len(p.residual) for p in parts), sum(p.local.shape[1] for p in parts)
+    out, row, column = np.zeros((rows, width)), 0, 0
+    for part in parts:
+        n, k = part.local.shape
+        out[row : row + n, column : column + k] = part.local
+        row, column = row + n, column + k
+    return out
+
+
+def _span(columns: np.ndarray) -> np.ndarray:
+    """Orthonormal basis of a span, shape (m, rank)."""
+    norms = np.linalg.norm(columns, axis=0)
+    good = (norms > 0) & np.isfinite(norms)
+    scaled = columns[:, good] / norms[good]
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    kept = values > 1e-9 * max(values.max(initial=0.0), 1e-300)
+    return (scaled @ vectors[:, kept]) / np.sqrt(values[kept])

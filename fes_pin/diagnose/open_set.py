@@ -1,0 +1,181 @@
+"""What no cause in the library explains: lack of fit on smooth features of the motion, and where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.signal
+import scipy.stats
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.library import Projection
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.models.model import Model
+from fes_pin.models.simulate import Simulator
+
+REMAINDER_LEVEL = 0.01
+"""Level of the test of the remainder; see `search.CLAIM_LEVEL`."""
+STRONG_LEVEL = 1e-12
+"""Level at which a remainder counts although it differs from trial to trial: a spasm, not noise."""
+SIGN_DRAWS = 400
+
+
+@dataclass(frozen=True)
+class Features:
+    """Smooth functions of the simulated motion, as whitened columns.
+
+    Attributes
+    ----------
+    names
+        Of the variable that each column is a function of.
+    columns
+        Shape (m, features), all trials end to end.
+    """
+
+    names: tuple[str, ...]
+    columns: np.ndarray
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is left beside the model."""
+
+    unexplained: bool
+    p_value: float
+    where: str | None
+    excess: float = 0.0
+    """By how much the statistic exceeds its 97.5 % quantile."""
+
+
+def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Features:
+    """About 40 smooth functions of angle, rate, acceleration, stimulus, activation and time of the simulated trials.
+
+    Each is also taken through a second-order low pass, as a torque would be by the joint.
+    """
+    simulated = Simulator(model, trials).run(model.parameters())
+    names: dict[str, str] = {}
+    blocks = []
+    for trial, one in zip(trials, simulated, strict=True):
+        for k, output in enumerate(model.rig.outputs(trial.kind)):
+            if output not in trial.columns or output not in noise:
+                continue
+            made = _of_trial(trial, one.readings[:, k], output)
+            whitened = {n: noise[output].whiten(v) for n, v in made.items()}
+            for n in whitened:
+                names[f"{output} {n}"] = n
+            blocks.append({f"{output} {n}": v for n, v in whitened.items()})
+    keys = list(names)
+    rows = []
+    for block in blocks:
+        count = len(next(iter(block.values())))
+        rows.append(np.stack([block.get(k, np.zeros(count)) for k in keys], axis=1))
+    return Features(tuple(names[k].split(":")[0] for k in keys), np.concatenate(rows))
+
+
+def _of_trial(trial: Trial, reading: np.ndarray, output: str) -> dict[str, np.ndarray]:
+    """Features of one channel of one trial by "variable: function", each scaled to about 1."""
+    dt = trial.dt
+    time = (trial.time - trial.time[0]) / max(trial.duration, dt)
+    centred = reading - reading.mean()
+    q = centred / max(float(np.abs(centred).max()), 1e-12)
+    v = np.gradient(q, dt)
+    v = v / max(float(np.abs(v).max()), 1e-12)
+    a = np.gradient(v, dt)
+    a = a / max(float(np.abs(a).max()), 1e-12)
+    base = {
+        "offset: 1": np.ones_like(time),
+        "time: t": time,
+        "time: t2": time**2,
+        "time: t3": time**3,
+        "angle: q2": q**2,
+        "angle: q3": q**3,
+        "rate: v": v,
+        "rate: v|v|": v * np.abs(v),
+        "rate: sign v": np.tanh(10.0 * v),
+        "rate: v3": v**3,
+        "acceleration: a": a,
+        "angle: q v": q * v,
+        "time: q t": q * time,
+        "time: v t": v * time,
+    }
+    for cycles in (1, 2, 3, 5, 8):
+        base[f"time: sin {cycles}"] = np.sin(2 * np.pi * cycles * time)
+        base[f"time: cos {cycles}"] = np.cos(2 * np.pi * cycles * time)
+    driven = {}
+    for name in ("pulse_width_us", "stim", "effort"):
+        if name in trial.columns:
+            u = trial[name] / max(float(np.abs(trial[name]).max()), 1e-12)
+            act, slow = _low_pass(u, 0.05, dt), _low_pass(u, 0.5, dt)
+            used = np.cumsum(act) * dt / max(trial.duration, dt)
+            driven = {
+                "stimulus: u": u,
+                "activation: act": act,
+                "activation: act2": act**2,
+                "activation: act3": act**3,
+                "activation: act q": act * q,
+                "activation: act v": act * v,
+                "activation: slow": slow,
+                "history: used": used,
+                "history: act used": act * used,
+                "history: act t": act * time,
+                "history: act slow": act * slow,
+            }
+    through = {f"{n} filtered": _low_pass(_low_pass(x, 0.05, dt), 0.05, dt) for n, x in {**base, **driven}.items()}
+    kind = "angle" if output != "force_n" else "force"
+    return {n.replace("angle:", f"{kind}:"): x for n, x in {**base, **driven, **through}.items()}
+
+
+def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
+    pole = float(np.exp(-dt / time_constant))
+    return scipy.signal.lfilter([1.0 - pole], [1.0, -pole], x)
+
+
+def remainder(fitted: Fit, seed: int = 0) -> Remainder:
+    """Test whether smooth features explain anything that a fit leaves.
+
+    The chi-square of the features is divided by the inflation that it shows when each trial's features change sign at
+    random: then only what is not coherent between trials is left, which noise that is not quite whitened has as well.
+    """
+    projection = Projection(fitted.parts)
+    made = features(fitted.model, fitted.trials, fitted.noise)
+    columns = projection(made.columns)
+    before, after = np.linalg.norm(made.columns, axis=0), np.linalg.norm(columns, axis=0)
+    good = after > 1e-3 * np.where(before > 0, before, 1.0)
+    columns, names = columns[:, good] / after[good], [n for n, g in zip(made.names, good, strict=True) if g]
+    values, vectors = np.linalg.eigh(columns.T @ columns)
+    kept = values > 1e-4 * values.max(initial=1e-300)
+    basis = (columns @ vectors[:, kept]) / np.sqrt(values[kept])
+    shares = _trial_shares(basis, projection.residual, fitted)
+    rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
+    plain = float(scipy.stats.chi2.sf(statistic, rank))
+    p_value = float(scipy.stats.chi2.sf(statistic / _inflation(shares, rank, seed), rank))
+    unexplained = p_value < REMAINDER_LEVEL or plain < STRONG_LEVEL
+    scores: dict[str, float] = {}
+    for name, z in zip(names, columns.T @ projection.residual, strict=True):
+        scores[name] = max(scores.get(name, 0.0), float(z**2))
+    where = max(scores, key=lambda n: scores[n]) if unexplained else None
+    inflation = _inflation(shares, rank, seed)
+    excess = max(0.0, statistic / inflation - float(scipy.stats.chi2.ppf(0.975, rank)))
+    shown = plain if unexplained and p_value >= REMAINDER_LEVEL else p_value
+    return Remainder(bool(unexplained), shown, where, excess)
+
+
+def _trial_shares(basis: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.ndarray:
+    """Each trial's part of the inner products of basis and residual, shape (trials, rank)."""
+    out, at = [], 0
+    for part in fitted.parts:
+        rows = slice(at, at + len(part.residual))
+        at = rows.stop
+        out.append(basis[rows].T @ residual[rows])
+    return np.array(out)
+
+
+def _inflation(shares: np.ndarray, rank: int, seed: int) -> float:
+    """How much larger than its rank the statistic is with random signs of the trials; 1 with fewer than 4 trials."""
+    if len(shares) < 4 or not rank:
+        return 1.0
+    signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(SIGN_DRAWS, len(shares)))
+    return max(1.0, float(np.mean(np.sum((signs @ shares) ** 2, axis=1))) / rank)

@@ -1,0 +1,91 @@
+"""A diagnosis on disk: `diagnosis.json` as the contract says, and the next experiment's stimulus."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+from fes_pin.data.trial import trial_csv
+from fes_pin.diagnose.diagnosis import Cause, Diagnosis
+from fes_pin.identify.fit import Fit
+from fes_pin.models.store import model_toml
+
+DIGITS = 6
+"""Significant digits printed: the last that does not depend on how sums are ordered."""
+NEXT_FILE = "next_trial.csv"
+
+
+def shown(value: float | None) -> float | None:
+    """A number as printed; None for what is not finite."""
+    if value is None or not math.isfinite(value):
+        return None
+    return float(f"{value:.{DIGITS}g}")
+
+
+def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
+    """`diagnosis.json` as a dictionary."""
+    return {
+        "study": diagnosis.study.name,
+        "verdict": diagnosis.verdict,
+        "causes": [_cause(c) for c in diagnosis.causes],
+        "remainder": {
+            "unexplained": diagnosis.remainder.unexplained,
+            "p_value": shown(diagnosis.remainder.p_value),
+            "where": diagnosis.remainder.where,
+        },
+        "absorbed": list(diagnosis.absorbed),
+        "nominal": {"parameters": _parameters(diagnosis.nominal), "error_percent": _errors(diagnosis.nominal_error)},
+        "extended": {"parameters": _parameters(diagnosis.extended), "error_percent": _errors(diagnosis.extended_error)},
+        "noise": {
+            n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in diagnosis.extended.noise.items()
+        },
+        "ceiling_percent": shown(diagnosis.ceiling_percent),
+        "next_experiment": _experiment(diagnosis),
+        "wall_s": round(diagnosis.wall_s, 2),
+    }
+
+
+def diagnosis_files(diagnosis: Diagnosis) -> dict[str, str]:
+    """Every file of a diagnosis but the report, by name."""
+    files = {
+        "diagnosis.json": json.dumps(diagnosis_record(diagnosis), indent=1, allow_nan=False) + "\n",
+        "model.toml": model_toml(diagnosis.model),
+    }
+    if diagnosis.next_experiment and diagnosis.next_experiment.trial is not None:
+        files[NEXT_FILE] = trial_csv(diagnosis.next_experiment.trial)
+    return files
+
+
+def _cause(cause: Cause) -> dict[str, Any]:
+    held = cause.gain_held_out
+    return {
+        "name": cause.name,
+        "stage": cause.stage,
+        "parameters": {n: {"value": shown(p.value), "std": shown(p.std)} for n, p in cause.parameters.items()},
+        "equivalents": list(cause.equivalents),
+        "p_value": shown(cause.p_value),
+        "gain_percent": {
+            "fit": shown(cause.gain_fit),
+            "held_out": shown(held.percent),
+            "ci95": [shown(held.low), shown(held.high)],
+        },
+    }
+
+
+def _parameters(fitted: Fit) -> dict[str, Any]:
+    return {n: {"value": shown(fitted.values[n]), "std": shown(fitted.std(n))} for n in fitted.free}
+
+
+def _errors(errors: tuple[float, float | None]) -> dict[str, float | None]:
+    return {"fit": shown(errors[0]), "held_out": shown(errors[1])}
+
+
+def _experiment(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    plan = diagnosis.next_experiment
+    if plan is None:
+        return None
+    trial = None
+    if plan.trial is not None:
+        trial = {"file": NEXT_FILE, "kind": plan.trial.kind, **{n: shown(v) for n, v in plan.trial.conditions.items()}}
+    return {"why": plan.why, "separates": list(plan.separates), "trial": trial}

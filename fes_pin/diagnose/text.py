@@ -1,0 +1,76 @@
+"""A diagnosis in words: what a person reads in the terminal."""
+
+from __future__ import annotations
+
+import math
+
+from fes_pin.diagnose.diagnosis import Cause, Diagnosis
+
+HEADLINES = {
+    "adequate": "the model is adequate: these data justify no extension of it.",
+    "unexplained": "the model misses something, and nothing in the library explains it.",
+}
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """The verdict in one sentence."""
+    count = len(diagnosis.causes)
+    if not count:
+        return HEADLINES[diagnosis.verdict]
+    rest = ", and something is left" if diagnosis.remainder.unexplained else ""
+    return f"{'one cause explains' if count == 1 else f'{count} causes explain'} what the model gets wrong{rest}."
+
+
+def quantity(value: float, std: float, unit: str) -> str:
+    """A value with its standard deviation, rounded to what it means."""
+    if not math.isfinite(std):
+        return f"{value:.3g} {unit} (not identified)".replace("  ", " ")
+    if std <= 0.0:
+        return f"{value:.4g} {unit} (held)".replace("  ", " ")
+    digits = max(0, 1 - math.floor(math.log10(std)))
+    if digits > 6 or abs(value) >= 1e5:
+        return f"{value:.3g} +- {std:.2g} {unit}".strip()
+    return f"{value:.{digits}f} +- {std:.{digits}f} {unit}".strip()
+
+
+def cause_row(cause: Cause) -> tuple[str, str, str, str, str]:
+    """Cause, stage, parameters, held-out gain, what it cannot be told from."""
+    values = "\n".join(f"{n} {quantity(p.value, p.std, p.unit)}" for n, p in cause.parameters.items())
+    held = cause.gain_held_out
+    gain = f"{held.percent:.0f} % [{held.low:.0f}, {held.high:.0f}]"
+    return cause.name, cause.stage, values, gain, ", ".join(cause.equivalents) or "-"
+
+
+def footnotes(diagnosis: Diagnosis) -> list[str]:
+    """What stands beneath the table."""
+    before, after = diagnosis.nominal_error, diagnosis.extended_error
+    shown = [
+        f"{b:.2f} -> {a:.2f} % {where}"
+        for b, a, where in zip(before, after, ("fitted", "held out"), strict=True)
+        if a is not None and b is not None
+    ]
+    lines = [f"error E {', '.join(shown)}; noise floor {diagnosis.ceiling_percent:.2f} %"]
+    left = diagnosis.remainder
+    where = f", most on {left.where}" if left.where else ""
+    lines.append(
+        f"{'something is' if left.unexplained else 'nothing'} left unexplained (p = {left.p_value:.2g}{where})"
+    )
+    if diagnosis.absorbed:
+        lines.append(f"not testable here: {', '.join(diagnosis.absorbed)}")
+    if diagnosis.next_experiment:
+        lines.append(f"next experiment: {diagnosis.next_experiment.why}")
+    return lines
+
+
+def verdict_text(diagnosis: Diagnosis) -> str:
+    """The verdict as plain text."""
+    lines = [f"{diagnosis.study.name}: {headline(diagnosis)}"]
+    if diagnosis.causes:
+        rows = [("cause", "stage", "parameters", "held-out gain", "cannot be told from")]
+        for cause in diagnosis.causes:
+            name, stage, values, gain, others = cause_row(cause)
+            for k, value in enumerate(values.split("\n")):
+                rows.append((name, stage, value, gain, others) if k == 0 else ("", "", value, "", ""))
+        widths = [max(len(r[k]) for r in rows) for k in range(5)]
+        lines += [" " + "  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows]
+    return "\n".join(lines + [f" {note}" for note in footnotes(diagnosis)])

@@ -1,0 +1,79 @@
+"""Models on disk: `model.toml`, whole and by itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from fes_pin.data.files import write_text
+from fes_pin.data.toml import Document, read_toml
+from fes_pin.models.effects import effect
+from fes_pin.models.model import Model
+from fes_pin.models.rigs import RIGS
+
+FORMAT = 1
+
+
+def model_toml(model: Model) -> str:
+    """A model as TOML: rig, constants, parameters to the last bit, effects."""
+    rig = model.rig
+    tables: dict[str, Any] = {
+        "format": FORMAT,
+        "rig": rig.name,
+        "fitted": list(rig.fitted_parameters()),
+        "constants": {n: float(v) for n, v in rig.constants.items()},
+        "nominal": {n: float(getattr(rig, n)) for n in rig.parameters()},
+        "effects": {e.name: {n: float(getattr(e, n)) for n in e.parameters()} for e in model.effects},
+    }
+    return tomli_w.dumps(tables)
+
+
+def save_model(model: Model, path: str | Path) -> None:
+    """Write `model.toml`, whole or not at all."""
+    write_text(path, model_toml(model))
+
+
+def load_model(path: str | Path) -> Model:
+    """Read a model that `save_model` wrote.
+
+    Raises
+    ------
+    InputError
+        Not such a file: names the row, the key and what was expected.
+    """
+    document = read_toml(path)
+    kinds = {rig.name: rig for rig in RIGS}
+    if document.data.get("format") != FORMAT:
+        raise document.error("format", f"expected format = {FORMAT}: a model that fes-pin saved")
+    if document.data.get("rig") not in kinds:
+        raise document.error("rig", f"expected one of {', '.join(kinds)}")
+    kind = kinds[document.data["rig"]]
+    fitted = document.data.get("fitted")
+    if not isinstance(fitted, list) or not set(map(str, fitted)) <= set(kind.parameters()):
+        raise document.error("fitted", f"expected names among {', '.join(kind.parameters())}")
+    nominal = _numbers(document, "nominal", set(kind.parameters()))
+    model = Model(kind(**nominal, constants=_numbers(document, "constants", None), fitted=tuple(fitted)))
+    for name in document.table("effects"):
+        try:
+            one = effect(name)
+        except KeyError as error:
+            raise document.error(f"effects.{name}", str(error.args[0])) from None
+        try:
+            model = model + one(**_numbers(document, f"effects.{name}", set(one.parameters())))
+        except ValueError as error:
+            raise document.error(f"effects.{name}", str(error)) from None
+    return model
+
+
+def _numbers(document: Document, key: str, known: set[str] | None) -> dict[str, float]:
+    values = document.table(key)
+    for name, value in values.items():
+        if known is not None and name not in known:
+            raise document.error(f"{key}.{name}", f"unknown; expected one of {', '.join(sorted(known))}")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise document.error(f"{key}.{name}", f"expected a number, found {value!r}")
+    if known is not None and (missing := known - set(values)):
+        raise document.error(key, f"expected {', '.join(sorted(missing))} as well")
+    return {n: float(v) for n, v in values.items()}
