@@ -152,7 +152,13 @@ def paper_study(name: str, frame: bool = False, seed: int = 0) -> Study:
     ]
     for k in range(2):
         isometric = record(
-            twin, isometric_stimulus(4.0), f"isometric_{k}", HELD_AT_RAD, FORCE_NOISE_N, seed + 100 + k, role="fit"
+            twin,
+            isometric_stimulus(4.0),
+            f"isometric_{k}",
+            held_at_rad=HELD_AT_RAD,
+            noise_std=FORCE_NOISE_N,
+            seed=seed + 100 + k,
+            role="fit",
         )
         trials.append(isometric)
     start = {

@@ -179,6 +179,7 @@ def record(
     twin: AnkleTwin,
     pulse_widths_us: np.ndarray,
     name: str,
+    *,
     held_at_rad: float | None = None,
     noise_std: float = 0.0,
     seed: int = 0,

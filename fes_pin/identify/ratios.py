@@ -56,7 +56,7 @@ class RatioProblem:
     """E of a model on motion trials as a function of the ratios, with exact sensitivities.
 
     The muscle (gain, time constant) and F_ANT are known from other trials, as in the paper. Moving k1, k2 and k3 moves
-    the model's gain, inertia and damping: gain = K a(k) / a = K (k1 / k2) (l / a), inertia = l / k2, damping = k3 l / k2.
+    the model's gain, inertia and damping: gain = K (k1 / k2) (l / a), inertia = l / k2, damping = k3 l / k2.
 
     Parameters
     ----------
@@ -64,6 +64,8 @@ class RatioProblem:
         An ankle, with effects or without; its parameters hold the known muscle, and the start of the ratios.
     trials
         Motion trials.
+    known_gain
+        K, if the model's own gain is not it but a start.
 
     Raises
     ------
@@ -71,13 +73,15 @@ class RatioProblem:
         For another rig, or trials that hold the joint.
     """
 
-    def __init__(self, model: Model, trials: Sequence[Trial]) -> None:
+    def __init__(self, model: Model, trials: Sequence[Trial], known_gain: float | None = None) -> None:
         if model.rig.name != "ankle":
             raise InputError(f"k1, k2 and k3 belong to the rig ankle, found {model.rig.name}")
         if not trials or any(t.kind != "motion" for t in trials):
             raise InputError("expected one or more motion trials to find k1, k2 and k3 from")
         self.model, self.trials = model, tuple(trials)
         self.known = model.parameters()
+        start_gain, self.known["gain"] = self.known["gain"], known_gain or self.known["gain"]
+        self.boost = start_gain / self.known["gain"]
         constants = model.rig.constants
         self.lever, self.arm = float(constants["com_distance_m"]), float(constants["moment_arm_m"])
         # RK4 is stable to 2.78 (Hairer and Wanner, Solving ODEs II, IV.2); the fastest decay is k3
@@ -89,7 +93,7 @@ class RatioProblem:
     def start(self) -> np.ndarray:
         """Logarithms of the ratios of the model as given."""
         v = self.known
-        return np.log(np.array([self.arm, self.lever, v["damping_nms"]]) / v["inertia_kgm2"])
+        return np.log(np.array([self.arm * self.boost, self.lever, v["damping_nms"]]) / v["inertia_kgm2"])
 
     def values(self, x: np.ndarray) -> dict[str, float]:
         """The model's parameters at log-ratios x, shape (3,)."""
