@@ -5,9 +5,9 @@
               -> inverse recruitment -> pulse width
 
 The feedback's gains are those of a linear quadratic regulator at each angle. Its one weight follows a rule: one degree
-of error is worth `boldness` of the muscle (Bryson's rule), and `boldness` is the greatest of a ladder at which the
-linear loop with its observer decays by at least `DECAY` a pulse at every corner of +-30 % in gain, time constant and
-stiffness, over the whole range of angles.
+of error is worth `boldness` of the muscle (Bryson's rule), and `boldness` is that of a ladder with which the linear loop,
+its observer included, decays fastest at the worst corner of +-30 % in gain, time constant and stiffness over the whole
+range of angles; of several that are as good, the boldest.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import numpy as np
 import scipy.linalg
 
 from fes_pin.models.model import Model
+from fes_pin.stimulate.endurance import EnduranceWatch, fatigue_of
 from fes_pin.stimulate.observer import PULSE_S, AnkleDynamics, JointObserver, transition
 from fes_pin.stimulate.pulse import PulseWidth
 from fes_pin.stimulate.recruitment import LinearRecruitment
@@ -29,8 +30,8 @@ from fes_pin.stimulate.reference import LOOKAHEAD, ReferenceWindow
 DEGREE = math.pi / 180.0
 LADDER = (0.5, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05, 0.03)
 """Shares of the muscle that one degree of error may be worth, boldest first."""
-DECAY = 0.95
-"""Largest modulus that an eigenvalue of the loop may have at a corner: errors then halve in 14 pulses (0.3 s)."""
+AS_GOOD = 0.002
+"""Difference of two moduli, per pulse, that does not count."""
 UNCERTAINTY = 0.3
 """Of gain, time constant and stiffness."""
 ANGLES = 9
@@ -95,7 +96,7 @@ def corners(dynamics: AnkleDynamics) -> list[AnkleDynamics]:
     """Ankles that differ by +-30 % in gain, time constant and stiffness."""
     low, high = 1.0 - UNCERTAINTY, 1.0 + UNCERTAINTY
     found = []
-    for gain, tau, stiff in itertools.product((low, 1.0, high), repeat=3):
+    for gain, tau, stiff in itertools.product((low, high), repeat=3):
         other = replace(dynamics, pull_nm=dynamics.pull_nm * gain, time_constant=dynamics.time_constant * tau)
         found.append(replace(other, f1=dynamics.f1 * stiff))
     return found
@@ -134,17 +135,17 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver) -> Gains:
             a.T, np.eye(4)[:, [1]], observer.noise[:4, :4] + 1e-12 * np.eye(4), np.array([[observer.variance]])
         )
         steady.append(p[:, 1] / (p[1, 1] + observer.variance))
-    others = corners(dynamics)
+    tried = []
     for boldness in LADDER:
         table = np.array([regulator(dynamics, q, boldness) for q in angles])
         radius = max(
             loop_radius(other, dynamics, q, k, see)
             for q, k, see in zip(angles[::2], table[::2], steady[::2], strict=True)
-            for other in others
+            for other in (dynamics, *corners(dynamics))
         )
-        if radius <= DECAY:
-            break
-    return Gains(angles, table, boldness, radius)
+        tried.append(Gains(angles, table, boldness, radius))
+    least = min(g.radius for g in tried)
+    return next(g for g in tried if g.radius <= least + AS_GOOD)
 
 
 class PositionController:
@@ -153,7 +154,8 @@ class PositionController:
     Parameters
     ----------
     model
-        The ankle as identified; of its effects, `recruitment_hysteresis` is compensated.
+        The ankle as identified; of its effects, `recruitment_hysteresis` is compensated, and `fatigue` tells how long
+        the muscle will last.
     load_kg
         M.
     observer
@@ -184,6 +186,8 @@ class PositionController:
         self.wanted_rad = self.lowest
         self.highest = dynamics.rest_angle(1.0)
         self.count = 0
+        fatigue = fatigue_of(model)
+        self.watch = EnduranceWatch(fatigue) if fatigue else None
 
     @property
     def share(self) -> float:
@@ -217,8 +221,15 @@ class PositionController:
             wanted = self._law()
             width, self.recruitment = self.pulse(wanted)
             self.short_of = max(wanted - 1.0, 0.0)
+        if self.watch is not None:
+            self.watch.take(float(self.observer.x[0]) * self.share, self.share)
         self.observer.predict(self.recruitment)
         return width
+
+    @property
+    def warning(self) -> str:
+        """One line, some time before the muscle can no longer do what it has been doing; else empty."""
+        return self.watch.warning if self.watch is not None else ""
 
     def _reach(self) -> None:
         """How far the muscle can move the joint now."""

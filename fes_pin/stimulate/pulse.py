@@ -56,7 +56,7 @@ class PulseWidth:
         wanted = min(max(recruitment, 0.0), 1.0) if math.isfinite(recruitment) else 0.0
         target = float(self.curve.pulse_width_us(wanted))
         if self.half == 0.0:
-            self.followed = width = self._allowed(target)
+            width = self._allowed(target)
             # the curve's own inverse: exact but for what the limits took
             return width, wanted if width == target else float(self.curve.recruitment(width))
         if wanted == 0.0:
