@@ -1,8 +1,8 @@
 """The domain of the ratios k1, k2, k3 that keep E below a level: extremes, shape, profile likelihood intervals.
 
 A domain is followed along a path: one direction is held step by step farther from the optimum while E is made least
-over the others, with exact sensitivities, until E meets the level. Where the path ends is the extreme: E's gradient there
-points along the direction. A path that never meets the level shows that the domain has no end.
+over the others, with exact sensitivities, until E meets the level. Where the path ends is the extreme: E's gradient
+there points along the direction. A path that never meets the level shows that the domain has no end.
 
 Source: Dombre, Fournier and Coiffet, section II-3-2, table 2. Profile likelihood: Venzon and Moolgavkar, Applied
 Statistics 37 (1988).

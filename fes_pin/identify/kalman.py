@@ -4,8 +4,8 @@ Between two samples the muscle of section II-3-1 does exactly
 
     F+ = alpha F + beta r,    alpha = exp(-dt / tau),  beta = (1 - alpha) K F_ref,    y = F + noise
 
-which is linear in what is sought. `GainFilter` carries the state (F, alpha, beta): its measurement is linear, and of its
-one product, alpha F, mean and covariance are propagated exactly (for a Gaussian), not linearised. So its bands mean
+which is linear in what is sought. `GainFilter` carries the state (F, alpha, beta): its measurement is linear, and of
+its one product, alpha F, mean and covariance are propagated exactly (for a Gaussian), not linearised. So its bands mean
 what they say, which `nees` and `nis` test. `RegressionFilter` is the plain linear filter on (alpha, beta) with the
 measured force as regressor; it is what a linear Kalman filter for these two usually is, and it takes the noise of the
 regressor for motion: its tau comes out short.

@@ -5,9 +5,9 @@
               -> inverse recruitment -> pulse width
 
 The feedback's gains are those of a linear quadratic regulator at each angle. Its one weight follows a rule: one degree
-of error is worth `boldness` of the muscle (Bryson's rule), and `boldness` is that of a ladder with which the linear loop,
-its observer included, decays fastest at the worst corner of +-30 % in gain, time constant and stiffness over the whole
-range of angles; of several that are as good, the boldest.
+of error is worth `boldness` of the muscle (Bryson's rule), and `boldness` is that of a ladder with which the linear
+loop, its observer included, decays fastest at the worst corner of +-30 % in gain, time constant and stiffness over the
+whole range of angles; of several that are as good, the boldest.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
+from fes_pin.models.effects import RecruitmentHysteresis
 from fes_pin.models.model import Model
 from fes_pin.stimulate.endurance import EnduranceWatch, fatigue_of
 from fes_pin.stimulate.observer import PULSE_S, AnkleDynamics, JointObserver, transition
@@ -174,9 +175,9 @@ class PositionController:
     def __init__(self, model: Model, load_kg: float = 0.0, observer: JointObserver | None = None) -> None:
         dynamics = AnkleDynamics.of(model, load_kg)
         constants = model.rig.constants
-        play = [e for e in model.effects if e.name == "recruitment_hysteresis"]
+        play = [e.half_width_us for e in model.effects if isinstance(e, RecruitmentHysteresis)]
         curve = LinearRecruitment(constants["threshold_us"], constants["saturation_us"])
-        self.pulse = PulseWidth(curve, play[0].half_width_us if play else 0.0)
+        self.pulse = PulseWidth(curve, play[0] if play else 0.0)
         self.dynamics = dynamics
         self.observer = observer if observer is not None else JointObserver(dynamics)
         self.gains = tune(dynamics, self.observer)

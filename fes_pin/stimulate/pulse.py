@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import Any, Protocol
 
 from fes_pin.data.errors import InputError
 
@@ -11,13 +11,18 @@ from fes_pin.data.errors import InputError
 class Curve(Protocol):
     """A recruitment curve; `fes_pin.stimulate.recruitment` has several."""
 
-    threshold_us: float
-    saturation_us: float
+    @property
+    def threshold_us(self) -> Any:
+        """Pulse width that recruits the first fibre."""
 
-    def recruitment(self, pulse_width_us: float) -> float:
+    @property
+    def saturation_us(self) -> Any:
+        """Pulse width that recruits the last."""
+
+    def recruitment(self, pulse_width_us: Any) -> Any:
         """Recruitment at a pulse width."""
 
-    def pulse_width_us(self, recruitment: float) -> float:
+    def pulse_width_us(self, recruitment: Any) -> Any:
         """Pulse width for a recruitment."""
 
 

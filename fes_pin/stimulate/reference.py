@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +56,7 @@ class ReferenceWindow:
         """Go on by one pulse; see `PositionController.step`. Values are held between two angles."""
         values = self.values
         values[:-1] = values[1:]
-        if isinstance(reference, (float, int)):
+        if not isinstance(reference, (list, tuple, np.ndarray)):
             values[-1] = self._good(reference, self.last, lowest, highest)
             self.last = float(values[-1])
             return
@@ -65,9 +66,10 @@ class ReferenceWindow:
         self.last = float(values[-1])
 
     @staticmethod
-    def _good(value: float, before: float, lowest: float, highest: float) -> float:
-        good = isinstance(value, (float, int)) and math.isfinite(value)
-        return min(max(value if good else before, lowest), highest)
+    def _good(value: Any, before: float, lowest: float, highest: float) -> float:
+        """A value held between two angles; the one before it if it is none."""
+        good = isinstance(value, (float, int)) and -math.inf < value < math.inf
+        return min(max(float(value) if good and abs(value) < 1e9 else before, lowest), highest)
 
     def now(self) -> list[float]:
         """Angle, rate and acceleration now, then the same a pulse ahead; rad and s."""

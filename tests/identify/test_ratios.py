@@ -48,7 +48,7 @@ def test_error_is_that_of_equation_2():
 
 def test_gradient_of_the_error_against_differences(framed):
     problem, optimum = framed
-    x, h = optimum.x + [0.1, -0.05, 0.2], 1e-5
+    x, h = optimum.x + np.array([0.1, -0.05, 0.2]), 1e-5
     numeric = [(problem.error(x + h * e)[0] - problem.error(x - h * e)[0]) / (2 * h) for e in np.eye(3)]
     np.testing.assert_allclose(problem.error(x)[1], numeric, rtol=1e-5)
 
@@ -79,7 +79,7 @@ def test_extremes_meet_the_optimality_conditions_and_an_independent_optimiser(fr
     for k, name in enumerate(RATIOS):
         found = scipy.optimize.minimize(
             lambda x, k=k: x[k],
-            domain.lowest[name].x + [0.01, 0.01, 0.01],
+            domain.lowest[name].x + 0.01,
             jac=lambda x, k=k: np.eye(3)[k],
             constraints={
                 "type": "ineq",
