@@ -1,9 +1,9 @@
 """State of a stimulated ankle from its angle, one sample to a pulse: an extended Kalman filter.
 
 State: activation, angle, rate, a torque that the model does not know, and the share of the believed gain that the
-muscle has. The torque wanders (it takes up what is wrong in passive curve, load and damping), the gain's share wanders more
-slowly (it takes up fatigue). What is fed in is the recruitment that the nerve really got, after every limit: a limit
-that holds the stimulus back leaves nothing to wind up.
+muscle has. The torque wanders (it takes up what is wrong in passive curve, load and damping), the gain's share wanders
+more slowly (it takes up fatigue). What is fed in is the recruitment that the nerve really got, after every limit: a
+limit that holds the stimulus back leaves nothing to wind up.
 """
 
 from __future__ import annotations
