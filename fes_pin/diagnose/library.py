@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,7 +72,8 @@ class Library:
         return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
 
     def _acts(self, effect: type[Effect], nominal: Model) -> bool:
-        return any(effect.signal in nominal.rig.signals(t.kind) for t in self.trials)
+        rig = nominal.rig
+        return any(effect.signal in rig.changeable(t.kind, rig.input_columns(t)) for t in self.trials)
 
     def _probe(self, effect: type[Effect], nominal: Model, fitted: Fit, noise: NoiseModel) -> list[Probe]:
         free = tuple(f"{effect.name}.{n}" for n in effect.amplitudes())
@@ -90,7 +91,7 @@ class Library:
 def _near_null(effect: type[Effect], name: str) -> float:
     info = effect.parameters()[name]
     assert info.null is not None
-    one_sided = info.lower == info.null or info.upper == info.null
+    one_sided = info.null in {info.lower, info.upper}
     return info.null + (TINY * info.scale if one_sided else 0.0)
 
 
@@ -154,7 +155,7 @@ class Projection:
             at = block.stop
             blocks.append(block)
             out.append(_score(probe, gram[block, block], along[block], float(before[block].sum())))
-        return Scores(out, gram, blocks)
+        return Scores(out, gram, along, blocks)
 
 
 @dataclass(frozen=True)
@@ -167,12 +168,15 @@ class Scores:
         One for each probe.
     gram
         Shape (k, k): inner products of what the fit leaves of all columns.
+    along
+        Shape (k,): their inner products with the residual.
     blocks
         The rows of `gram` that belong to each probe.
     """
 
     scored: list[Scored]
     gram: np.ndarray
+    along: np.ndarray
     blocks: list[slice]
 
 
@@ -213,3 +217,36 @@ def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
     for s in scored:
         out.setdefault(s.probe.name, []).append(s)
     return {n: sorted(v, key=lambda s: -s.gain) for n, v in out.items()}
+
+
+def best_pairs(scores: Scores, count: int) -> list[tuple[Scored, Scored]]:
+    """Pairs of effects whose linearizations together promise most, best first, each pair of names once."""
+    found: dict[tuple[str, str], tuple[float, Scored, Scored]] = {}
+    for i, first in enumerate(scores.scored):
+        for j in range(i):
+            second = scores.scored[j]
+            if first.probe.name == second.probe.name or not (first.kept > 0 and second.kept > 0):
+                continue
+            gain, a, b = _pair(scores, i, j)
+            key = (second.probe.name, first.probe.name)
+            if key not in found or gain > found[key][0]:
+                found[key] = (gain, replace(first, amplitudes=a), replace(second, amplitudes=b))
+    ordered = sorted(found.items(), key=lambda item: (-item[1][0], item[0]))[:count]
+    return [(one, other) for _, (_, one, other) in ordered]
+
+
+def _pair(scores: Scores, i: int, j: int) -> tuple[float, dict[str, float], dict[str, float]]:
+    """Joint promise of two probes within their bounds, and the amplitudes that go with it."""
+    rows = np.r_[scores.blocks[i], scores.blocks[j]]
+    gram, along = scores.gram[np.ix_(rows, rows)], scores.along[rows]
+    keys = [(k, n) for k in (i, j) for n in scores.scored[k].probe.effect.amplitudes()]
+    info = [scores.scored[k].probe.effect.parameters()[n] for k, n in keys]
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    scaled = gram * np.outer(scale, scale) + 1e-8 * np.eye(len(rows))
+    x = scale * np.linalg.solve(scaled, along * scale)
+    nulls = np.array([f.null or 0.0 for f in info])
+    if any(not f.lower <= v + z <= f.upper for f, v, z in zip(info, x, nulls, strict=True)):
+        return 0.0, {}, {}
+    values = {key: float(v + z) for key, v, z in zip(keys, x, nulls, strict=True)}
+    first, second = ({n: v for (k, n), v in values.items() if k == which} for which in (i, j))
+    return float(2.0 * along @ x - x @ gram @ x), first, second

@@ -7,20 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import Noise, estimate_noise
+from fes_pin.identify.noise import Noise, estimate_noise, thinning
 from fes_pin.identify.problem import Problem
-
-
-def channel_rows(fitted: Fit) -> list[tuple[int, str, slice]]:
-    """Trial, output column and rows of each channel among a fit's whitened residuals, end to end."""
-    out, at = [], 0
-    for i, trial in enumerate(fitted.trials):
-        for name in fitted.model.rig.outputs(trial.kind):
-            if name in trial.columns and name in fitted.noise:
-                count = len(trial) - len(fitted.noise[name].ar)
-                out.append((i, name, slice(at, at + count)))
-                at += count
-    return out
 
 
 def rich_noise(fitted: Fit, white: dict[str, Noise], columns: Sequence[np.ndarray]) -> dict[str, Noise]:
@@ -41,20 +29,22 @@ def rich_noise(fitted: Fit, white: dict[str, Noise], columns: Sequence[np.ndarra
     explain = [np.concatenate([p.jacobian for p in parts]), *columns, _local_columns(parts)]
     basis = _span(np.concatenate([c for c in explain if c.shape[1]], axis=1))
     left = residual - basis @ (basis.T @ residual)
-    at, channels = 0, {}
+    at = 0
+    channels: dict[str, list[np.ndarray]] = {}
     for trial in fitted.trials:
         for name in fitted.model.rig.outputs(trial.kind):
             if name in trial.columns and name in white:
-                piece = left[at : at + len(trial)] * white[name].innovation_std
-                at += len(trial)
+                count = len(trial) // thinning(trial.dt, white[name].step_s)
+                piece = left[at : at + count] * white[name].innovation_std
+                at += count
                 channels.setdefault(name, []).append(piece)
     share = {n: basis.shape[1] * sum(map(len, v)) // max(len(left), 1) for n, v in channels.items()}
-    return {name: estimate_noise(pieces, used=share[name]) for name, pieces in channels.items()}
+    return {n: estimate_noise(v, share[n], white[n].std, white[n].step_s) for n, v in channels.items()}
 
 
 def whiteless(noise: dict[str, Noise]) -> dict[str, Noise]:
     """The same noise, taken for white."""
-    return {n: Noise(max(m.std, 1e-12), (), m.std) for n, m in noise.items()}
+    return {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in noise.items()}
 
 
 def _local_columns(parts: Sequence) -> np.ndarray:

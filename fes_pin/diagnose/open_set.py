@@ -63,7 +63,7 @@ def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Featur
             if output not in trial.columns or output not in noise:
                 continue
             made = _of_trial(trial, one.readings[:, k], output)
-            whitened = {n: noise[output].whiten(v) for n, v in made.items()}
+            whitened = {n: noise[output].whiten(v, trial.dt) for n, v in made.items()}
             for n in whitened:
                 names[f"{output} {n}"] = n
             blocks.append({f"{output} {n}": v for n, v in whitened.items()})

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.stats
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.library import Library, Projection, Scored, Scores, best_by_effect
+from fes_pin.diagnose.held_out import predictive_error
+from fes_pin.diagnose.library import Library, Projection, Scored, Scores, best_by_effect, best_pairs
 from fes_pin.diagnose.noise_floor import rich_noise, whiteless
 from fes_pin.diagnose.open_set import remainder
 from fes_pin.diagnose.significance import Family, coherence_p_value
@@ -29,11 +30,17 @@ FORM_SHARE = 0.02
 an error of 14 % in its form leaves 2 % of its likelihood to whatever else comes near."""
 HOPE_LEVEL = 0.1
 """A round of joint fits is left out only if neither a linear promise nor smooth features reach this level."""
+PROMISING = 25.0
+"""Linear promise of a further cause, in twice the log-likelihood, that keeps a set from being complete: 5 sigma."""
 REFINE_LEVEL = 1e-3
 """Level at which a refinement of an effect's form is adopted."""
 MOST_CAUSES = 3
 BEAM = 3
 """Sets that each round extends; greedy search (1) loses 5 to 8 points of exact pairs (DESIGN section 6)."""
+POOL = 6
+"""Sets of each size that are compared by prediction."""
+SEEDS = 4
+"""Pairs that the linear screen proposes by itself, for causes that do nothing alone."""
 JOINT_FITS = 8
 """Extensions of a round that are fitted jointly, best linear promise first."""
 STARTS = 2
@@ -136,19 +143,58 @@ class Search:
         family = self._singles()
         best: Names = ()
         for size in range(1, MOST_CAUSES + 1):
-            self.progress(0.35 + 0.15 * size, f"sets of {size}")
+            self.progress(0.35 + 0.12 * size, f"sets of {size}")
             if size > 1 and not self._extend_beam(size, family):
                 break
-            ranked = self.ranked(size)
-            if not ranked or not self._better(ranked[0], best, family):
+            first = self._swap(self.ranked(size)[0])
+            if size == 2 and not self._complete(first):
+                self._extend_beam(size, family, every=True)
+                first = self._swap(self.ranked(size)[0])
+            if self._better(first, best, family):
+                self._refine(first)
+                best = first
+            if best == first and self._complete(best):
+                keep = [(), best, *self.ranked(1)[:6], *self.ranked(size)[:6], *_subsets(best)]
+                self.refit(keep, best)
+                best = self.ranked(size)[0]
+            elif size > 1 and best != first:
                 break
-            best = self._swap(ranked[0])
-            self._refine(best)
-            keep = [(), best, *self.ranked(1)[:6], *self.ranked(size)[:6], *_subsets(best)]
-            self.refit(keep, best)
-            best = self.ranked(size)[0]
         best = self._backward(best, family)
-        return self._finish(best, family)
+        if not self._complete(best):
+            best = self._backward(self._by_prediction(best), family)
+            self._refine(best)
+        self.refit([(), best, *self.ranked(1), *self.ranked(len(best) or 1)[:JOINT_FITS], *_subsets(best)], best)
+        return self.settle(best)
+
+    def settle(self, names: Names) -> Searched:
+        """Everything that is to be said of a set of causes: its rivals, and each cause's part in it."""
+        searched = self._finish(names, self.family)
+        return searched if self._complete(names) or not names else self._for_prediction(searched)
+
+    def _for_prediction(self, searched: Searched) -> Searched:
+        """Fit for least open-loop error: what the best set leaves is more than noise, and not to be whitened."""
+        learned, self.noise = self.noise, whiteless(noise_of(searched.best))
+
+        def again(fitted: Fit) -> Fit:
+            return self.fit_from([fitted.model], fitted.unknowns)
+
+        nominal, best = again(searched.nominal), again(searched.best)
+        without = {n: again(f) for n, f in searched.without.items()}
+        rivals = {n: in_parallel(again, fits) for n, fits in searched.rivals.items()}
+        self.noise = learned
+        return replace(searched, nominal=nominal, best=best, without=without, rivals=rivals)
+
+    def _complete(self, names: Names) -> bool:
+        """True if a set leaves only noise: no further cause promises anything, and neither do smooth features.
+
+        The promise is judged by the present noise; noise learned from the set itself can swallow a slow cause.
+        """
+        fitted, none = self.fits[names], self.fits[()]
+        promise = max(s.gain for s in self.scores(fitted).scored)
+        if promise > max(PROMISING, FORM_SHARE * (none.sse - fitted.sse)):
+            return False
+        own = fit_problem(Problem(fitted.model, self.trials, noise_of(fitted)), fitted.values, fitted.unknowns)
+        return not remainder(own, self.seed).unexplained
 
     def _nominal(self) -> None:
         self.progress(0.02, "nominal model")
@@ -162,14 +208,16 @@ class Search:
         self.progress(0.08, "screening")
         scores = self.scores(base)
         family, scored = Family(scores, self.seed), best_by_effect(scores.scored)
+        self.family = family
+        self._seeds = best_pairs(scores, SEEDS)
         self.progress(0.12, "every cause, fitted jointly")
         fitted = in_parallel(lambda v: self.extend(base, v), scored.values())
         for name, one in zip(scored, fitted, strict=True):
             self.fits[(name,)] = one
         return family
 
-    def _extend_beam(self, size: int, family: Family) -> bool:
-        """Fit the most promising sets of a size; False if nothing at all is left to find."""
+    def _extend_beam(self, size: int, family: Family, every: bool = False) -> bool:
+        """Fit the most promising sets of a size, or every one; False if nothing at all is left to find."""
         promised: dict[Names, tuple[float, Names, list[Scored]]] = {}
         for names in self.ranked(size - 1)[:BEAM]:
             base = self.fits[names]
@@ -178,13 +226,27 @@ class Search:
                 promise = base.sse - scored[0].gain
                 if key not in self.fits and (key not in promised or promise < promised[key][0]):
                     promised[key] = (promise, names, scored)
-        chosen = sorted(promised.items(), key=lambda item: (item[1][0], item[0]))[:JOINT_FITS]
-        if not chosen or not (self._hopeful(size, chosen[0][1][0], family)):
+        if size == 2:
+            self._plant(promised)
+        chosen = sorted(promised.items(), key=lambda item: (item[1][0], item[0]))
+        if not every:
+            chosen = chosen[:JOINT_FITS]
+        if not chosen or not (every or self._hopeful(size, chosen[0][1][0], family)):
             return False
         fitted = in_parallel(lambda item: self.extend(self.fits[item[1][1]], item[1][2]), chosen)
         for (key, _), one in zip(chosen, fitted, strict=True):
             self.fits[key] = one
         return True
+
+    def _plant(self, promised: dict[Names, tuple[float, Names, list[Scored]]]) -> None:
+        """Fit the pairs of the linear screen that no single leads to."""
+        base = self.fits[()]
+        wanted = {tuple(sorted((a.probe.name, b.probe.name))): (a, b) for a, b in self._seeds}
+        missing = [(k, v) for k, v in wanted.items() if k not in self.fits]
+        fitted = in_parallel(lambda item: self.fit_from([_both(base.model, *item[1])], base.unknowns), missing)
+        for (key, _), one in zip(missing, fitted, strict=True):
+            self.fits[key] = one
+            promised.pop(key, None)
 
     def _hopeful(self, size: int, promise: float, family: Family) -> bool:
         """True unless both the linear promise and the smooth features say that the best smaller set is complete."""
@@ -222,15 +284,18 @@ class Search:
 
     def _refine(self, names: Names) -> None:
         """Adopt refinements of the effects' forms that the data demand."""
-        for name in names:
-            base = self.fits[names]
-            starts = _refined(base.model, name)
-            if not starts:
-                continue
-            fitted = self.fit_from(starts, base.unknowns)
-            degrees = len(fitted.free) - len(base.free)
-            if degrees > 0 and scipy.stats.chi2.sf(base.sse - fitted.sse, degrees) < REFINE_LEVEL:
-                self.fits[names] = fitted
+        refined, base = self._refinement(names), self.fits[names]
+        if refined is not None:
+            degrees = max(len(refined.free) - len(base.free), 1)
+            if scipy.stats.chi2.sf(base.sse - refined.sse, degrees) < REFINE_LEVEL:
+                self.fits[names] = refined
+
+    def _refinement(self, names: Names) -> Fit | None:
+        """The best fit of a set with the form of one of its effects refined."""
+        base = self.fits[names]
+        starts = [s for name in names if (s := _refined(base.model, name))]
+        fitted = in_parallel(lambda s: self.fit_from(s, base.unknowns), starts)
+        return min(fitted, key=lambda f: f.sse, default=None)
 
     def _swap(self, names: Names) -> Names:
         """Replace single causes as long as that helps."""
@@ -277,6 +342,27 @@ class Search:
             names = rests[weakest]
         return names
 
+    def _by_prediction(self, names: Names) -> Names:
+        """Choose by open-loop errors on trials left out, where no set leaves only noise.
+
+        Then likelihoods compare wrong models, and a flexible one can win by what it does to single trials; a cause must
+        help on trials that it was not fitted to.
+        """
+        self.progress(0.72, "prediction of trials left out")
+        if len(self.trials) < 3:
+            return names
+        pool = dict.fromkeys(
+            [names, *_subsets(names), *(n for k in range(1, MOST_CAUSES + 1) for n in self.ranked(k)[:POOL])]
+        )
+        errors = dict(zip(pool, in_parallel(lambda n: predictive_error(self.fits[n]), pool), strict=True))
+        for one in sorted(errors, key=lambda n: (errors[n], n))[:POOL]:
+            refined = self._refinement(one)
+            if refined is not None and (error := predictive_error(refined)) < errors[one]:
+                self.fits[one], errors[one] = refined, error
+        best = min(errors, key=lambda n: (errors[n], n))
+        good = [n for n in errors if errors[n] <= errors[best] + FORM_SHARE]
+        return min(good, key=lambda n: (len(n), errors[n], n))
+
     def _finish(self, names: Names, family: Family) -> Searched:
         self.progress(0.8, "rivals")
         best, without, rivals, p_values = self.fits[names], {}, {}, {}
@@ -321,6 +407,12 @@ def _refined(model: Model, name: str) -> list[Model]:
         return []
     choices = itertools.product(*(i.grid for i in info.values()))
     return [model.with_parameters({f"{name}.{n}": v for n, v in zip(info, values, strict=True)}) for values in choices]
+
+
+def _both(model: Model, first: Scored, second: Scored) -> Model:
+    for one in (first, second):
+        model = model + _with_amplitudes(one.probe.effect, one.amplitudes)
+    return model
 
 
 def _with_amplitudes(effect: Effect, amplitudes: dict[str, float]) -> Effect:

@@ -42,8 +42,8 @@ class Family:
 def coherence_p_value(smaller: Fit, larger: Fit, degrees: int) -> float:
     """p-value of a gain against its spread between trials, whatever the noise within each.
 
-    With x_i what the larger model adds to trial i and r_i what it leaves there, x_i' r_i / |x_i| has the variance phi of
-    the noise along x_i; gain / (degrees phi) is compared with Fisher's F.
+    With x_i what the larger model adds to trial i and r_i what it leaves there, x_i' r_i / |x_i| has the variance phi
+    of the noise along x_i; gain / (degrees phi) is compared with Fisher's F.
     """
     gain = smaller.sse - larger.sse
     units = [

@@ -10,8 +10,8 @@ import numpy as np
 import scipy.stats
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import Noise, NoiseModel, estimate_noise
-from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
+from fes_pin.identify.noise import Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
+from fes_pin.identify.problem import Linearized, NormalEquations, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
 
 TOLERANCE = 0.01
@@ -134,14 +134,11 @@ class _Search:
             system = normal_equations(self.parts, self.damping)
             if not np.isfinite(system.sse):
                 return True
-            free = self.free_now(system.gradient)
-            move = np.zeros(len(self.x))
-            move[free] = _damped(system.hessian[np.ix_(free, free)], system.gradient[free], self.damping)
-            new_x = np.clip(self.x + move, self.lower, self.upper)
-            move = new_x - self.x
-            promised = 2.0 * system.gradient @ move - move @ system.hessian @ move
+            move = self._bounded_move(system)
+            new_x = self.x + move
+            promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
             locals_ = self._moved(system.local_steps(move))
-            if promised < TOLERANCE and not system.eliminated:
+            if promised < TOLERANCE:
                 return True
             parts = self._linearize(new_x, locals_)
             sse = whitened_sse(parts)
@@ -152,6 +149,21 @@ class _Search:
                 return gained < TOLERANCE
             self.damping = max(self.damping * 10.0, 1e-4)
         return True
+
+    def _bounded_move(self, system: NormalEquations) -> np.ndarray:
+        """Marquardt's step inside the bounds: what would leave them stops there, and the others step anew."""
+        free, move = self.free_now(system.gradient), np.zeros(len(self.x))
+        for _ in range(len(self.x)):
+            held = ~free
+            gradient = system.gradient - system.hessian[:, held] @ move[held]
+            move[free] = _damped(system.hessian[np.ix_(free, free)], gradient[free], self.damping)
+            inside = np.clip(self.x + move, self.lower, self.upper)
+            out = free & (inside != self.x + move)
+            if not out.any():
+                break
+            move[out] = (inside - self.x)[out]
+            free &= ~out
+        return np.clip(self.x + move, self.lower, self.upper) - self.x
 
     def _moved(self, steps: list[np.ndarray]) -> Unknowns:
         if not steps:
@@ -237,22 +249,29 @@ def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
             if name in trial.columns:
                 columns.setdefault(name, []).append(trial[name])
     out = {}
+    step = noise_step([t.dt for t in trials])
     for name, pieces in columns.items():
         bend = np.concatenate([np.diff(p, 2) for p in pieces])
         level = 1.4826 * float(np.median(np.abs(bend))) / math.sqrt(6.0)
         floor = 1e-6 * max(float(np.ptp(np.concatenate(pieces))), 1e-9)
-        out[name] = Noise(max(level, floor), (), max(level, floor))
+        out[name] = Noise(max(level, floor), (), max(level, floor), step)
     return out
 
 
 def noise_of(fitted: Fit) -> dict[str, Noise]:
     """The noise that a fit's residuals show, by output column."""
     problem = Problem(fitted.model, fitted.trials, fitted.noise, free=())
+    step = noise_step([t.dt for t in fitted.trials])
     columns: dict[str, list[np.ndarray]] = {}
-    for residuals in problem.residuals(fitted.values, fitted.unknowns):
+    squares: dict[str, list[float]] = {}
+    for trial, residuals in zip(fitted.trials, problem.residuals(fitted.values, fitted.unknowns), strict=True):
         for name, residual in residuals.items():
-            columns.setdefault(name, []).append(residual)
-    return {name: estimate_noise(pieces, used=len(fitted.free)) for name, pieces in columns.items()}
+            columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
+            squares.setdefault(name, []).append(float(np.mean(residual**2)))
+    return {
+        name: estimate_noise(pieces, len(fitted.free), math.sqrt(float(np.mean(squares[name]))), step)
+        for name, pieces in columns.items()
+    }
 
 
 def _damped(hessian: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -9,12 +10,16 @@ import numpy as np
 import scipy.linalg
 
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
-"""Orders tried. Sensor noise is whitened by a few; random torque under white sensor noise is slow and needs 24 to 48: on
-the ankle, order 12 leaves 2.2 times too much power below 0.5 Hz, order 24 none, and a test would take it for a cause."""
+"""Orders tried. Sensor noise is whitened by a few; random torque under white sensor noise is slow and needs 24 to 48:
+on the ankle, order 12 leaves 2.2 times too much power below 0.5 Hz, order 24 none; a test would take it for a cause."""
 
 
 COEFFICIENT_PRICE = 4.0
 """Twice the log-likelihood that one more coefficient must earn: two standard deviations; Akaike's 2 keeps too many."""
+
+WHITE_SHARE = 0.003
+"""Share of the residual's variance that is taken for white on top of it. It keeps a filter from becoming a resonator
+that swallows what a model gets wrong: the range of its spectrum stays within about 300. Slow noise weighs as before."""
 
 
 @dataclass(frozen=True)
@@ -28,26 +33,32 @@ class Noise:
     ar
         Coefficients, shape (p,).
     std
-        Standard deviation of the noise itself.
+        Standard deviation of the noise of a single sample.
+    step_s
+        Time step of the coefficients, s: trials sampled faster are averaged to it. 0 takes samples as they are.
     """
 
     innovation_std: float
     ar: tuple[float, ...] = ()
     std: float = 0.0
+    step_s: float = 0.0
 
-    def whiten(self, values: np.ndarray) -> np.ndarray:
+    def whiten(self, values: np.ndarray, dt: float) -> np.ndarray:
         """Innovations in units of their standard deviation.
 
         Parameters
         ----------
         values
             Shape (n, ...): residuals, or sensitivities that go with them.
+        dt
+            Their time step, s.
 
         Returns
         -------
         ndarray
-            Shape (n - p, ...): the first p samples only start the filter.
+            Shape (n / thinning - p, ...): the first p samples only start the filter.
         """
+        values = thin(values, thinning(dt, self.step_s))
         p = len(self.ar)
         out = values[p:] / self.innovation_std
         for lag, coefficient in enumerate(self.ar, start=1):
@@ -55,7 +66,9 @@ class Noise:
         return out
 
 
-def estimate_noise(residuals: Sequence[np.ndarray], used: int = 0) -> Noise:
+def estimate_noise(
+    residuals: Sequence[np.ndarray], used: int = 0, std: float | None = None, step_s: float = 0.0
+) -> Noise:
     """Fit autoregressive noise to the residuals of one channel, by least squares.
 
     Parameters
@@ -64,6 +77,10 @@ def estimate_noise(residuals: Sequence[np.ndarray], used: int = 0) -> Noise:
         One array of shape (n,) for each trial.
     used
         Degrees of freedom that a fit has taken out of the residuals already.
+    std
+        Standard deviation of single samples, where the residuals are averages.
+    step_s
+        Time step of the residuals, if they are averages.
     """
     total = sum(len(r) for r in residuals)
     shortest = min(len(r) for r in residuals)
@@ -79,14 +96,43 @@ def estimate_noise(residuals: Sequence[np.ndarray], used: int = 0) -> Noise:
             if p
             else np.zeros(0)
         )
-        rss = max(float(gram[0, 0] - gram[0, 1 : p + 1] @ ar), 1e-300)
+        around = gram[1 : p + 1, 1 : p + 1] + _ridge(gram, p)
+        power = (1.0 + WHITE_SHARE) * gram[0, 0]
+        rss = max(float(power - 2.0 * gram[0, 1 : p + 1] @ ar + ar @ around @ ar), 1e-300)
         criterion = count * np.log(rss / count) + COEFFICIENT_PRICE * p
         if best is None or criterion < best[0]:
             best = (criterion, p, ar, rss)
     assert best is not None
     innovation = float(np.sqrt(best[3] / max(count - best[1] - used, 1)))
-    std = float(np.sqrt(sum(float(r @ r) for r in residuals) / max(total - used, 1)))
-    return Noise(max(innovation, 1e-12), tuple(float(a) for a in best[2]), std)
+    own = float(np.sqrt(sum(float(r @ r) for r in residuals) / max(total - used, 1)))
+    return Noise(max(innovation, 1e-12), tuple(float(a) for a in best[2]), own if std is None else std, step_s)
+
+
+FASTEST_S = 4e-3
+"""Shortest time step that noise is modelled at, s: 250 Hz keeps the mains, and 48 coefficients reach back 0.2 s."""
+
+
+def thinning(dt: float, step_s: float) -> int:
+    """How many samples are averaged into one."""
+    return max(1, round(step_s / dt)) if step_s > 0 else 1
+
+
+def noise_step(steps: Sequence[float]) -> float:
+    """Time step that the noise of trials with these sample steps is modelled at, s."""
+    slowest = max(steps)
+    return max(1, math.floor(FASTEST_S / slowest + 1e-6)) * slowest
+
+
+def thin(values: np.ndarray, count: int) -> np.ndarray:
+    """Means of `count` samples in a row along the first axis; what is left over at the end is dropped."""
+    if count == 1:
+        return values
+    end = len(values) // count * count
+    total = values[0:end:count].copy()
+    for k in range(1, count):
+        total += values[k:end:count]
+    total /= count
+    return total
 
 
 def _lags(residual: np.ndarray, order: int) -> np.ndarray:
@@ -96,8 +142,8 @@ def _lags(residual: np.ndarray, order: int) -> np.ndarray:
 
 
 def _ridge(gram: np.ndarray, p: int) -> np.ndarray:
-    """Just enough to keep a noiseless channel solvable."""
-    return 1e-12 * gram[0, 0] * np.eye(p)
+    """A little white noise beside the residual: see `WHITE_SHARE`."""
+    return WHITE_SHARE * gram[0, 0] * np.eye(p)
 
 
 NoiseModel = Mapping[str, Noise]

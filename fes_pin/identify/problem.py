@@ -78,15 +78,15 @@ class Problem:
         """Whitened residuals and sensitivities at a parameter value."""
         out, split = [], len(self.free)
         for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
-            pieces = []
+            residuals, sensitivities = [], []
             for k, name in enumerate(self.model.rig.outputs(trial.kind)):
                 if name not in trial.columns or name not in self.noise:
                     continue
-                residual = trial[name] - simulated.readings[:, k]
-                stacked = np.concatenate([residual[:, None], simulated.sensitivities[:, k]], axis=1)
-                pieces.append(self.noise[name].whiten(stacked))
-            rows = np.concatenate(pieces) if len(pieces) > 1 else pieces[0]
-            out.append(Linearized(rows[:, 0], rows[:, 1 : 1 + split], rows[:, 1 + split :]))
+                noise = self.noise[name]
+                residuals.append(noise.whiten(trial[name] - simulated.readings[:, k], trial.dt))
+                sensitivities.append(noise.whiten(simulated.sensitivities[:, k], trial.dt))
+            rows = np.concatenate(sensitivities) if len(sensitivities) > 1 else sensitivities[0]
+            out.append(Linearized(np.concatenate(residuals), rows[:, :split], rows[:, split:]))
         return out
 
 
@@ -121,11 +121,14 @@ class NormalEquations:
         Sum of squared whitened residuals.
     gradient, hessian
         Of half of it, shape (parameters,) and (parameters, parameters), after elimination.
+    local_gain
+        What steps of the trials' unknowns alone promise.
     """
 
     sse: float
     gradient: np.ndarray
     hessian: np.ndarray
+    local_gain: float
     eliminated: tuple[tuple[np.ndarray, np.ndarray], ...]
 
     def local_steps(self, step: np.ndarray) -> list[np.ndarray]:
@@ -136,7 +139,7 @@ class NormalEquations:
 def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> NormalEquations:
     """Sum the trials; each trial's unknowns are eliminated by its Schur complement, damped as Marquardt does."""
     size = parts[0].jacobian.shape[1]
-    sse, gradient, hessian = 0.0, np.zeros(size), np.zeros((size, size))
+    sse, gradient, hessian, local_gain = 0.0, np.zeros(size), np.zeros((size, size)), 0.0
     eliminated = []
     for part in parts:
         r, j, local = part.residual, part.jacobian, part.local
@@ -150,9 +153,10 @@ def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> Norma
             slope = np.linalg.solve(own, local.T @ j)
             g, h = g - j.T @ (local @ constant), h - j.T @ (local @ slope)
             eliminated.append((constant, slope))
+            local_gain += float(r @ (local @ constant))
         gradient += g
         hessian += h
-    return NormalEquations(sse, gradient, hessian, tuple(eliminated))
+    return NormalEquations(sse, gradient, hessian, local_gain, tuple(eliminated))
 
 
 def whitened_sse(parts: Sequence[Linearized]) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from fes_pin.models.parameters import Parameter
 from fes_pin.models.rigs.base import Rig
@@ -47,7 +48,7 @@ class Model:
         return info
 
     def fitted_parameters(self) -> tuple[str, ...]:
-        """What a fit moves: the rig's fitted parameters and all of the effects' but discrete choices and unused refinements."""
+        """What a fit moves: the rig's fitted parameters, and of the effects' all but choices and unused forms."""
         names = list(self.rig.fitted_parameters())
         for effect in self.effects:
             names += [f"{effect.name}.{n}" for n in effect.fitted_parameters()]
@@ -65,7 +66,8 @@ class Model:
         for name in values:
             if name not in known:
                 raise KeyError(f"no parameter {name}; there are {', '.join(known)}")
-        rig = dataclasses.replace(self.rig, **{n: float(v) for n, v in values.items() if "." not in n})
+        nominal: dict[str, Any] = {n: float(v) for n, v in values.items() if "." not in n}
+        rig = dataclasses.replace(self.rig, **nominal)
         effects = []
         for effect in self.effects:
             prefix = f"{effect.name}."
@@ -73,9 +75,9 @@ class Model:
             effects.append(dataclasses.replace(effect, **own))
         return Model(rig, tuple(effects))
 
-    def acting(self, kind: str) -> Model:
-        """The same model without the effects that a kind of trial cannot feel."""
-        signals = self.rig.signals(kind)
+    def acting(self, kind: str, inputs: tuple[str, ...] | None = None) -> Model:
+        """The same model without the effects that a kind of trial, with these input columns, cannot feel."""
+        signals = self.rig.signals(kind) if inputs is None else self.rig.changeable(kind, inputs)
         return Model(self.rig, tuple(e for e in self.effects if e.signal in signals))
 
     def structure(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.models.compile.lanes import WIDTH
+from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.compile.program import Program, program
 from fes_pin.models.model import Model
 
@@ -100,7 +100,7 @@ class _Block:
         self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...], max_step_s: float
     ) -> None:
         first = trials[lanes[0]]
-        rig, model = model.rig, model.acting(first.kind)
+        rig, model = model.rig, model.acting(first.kind, model.rig.input_columns(first))
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
         self.inputs = rig.input_columns(first)
         available = set(model.parameters()) | set(rig.unknowns(first.kind))
@@ -142,7 +142,7 @@ class _Block:
         if delay:
             constants = constants.copy()
             constants[self.layout.constants.index("shift"), : len(shift)] = shift
-        y, s = self.program.run(self._driven(shift), p, constants, self.guess.copy(), self.substeps)
+        y, s = self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
         for lane, (i, trial) in enumerate(zip(self.lanes, self.trials, strict=True)):
             yield i, Simulated(y[: len(trial), :, lane], self._spread(s[: len(trial), ..., lane]))
 

@@ -118,7 +118,7 @@ class Effect:
         return {n: info.grid or (getattr(cls, n),) for n, info in cls.parameters().items()}
 
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
-        """Bounds that the measured range sets to parameters, tighter than the physical ones; `measured` as in `grids`."""
+        """Bounds that the measured range sets to parameters, inside the physical ones; `measured` as in `grids`."""
         return {}
 
     @classmethod

@@ -7,6 +7,7 @@ from typing import Any
 
 import tomli_w
 
+from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.models.effects import effect
@@ -55,20 +56,25 @@ def load_model(path: str | Path) -> Model:
         raise document.error("fitted", f"expected names among {', '.join(kind.parameters())}")
     nominal = _numbers(document, "nominal", set(kind.parameters()))
     model = Model(kind(**nominal, constants=_numbers(document, "constants", None), fitted=tuple(fitted)))
-    for name in document.table("effects"):
+    listed = document.table("effects")
+    for name in listed:
         try:
             one = effect(name)
+            added = one(**_numbers(document, f"effects.{name}", set(one.parameters()), listed))
+            model = model + added
         except KeyError as error:
             raise document.error(f"effects.{name}", str(error.args[0])) from None
-        try:
-            model = model + one(**_numbers(document, f"effects.{name}", set(one.parameters())))
+        except InputError:
+            raise
         except ValueError as error:
             raise document.error(f"effects.{name}", str(error)) from None
     return model
 
 
-def _numbers(document: Document, key: str, known: set[str] | None) -> dict[str, float]:
-    values = document.table(key)
+def _numbers(
+    document: Document, key: str, known: set[str] | None, inside: dict[str, Any] | None = None
+) -> dict[str, float]:
+    values = document.table(key, inside)
     for name, value in values.items():
         if known is not None and name not in known:
             raise document.error(f"{key}.{name}", f"unknown; expected one of {', '.join(sorted(known))}")

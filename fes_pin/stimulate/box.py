@@ -14,6 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from fes_pin.data.errors import InputError
 from fes_pin.stimulate.native import Integers, Native, Reals, address
 
 FREE, AT_LOWER, AT_UPPER = 0, 1, 2
@@ -46,14 +47,30 @@ def rebuild(n: int, H: Reals, P: Reals, status: Integers):
     return 0
 
 
+def add_rows(n: int, rows: int, a: Reals, A: Reals, out: Reals):
+    """out += the sum of a[j] times row j of A (rows x n), four rows at a time."""
+    fours = rows - rows % 4
+    for block in range(fours // 4):
+        j = 4 * block
+        a0 = a[j]
+        a1 = a[j + 1]
+        a2 = a[j + 2]
+        a3 = a[j + 3]
+        at = j * n
+        for k in range(n):
+            out[k] += a0 * A[at + k] + a1 * A[at + n + k] + a2 * A[at + 2 * n + k] + a3 * A[at + 3 * n + k]
+    for j in range(fours, rows):
+        a0 = a[j]
+        for k in range(n):
+            out[k] += a0 * A[j * n + k]
+    return 0
+
+
 def gradient(n: int, H: Reals, f: Reals, r: Reals, g: Reals):
     """g = H r + f, row by row of the symmetric H."""
     for k in range(n):
         g[k] = f[k]
-    for j in range(n):
-        a = r[j]
-        for k in range(n):
-            g[k] += a * H[j * n + k]
+    add_rows(n, n, r, H, g)
     return 0
 
 
@@ -61,10 +78,8 @@ def respond(n: int, f: Reals, lower: Reals, upper: Reals, P: Reals, status: Inte
     """Variables and gradients that belong to the guess `status`: P's signs make its transpose do."""
     for k in range(n):
         g[k] = 0.0
-    for j in range(n):
-        z = f[j] if status[j] == 0 else lower[j] if status[j] == 1 else upper[j]
-        for k in range(n):
-            g[k] += z * P[j * n + k]
+        r[k] = f[k] if status[k] == 0 else lower[k] if status[k] == 1 else upper[k]
+    add_rows(n, n, r, P, g)
     for k in range(n):
         if status[k] == 0:
             r[k] = -g[k]
@@ -103,7 +118,7 @@ def solve(
     limit: int,
     tolerance: float,
 ):
-    """Solve from the guess in `status` and its P; the number of pivots, or minus that number if it gave up."""
+    """Solve from the guess in `status` and its P; the number of pivots, or minus that number less 1 if it gave up."""
     count = 0
     while True:
         respond(n, f, lower, upper, P, status, r, g)
@@ -123,7 +138,7 @@ def solve(
         if worst < 0:
             break
         if count >= limit:
-            count = -count
+            count = -count - 1
             break
         if status[worst] == 0:
             status[worst] = 1 if r[worst] < lower[worst] or lower[worst] == upper[worst] else 2
@@ -195,7 +210,7 @@ def sequence(
         failed[k] = 0
         if used < 0:
             failed[k] = 1
-            used = -used
+            used = -used - 1
         for i in range(n):
             work[i] = R[k * n + i]
         pivots += used
@@ -206,7 +221,7 @@ def sequence(
 @lru_cache(maxsize=1)
 def compiled() -> Native:
     """The functions above as machine code."""
-    return Native(pivot, rebuild, gradient, respond, refine, solve, sequence)
+    return Native(pivot, rebuild, add_rows, gradient, respond, refine, solve, sequence)
 
 
 class BoxProgram:
@@ -246,8 +261,24 @@ class BoxProgram:
         return pivots >= 0
 
 
-def solve_sequence(H, F, lower, upper, *, keep=0.0, rate=np.inf, previous=None, tolerance=1e-12):
-    """Solutions of samples in order, each warm-started from the last.
+def by_daqp(H, f, lower, upper) -> np.ndarray:
+    """The same program by DAQP through qpsolvers, cut to the limits.
+
+    Raises
+    ------
+    InputError
+        DAQP finds no answer either: the program holds numbers beyond what double precision can tell apart.
+    """
+    import qpsolvers
+
+    r = qpsolvers.solve_qp(H, f, lb=lower, ub=upper, solver="daqp")
+    if r is None:
+        raise InputError("no solver finds the allocation: torques or moment arms of too different sizes")
+    return np.clip(r, lower, upper)
+
+
+def solve_sequence(H, F, lower, upper, *, keep=0.0, rate=np.inf, previous=None, tolerance=1e-12) -> np.ndarray:
+    """Solutions (count, n) of samples in order, each warm-started from the last; where pivoting gives up, DAQP's.
 
     Parameters
     ----------
@@ -257,24 +288,40 @@ def solve_sequence(H, F, lower, upper, *, keep=0.0, rate=np.inf, previous=None, 
         (n,) or (count, n).
     keep, rate, previous
         Price of change and its bound per sample, from `previous` (n,), by default 0.
-
-    Returns
-    -------
-    tuple
-        r (count, n), gradients (count, n), which failed (count,) bool, status of the last sample (n,), pivots.
     """
     F = np.array(F, dtype=float, order="C")
     count, n = F.shape
     H, lower, upper = (np.ascontiguousarray(a, dtype=float) for a in (H, lower, upper))
     if lower.ndim != upper.ndim:
         lower, upper = (np.ascontiguousarray(np.broadcast_to(a, (count, n))) for a in (lower, upper))
+    R, start = np.empty((count, n)), 0
+    before = np.zeros(n) if previous is None else np.array(previous, dtype=float)
+    while start < count:
+        each = [a[start:] if a.ndim == d else a for a, d in ((H, 3), (lower, 2), (upper, 2))]
+        R[start:], failed = run(each[0], F[start:].copy(), each[1], each[2], keep, rate, before, tolerance)
+        carries = keep > 0.0 or rate < np.inf
+        for k in start + np.flatnonzero(failed):
+            before = R[k - 1] if k > 0 else before
+            low, high = (a[k] if a.ndim == 2 else a for a in (lower, upper))
+            low, high = np.clip(before - rate, low, high), np.clip(before + rate, low, high)
+            R[k] = by_daqp(H[k] if H.ndim == 3 else H, F[k] - keep * before, low, high)
+            if carries:  # what follows depends on it
+                start, before = int(k) + 1, R[k]
+                break
+        else:
+            break
+    return R
+
+
+def run(H, F, lower, upper, keep: float, rate: float, previous, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """One pass of `sequence` over contiguous arrays (F is used up): solutions, and which samples gave up."""
+    count, n = F.shape
     P, status, R, G = np.empty((n, n)), np.ones(n, dtype=np.int64), np.empty((count, n)), np.empty((count, n))
     failed, work = np.zeros(count, dtype=np.int64), np.zeros(3 * n)
-    if previous is not None:
-        work[:n] = previous
+    work[:n] = previous
     native = compiled()
     native["rebuild"](n, address(H), address(P), address(status))
-    pivots = native["sequence"](
+    native["sequence"](
         count,
         n,
         address(H),
@@ -289,4 +336,4 @@ def solve_sequence(H, F, lower, upper, *, keep=0.0, rate=np.inf, previous=None, 
         PIVOTS_PER_VARIABLE * n,
         tolerance,
     )
-    return R, G, failed.astype(bool), status, pivots
+    return R, failed.astype(bool)

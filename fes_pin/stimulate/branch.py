@@ -7,7 +7,17 @@ from functools import lru_cache
 
 import numpy as np
 
-from fes_pin.stimulate.box import PIVOTS_PER_VARIABLE, BoxProgram, gradient, pivot, rebuild, refine, respond, solve
+from fes_pin.stimulate.box import (
+    PIVOTS_PER_VARIABLE,
+    BoxProgram,
+    add_rows,
+    gradient,
+    pivot,
+    rebuild,
+    refine,
+    respond,
+    solve,
+)
 from fes_pin.stimulate.native import Integers, Native, Reals, address
 
 NODES = 20_000
@@ -123,7 +133,7 @@ def search(
 @lru_cache(maxsize=1)
 def compiled() -> Native:
     """The search as machine code."""
-    return Native(pivot, rebuild, gradient, respond, refine, solve, worst_choice, search)
+    return Native(pivot, rebuild, add_rows, gradient, respond, refine, solve, worst_choice, search)
 
 
 def rounded(H, f, lower, upper, least) -> Choice:

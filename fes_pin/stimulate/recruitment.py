@@ -14,6 +14,9 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 
+STRAIGHT_BELOW = 1e-6
+"""Fraction of the way below which a Hill curve is straight, as in the model of the same name."""
+
 
 @dataclass(frozen=True, eq=False)
 class LinearRecruitment:
@@ -148,6 +151,86 @@ class GompertzRecruitment(LinearRecruitment):
         """See the class."""
         low, high = self.ends()
         return -np.log(-np.log(low + r * (high - low)) / self.delay) / self.growth
+
+
+@dataclass(frozen=True, eq=False)
+class HillRecruitment(LinearRecruitment):
+    """Hill's function, 1 at saturation: `(1 + e) x^n / (1 + e x^n)`, n = exp(log_exponent), e = exp(log_bend) - 1.
+
+    The same curve, with the same parameters, as the cause `recruitment_curvature`, to the straight line that it has
+    below a millionth of the way.
+    """
+
+    log_exponent: Any = 0.1
+    log_bend: Any = 0.2
+
+    def shape(self, x):
+        """See the class."""
+        n, bend = np.exp(self.log_exponent), np.exp(self.log_bend)
+        power = x * np.maximum(x, STRAIGHT_BELOW) ** (n - 1.0)
+        return bend * power / (1.0 + (bend - 1.0) * power)
+
+    def inverse_shape(self, r):
+        """See the class."""
+        n, bend = np.exp(self.log_exponent), np.exp(self.log_bend)
+        power = r / (bend - (bend - 1.0) * r)
+        straight = power * STRAIGHT_BELOW ** (1.0 - n)
+        return np.where(straight < STRAIGHT_BELOW, straight, power ** (1.0 / n))
+
+
+class Hysteresis:
+    """Play between stimulator and nerve: the width that acts follows the pulse width only beyond `half_width_us`.
+
+        acting' = clip(acting, w - half_width_us, w + half_width_us)
+
+    The same as the cause `recruitment_hysteresis`. Its inverse overshoots by the half width on the way up and
+    undershoots on the way down; what that would need beyond threshold and saturation cannot be had and is cut there.
+
+    Parameters
+    ----------
+    curve
+        Recruitment of the acting width.
+    half_width_us
+        0 or more.
+    acting_us
+        The width that acts at the beginning.
+
+    Raises
+    ------
+    InputError
+        Negative half width.
+    """
+
+    def __init__(self, curve: LinearRecruitment, half_width_us: float, acting_us: float = 0.0) -> None:
+        if not half_width_us >= 0.0:
+            raise InputError(f"half_width_us must be 0 or more, got {half_width_us}")
+        self.curve, self.half_width_us, self.acting_us = curve, float(half_width_us), float(acting_us)
+
+    def recruitment(self, pulse_width_us: float) -> float:
+        """Recruitment by the next pulse, which moves the play."""
+        low, high = pulse_width_us - self.half_width_us, pulse_width_us + self.half_width_us
+        self.acting_us = min(max(self.acting_us, low), high)
+        return float(self.curve.recruitment(self.acting_us))
+
+    def reach(self) -> tuple[float, float]:
+        """Least and greatest recruitment that the next pulse can have, other than by no pulse."""
+        threshold, saturation = float(self.curve.threshold_us), float(self.curve.saturation_us)
+        low = min(self.acting_us, threshold + self.half_width_us)
+        high = max(self.acting_us, saturation - self.half_width_us)
+        return float(self.curve.recruitment(low)), float(self.curve.recruitment(high))
+
+    def pulse_width_us(self, recruitment: float) -> float:
+        """Pulse width for a recruitment from the present state: exact within `reach`, else the nearest; 0 for 0."""
+        if recruitment <= 0.0:
+            return 0.0
+        target = float(self.curve.pulse_width_us(recruitment))
+        threshold, saturation = float(self.curve.threshold_us), float(self.curve.saturation_us)
+        aim = (
+            self.acting_us
+            if target == self.acting_us
+            else target + np.copysign(self.half_width_us, target - self.acting_us)
+        )
+        return float(min(max(aim, threshold), saturation))
 
 
 class MeasuredRecruitment:

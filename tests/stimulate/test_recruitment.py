@@ -9,6 +9,8 @@ from fes_pin.data.errors import InputError
 from fes_pin.stimulate.recruitment import (
     ChannelRecruitment,
     GompertzRecruitment,
+    HillRecruitment,
+    Hysteresis,
     LinearRecruitment,
     MeasuredRecruitment,
     SaturatingRecruitment,
@@ -22,6 +24,8 @@ CURVES = [
     SaturatingRecruitment(150.0, 500.0, -2.0),
     SigmoidRecruitment(100.0, 400.0, 12.0, 0.4),
     GompertzRecruitment(180.0, 1000.0, 4.0, 5.0),
+    HillRecruitment(180.0, 1000.0, 0.8, 1.5),
+    HillRecruitment(180.0, 1000.0, -0.7, -1.0),
     MeasuredRecruitment([120, 200, 260, 500], [0, 0.2, 0.8, 1]),
 ]
 MIXED = ChannelRecruitment(CURVES, len(CURVES))
@@ -86,6 +90,7 @@ def test_one_curve_with_arrays_of_thresholds():
         lambda: SaturatingRecruitment(100.0, 500.0, 0.0),
         lambda: SigmoidRecruitment(100.0, 500.0, -1.0),
         lambda: GompertzRecruitment(100.0, 500.0, 0.0),
+        lambda: Hysteresis(LinearRecruitment(), -1.0),
         lambda: MeasuredRecruitment([100, 200], [0, 0.9]),
         lambda: MeasuredRecruitment([100, 200, 150], [0, 0.5, 1]),
         lambda: MeasuredRecruitment([100], [0]),
@@ -95,3 +100,29 @@ def test_one_curve_with_arrays_of_thresholds():
 def test_bad_curves_are_refused(make):
     with pytest.raises(InputError):
         make()
+
+
+def test_hill_curve_is_the_models_formula():
+    x, n, e = np.linspace(0.01, 1, 50), np.exp(0.8), np.exp(1.5) - 1
+    got = HillRecruitment(100.0, 200.0, 0.8, 1.5).recruitment(100.0 + 100.0 * x)
+    np.testing.assert_allclose(got, (1 + e) * x**n / (1 + e * x**n), atol=1e-13)
+
+
+@pytest.mark.parametrize("curve", [LinearRecruitment(180.0, 1000.0), SigmoidRecruitment(180.0, 600.0)])
+def test_hysteresis_is_undone_wherever_it_can_be(curve):
+    rng, exact, cut = np.random.default_rng(0), 0, 0
+    for half_width in (0.0, 15.0, 80.0):
+        play = Hysteresis(curve, half_width, acting_us=300.0)
+        wanted = np.clip(0.5 + 0.6 * np.sin(np.cumsum(rng.normal(size=2000)) * 0.3), 0, 1)
+        for r in wanted:
+            low, high = play.reach()
+            width = play.pulse_width_us(r)
+            assert width == 0.0 if r == 0 else curve.threshold_us <= width <= curve.saturation_us
+            got = play.recruitment(width)
+            if r == 0.0 or low <= r <= high:
+                assert got == pytest.approx(r, abs=1e-12)
+                exact += 1
+            else:
+                assert got == pytest.approx(low if r < low else high, abs=1e-12)
+                cut += 1
+    assert exact > 3000 and cut > 100

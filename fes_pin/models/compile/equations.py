@@ -19,31 +19,10 @@ from typing import Any
 
 import casadi as ca
 
+from fes_pin.models.compile.layout import Layout, Sizes
 from fes_pin.models.maths import clip
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Signals
-
-TIMING = ("t0", "dt", "step", "shift")
-"""Constants that every program reads: time of the first sample, sample and integration step, whole samples of delay."""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Names and order of what goes in and out of a compiled program."""
-
-    kind: str
-    inputs: tuple[str, ...]
-    parameters: tuple[str, ...]
-    unknowns: tuple[str, ...]
-    constants: tuple[str, ...]
-    outputs: tuple[str, ...]
-    columns: tuple[str, ...]
-    """Parameters and unknowns with respect to which the program gives sensitivities."""
-
-    @property
-    def values(self) -> tuple[str, ...]:
-        """Everything that is a parameter to the program."""
-        return (*self.parameters, *self.unknowns)
 
 
 @dataclass(frozen=True)
@@ -57,19 +36,10 @@ class Equations:
     rates: ca.Function
     output: ca.Function
 
-
-def make_layout(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...]) -> Layout:
-    """The layout of a model's program for trials of a kind with these input columns."""
-    rig = model.rig
-    return Layout(
-        kind=kind,
-        inputs=inputs,
-        parameters=tuple(model.parameters()),
-        unknowns=rig.unknowns(kind),
-        constants=(*rig.constant_names(kind), *TIMING),
-        outputs=rig.outputs(kind),
-        columns=columns,
-    )
+    @property
+    def sizes(self) -> Sizes:
+        """Lengths of the vectors of states, memories and readings, each with its sensitivities."""
+        return Sizes(self.start.numel_out(0), self.start.numel_out(1), self.output.numel_out(0))
 
 
 class _Symbols:
@@ -125,8 +95,8 @@ class _Symbols:
         return share * before + (1.0 - share) * now
 
     def rig(self) -> Any:
-        names = [n for n in self.layout.parameters if "." not in n]
-        return dataclasses.replace(self.model.rig, **{n: self.p[n] for n in names})
+        nominal: dict[str, Any] = {n: self.p[n] for n in self.layout.parameters if "." not in n}
+        return dataclasses.replace(self.model.rig, **nominal)
 
     def at_rest(self) -> tuple[dict[str, Any], dict[str, Any], Any]:
         """States, memories and residual of the static equilibrium as expressions in z."""

@@ -1,19 +1,21 @@
 """Elementary functions on SIMD lanes, written as LLVM IR.
 
-Each is accurate to a few units in the last place on the range that a model uses; NaN and infinity pass through, so a
-simulation that went wrong shows it. Polynomials are Taylor series after range reduction, long enough that the
+Each is accurate to a few units in the last place; NaN passes through, so a simulation that went wrong shows it.
+Ranges: `exp` is 0 below -708 and infinite above 709.4; `log` is -inf at 0 and NaN below, and takes numbers below
+2.2e-308 for 0; `sin` and `cos` are exact to the rounding of the result up to 1e6, to that of the argument from there,
+and NaN from 1e9; `tanh` takes any number. Polynomials are Taylor series after range reduction, long enough that the
 truncation error is below the rounding error.
 """
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Sequence
 
 from llvmlite import ir
 
-WIDTH = 8
-"""Lanes in a block: two AVX2 registers, or one of AVX-512."""
+from fes_pin.models.compile.layout import WIDTH
 
 DOUBLE, INT64, BOOL = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
 VECTOR, INT_VECTOR = ir.VectorType(DOUBLE, WIDTH), ir.VectorType(INT64, WIDTH)
@@ -39,11 +41,12 @@ def splat_int(value: int) -> ir.Constant:
 
 
 class LaneFunctions:
-    """The functions of one module, each emitted when first called for."""
+    """The functions of one module, written out where they are called: a call would spill every register."""
 
     def __init__(self, module: ir.Module) -> None:
         self.module = module
         self._made: dict[str, ir.Function] = {}
+        self._turns: dict[tuple[ir.Block, ir.Value], tuple[ir.Value, ir.Value, ir.Value]] = {}
         self._bodies: dict[str, Callable[[ir.IRBuilder, ir.Value], ir.Value]] = {
             "exp": self._exp,
             "log": self._log,
@@ -55,19 +58,10 @@ class LaneFunctions:
     def call(self, builder: ir.IRBuilder, name: str, *args: ir.Value) -> ir.Value:
         """Call `name` on lanes: our own vector code, an LLVM intrinsic, or the C library lane by lane."""
         if name in self._bodies:
-            return builder.call(self._function(name), args)
+            return self._bodies[name](builder, *args)
         if name in {"fabs", "sqrt", "floor", "ceil", "copysign", "rint"}:
             return builder.call(self._intrinsic(name, len(args)), args)
         return self._per_lane(builder, name, args)
-
-    def _function(self, name: str) -> ir.Function:
-        if name not in self._made:
-            function = ir.Function(self.module, ir.FunctionType(VECTOR, [VECTOR]), f"lanes_{name}")
-            function.linkage = "internal"
-            builder = ir.IRBuilder(function.append_basic_block())
-            self._made[name] = function
-            builder.ret(self._bodies[name](builder, function.args[0]))
-        return self._made[name]
 
     def _intrinsic(self, name: str, arity: int) -> ir.Function:
         full = f"llvm.{name}.v{WIDTH}f64"
@@ -86,14 +80,14 @@ class LaneFunctions:
         return out
 
     def _exp(self, b: ir.IRBuilder, x: ir.Value) -> ir.Value:
-        """e^x = 2^n e^r with |r| <= ln 2 / 2; arguments are held to [-708, 709], beyond which a double has no room."""
-        x = select_lanes(b, b.fcmp_ordered("<", x, splat(-708.0)), splat(-708.0), x)
-        x = select_lanes(b, b.fcmp_ordered(">", x, splat(709.0)), splat(709.0), x)
+        """e^x = 2^n e^r with |r| <= ln 2 / 2; beyond [-708, 709.4] a double has no room for 2^n."""
         n = self.call(b, "rint", b.fmul(x, splat(1 / math.log(2))))
         r = b.fsub(b.fsub(x, b.fmul(n, splat(LN2_HIGH))), b.fmul(n, splat(LN2_LOW)))
-        y = horner(b, r, [1 / math.factorial(k) for k in range(14)])
+        y = polynomial(b, r, [1 / math.factorial(k) for k in range(14)])
         bits = b.shl(b.add(self._to_int(b, n), splat_int(1023)), splat_int(52))
-        return b.fmul(y, b.bitcast(bits, VECTOR))
+        y = b.fmul(y, b.bitcast(bits, VECTOR))
+        y = select_lanes(b, b.fcmp_ordered("<", x, splat(-708.0)), splat(0.0), y)
+        return select_lanes(b, b.fcmp_ordered(">", x, splat(709.4)), splat(math.inf), y)
 
     def _to_int(self, b: ir.IRBuilder, n: ir.Value) -> ir.Value:
         """A whole number |n| < 2^51 as an integer: adding 1.5 * 2^52 leaves it in the low bits of the mantissa."""
@@ -101,7 +95,7 @@ class LaneFunctions:
         return b.sub(b.bitcast(b.fadd(n, splat(magic)), INT_VECTOR), b.bitcast(splat(magic), INT_VECTOR))
 
     def _log(self, b: ir.IRBuilder, x: ir.Value) -> ir.Value:
-        """ln x = e ln 2 + 2 atanh((m - 1) / (m + 1)), x = m 2^e, m in [sqrt(1/2), sqrt(2)); NaN for x <= 0."""
+        """ln x = e ln 2 + 2 atanh((m - 1) / (m + 1)), x = m 2^e, m in [sqrt(1/2), sqrt(2))."""
         bits = b.bitcast(x, INT_VECTOR)
         offset = b.sub(bits, splat_int(0x3FE6A09E667F3BCD))  # sqrt(1/2)
         exponent = b.ashr(offset, splat_int(52))
@@ -109,40 +103,56 @@ class LaneFunctions:
         magic = 6755399441055744.0
         e = b.fsub(b.bitcast(b.add(exponent, b.bitcast(splat(magic), INT_VECTOR)), VECTOR), splat(magic))
         f = b.fdiv(b.fsub(m, splat(1.0)), b.fadd(m, splat(1.0)))
-        series = horner(b, b.fmul(f, f), [2 / (2 * k + 1) for k in range(12)])
+        series = polynomial(b, b.fmul(f, f), [2 / (2 * k + 1) for k in range(12)])
         value = b.fadd(b.fmul(e, splat(LN2_HIGH)), b.fadd(b.fmul(f, series), b.fmul(e, splat(LN2_LOW))))
-        return select_lanes(b, b.fcmp_ordered(">", x, splat(0.0)), value, splat(math.nan))
+        value = select_lanes(b, b.fcmp_unordered("<", x, splat(sys.float_info.min)), splat(-math.inf), value)
+        value = select_lanes(b, b.fcmp_ordered("<=", x, splat(sys.float_info.max)), value, x)
+        return select_lanes(b, b.fcmp_ordered("<", x, splat(0.0)), splat(math.nan), value)
 
     def _sine(self, b: ir.IRBuilder, x: ir.Value, quarter: int) -> ir.Value:
-        """Sine of x plus `quarter` quarter turns, by reduction to |r| <= pi / 4."""
-        n = self.call(b, "rint", b.fmul(x, splat(2 / math.pi)))
-        r = b.fsub(x, b.fmul(n, splat(HALF_PI_HIGH)))
-        r = b.fsub(b.fsub(r, b.fmul(n, splat(HALF_PI_MIDDLE))), b.fmul(n, splat(HALF_PI_LOW)))
-        square = b.fmul(r, r)
-        sine = b.fmul(r, horner(b, square, [(-1) ** k / math.factorial(2 * k + 1) for k in range(9)]))
-        cosine = horner(b, square, [(-1) ** k / math.factorial(2 * k) for k in range(10)])
-        turn = b.add(self._to_int(b, n), splat_int(quarter))
+        """Sine of x plus `quarter` quarter turns."""
+        if (b.block, x) not in self._turns:
+            self._turns[b.block, x] = self._turn(b, x)
+        quarters, sine, cosine = self._turns[b.block, x]
+        turn = b.add(quarters, splat_int(quarter))
         odd = b.icmp_signed("!=", b.and_(turn, splat_int(1)), splat_int(0))
         value = select_lanes(b, odd, cosine, sine)
         sign = b.shl(b.and_(turn, splat_int(2)), splat_int(62))
         return b.bitcast(b.xor(b.bitcast(value, INT_VECTOR), sign), VECTOR)
+
+    def _turn(self, b: ir.IRBuilder, x: ir.Value) -> tuple[ir.Value, ir.Value, ir.Value]:
+        """Quarter turns in x, and sine and cosine of the rest |r| <= pi / 4; sin(x) and cos(x) share them."""
+        n = self.call(b, "rint", b.fmul(x, splat(2 / math.pi)))
+        r = b.fsub(x, b.fmul(n, splat(HALF_PI_HIGH)))
+        r = b.fsub(b.fsub(r, b.fmul(n, splat(HALF_PI_MIDDLE))), b.fmul(n, splat(HALF_PI_LOW)))
+        size = self.call(b, "fabs", x)
+        r = select_lanes(b, b.fcmp_ordered("<", size, splat(1e9)), r, splat(math.nan))
+        square = b.fmul(r, r)
+        sine = b.fmul(r, polynomial(b, square, [(-1) ** k / math.factorial(2 * k + 1) for k in range(9)]))
+        cosine = polynomial(b, square, [(-1) ** k / math.factorial(2 * k) for k in range(10)])
+        return self._to_int(b, n), sine, cosine
 
     def _tanh(self, b: ir.IRBuilder, x: ir.Value) -> ir.Value:
         """tanh x = (1 - e) / (1 + e), e = exp(-2 |x|), with the sign of x; a series below 0.03."""
         size = self.call(b, "fabs", x)
         e = self.call(b, "exp", b.fmul(size, splat(-2.0)))
         value = b.fdiv(b.fsub(splat(1.0), e), b.fadd(splat(1.0), e))
-        small = b.fmul(size, horner(b, b.fmul(x, x), [1.0, -1 / 3, 2 / 15, -17 / 315, 62 / 2835, -1382 / 155925]))
+        small = b.fmul(size, polynomial(b, b.fmul(x, x), [1.0, -1 / 3, 2 / 15, -17 / 315, 62 / 2835, -1382 / 155925]))
         value = select_lanes(b, b.fcmp_ordered("<", size, splat(0.03)), small, value)
         return self.call(b, "copysign", value, x)
 
 
-def horner(b: ir.IRBuilder, x: ir.Value, coefficients: Sequence[float]) -> ir.Value:
-    """Sum of coefficients[k] x^k."""
-    value: ir.Value = splat(coefficients[-1])
-    for c in reversed(coefficients[:-1]):
-        value = b.fadd(b.fmul(value, x, flags=CONTRACT), splat(c), flags=CONTRACT)
-    return value
+def polynomial(b: ir.IRBuilder, x: ir.Value, coefficients: Sequence[float]) -> ir.Value:
+    """Sum of coefficients[k] x^k, in pairs of pairs (Estrin): a chain of log2(terms) steps, Horner's has `terms`."""
+    terms: list[ir.Value] = [splat(c) for c in coefficients]
+    while len(terms) > 1:
+        pairs = [
+            b.fadd(b.fmul(terms[k + 1], x, flags=CONTRACT), terms[k], flags=CONTRACT)
+            for k in range(0, len(terms) - 1, 2)
+        ]
+        terms = pairs + terms[2 * len(pairs) :]
+        x = b.fmul(x, x)
+    return terms[0]
 
 
 def select_lanes(b: ir.IRBuilder, mask: ir.Value, yes: ir.Value, no: ir.Value) -> ir.Value:

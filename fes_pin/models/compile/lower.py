@@ -31,6 +31,13 @@ _LANE_FUNCTIONS = {
     ca.OP_ERF: "erf",
     ca.OP_POW: "pow",
     ca.OP_FMOD: "fmod",
+    ca.OP_REMAINDER: "remainder",
+    ca.OP_HYPOT: "hypot",
+    ca.OP_LOG1P: "log1p",
+    ca.OP_EXPM1: "expm1",
+    ca.OP_ASINH: "asinh",
+    ca.OP_ACOSH: "acosh",
+    ca.OP_ATANH: "atanh",
 }
 
 
@@ -85,11 +92,9 @@ class Lowering:
             ca.OP_AND: lambda: _number(b, b.and_(_truth(b, a[0]), _truth(b, a[1]))),
             ca.OP_OR: lambda: _number(b, b.or_(_truth(b, a[0]), _truth(b, a[1]))),
             ca.OP_IF_ELSE_ZERO: lambda: select_lanes(b, _truth(b, a[0]), a[1], zero),
-            ca.OP_FMIN: lambda: select_lanes(b, b.fcmp_unordered("<", a[0], a[1]), a[0], a[1]),
-            ca.OP_FMAX: lambda: select_lanes(b, b.fcmp_unordered(">", a[0], a[1]), a[0], a[1]),
-            ca.OP_SIGN: lambda: b.fsub(
-                _number(b, b.fcmp_ordered(">", a[0], zero)), _number(b, b.fcmp_ordered("<", a[0], zero))
-            ),
+            ca.OP_FMIN: lambda: _extreme(b, "<", a[0], a[1]),
+            ca.OP_FMAX: lambda: _extreme(b, ">", a[0], a[1]),
+            ca.OP_SIGN: lambda: _sign(b, a[0]),
         }
         if op in simple:
             return simple[op]()
@@ -107,6 +112,19 @@ def _element(b: ir.IRBuilder, pointer: ir.Value, index: int) -> ir.Value:
 def _number(b: ir.IRBuilder, mask: ir.Value) -> ir.Value:
     """A mask as 1.0 and 0.0."""
     return b.select(mask, splat(1.0), splat(0.0))
+
+
+def _extreme(b: ir.IRBuilder, relation: str, one: ir.Value, other: ir.Value) -> ir.Value:
+    """The smaller or larger number; NaN if either is (CasADi's own would hide it)."""
+    chosen = select_lanes(b, b.fcmp_unordered(relation, one, other), one, other)
+    return select_lanes(b, b.fcmp_unordered("uno", other, other), other, chosen)
+
+
+def _sign(b: ir.IRBuilder, value: ir.Value) -> ir.Value:
+    """-1, 0 or 1; NaN for NaN."""
+    zero = splat(0.0)
+    sign = b.fsub(_number(b, b.fcmp_ordered(">", value, zero)), _number(b, b.fcmp_ordered("<", value, zero)))
+    return select_lanes(b, b.fcmp_unordered("uno", value, value), value, sign)
 
 
 def _truth(b: ir.IRBuilder, value: ir.Value) -> ir.Value:

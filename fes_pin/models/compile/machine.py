@@ -7,6 +7,7 @@ import hashlib
 import os
 import sys
 import threading
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -29,13 +30,18 @@ def cache_folder() -> Path:
     return Path(base) / "fes_pin"
 
 
-@cache
-def _target() -> llvm.TargetMachine:
+def _new_target() -> llvm.TargetMachine:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=1, jit=True
     )
+
+
+@cache
+def _target() -> llvm.TargetMachine:
+    """The one that compiles. An execution engine takes its target machine with it when it goes: it needs its own."""
+    return _new_target()
 
 
 @cache
@@ -50,13 +56,12 @@ class MachineCode:
 
     def __init__(self, object_code: bytes) -> None:
         with _LOCK:
-            _target()
-            empty = llvm.parse_assembly("")
-            self._engine = llvm.create_mcjit_compiler(empty, _target())
+            target = _new_target()
+            self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target)
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(object_code))
             self._engine.finalize_object()
 
-    def function(self, name: str, *argument_types: type) -> ctypes._CFuncPtr:
+    def function(self, name: str, *argument_types: type) -> Callable[..., None]:
         """The function of that name as a ctypes callable; ctypes releases the interpreter lock while it runs."""
         return ctypes.CFUNCTYPE(None, *argument_types)(self._engine.get_function_address(name))
 

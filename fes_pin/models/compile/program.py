@@ -1,44 +1,31 @@
-"""The compiled program of a model: a whole trial, with sensitivities, eight lanes at a time."""
+"""The program of a model: compiled once for its structure, kept in memory and on disk."""
 
 from __future__ import annotations
 
-import ctypes
 import json
-from dataclasses import asdict, dataclass
-from pathlib import Path
+import logging
+import os
+import threading
+from dataclasses import asdict
+from functools import cache
+from typing import Protocol
 
 import numpy as np
-from llvmlite import ir
 
-from fes_pin.models.compile.equations import Equations, Layout, derive, make_layout
-from fes_pin.models.compile.lanes import DOUBLE, INT64, VECTOR, WIDTH, select_lanes, splat
-from fes_pin.models.compile.lower import Lowering
-from fes_pin.models.compile.machine import MachineCode, cached_path, compile_object, read_cached, write_cached
-from fes_pin.models.compile.signature import source_signature
+from fes_pin.data.errors import InputError
+from fes_pin.models.compile.equations import derive
+from fes_pin.models.compile.layout import Layout, make_layout
+from fes_pin.models.compile.virtual import VirtualProgram
 from fes_pin.models.model import Model
 
-REST_ITERATIONS = 40
-"""Newton steps to the static equilibrium; steps are held to REST_STEP, so 40 of them cross any joint's range."""
-REST_STEP = 0.2
+ENGINES = ("llvm", "casadi")
+_LOG = logging.getLogger("fes_pin")
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """Lengths of the vectors that a program keeps."""
+class Program(Protocol):
+    """One model structure, kind of trial and set of sensitivity columns, ready to run."""
 
-    state: int
-    memory: int
-    reading: int
-
-
-class Program:
-    """Machine code of one model structure, kind of trial and set of sensitivity columns."""
-
-    def __init__(self, layout: Layout, sizes: Sizes, object_code: bytes) -> None:
-        self.layout, self.sizes = layout, sizes
-        self._code = MachineCode(object_code)
-        pointer = ctypes.c_void_p
-        self._run = self._code.function("simulate", ctypes.c_int64, ctypes.c_int64, *[pointer] * 6)
+    layout: Layout
 
     def run(
         self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
@@ -63,162 +50,14 @@ class Program:
         sensitivities
             Shape (n, outputs, columns, WIDTH).
         """
-        n, outputs = inputs.shape[0], len(self.layout.outputs)
-        out = np.empty((n, self.sizes.reading, WIDTH))
-        arguments = [np.ascontiguousarray(a, dtype=float) for a in (inputs, values, constants, guess)]
-        scratch = np.zeros((2 * (self.sizes.state + 1) * 3 + 2 * (self.sizes.memory + 1), WIDTH))
-        self._run(n, substeps, *[a.ctypes.data for a in (*arguments, out, scratch)])
-        return out[:, :outputs], out[:, outputs:].reshape(n, outputs, len(self.layout.columns), WIDTH)
 
 
-def emit(equations: Equations) -> str:
-    """LLVM assembly of a program: static equilibrium, then samples of Runge-Kutta steps."""
-    module = ir.Module(name="fes_pin")
-    lowering = Lowering(module)
-    parts = {n: lowering.lower(getattr(equations, n)) for n in ("rest", "start", "sample", "rates", "output")}
-    return str(_Loop(module, equations, parts).module)
-
-
-class _Loop:
-    """The time loop around a model's functions."""
-
-    def __init__(self, module: ir.Module, equations: Equations, parts: dict[str, ir.Function]) -> None:
-        self.module, self.parts, self.equations = module, parts, equations
-        self.sizes = sizes_of(equations)
-        double = ir.PointerType(VECTOR)
-        function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INT64, INT64] + [double] * 6), "simulate")
-        self.n, self.substeps, self.u, self.p, self.c, self.z, self.y, scratch = function.args
-        self.b = ir.IRBuilder(function.append_basic_block())
-        self._carve(scratch)
-        self._constants()
-        self._rest()
-        self._samples()
-        self.b.ret_void()
-
-    def _carve(self, scratch: ir.Value) -> None:
-        """Vectors in the scratch memory: states, stage states, stage rates, their sum, memories old and new."""
-        at = 0
-        for name, size in (
-            ("state", self.sizes.state),
-            ("stage", self.sizes.state),
-            ("rate", self.sizes.state),
-            ("total", self.sizes.state),
-            ("memory", self.sizes.memory),
-            ("after", self.sizes.memory),
-        ):
-            setattr(self, name, self._at(scratch, at))
-            at += size + 1
-        self.t = self.b.alloca(VECTOR)
-        self.since = self.b.alloca(VECTOR)
-        self.g = self.b.alloca(VECTOR, ir.Constant(INT64, 2))
-
-    def _at(self, pointer: ir.Value, index: int | ir.Value) -> ir.Value:
-        return self.b.gep(pointer, [ir.Constant(INT64, index) if isinstance(index, int) else index])
-
-    def _load(self, pointer: ir.Value, index: int | ir.Value = 0) -> ir.Value:
-        return self.b.load(self._at(pointer, index), align=8)
-
-    def _store(self, value: ir.Value, pointer: ir.Value, index: int | ir.Value = 0) -> None:
-        self.b.store(value, self._at(pointer, index), align=8)
-
-    def _constants(self) -> None:
-        names = self.equations.layout.constants
-        self.t0, self.dt, self.step = (self._load(self.c, names.index(n)) for n in ("t0", "dt", "step"))
-
-    def _count(self, end: ir.Value, body: object) -> None:
-        """for k in range(end): body(k)."""
-        b = self.b
-        before, loop, done = b.block, b.append_basic_block(), b.append_basic_block()
-        b.cbranch(b.icmp_signed(">", end, ir.Constant(INT64, 0)), loop, done)
-        b.position_at_end(loop)
-        k = b.phi(INT64)
-        k.add_incoming(ir.Constant(INT64, 0), before)
-        body(k)  # type: ignore[operator]
-        following = b.add(k, ir.Constant(INT64, 1))
-        k.add_incoming(following, b.block)
-        b.cbranch(b.icmp_signed("<", following, end), loop, done)
-        b.position_at_end(done)
-
-    def _number(self, k: ir.Value) -> ir.Value:
-        """An integer as lanes of doubles."""
-        one = self.b.insert_element(
-            ir.Constant(VECTOR, ir.Undefined), self.b.sitofp(k, DOUBLE), ir.Constant(ir.IntType(32), 0)
-        )
-        mask = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-        return self.b.shuffle_vector(one, one, mask)
-
-    def _rest(self) -> None:
-        b = self.b
-
-        def newton(_: ir.Value) -> None:
-            b.call(self.parts["rest"], [self.z, self.p, self.c, self.g, self._at(self.g, 1)])
-            step = b.fdiv(self._load(self.g), self._load(self.g, 1))
-            step = select_lanes(b, b.fcmp_ordered(">", step, splat(REST_STEP)), splat(REST_STEP), step)
-            step = select_lanes(b, b.fcmp_ordered("<", step, splat(-REST_STEP)), splat(-REST_STEP), step)
-            self._store(b.fsub(self._load(self.z), step), self.z)
-
-        self._count(ir.Constant(INT64, REST_ITERATIONS), newton)
-        b.call(self.parts["start"], [self.z, self.p, self.c, self.state, self.memory])
-
-    def _samples(self) -> None:
-        b, inputs = self.b, len(self.equations.layout.inputs)
-
-        def sample(n: ir.Value) -> None:
-            t = b.fadd(self.t0, b.fmul(self._number(n), self.dt))
-            b.store(t, self.t, align=8)
-            u = self._at(self.u, b.mul(n, ir.Constant(INT64, inputs)))
-            y = self._at(self.y, b.mul(n, ir.Constant(INT64, self.sizes.reading)))
-            b.call(self.parts["sample"], [self.state, self.memory, u, self.t, self.p, self.c, self.after])
-            self._copy(self.after, self.memory, self.sizes.memory)
-            b.call(self.parts["output"], [self.state, self.memory, u, self.t, self.p, self.c, y])
-            self._count(self.substeps, lambda j: self._runge_kutta(j, t, u))
-
-        self._count(self.n, sample)
-
-    def _copy(self, source: ir.Value, target: ir.Value, size: int) -> None:
-        self._count(ir.Constant(INT64, size), lambda i: self._store(self._load(source, i), target, i))
-
-    def _runge_kutta(self, j: ir.Value, sample_time: ir.Value, u: ir.Value) -> None:
-        """One step of the classical Runge-Kutta method of order four."""
-        b = self.b
-        since = b.fmul(self._number(j), self.step)
-        b.store(since, self.since, align=8)
-        begin = b.fadd(sample_time, since)
-        size = ir.Constant(INT64, self.sizes.state)
-        for weight, ahead, at, source in (
-            (1 / 6, 0.5, 0.0, self.state),
-            (1 / 3, 0.5, 0.5, self.stage),
-            (1 / 3, 1.0, 0.5, self.stage),
-            (1 / 6, 0.0, 1.0, self.stage),
-        ):
-            b.store(b.fadd(begin, b.fmul(self.step, splat(at))), self.t, align=8)
-            b.call(self.parts["rates"], [source, self.memory, u, self.t, self.since, self.p, self.c, self.rate])
-            share, forward = b.fmul(self.step, splat(weight)), b.fmul(self.step, splat(ahead))
-            self._count(size, lambda i, a=at, w=weight, s=share, f=forward: self._advance(i, a, w, s, f))
-
-    def _advance(self, i: ir.Value, at: float, weight: float, share: ir.Value, forward: ir.Value) -> None:
-        """Add a stage to the sum, and go to the next stage or, after the last, to the next step."""
-        b = self.b
-        rate, state = self._load(self.rate, i), self._load(self.state, i)
-        total = state if at == 0.0 else self._load(self.total, i)
-        total = b.fadd(total, b.fmul(share, rate))
-        if at == 1.0:
-            self._store(total, self.state, i)
-            return
-        self._store(total, self.total, i)
-        self._store(b.fadd(state, b.fmul(forward, rate)), self.stage, i)
-
-
-def sizes_of(equations: Equations) -> Sizes:
-    """Lengths of a program's vectors."""
-    return Sizes(equations.start.numel_out(0), equations.start.numel_out(1), equations.output.numel_out(0))
-
-
-_PROGRAMS: dict[tuple[tuple[str, ...], Layout], Program] = {}
+_LOCK = threading.Lock()  # CasADi's expressions are not made for two threads
+_PROGRAMS: dict[tuple[str, tuple[str, ...], Layout], Program] = {}
 
 
 def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...]) -> Program:
-    """The compiled program of a model; compiled once for its structure, and kept on disk between runs.
+    """The program of a model, compiled if it was not before.
 
     Parameters
     ----------
@@ -228,28 +67,47 @@ def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str
         Input columns of the trials.
     columns
         Parameters and unknowns to give sensitivities for.
+
+    Raises
+    ------
+    InputError
+        If FES_PIN_ENGINE names no engine.
     """
-    layout = make_layout(model, kind, inputs, columns)
-    key = (model.structure(), layout)
+    layout, engine = make_layout(model, kind, inputs, columns), chosen_engine()
+    key = (engine, model.structure(), layout)
     if key not in _PROGRAMS:
-        _PROGRAMS[key] = _stored(model, layout) or _compiled(model, layout)
+        with _LOCK:
+            if key not in _PROGRAMS:
+                made = _native(model, layout) if engine == "llvm" else None
+                _PROGRAMS[key] = made or VirtualProgram(derive(model, layout))
     return _PROGRAMS[key]
 
 
-def _path(model: Model, layout: Layout) -> Path:
-    return cached_path(json.dumps([source_signature(), model.structure(), asdict(layout)]), ".program")
+def chosen_engine() -> str:
+    """What programs run on: `FES_PIN_ENGINE`, "llvm" for machine code (default) or "casadi" for its virtual machine."""
+    engine = os.environ.get("FES_PIN_ENGINE") or ENGINES[0]
+    if engine not in ENGINES:
+        raise InputError(f"FES_PIN_ENGINE: expected {' or '.join(ENGINES)}, found {engine[:40]!r}")
+    return engine
 
 
-def _stored(model: Model, layout: Layout) -> Program | None:
-    stored = read_cached(_path(model, layout))
-    if stored is None:
+def _native(model: Model, layout: Layout) -> Program | None:
+    """Machine code from the cache or compiled; None if it cannot be made here."""
+    try:
+        from fes_pin.models.compile import machine, native  # noqa: PLC0415 - llvmlite may be missing
+        from fes_pin.models.compile.signature import source_signature  # noqa: PLC0415
+
+        path = machine.cached_path(json.dumps([source_signature(), model.structure(), asdict(layout)]), ".program")
+        stored = machine.read_cached(path)
+        if stored is None:
+            stored = native.compile_equations(derive(model, layout))
+            machine.write_cached(path, stored)
+        return native.NativeProgram(layout, stored)
+    except (ImportError, OSError, RuntimeError, NotImplementedError) as problem:
+        _say_slow(" ".join(str(problem).split()))
         return None
-    head, _, body = stored.partition(b"\n")
-    return Program(layout, Sizes(**json.loads(head)), body)
 
 
-def _compiled(model: Model, layout: Layout) -> Program:
-    equations = derive(model, layout)
-    body, sizes = compile_object(emit(equations)), sizes_of(equations)
-    write_cached(_path(model, layout), json.dumps(asdict(sizes)).encode() + b"\n" + body)
-    return Program(layout, sizes, body)
+@cache
+def _say_slow(reason: str) -> None:
+    _LOG.warning("models run on CasADi's virtual machine, tens of times slower: %s", reason)

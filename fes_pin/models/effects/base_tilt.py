@@ -16,7 +16,8 @@ class BaseTilt(Effect):
         g(q) -> g(q + tilt)
 
     Tell-tale: rest angles are off in a way that depends on the angle; motion about them is nearly right.
-    Source: a rotation of the URDF's base about the joint's axis.
+    Source: a rotation of the URDF's base about the joint's axis; for a prismatic joint, which reads g(0 + tilt), one
+    that raises its axis.
     """
 
     tilt_rad: float = parameter(0.05, unit="rad", null=0.0, lower=-1.0, upper=1.0, scale=0.02)

@@ -13,7 +13,7 @@ V_SMOOTH = 0.002
 """Speed below which dry friction fades, rad/s; far below the speeds of a limb's motion (1 rad/s)."""
 
 STIFFEST = 2.5
-"""Largest rate of decay times step that it may show; RK4 is stable to 2.78 (Hairer and Wanner, Solving ODEs II, IV.2)."""
+"""Largest rate of decay times step that it may show; RK4 is stable to 2.78: Hairer, Wanner, Solving ODEs II, IV.2."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ class FrameVibration(Effect):
 
     coupling: float = parameter(0.1, null=0.0, lower=0.0, upper=5.0, scale=0.05)
     frequency_hz: float = parameter(
-        10.0, unit="Hz", lower=1.0, upper=60.0, scale=1.0, grid=(3.0, 4.5, 6.5, 9.0, 11.0, 13.5, 17.0, 22.0, 30.0)
+        10.0, unit="Hz", lower=2.0, upper=60.0, scale=1.0, grid=(3.0, 4.5, 6.5, 9.0, 11.0, 13.5, 17.0, 22.0, 30.0)
     )
     damping_ratio: float = parameter(0.05, lower=0.002, upper=0.7, scale=0.02)
 

@@ -20,8 +20,8 @@ class PeriodicTorque(Effect):
         torque + in_phase sin(2 pi f t) + quadrature cos(2 pi f t)
 
     Tell-tale: the rest angle sways in time with nothing that was commanded.
-    Source: a Fourier component at the breathing rate of a dog or a person, 0.1 to 1 Hz; the phase is that of the
-    trial's first sample.
+    Source: a Fourier component at the breathing rate: at rest 12 to 20 a minute in people, 10 to 35 in dogs, and up
+    to 0.8 Hz; the phase is that of the trial's first sample.
     """
 
     in_phase: float = parameter(0.01, unit="N m", null=0.0, lower=-100.0, upper=100.0, scale=0.005)
@@ -30,9 +30,9 @@ class PeriodicTorque(Effect):
         0.4,
         unit="Hz",
         lower=0.05,
-        upper=3.0,
+        upper=0.8,
         scale=0.02,
-        grid=(0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0),
+        grid=(0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75),
     )
 
     name, stage, signal, rigs = "periodic_torque", Stage.RIG, "torque", ("ankle", "joint")

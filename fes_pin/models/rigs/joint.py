@@ -19,8 +19,8 @@ class Joint(Rig):
         inertia_scale M v' = effort - gravity_scale (A cos(q) + B sin(q)) - damping v
 
     M, A and B are read off Pinocchio's CRBA and gravity of the URDF (`constants`: `inertia`, `gravity_cos`,
-    `gravity_sin`); for a prismatic joint gravity is the constant A. The effort is held between samples. Each trial has
-    its own initial position and velocity.
+    `gravity_sin`, `revolute`); for a prismatic joint (`revolute` 0) gravity is the constant A. The effort is held
+    between samples. Each trial has its own initial position and velocity.
     """
 
     inertia_scale: float = parameter(1.0, lower=1e-3, upper=1e3, scale=0.1)
@@ -48,7 +48,7 @@ class Joint(Rig):
         return ("effort",) if "effort" in trial.columns else ()
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
-        return ("inertia", "gravity_cos", "gravity_sin")
+        return ("inertia", "gravity_cos", "gravity_sin", "revolute")
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         return {name: float(self.constants[name]) for name in self.constant_names(trial.kind)}
@@ -79,7 +79,7 @@ class Joint(Rig):
         c = s.c
         s.q, s.v, s.act, s.sensed = s.x.q, s.x.v, 0.0, s.x.q
         s.inertia = self.inertia_scale * c.inertia
-        tilted = s.through("gravity_angle", s.q)
+        tilted = s.through("gravity_angle", c.revolute * s.q)
         gravity = self.gravity_scale * (c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted))
         effort = s.through("effort", getattr(s.u, "effort", 0.0))
         s.torque = s.through("torque", effort - gravity - self.damping * s.v)

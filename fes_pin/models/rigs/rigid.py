@@ -47,12 +47,17 @@ def _ankle_rig() -> pin.Model:
 def point_foot(mass_kg: float, com_distance_m: float, inertia_kgm2: float | None = None) -> pin.Model:
     """The ankle rig's URDF with the foot's mass, its centre and, if given, its inertia about the joint.
 
-    The inertia about the joint must be at least m l^2; without it the foot is a point mass.
+    Without an inertia the foot is a point mass.
+
+    Raises
+    ------
+    ValueError
+        If the inertia is smaller than m l^2.
     """
     model = _ankle_rig().copy()
-    about_com = (inertia_kgm2 if inertia_kgm2 is not None else mass_kg * com_distance_m**2) - (
-        mass_kg * com_distance_m**2
-    )
+    about_com = 0.0 if inertia_kgm2 is None else inertia_kgm2 - mass_kg * com_distance_m**2
+    if about_com < 0.0:
+        raise ValueError(f"expected an inertia of at least m l^2, {mass_kg * com_distance_m**2:g} kg m2")
     direction = model.inertias[1].lever / np.linalg.norm(model.inertias[1].lever)
     model.inertias[1] = pin.Inertia(mass_kg, com_distance_m * direction, about_com * np.eye(3))
     return model
@@ -68,12 +73,17 @@ def _gravity(model: pin.Model, data: Any, position: float) -> float:
 
 
 def gravity_coefficients(model: pin.Model) -> tuple[float, float]:
-    """A and B of a one-joint model's gravity torque A cos(q) + B sin(q), N m; (force, 0) for a prismatic joint.
+    """A and B of a one-joint model's gravity torque A cos(q) + B sin(q), N m.
 
-    It stands on the left-hand side of M(q) a + g(q) = tau, as in Pinocchio.
+    A prismatic joint feels A cos(tilt) + B sin(tilt), N, with tilt the angle by which its axis is raised: A the weight
+    along the axis, B across it. Gravity stands on the left-hand side of M(q) a + g(q) = tau, as in Pinocchio.
     """
     data = model.createData()
-    return _gravity(model, data, 0.0), _gravity(model, data, math.pi / 2) if is_revolute(model) else 0.0
+    along = _gravity(model, data, 0.0)
+    if is_revolute(model):
+        return along, _gravity(model, data, math.pi / 2)
+    weight = joint_inertia(model) * float(np.linalg.norm(model.gravity.linear))
+    return along, math.sqrt(max(weight * weight - along * along, 0.0))
 
 
 def joint_inertia(model: pin.Model) -> float:

@@ -1,0 +1,164 @@
+"""Which part of walking can stimulated nerves make, which pulse widths do it, and what is short, and why?
+
+Measured walking (two strides, one adult) gives the joint torques; four sets of nerves are asked for them.
+Run the cells, or `python analysis/allocate_walking.py`; the picture goes to out/allocate_walking.png.
+"""
+
+# %% The torques of a measured walk
+from collections import Counter
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from fes_pin.stimulate.allocate import Allocator, allocate
+from fes_pin.stimulate.attainable import Attainable
+from fes_pin.stimulate.measured import read_walk
+from fes_pin.stimulate.muscles import JOINTS
+from fes_pin.stimulate.nerves import Nerves
+from fes_pin.stimulate.recruitment import LinearRecruitment
+from fes_pin.stimulate.walk import allocate_walk, clipped, direction_error, rescaled
+
+walk = read_walk()
+weights = walk.known.astype(float)
+LEG = [n.removeprefix("left_") for n in Nerves().names if n.startswith("left_")]
+TRUNK = ("erector_spinae", "abdominals")
+SETS = {
+    "peroneal (drop foot)": ["deep_peroneal"],
+    "four a leg": ["femoral", "hamstrings", "tibial", "deep_peroneal"],
+    "every leg nerve": [n for n in LEG if n not in TRUNK],
+    "legs and trunk": LEG,
+}
+SAGITTAL = [
+    f"{side}_{joint}" for side in ("left", "right") for joint in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
+]
+
+
+def both_sides(names):
+    return [f"{side}_{name}" for side in ("left", "right") for name in names]
+
+
+# %% Attained: every joint that counts within 10 % of its peak torque; strengths are known to a factor of 1.8
+def attained(result, joints):
+    index = [JOINTS.index(j) for j in joints]
+    met = np.abs(result.shortfall[:, index]) <= np.maximum(0.1 * np.abs(walk.torque[:, index]).max(0), 1.0)
+    return met.all(1).mean(), met.mean()
+
+
+print(f"{len(walk.time)} samples, {walk.time[-1] - walk.time[0]:.2f} s; joints within 10 % of their peak torque")
+print(f"{'nerves':22s} {'all sagittal':>24s} {'all in 3-D':>20s} {'joint samples':>16s}   (weak, table, strong)")
+results = {}
+for name, nerves in SETS.items():
+    row = []
+    for strength in (1 / 1.8, 1.0, 1.8):
+        channels = Nerves(both_sides(nerves), strength=strength)
+        sagittal = allocate_walk(walk.torque, channels, walk.q, weights=np.isin(JOINTS, SAGITTAL).astype(float))
+        full = allocate_walk(walk.torque, channels, walk.q, weights=weights)
+        assert max(sagittal.residual.max(), full.residual.max()) < 1e-9
+        row.append((attained(sagittal, SAGITTAL)[0], *attained(full, walk.known_joints)))
+        if strength == 1.0:
+            results[name] = (sagittal, full)
+    cells = [" - ".join(f"{100 * r[k]:3.0f}" for r in row) + " %" for k in range(3)]
+    print(f"{name:22s} {cells[0]:>24s} {cells[1]:>20s} {cells[2]:>16s}")
+
+# %% What is short, and why: the worst joint of every sample, counted
+for name, (sagittal, _) in results.items():
+    words = Counter()
+    for k in range(len(walk.time)):
+        reasons = sagittal.at(k).reasons
+        if reasons:
+            joint, _, why = reasons[0].partition(": ")
+            words[f"{' '.join(joint.split()[1:-4])}: {why.replace('left ', '').replace('right ', '')}"] += 1
+    print(name)
+    for reason, count in words.most_common(3):
+        print(f"   {100 * count / len(walk.time):3.0f} % of samples: {reason}")
+
+# %% Against the rules of thumb: least squares without limits, then clip or rescale
+index = [JOINTS.index(j) for j in SAGITTAL]
+errors = {}
+for name, (sagittal, _) in results.items():
+    rules = {"this": sagittal.achieved[:, index]}
+    for rule, choose in (("clip", clipped), ("rescale", rescaled)):
+        rules[rule] = np.array(
+            [m[index] @ choose(m[index], t[index]) for m, t in zip(sagittal.matrices, walk.torque, strict=True)]
+        )
+    wanted = walk.torque[:, index]
+    errors[name] = {
+        rule: (np.degrees(np.median(direction_error(wanted, got))), np.sqrt(((got - wanted) ** 2).sum(1).mean()))
+        for rule, got in rules.items()
+    }
+    text = "   ".join(f"{rule} {angle:5.1f} deg, {size:5.1f} N m" for rule, (angle, size) in errors[name].items())
+    print(f"{name:22s} median torque-direction error and rms torque error: {text}")
+
+# %% The ankle rig: the paper's threshold and saturation, one joint, one nerve
+rig = Allocator([[0.034 * 60.0]], recruitment=LinearRecruitment(180.0, 1000.0), effort=1e-9)
+for torque in (0.0, 0.5, 1.5, 2.5):
+    print(f"ankle rig, {torque} N m wanted:", str(rig([torque])).replace("\n", "; "))
+
+# %% The picture
+chosen = "four a leg"
+sagittal, _ = results[chosen]
+figure, axes = plt.subplots(2, 3, figsize=(13, 7.2), constrained_layout=True)
+titles = ("right hip, flexion +", "right knee, flexion +", "right ankle, dorsiflexion +")
+for axis, joint, title in zip(axes[0], SAGITTAL[3:], titles, strict=True):
+    j = JOINTS.index(joint)
+    axis.plot(walk.time, walk.torque[:, j], color="0.25", lw=2.2, label="measured walking")
+    axis.plot(
+        walk.time,
+        sagittal.achieved[:, j],
+        color="tab:orange",
+        lw=1.5,
+        label="stimulated: femoral, hamstrings,\ntibial, deep peroneal",
+    )
+    axis.fill_between(
+        walk.time, walk.torque[:, j], sagittal.achieved[:, j], color="tab:red", alpha=0.25, lw=0, label="short"
+    )
+    axis.set(title=title, xlabel="time (s)", ylabel="torque (N m)")
+    axis.margins(x=0)
+axes[0, 0].set_ylim(-115, 45)
+axes[0, 0].legend(fontsize=8, loc="lower left")
+names = sagittal.allocator.names
+right = [i for i, n in enumerate(names) if n.startswith("right_")]
+width = np.where(sagittal.pulse_width_us[:, right].T > 0, sagittal.pulse_width_us[:, right].T, np.nan)
+image = axes[1, 0].pcolormesh(walk.time, np.arange(len(right) + 1), width[:, :-1], cmap="viridis", vmin=180, vmax=1000)
+axes[1, 0].set(title="pulse widths (white: off)", xlabel="time (s)", yticks=np.arange(len(right)) + 0.5)
+axes[1, 0].set_yticklabels([names[i].removeprefix("right_").replace("_", "\n") for i in right], fontsize=8)
+figure.colorbar(image, ax=axes[1, 0], label="us")
+outline = Attainable(Nerves(both_sides(SETS[chosen])), walk.q[60]).outline(
+    "right_knee_flexion", "right_ankle_dorsiflexion"
+)
+wide = Attainable(Nerves(both_sides(SETS["every leg nerve"])), walk.q[60]).outline(
+    "right_knee_flexion", "right_ankle_dorsiflexion"
+)
+axes[1, 1].fill(*wide.T, color="tab:blue", alpha=0.15, label="every leg nerve")
+axes[1, 1].fill(*outline.T, color="tab:orange", alpha=0.35, label="four a leg")
+knee, ankle = (walk.torque[:, JOINTS.index(j)] for j in ("right_knee_flexion", "right_ankle_dorsiflexion"))
+axes[1, 1].plot(knee, ankle, color="0.25", lw=1.5, label="measured walking")
+axes[1, 1].set(
+    title="attainable torque, knee and ankle", xlabel="knee flexion (N m)", ylabel="ankle dorsiflexion (N m)"
+)
+axes[1, 1].set_ylim(-480, 100)
+axes[1, 1].legend(fontsize=8, loc="lower left")
+place = np.arange(len(errors))
+for k, (rule, colour) in enumerate({"this": "tab:orange", "clip": "tab:blue", "rescale": "tab:green"}.items()):
+    axes[1, 2].bar(place + 0.27 * (k - 1), [e[rule][0] for e in errors.values()], 0.25, color=colour, label=rule)
+axes[1, 2].set(title="torque-direction error, sagittal", ylabel="median (degrees)", xticks=place)
+axes[1, 2].set_xticklabels(
+    [n.replace(" (", "\n(").replace("every leg", "every\nleg").replace("legs and", "legs\nand") for n in errors],
+    fontsize=8,
+)
+axes[1, 2].legend(fontsize=8)
+out = Path(__file__).parents[1] / "out"
+out.mkdir(exist_ok=True)
+figure.savefig(out / "allocate_walking.png", dpi=110)
+
+# %% The number
+share = {name: attained(sagittal, SAGITTAL)[0] for name, (sagittal, _) in results.items()}
+print(f"Four nerves a leg make {100 * share[chosen]:.0f} % of the samples of walking (sagittal hip, knee and ankle).")
+example = allocate(
+    dict(zip(JOINTS, walk.torque[60], strict=True)), Nerves(both_sides(SETS[chosen])), walk.q[60], weights=weights
+)
+print(example)

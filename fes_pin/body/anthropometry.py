@@ -1,0 +1,218 @@
+"""A subject's ten segments from mass, height and sex, by published tables.
+
+Sources
+-------
+Segment masses, lengths, centres of mass and radii of gyration: P. de Leva, "Adjustments to Zatsiorsky-Seluyanov's
+segment inertia parameters", J. Biomech. 29(9):1223-1230, 1996, table 4 (100 men and 15 women, young adults). The
+figures were compared with public transcriptions: a MATLAB look-up table by R. Gurchiek (all of them), biobuddy's
+`de_leva.py` (trunk, head, arms) and pyomech (head, arms, thigh, foot). They agree but for slips in one at a time
+(female head 6.69 %, male shank 4.32 %, decimal points); the knee-to-ankle shank of women and the shoulder height rest
+on one. The article itself was not at hand.
+Heights and breadths that de Leva does not give: D. A. Winter, "Biomechanics and Motor Control of Human Movement",
+figure 4.1 (after Drillis and Contini 1966): ankle 0.039 H, half shoulder breadth 0.129 H, foot breadth 0.055 H (each
+compared with public code that cites it; the book was not at hand).
+Hip joint centres 0.095 H apart, MTP centre 0.011 H above the ground, ankle at 0.26 and MTP at 0.72 of the foot's
+length from the heel, forefoot 0.138 of the foot's mass: rounded from the measured and scaled adult of
+`walking_subject01` (hips 0.171 m at 1.80 m; heel markers against joint centres: 0.25-0.27 and 0.70-0.74; toes 0.209 kg
+of 1.513 kg).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.body.joints import SIDES
+from fes_pin.body.skeleton import Segment, Skeleton
+from fes_pin.data.errors import InputError
+
+ANKLE_HEIGHT = 0.039
+HIP_SPACING = 0.095
+SHOULDER_HALF_BREADTH = 0.129
+FOOT_BREADTH = 0.055
+MTP_HEIGHT = 0.011
+ANKLE_ALONG_FOOT = 0.26
+MTP_ALONG_FOOT = 0.72
+FOREFOOT_MASS = 0.138
+MASS_RANGE_KG = (20.0, 250.0)
+HEIGHT_RANGE_M = (1.0, 2.4)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One line of de Leva's table 4.
+
+    `mass` in percent of the body, `length` in mm at the stature of the group, `com` in percent of the length from the
+    upper end, `radii` of gyration in percent of the length about the forward, the leftward and the long axis.
+    """
+
+    mass: float
+    length: float
+    com: float
+    radii: tuple[float, float, float]
+
+
+# Ends: head vertex-C7; upper trunk C7-xiphoid; middle trunk xiphoid-navel; lower trunk navel-mid-hip; arm
+# shoulder-elbow- wrist-tip of the middle finger; thigh hip-knee; shank knee-ankle; foot heel-toe tip. The columns
+# "sagittal" and "transverse" are about the forward and the leftward axis: a wide upper trunk has the greater radius
+# about the forward one.
+_DE_LEVA = {
+    "male": {
+        "head": _Row(6.94, 242.9, 50.02, (30.3, 31.5, 26.1)),
+        "upper_trunk": _Row(15.96, 242.1, 50.66, (50.5, 32.0, 46.5)),
+        "middle_trunk": _Row(16.33, 215.5, 45.02, (48.2, 38.3, 46.8)),
+        "lower_trunk": _Row(11.17, 145.7, 61.15, (61.5, 55.1, 58.7)),
+        "upper_arm": _Row(2.71, 281.7, 57.72, (28.5, 26.9, 15.8)),
+        "forearm": _Row(1.62, 268.9, 45.74, (27.6, 26.5, 12.1)),
+        "hand": _Row(0.61, 187.9, 36.24, (28.8, 23.5, 18.4)),
+        "thigh": _Row(14.16, 422.2, 40.95, (32.9, 32.9, 14.9)),
+        "shank": _Row(4.33, 440.3, 43.95, (25.1, 24.6, 10.2)),
+        "foot": _Row(1.37, 258.1, 44.15, (25.7, 24.5, 12.4)),
+    },
+    "female": {
+        "head": _Row(6.68, 243.7, 48.41, (27.1, 29.5, 26.1)),
+        "upper_trunk": _Row(15.45, 228.0, 50.50, (46.6, 31.4, 44.9)),
+        "middle_trunk": _Row(14.65, 205.3, 45.12, (43.3, 35.4, 41.5)),
+        "lower_trunk": _Row(12.47, 181.5, 49.20, (43.3, 40.2, 44.4)),
+        "upper_arm": _Row(2.55, 275.1, 57.54, (27.8, 26.0, 14.8)),
+        "forearm": _Row(1.38, 264.3, 45.59, (26.1, 25.7, 9.4)),
+        "hand": _Row(0.56, 170.1, 34.27, (24.4, 20.8, 15.4)),
+        "thigh": _Row(14.78, 368.5, 36.12, (36.9, 36.4, 16.2)),
+        "shank": _Row(4.81, 438.6, 43.52, (26.7, 26.3, 9.2)),
+        "foot": _Row(1.29, 228.3, 40.14, (29.9, 27.9, 13.9)),
+    },
+}
+_STATURE = {"male": 1741.0, "female": 1735.0}
+_SHOULDERS_TO_HIPS = {"male": 515.5, "female": 497.9}
+"""Mid-shoulder to mid-hip, mm (de Leva's alternative trunk)."""
+_COLUMN = ("shank", "thigh", "lower_trunk", "middle_trunk", "upper_trunk", "head")
+_PAIRED = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A person: mass (kg), standing height (m), `male` or `female` (whose segment table is used).
+
+    Raises
+    ------
+    InputError
+        Mass outside 20 to 250 kg, height outside 1.0 to 2.4 m, or another sex.
+    """
+
+    mass_kg: float
+    height_m: float
+    sex: str = "male"
+
+    def __post_init__(self) -> None:
+        for label, value, unit, (low, high) in (
+            ("mass_kg", self.mass_kg, "kg", MASS_RANGE_KG),
+            ("height_m", self.height_m, "m", HEIGHT_RANGE_M),
+        ):
+            number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+            if not (number and low <= value <= high):
+                raise InputError(
+                    f"must be between {low:g} and {high:g} {unit} (an adult's), got {value!r}", column=label
+                )
+        if self.sex not in _DE_LEVA:
+            raise InputError(f"must be 'male' or 'female' (the two segment tables), got {self.sex!r}", column="sex")
+
+
+def skeleton_of_subject(subject: Subject) -> Skeleton:
+    """The subject's ten segments and joint centres.
+
+    Segments keep the table's share of mass and, sideways and forwards, its share of stature. Ankle height and table do
+    not add up to stature exactly, so the column of shank, thigh, trunk and head is scaled as one (by 0.98 for men, 1.00
+    for women) to close it: total mass and height are the subject's to rounding. Arms hang; they are part of the trunk.
+    """
+    table = _DE_LEVA[subject.sex]
+    body_percent = sum(row.mass * (2 if name in _PAIRED else 1) for name, row in table.items())
+    per_percent = subject.mass_kg / body_percent
+    per_mm = subject.height_m / _STATURE[subject.sex]
+    ankle = ANKLE_HEIGHT * subject.height_m
+    column_mm = sum(table[name].length for name in _COLUMN)
+    column = (subject.height_m - ankle) / column_mm
+
+    bottoms, z = {}, ankle
+    for name in _COLUMN:
+        bottoms[name], z = z, z + column * table[name].length
+
+    def upright(name: str, y: float, bottom: float, scale: float) -> Segment:
+        row = table[name]
+        length = scale * row.length
+        mass = per_percent * row.mass
+        radii = length * np.array(row.radii) / 100.0
+        return Segment(mass, np.array([0.0, y, bottom + length * (1.0 - row.com / 100.0)]), mass * np.diag(radii**2))
+
+    hip, shoulder = 0.5 * HIP_SPACING * subject.height_m, SHOULDER_HALF_BREADTH * subject.height_m
+    parts = [upright(name, 0.0, bottoms[name], column) for name in ("middle_trunk", "upper_trunk", "head")]
+    for y in (shoulder, -shoulder):
+        top = bottoms["lower_trunk"] + column * _SHOULDERS_TO_HIPS[subject.sex]
+        for name in ("upper_arm", "forearm", "hand"):
+            top -= per_mm * table[name].length
+            parts.append(upright(name, y, top, per_mm))
+    segments = {"trunk": combined(parts), "pelvis": upright("lower_trunk", 0.0, bottoms["lower_trunk"], column)}
+    centres = {"lumbar": np.array([0.0, 0.0, bottoms["middle_trunk"]])}
+    points = {
+        "vertex": np.array([0.0, 0.0, subject.height_m]),
+        "neck": np.array([0.0, 0.0, bottoms["head"]]),
+    }
+    for side, y in zip(SIDES, (hip, -hip), strict=True):
+        segments[f"{side}_thigh"] = upright("thigh", y, bottoms["thigh"], column)
+        segments[f"{side}_shank"] = upright("shank", y, bottoms["shank"], column)
+        centres[f"{side}_hip"] = np.array([0.0, y, bottoms["lower_trunk"]])
+        centres[f"{side}_knee"] = np.array([0.0, y, bottoms["thigh"]])
+        centres[f"{side}_ankle"] = np.array([0.0, y, ankle])
+        length = per_mm * table["foot"].length
+        heel = -ANKLE_ALONG_FOOT * length
+        centres[f"{side}_mtp"] = np.array([heel + MTP_ALONG_FOOT * length, y, MTP_HEIGHT * subject.height_m])
+        points[f"{side}_heel"] = np.array([heel, y, 0.0])
+        points[f"{side}_toe"] = np.array([heel + length, y, 0.0])
+        points[f"{side}_shoulder"] = np.array([0.0, np.sign(y) * shoulder, top + per_mm * _arm_mm(table)])
+        points[f"{side}_elbow"] = points[f"{side}_shoulder"] - [0.0, 0.0, per_mm * table["upper_arm"].length]
+        points[f"{side}_fingers"] = np.array([0.0, np.sign(y) * shoulder, top])
+        hind, fore = _split_foot(table["foot"], per_percent, length, centres[f"{side}_ankle"], centres[f"{side}_mtp"])
+        segments[f"{side}_hindfoot"], segments[f"{side}_forefoot"] = hind, fore
+    return Skeleton(segments, centres, points, subject.height_m)
+
+
+def _arm_mm(table: dict[str, _Row]) -> float:
+    return sum(table[name].length for name in ("upper_arm", "forearm", "hand"))
+
+
+def combined(parts: list[Segment]) -> Segment:
+    """Several segments held rigidly together."""
+    mass = sum(part.mass for part in parts)
+    com = sum((part.mass * part.com for part in parts), np.zeros(3)) / mass
+    inertia = np.zeros((3, 3))
+    for part in parts:
+        d = part.com - com
+        inertia += part.inertia + part.mass * ((d @ d) * np.eye(3) - np.outer(d, d))
+    return Segment(float(mass), com, inertia)
+
+
+def _split_foot(
+    row: _Row, per_percent: float, length: float, ankle: np.ndarray, mtp: np.ndarray
+) -> tuple[Segment, Segment]:
+    """Hindfoot and forefoot: together they have de Leva's mass, centre along the foot and inertia.
+
+    The forefoot is an even slab from the MTP joint to the toe tip; the hindfoot is what is left. Its centre lies on the
+    line from ankle to MTP, as the paper assumes; its inertia is that of the foot less the forefoot's, along the foot.
+    The greater of the two cross radii is about the vertical (a foot is wider than high; the table does not say).
+    """
+    mass = per_percent * row.mass
+    heel = ankle[0] - ANKLE_ALONG_FOOT * length
+    centre = heel + length * row.com / 100.0
+    toes, toe_length = FOREFOOT_MASS * mass, (1.0 - MTP_ALONG_FOOT) * length
+    toes_x = mtp[0] + 0.5 * toe_length
+    rest = mass - toes
+    rest_x = (mass * centre - toes * toes_x) / rest
+    rest_z = mtp[2] + (ankle[2] - mtp[2]) * (mtp[0] - rest_x) / (mtp[0] - ankle[0])
+    width, thick = FOOT_BREADTH / ANKLE_HEIGHT * ankle[2], 2.0 * mtp[2]
+    toes_inertia = toes / 12.0 * np.array([width**2 + thick**2, toe_length**2 + thick**2, toe_length**2 + width**2])
+    vertical, cross, along = (np.array(row.radii) / 100.0 * length) ** 2 * mass
+    apart = toes * (toes_x - centre) ** 2 + rest * (rest_x - centre) ** 2
+    whole = np.array([along, cross - apart, vertical - apart])
+    hind = Segment(rest, np.array([rest_x, ankle[1], rest_z]), np.diag(whole - toes_inertia))
+    fore = Segment(toes, np.array([toes_x, mtp[1], mtp[2]]), np.diag(toes_inertia))
+    return hind, fore

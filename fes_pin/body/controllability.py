@@ -1,0 +1,239 @@
+"""Which inputs control which modes, and at what price.
+
+With A-orthonormal mode shapes, mode i obeys eta'' = mu_i eta + phi_i' (C + Q u). Its row b_i = phi_i' Q is what the
+Popov-Belevitch-Hautus (PBH) test looks at, for +sqrt(mu_i) and -sqrt(mu_i) alike. Inputs that only pull control a body
+only if, besides, every real left eigenvector of F sees pulls of both signs (R. F. Brammer, "Controllability in linear
+autonomous systems with positive controllers", SIAM J. Control 10:339-353, 1972).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import linalg
+
+from fes_pin.body.inputs import Inputs
+from fes_pin.body.linearize import LinearBody
+from fes_pin.body.modes import Modes, modes
+from fes_pin.data.errors import InputError
+
+RELATIVE_TOLERANCE = 1e-9
+"""Below this part of the largest gain, an input does not act on a mode: rounding, not muscle."""
+SAME_POLE = 1e-6
+"""Eigenvalues of A^-1 B closer than this part of their size (or of 1/s2) are taken as one."""
+
+
+@dataclass(frozen=True)
+class Controllability:
+    """What a set of inputs can do with the modes of a body.
+
+    Parameters
+    ----------
+    modes, inputs, horizon
+        The modes, the inputs, the time allowed (s).
+    gains
+        b = shapes' Q: (modes, inputs), modal force per unit of input.
+    controllable
+        PBH per mode: inputs of either sign could move it independently of the modes that share its pole.
+    both_ways
+        Inputs within their bounds push it both ways.
+    energy
+        Least integral of u'u that brings 1 degree in this mode alone back to rest within the horizon, the other modes
+        let go: s for nerves (u = 0..1), (N m)2 s for torques; infinite if the mode is out of reach. Bounds are not
+        looked at.
+    mode_influence
+        Acceleration of the mode's greatest joint per unit of input: (modes, inputs) rad/s2.
+    joint_influence
+        Acceleration of each joint per unit of input, A^-1 Q: (joints, inputs) rad/s2.
+    """
+
+    linear: LinearBody = field(repr=False)
+    modes: Modes = field(repr=False)
+    inputs: Inputs
+    horizon: float
+    gains: np.ndarray = field(repr=False)
+    controllable: np.ndarray = field(repr=False)
+    both_ways: np.ndarray = field(repr=False)
+    energy: np.ndarray = field(repr=False)
+    mode_influence: np.ndarray = field(repr=False)
+    joint_influence: np.ndarray = field(repr=False)
+
+    @property
+    def falling(self) -> np.ndarray:
+        """Which modes fall: (modes,) bool."""
+        return np.array([mode.kind == "fall" for mode in self.modes])
+
+    @property
+    def controls_falls(self) -> bool:
+        """Whether every falling mode can be moved, both ways, with these inputs."""
+        return bool(np.all(self.controllable[self.falling] & self.both_ways[self.falling]))
+
+    @property
+    def fall_energy(self) -> tuple[np.ndarray, float]:
+        """Price of all falls together, without a horizon (see `stabilizing_price`)."""
+        rows = self.falling
+        scale = np.array([np.radians(1.0) / np.abs(mode.shape).max() for mode in self.modes])
+        return stabilizing_price(self.modes.values[rows], self.gains[rows], scale[rows])
+
+    def __str__(self) -> str:
+        out = [f"{self.inputs.n} inputs, horizon {self.horizon:g} s: " + ", ".join(self.inputs.names)]
+        if not self.linear.conservative:
+            out.append("(of the modes without damping and rates: see pbh)")
+        out.append(f"{'mode':70s} PBH  both ways  energy of 1 deg  strongest input")
+        for i, mode in enumerate(self.modes):
+            strongest = self.inputs.names[int(np.abs(self.mode_influence[i]).argmax())] if self.inputs.n else "-"
+            out.append(
+                f"{i + 1:3d} {mode.name:66s} {'yes' if self.controllable[i] else 'no':4s} "
+                f"{'yes' if self.both_ways[i] else 'no':10s} {self.energy[i]:15.3g}  {strongest}"
+            )
+        return "\n".join(out)
+
+
+def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> Controllability:
+    """Controllability of every mode of a body.
+
+    Parameters
+    ----------
+    linear
+        From `linearize`, without damping and rates (for others see `pbh`).
+    inputs
+        `Inputs`, `Nerves`, or names of joints with a motor each.
+    horizon
+        Time allowed to bring a mode back, s.
+
+    Raises
+    ------
+    InputError
+        Inputs that are none, or a horizon that is not positive.
+    """
+    if not (np.isfinite(horizon) and horizon > 0.0):
+        raise InputError(f"the horizon must be positive, got {horizon}", column="horizon")
+    inputs = Inputs.of(inputs, linear)
+    found = modes(linear)
+    torque = inputs.on(linear)
+    gains = found.shapes.T @ torque
+    size = np.abs(gains).max(initial=0.0)
+    gains = np.where(np.abs(gains) > RELATIVE_TOLERANCE * size, gains, 0.0)
+    greatest = np.abs(found.shapes).max(axis=0)
+    squared = (gains**2).sum(axis=1)
+    price = mode_price(found.values, horizon) * (np.radians(1.0) / greatest) ** 2
+    controllable = _independent(found.values, gains)
+    with np.errstate(divide="ignore"):
+        energy = np.where(controllable, price / squared, np.inf)
+    return Controllability(
+        linear=linear,
+        modes=found,
+        inputs=inputs,
+        horizon=float(horizon),
+        gains=gains,
+        controllable=controllable,
+        both_ways=_both_ways(gains, inputs),
+        energy=energy,
+        mode_influence=gains * greatest[:, None],
+        joint_influence=linalg.solve(linear.A, torque, assume_a="pos"),
+    )
+
+
+def _independent(values: np.ndarray, gains: np.ndarray) -> np.ndarray:
+    """PBH per mode: within a group of equal poles as many independent rows as modes are needed."""
+    groups, start = [], 0
+    for i in range(1, len(values) + 1):
+        if i == len(values) or abs(values[i] - values[i - 1]) > SAME_POLE * max(1.0, abs(values[i])):
+            groups.append(range(start, i))
+            start = i
+    found = np.zeros(len(values), dtype=bool)
+    for group in groups:
+        rows = gains[list(group)]
+        found[list(group)] = len(group) == 1 and rows.any() if len(group) == 1 else _full_rank(rows)
+    return found
+
+
+def _full_rank(rows: np.ndarray) -> bool:
+    singular = np.linalg.svd(rows, compute_uv=False)
+    return len(singular) >= len(rows) and bool(singular[len(rows) - 1] > RELATIVE_TOLERANCE * max(singular[0], 1e-300))
+
+
+def _both_ways(gains: np.ndarray, inputs: Inputs) -> np.ndarray:
+    """Whether inputs within their bounds push each mode up and down."""
+    plus, minus = gains > 0.0, gains < 0.0
+    up = (plus & (inputs.upper > 0.0)) | (minus & (inputs.lower < 0.0))
+    down = (minus & (inputs.upper > 0.0)) | (plus & (inputs.lower < 0.0))
+    return np.logical_and(up.any(axis=1), down.any(axis=1))
+
+
+def mode_price(values: np.ndarray, horizon: float) -> np.ndarray:
+    """Least integral of w2 that brings eta'' = mu eta + w from eta = 1 at rest to rest at 0 within the horizon: 1/s3.
+
+    The finite-horizon Gramian of one mode in closed form; with a = sqrt(|mu|) T it is mu^(3/2) (2 a + sinh 2 a) /
+    (sinh(a)^2 - a^2) for a fall, the same with sin for a swing, 12 / T^3 between. It tends to 2 mu^(3/2) for long
+    horizons.
+    """
+    values = np.asarray(values, dtype=float)
+    rate = np.sqrt(np.abs(values))
+    a = rate * horizon
+    series = 12.0 / horizon**3 * (1.0 + 0.4 * values * horizon**2)
+    safe = np.clip(a, 0.05, None)
+    big = np.minimum(safe, 300.0)
+    with np.errstate(over="ignore"):
+        decay = np.exp(-2.0 * big)
+        fall = 2.0 * (1.0 - decay**2 + 4.0 * big * decay) / ((1.0 - decay) ** 2 - 4.0 * big**2 * decay)
+    swing = (2.0 * safe + np.sin(2.0 * safe)) / (safe**2 - np.sin(safe) ** 2)
+    return np.where(a < 0.05, series, rate**3 * np.where(values > 0.0, fall, swing))
+
+
+def stabilizing_price(values: np.ndarray, gains: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, float]:
+    """Least energy that catches all falling modes together, each from 1 degree, and the condition of the task.
+
+    The growing part z = eta + eta'/rate of mode i obeys z' = rate z + b u / rate; with the Gramian of the reversed
+    system, W_ij = b_i.b_j / (rate_i rate_j (rate_i + rate_j)), catching z costs z' W^-1 z, whatever the time.
+
+    Parameters
+    ----------
+    values, gains
+        Of the falling modes: (k,) 1/s2 and (k, inputs).
+    scale
+        Modal coordinate of 1 degree in each: (k,).
+
+    Returns
+    -------
+    energy, condition
+        (k,) as `Controllability.energy`, but with all other falls held too; and the condition number of W in degrees.
+    """
+    rates = np.sqrt(values)
+    if not len(rates):
+        return np.zeros(0), 1.0
+    rows = gains / (rates * scale)[:, None]
+    gramian = (rows @ rows.T) / (rates[:, None] + rates[None, :])
+    eigenvalues, vectors = np.linalg.eigh(gramian)
+    if eigenvalues[0] <= 1e-14 * eigenvalues[-1]:
+        return np.full(len(rates), np.inf), np.inf
+    return ((vectors**2) / eigenvalues).sum(axis=1), float(eigenvalues[-1] / eigenvalues[0])
+
+
+def gramian(linear: LinearBody, inputs, horizon: float) -> np.ndarray:
+    """Controllability Gramian, the integral of e^(Fs) G G' e^(F's) over 0..horizon with G = R Q: (2n, 2n).
+
+    By Van Loan's block exponential (IEEE Trans. Autom. Control 23:395-404, 1978); works with damping and rates. A body
+    falls fast, so over long horizons its condition exceeds double precision.
+    """
+    G = linear.R @ Inputs.of(inputs, linear).on(linear)
+    n = len(linear.F)
+    block = np.zeros((2 * n, 2 * n))
+    block[:n, :n] = -linear.F
+    block[:n, n:] = G @ G.T
+    block[n:, n:] = linear.F.T
+    big = linalg.expm(block * horizon)
+    found = big[n:, n:].T @ big[:n, n:]
+    return 0.5 * (found + found.T)
+
+
+def pbh(linear: LinearBody, inputs) -> tuple[np.ndarray, np.ndarray]:
+    """Poles of F and, for each, how far inputs reach it: |w' R Q| of its unit left eigenvector w. (2n,), (2n,).
+
+    Works with damping and rates. A zero means out of reach; of poles that coincide only the group's rank would tell.
+    """
+    values, left = linalg.eig(linear.F, left=True, right=False)
+    reach = np.linalg.norm(left.conj().T @ linear.R @ Inputs.of(inputs, linear).on(linear), axis=1)
+    order = np.lexsort((values.imag, -values.real))
+    return values[order], reach[order]

@@ -1,0 +1,173 @@
+"""Postures of the walk by name, and measured walking as postures of a body that stands on one forefoot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from fes_pin.body.joints import JOINT_NAMES, SIDES, mirrored
+from fes_pin.data.errors import InputError
+
+TABLE = Path(__file__).with_name("gait_postures.csv")
+"""Degrees, right stance; made by scripts/generate_postures from the measured walk."""
+_MIRROR_SIGN = {"lumbar_bending": -1.0, "lumbar_rotation": -1.0}
+
+
+@lru_cache(maxsize=1)
+def _table() -> dict[str, dict[str, float]]:
+    rows = [line.split(",") for line in TABLE.read_text().splitlines() if line and not line.startswith("#")]
+    names = rows[0][2:]
+    return {row[0]: {n: float(np.radians(float(v))) for n, v in zip(names, row[2:], strict=True)} for row in rows[1:]}
+
+
+def posture_names() -> tuple[str, ...]:
+    """`neutral` and the named postures of the walk."""
+    return ("neutral", *_table())
+
+
+def posture_angles(name: str, stance: str) -> dict[str, float]:
+    """Angles of a named posture, rad by joint name, for a body standing on that side.
+
+    Raises
+    ------
+    InputError
+        Unknown posture.
+    """
+    if name == "neutral":
+        return dict.fromkeys(JOINT_NAMES, 0.0)
+    if name not in _table():
+        raise InputError(f"unknown posture {name!r}; known are {', '.join(posture_names())}")
+    angles = _table()[name]
+    if stance == "right":
+        return dict(angles)
+    return {mirrored(joint): _MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
+
+
+def mirror(angles: Mapping[str, float]) -> dict[str, float]:
+    """A posture seen in a mirror: left and right change places."""
+    return {mirrored(joint): _MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
+
+
+# Axes of OpenSim's ankle and subtalar joints of the right leg (gait2354, `subject01_model.json`), in our axes.
+_ANKLE_AXIS = np.array([-0.10501355, -0.97912632, -0.17402245])
+_SUBTALAR_AXIS = np.array([0.78717961, 0.12094949, 0.60474746])
+
+
+def _turn(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Rotation matrices (N, 3, 3) about a fixed axis."""
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    return np.eye(3) + s * cross + (1.0 - c) * (cross @ cross)
+
+
+def ankle_angles(rotation: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Dorsiflexion, inversion and rotation, in this order from the shank, that give rotations (N, 3, 3)."""
+    sign = 1.0 if side == "right" else -1.0
+    inversion = -np.arcsin(np.clip(rotation[:, 1, 2], -1.0, 1.0))
+    dorsiflexion = -np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
+    rotated = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])
+    return dorsiflexion, sign * inversion, sign * rotated
+
+
+def ankle_rotation(side: str, dorsiflexion: np.ndarray, inversion: np.ndarray, rotated: np.ndarray) -> np.ndarray:
+    """Rotation of the hindfoot in the shank's frame, (N, 3, 3), of ankle angles, rad (N,)."""
+    sign = 1.0 if side == "right" else -1.0
+    forward, left, up = np.eye(3)
+    return _turn(-left, dorsiflexion) @ _turn(sign * forward, inversion) @ _turn(sign * up, rotated)
+
+
+def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_foot: bool = True) -> np.ndarray:
+    """Measured OpenSim coordinates as postures of our body: (N, 19) rad, in the order of `JOINT_NAMES`.
+
+    Hips, knees, MTP and lumbar angles are the measured ones. (OpenSim's torso frame leans some 9 degrees against the
+    line from hips to shoulders in this recording: a lumbar extension of -19 degrees is nearly upright.) OpenSim's
+    oblique ankle and subtalar axes become the three angles of our ball of an ankle with the same rotation. Our stance
+    forefoot lies flat on the ground, the measured one nearly so: with `flat_foot` the stance ankle takes up the
+    difference, so that shank, pelvis and trunk stand in space as measured.
+
+    Parameters
+    ----------
+    coordinates
+        `q_hip_flexion_r` ... `q_lumbar_rotation` (with `q_pelvis_tilt`, `_list`, `_rotation` for `flat_foot`), rad,
+        (N,).
+    stance
+        `left` or `right`.
+    flat_foot
+        Whether the stance ankle makes up for a stance forefoot that is not flat.
+
+    Raises
+    ------
+    InputError
+        A coordinate is missing, or another stance.
+    """
+    if stance not in SIDES:
+        raise InputError(f"must be 'left' or 'right', got {stance!r}", column="stance")
+
+    def measured(name: str) -> np.ndarray:
+        try:
+            return np.asarray(coordinates[f"q_{name}"], dtype=float)
+        except (KeyError, ValueError):
+            raise InputError("the coordinate is missing", column=f"q_{name}") from None
+
+    angles: dict[str, np.ndarray] = {}
+    for side in SIDES:
+        s = side[0]
+        for joint in ("hip_flexion", "hip_adduction", "hip_rotation"):
+            angles[f"{side}_{joint}"] = measured(f"{joint}_{s}")
+        angles[f"{side}_knee_flexion"] = -measured(f"knee_angle_{s}")
+        angles[f"{side}_mtp_extension"] = measured(f"mtp_angle_{s}")
+        sign = np.array([1.0, 1.0, 1.0]) if side == "right" else np.array([-1.0, 1.0, -1.0])
+        foot = _turn(_ANKLE_AXIS * sign, measured(f"ankle_angle_{s}"))
+        foot = foot @ _turn(_SUBTALAR_AXIS * sign, measured(f"subtalar_angle_{s}"))
+        if side == stance and flat_foot:
+            foot = _flat_ankle(angles, measured, side, foot)
+        for joint, value in zip(
+            ("ankle_dorsiflexion", "ankle_inversion", "ankle_rotation"), ankle_angles(foot, side), strict=True
+        ):
+            angles[f"{side}_{joint}"] = value
+    for joint in JOINT_NAMES[16:]:
+        angles[joint] = measured(joint)
+    return np.stack([angles[name] for name in JOINT_NAMES], axis=1)
+
+
+def pelvis_turns(coordinates: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Orientation of the measured pelvis in the world: (N, 3, 3).
+
+    Parameters
+    ----------
+    coordinates
+        `q_pelvis_tilt`, `q_pelvis_list` and `q_pelvis_rotation`, rad, (N,).
+
+    Raises
+    ------
+    InputError
+        One of them is missing.
+    """
+    forward, left, up = np.eye(3)
+    turns = []
+    for name, axis in (("tilt", -left), ("list", forward), ("rotation", up)):
+        if f"q_pelvis_{name}" not in coordinates:
+            raise InputError("the coordinate is missing", column=f"q_pelvis_{name}")
+        turns.append(_turn(axis, np.asarray(coordinates[f"q_pelvis_{name}"], dtype=float)))
+    return turns[0] @ turns[1] @ turns[2]
+
+
+def _flat_ankle(angles: Mapping[str, np.ndarray], measured, side: str, foot: np.ndarray) -> np.ndarray:
+    """Rotation shank -> hindfoot that keeps the shank upright as measured, and the foot's heading, forefoot flat."""
+    forward, left, up = np.eye(3)
+    sign = 1.0 if side == "right" else -1.0
+    pelvis = pelvis_turns({f"q_pelvis_{n}": measured(f"pelvis_{n}") for n in ("tilt", "list", "rotation")})
+    shank = (
+        pelvis
+        @ _turn(-left, angles[f"{side}_hip_flexion"])
+        @ _turn(sign * forward, angles[f"{side}_hip_adduction"])
+        @ _turn(sign * up, angles[f"{side}_hip_rotation"])
+        @ _turn(left, angles[f"{side}_knee_flexion"])
+    )
+    ahead = (shank @ foot)[:, :, 0]
+    flat = _turn(up, np.arctan2(ahead[:, 1], ahead[:, 0])) @ _turn(left, angles[f"{side}_mtp_extension"])
+    return np.swapaxes(shank, 1, 2) @ flat

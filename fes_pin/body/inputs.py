@@ -1,0 +1,128 @@
+"""What may act on the joints: torques, muscles or nerves, each a column of joint torques with bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fes_pin.body.joints import JOINT_NAMES, known_joint
+from fes_pin.body.linearize import LinearBody
+from fes_pin.data.errors import InputError
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """A set of inputs u: joint torques D = matrix @ u.
+
+    Parameters
+    ----------
+    names
+        One per input.
+    joint_names
+        Rows of `matrix`.
+    matrix
+        Torque per unit of input: (n_joints, n_inputs) N m.
+    lower, upper
+        Bounds of each input: (n_inputs,); a nerve has 0 and 1 (it only pulls), a torque minus and plus its limit.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, repeated names, unknown joints, or bounds that do not hold 0.
+    """
+
+    names: tuple[str, ...]
+    joint_names: tuple[str, ...]
+    matrix: np.ndarray = field(repr=False)
+    lower: np.ndarray = field(repr=False)
+    upper: np.ndarray = field(repr=False)
+
+    def __post_init__(self) -> None:
+        shape = (len(self.joint_names), len(self.names))
+        if self.matrix.shape != shape or not np.all(np.isfinite(self.matrix)):
+            raise InputError(f"the input matrix must be finite and of shape {shape}, got {self.matrix.shape}")
+        if len(set(self.names)) < len(self.names):
+            raise InputError("an input is named twice")
+        for name in self.joint_names:
+            known_joint(name)
+        if self.lower.shape != shape[1:] or self.upper.shape != shape[1:]:
+            raise InputError(f"bounds must have {shape[1]} values each")
+        if not (np.all(self.lower <= 0.0) and np.all(self.upper >= 0.0)):
+            raise InputError("the bounds of an input must hold 0")
+
+    @classmethod
+    def torques(cls, joints: Iterable[str] = JOINT_NAMES, limit_nm: float = np.inf) -> Inputs:
+        """A motor at each joint: u is its torque, N m, within plus and minus the limit.
+
+        Raises
+        ------
+        InputError
+            Unknown joint, or a negative limit.
+        """
+        names = tuple(known_joint(name) for name in joints)
+        if not limit_nm >= 0.0:
+            raise InputError(f"the torque limit must be 0 or more, got {limit_nm}")
+        matrix = np.array([[float(joint == name) for name in names] for joint in JOINT_NAMES]).reshape(19, len(names))
+        bound = np.full(len(names), float(limit_nm))
+        return cls(names, JOINT_NAMES, matrix, -bound, bound)
+
+    @classmethod
+    def pulling(cls, names: Sequence[str], matrix, joint_names: Sequence[str] = JOINT_NAMES) -> Inputs:
+        """Muscles or nerves: u is 0 to 1, `matrix` the torque at full recruitment, N m."""
+        count = len(names)
+        return cls(tuple(names), tuple(joint_names), np.asarray(matrix, float), np.zeros(count), np.ones(count))
+
+    @classmethod
+    def of(cls, thing, linear: LinearBody) -> Inputs:
+        """Inputs from whatever names them: `Inputs`, joint names, or nerves (with `names` and `torque_matrix`).
+
+        Raises
+        ------
+        InputError
+            None of these.
+        """
+        if isinstance(thing, Inputs):
+            return thing
+        if hasattr(thing, "torque_matrix") and hasattr(thing, "names"):
+            posture = {**dict.fromkeys(JOINT_NAMES, 0.0), **linear.whole_posture}
+            return cls.pulling(thing.names, thing.torque_matrix(posture))
+        if isinstance(thing, str):
+            thing = [thing]
+        if isinstance(thing, Mapping) or not isinstance(thing, Iterable):
+            raise InputError("inputs must be Inputs, Nerves, or names of joints")
+        return cls.torques([known_joint(name) for name in thing])
+
+    @property
+    def n(self) -> int:
+        """Number of inputs."""
+        return len(self.names)
+
+    def on(self, linear: LinearBody) -> np.ndarray:
+        """The matrix with rows in the order of a linearized body's joints: (n, n_inputs)."""
+        rows = {name: i for i, name in enumerate(self.joint_names)}
+        matrix = np.zeros((linear.n, self.n))
+        for i, name in enumerate(linear.joint_names):
+            if name in rows:
+                matrix[i] = self.matrix[rows[name]]
+        return matrix
+
+    def select(self, names: Iterable[str]) -> Inputs:
+        """Only these inputs.
+
+        Raises
+        ------
+        InputError
+            A name that is not among them.
+        """
+        wanted = tuple(names)
+        for name in wanted:
+            if name not in self.names:
+                raise InputError(f"unknown input {name!r}; there are {', '.join(self.names)}")
+        keep = [self.names.index(name) for name in wanted]
+        return Inputs(wanted, self.joint_names, self.matrix[:, keep], self.lower[keep], self.upper[keep])
+
+    def scaled(self, factor: float) -> Inputs:
+        """All torques times a factor (strengths are known to 1.3-1.8)."""
+        return Inputs(self.names, self.joint_names, factor * self.matrix, self.lower, self.upper)

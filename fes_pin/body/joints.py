@@ -1,0 +1,173 @@
+"""The 19 joints of the walking body: names, axes, limits; the ten segments that they join.
+
+World and neutral segment frames: x forward, y left, z up. Every joint is a revolute or three revolutes in series
+through one centre, written from the pelvis outwards; positive as named (adduction towards the midline, rotation
+internal, bending right, lumbar rotation left).
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+
+SIDES = ("left", "right")
+_LEG = (
+    "hip_flexion",
+    "hip_adduction",
+    "hip_rotation",
+    "knee_flexion",
+    "ankle_dorsiflexion",
+    "ankle_inversion",
+    "ankle_rotation",
+    "mtp_extension",
+)
+JOINT_NAMES: tuple[str, ...] = (
+    *(f"{side}_{joint}" for side in SIDES for joint in _LEG),
+    *("lumbar_extension", "lumbar_bending", "lumbar_rotation"),
+)
+"""The 19 joints in the order in which tables and arrays without names list them."""
+
+SEGMENT_NAMES: tuple[str, ...] = (
+    "trunk",
+    "pelvis",
+    *(f"{side}_{segment}" for side in SIDES for segment in ("thigh", "shank", "hindfoot", "forefoot")),
+)
+"""The paper's ten segments; the trunk carries head and arms."""
+
+_FORWARD, _LEFT, _UP = np.eye(3)
+_AXES = {  # of a right leg; the left leg's adduction, inversion and rotations are mirrored
+    "hip_flexion": -_LEFT,
+    "hip_adduction": _FORWARD,
+    "hip_rotation": _UP,
+    "knee_flexion": _LEFT,
+    "ankle_dorsiflexion": -_LEFT,
+    "ankle_inversion": _FORWARD,
+    "ankle_rotation": _UP,
+    "mtp_extension": -_LEFT,
+    "lumbar_extension": -_LEFT,
+    "lumbar_bending": _FORWARD,
+    "lumbar_rotation": _UP,
+}
+
+# Degrees. Ranges of motion as clinics teach them: hip -15..125, abduction 45, adduction 45, rotations 45; ankle 50
+# plantar to 20 dorsal, inversion 35, eversion 25; MTP 30 flexion to 80 extension (table "Normal values for range of
+# motion of joints", MSD Manual; read there). Wider where people are known to go further with weight on the limb: hip
+# extension 30 and knee -10..150 (AAOS, Joint Motion 1965, and Kapandji, from memory), dorsiflexion 40 in a loaded
+# lunge (Bennell 1998, from memory). Thoracolumbar: flexion 80, extension 30, bending 35, rotation 45 (AAOS 1965, from
+# memory). Foot about the leg's axis: 20 either way (our choice: no agreed figure).
+_LIMITS_DEG = {
+    "hip_flexion": (-30.0, 125.0),
+    "hip_adduction": (-45.0, 45.0),
+    "hip_rotation": (-45.0, 45.0),
+    "knee_flexion": (-10.0, 150.0),
+    "ankle_dorsiflexion": (-50.0, 40.0),
+    "ankle_inversion": (-25.0, 35.0),
+    "ankle_rotation": (-20.0, 20.0),
+    "mtp_extension": (-30.0, 80.0),
+    "lumbar_extension": (-80.0, 30.0),
+    "lumbar_bending": (-35.0, 35.0),
+    "lumbar_rotation": (-45.0, 45.0),
+}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A mechanical joint between two segments: one hinge, or a ball as three revolutes from the pelvis outwards."""
+
+    name: str
+    inner: str
+    outer: str
+    revolutes: tuple[str, ...]
+
+
+def side_of(name: str) -> str | None:
+    """`left`, `right`, or None for what lies on the midline."""
+    side = name.split("_", 1)[0]
+    return side if side in SIDES else None
+
+
+def _plain(name: str) -> str:
+    return name.split("_", 1)[1] if side_of(name) else name
+
+
+def axis_of(name: str) -> np.ndarray:
+    """Axis about which the outer segment turns when the joint's angle grows: (3,) unit vector, neutral posture."""
+    plain = _plain(name)
+    axis = _AXES[plain].copy()
+    return -axis if side_of(name) == "left" and abs(axis[1]) < 0.5 else axis
+
+
+def limits_of(name: str) -> tuple[float, float]:
+    """Smallest and greatest angle, rad."""
+    low, high = np.radians(_LIMITS_DEG[_plain(name)])
+    return float(low), float(high)
+
+
+def _leg_joints(side: str) -> list[Joint]:
+    def named(*parts: str) -> tuple[str, ...]:
+        return tuple(f"{side}_{part}" for part in parts)
+
+    thigh, shank, hindfoot, forefoot = named("thigh", "shank", "hindfoot", "forefoot")
+    return [
+        Joint(f"{side}_hip", "pelvis", thigh, named(*_LEG[0:3])),
+        Joint(f"{side}_knee", thigh, shank, named(_LEG[3])),
+        Joint(f"{side}_ankle", shank, hindfoot, named(*_LEG[4:7])),
+        Joint(f"{side}_mtp", hindfoot, forefoot, named(_LEG[7])),
+    ]
+
+
+JOINTS: tuple[Joint, ...] = (
+    *_leg_joints("left"),
+    *_leg_joints("right"),
+    Joint("lumbar", "pelvis", "trunk", JOINT_NAMES[16:]),
+)
+"""The nine joints of the paper's ten segments."""
+
+
+def known_joint(name: str) -> str:
+    """The name itself, if it is one of the 19.
+
+    Raises
+    ------
+    InputError
+        It is not; the message names the nearest.
+    """
+    if name not in JOINT_NAMES:
+        near = difflib.get_close_matches(str(name), JOINT_NAMES, n=1, cutoff=0.0)[0]
+        raise InputError(f"unknown joint {name!r}; did you mean {near!r}?")
+    return name
+
+
+def angles_array(angles: Mapping[str, float] | Sequence[float] | np.ndarray, order: Sequence[str]) -> np.ndarray:
+    """Joint values as an array in the given order: (19,); joints that a mapping leaves out are 0.
+
+    Raises
+    ------
+    InputError
+        Unknown joint, wrong number of values, or a value that is not finite.
+    """
+    if isinstance(angles, Mapping):
+        for name in angles:
+            known_joint(name)
+        try:
+            values = np.array([float(angles.get(name, 0.0)) for name in order])
+        except (TypeError, ValueError):
+            raise InputError("a joint's value must be a number") from None
+    else:
+        values = np.asarray(angles, dtype=float)
+        if values.shape != (len(order),):
+            raise InputError(f"{len(order)} joint values were expected, got an array of shape {values.shape}")
+    if not np.all(np.isfinite(values)):
+        raise InputError(f"{order[int(np.argmin(np.isfinite(values)))]} must be a finite number")
+    return values
+
+
+def mirrored(name: str) -> str:
+    """The same joint of the other side; midline names stay."""
+    side = side_of(name)
+    return name if side is None else f"{SIDES[1 - SIDES.index(side)]}_{_plain(name)}"

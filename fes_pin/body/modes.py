@@ -1,0 +1,233 @@
+"""Modes of a linearized body: how it falls and swings when nothing acts on it.
+
+The 19 eigenpairs of A^-1 B come from the symmetric generalized problem B phi = mu A phi with phi' A phi = 1. The
+paper's three properties follow: the 38 eigenvalues of F are +-sqrt(mu); its eigenvectors are (phi, +-sqrt(mu) phi);
+and A^-1 B is similar to the symmetric Q = A^(-1/2) B A^(-1/2), which Jacobi's rotations diagonalize.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+from scipy import linalg
+
+from fes_pin.body.joints import side_of
+from fes_pin.body.linearize import LinearBody
+
+NEUTRAL_RATE = 1e-3
+"""Below this rate, 1/s, a mode neither falls nor swings within a quarter of an hour."""
+_PLANES = {
+    "fore-aft": ("flexion", "dorsiflexion", "extension"),
+    "sideways": ("adduction", "inversion", "bending"),
+    "turning": ("rotation",),
+}
+_VERBS = {
+    ("fall", "fore-aft"): "fall forward or back",
+    ("fall", "sideways"): "fall sideways",
+    ("fall", "turning"): "twist away",
+    ("swing", "fore-aft"): "swing forward and back",
+    ("swing", "sideways"): "swing sideways",
+    ("swing", "turning"): "twist to and fro",
+    ("neutral", "fore-aft"): "drift forward or back",
+    ("neutral", "sideways"): "drift sideways",
+    ("neutral", "turning"): "drift in rotation",
+}
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One way in which the body falls or swings.
+
+    Parameters
+    ----------
+    value
+        Eigenvalue of A^-1 B, 1/s2: positive falls, negative swings.
+    shape
+        Eigenvector with shape' A shape = 1: (n,).
+    joint_names
+        Its joints.
+    participation
+        Share of each joint in the mode, by |shape_j (A shape)_j|: (n,), sums to 1.
+    name
+        For a person: "fall sideways about the stance ankle, 0.24 s to double".
+    """
+
+    value: float
+    shape: np.ndarray = field(repr=False)
+    joint_names: tuple[str, ...] = field(repr=False)
+    participation: np.ndarray = field(repr=False)
+    name: str = ""
+
+    @property
+    def kind(self) -> str:
+        """`fall`, `swing` or `neutral`."""
+        return kind_of(self.value)
+
+    @property
+    def rate(self) -> float:
+        """Rate of growth when it falls, angular frequency when it swings, 1/s."""
+        return float(np.sqrt(abs(self.value)))
+
+    @property
+    def time_constant(self) -> float:
+        """Time in which a fall grows e-fold, s; infinite for other modes."""
+        return 1.0 / self.rate if self.kind == "fall" else np.inf
+
+    @property
+    def doubling_time(self) -> float:
+        """Time in which a fall doubles, s; infinite for other modes."""
+        return np.log(2.0) * self.time_constant
+
+    @property
+    def frequency(self) -> float:
+        """Frequency of a swing, Hz; 0 for other modes."""
+        return self.rate / (2.0 * np.pi) if self.kind == "swing" else 0.0
+
+    @property
+    def joints(self) -> dict[str, float]:
+        """Joints by share, greatest first."""
+        order = np.argsort(-self.participation)
+        return {self.joint_names[i]: float(self.participation[i]) for i in order}
+
+    @property
+    def one_degree(self) -> np.ndarray:
+        """The shape scaled so that the joint that moves most moves by one degree: (n,) rad."""
+        return self.shape * np.radians(1.0) / np.abs(self.shape).max()
+
+
+@dataclass(frozen=True)
+class Modes:
+    """All modes of a body, fastest fall first, fastest swing last.
+
+    Parameters
+    ----------
+    modes
+        The n of them.
+    values
+        Eigenvalues of A^-1 B, falling order: (n,) 1/s2.
+    shapes
+        Eigenvectors in columns, shapes' A shapes = 1: (n, n).
+    conservative
+        False where damping or motion is left out here; `poles` then tells the whole.
+    """
+
+    modes: tuple[Mode, ...]
+    values: np.ndarray = field(repr=False)
+    shapes: np.ndarray = field(repr=False)
+    conservative: bool = True
+
+    def __iter__(self):
+        return iter(self.modes)
+
+    def __len__(self) -> int:
+        return len(self.modes)
+
+    def __getitem__(self, i: int) -> Mode:
+        return self.modes[i]
+
+    @property
+    def falling(self) -> tuple[Mode, ...]:
+        """The unstable modes."""
+        return tuple(mode for mode in self.modes if mode.kind == "fall")
+
+    def __str__(self) -> str:
+        lines = [f"{len(self)} modes, {len(self.falling)} of them fall"]
+        if not self.conservative:
+            lines.append("(without damping and rates: see poles)")
+        for i, mode in enumerate(self.modes, 1):
+            top = ", ".join(f"{name} {100 * share:.0f} %" for name, share in list(mode.joints.items())[:3])
+            lines.append(f"{i:3d}  {mode.name:66s} {top}")
+        return "\n".join(lines)
+
+
+def kind_of(value: float) -> str:
+    """`fall`, `swing` or `neutral` by an eigenvalue of A^-1 B."""
+    if abs(value) < NEUTRAL_RATE**2:
+        return "neutral"
+    return "fall" if value > 0.0 else "swing"
+
+
+def modes(linear: LinearBody) -> Modes:
+    """The eigenpairs of A^-1 B with names.
+
+    Parameters
+    ----------
+    linear
+        From `linearize`. Damping and rates are left out (with them see `poles`); of a B that is not symmetric (moving
+        posture) the symmetric part is taken.
+    """
+    B = 0.5 * (linear.B + linear.B.T)
+    values, shapes = linalg.eigh(B, linear.A)
+    values, shapes = values[::-1], shapes[:, ::-1]
+    signs = np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(len(values))])
+    shapes = shapes * signs
+    shares = np.abs(shapes * (linear.A @ shapes))
+    shares /= shares.sum(axis=0)
+    stance = linear.body.stance
+    named = tuple(
+        Mode(float(value), shape, linear.joint_names, share, _name(float(value), share, linear.joint_names, stance))
+        for value, shape, share in zip(values, shapes.T, shares.T, strict=True)
+    )
+    return Modes(named, values, shapes, linear.conservative)
+
+
+def poles(linear: LinearBody) -> np.ndarray:
+    """The 2n eigenvalues of F with damping and rates, 1/s, fastest growing first."""
+    if linear.conservative:
+        roots = np.emath.sqrt(modes(linear).values).astype(complex)
+        values = np.concatenate([roots, -roots])
+    else:
+        values = np.linalg.eigvals(linear.F)
+    return values[np.lexsort((values.imag, -values.real))]
+
+
+def state_eigenvectors(found: Modes) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and modal matrix of F built from the modes: (2n,), (2n, 2n) complex; the paper's second property."""
+    roots = np.emath.sqrt(found.values).astype(complex)
+    both = np.concatenate([roots, -roots])
+    columns = np.hstack([found.shapes, found.shapes])
+    return both, np.vstack([columns, columns * both])
+
+
+def centre_of_mass_motion(linear: LinearBody, shape: np.ndarray) -> np.ndarray:
+    """How the centre of mass moves per unit of a shape: (3,) m, world axes."""
+    body = linear.body
+    q, v = np.zeros(body.model.nq), np.zeros(body.model.nv)
+    free = [body.joint_names.index(name) for name in linear.joint_names]
+    q[free], v[free] = linear.q, shape
+    data = body.model.createData()
+    return pin.jacobianCenterOfMass(body.model, data, q) @ v
+
+
+def _plane(share: np.ndarray, names: tuple[str, ...]) -> str:
+    totals = {
+        plane: sum(float(s) for s, name in zip(share, names, strict=True) if name.rsplit("_", 1)[1] in motions)
+        for plane, motions in _PLANES.items()
+    }
+    return max(totals, key=totals.__getitem__)
+
+
+def _region(name: str, stance: str) -> str:
+    side = side_of(name)
+    if side is None:
+        return "back"
+    part = name.split("_")[1]
+    place = {"mtp": "toe joint"}.get(part, part)
+    return f"{'stance' if side == stance else 'swing'} {place}"
+
+
+def _name(value: float, share: np.ndarray, names: tuple[str, ...], stance: str) -> str:
+    regions: dict[str, float] = {}
+    for s, name in zip(share, names, strict=True):
+        region = _region(name, stance)
+        regions[region] = regions.get(region, 0.0) + float(s)
+    order = sorted(regions, key=regions.__getitem__, reverse=True)
+    where = order[0] if len(order) < 2 or regions[order[1]] < 0.5 * regions[order[0]] else f"{order[0]} and {order[1]}"
+    kind = kind_of(value)
+    text = f"{_VERBS[kind, _plane(share, names)]} about the {where}"
+    rate = np.sqrt(abs(value))
+    if kind == "fall":
+        return f"{text}, {np.log(2.0) / rate:.2g} s to double"
+    return f"{text}, {rate / (2.0 * np.pi):.2f} Hz" if kind == "swing" else text

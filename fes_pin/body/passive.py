@@ -1,0 +1,133 @@
+"""Passive torques of unstimulated joints: springs and dampers given by name, or the measured legs of Riener and Edrich.
+
+Every class here answers `torque(q, names)`, `stiffness(q, names)` = -d torque / d q, symmetric, and `damping(names)`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from fes_pin.body.joints import SIDES, angles_array
+from fes_pin.data.errors import InputError
+
+
+class Passive(Protocol):
+    """What the linearization asks of passive joints."""
+
+    def torque(self, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
+        """Passive torque at rest: (19,) N m."""
+
+    def stiffness(self, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
+        """Minus its derivative, symmetric: (19, 19) N m/rad."""
+
+    def damping(self, names: Sequence[str]) -> np.ndarray:
+        """Diagonal damping: (19, 19) N m s/rad."""
+
+
+def _positive(values: Mapping[str, float], names: Sequence[str], what: str) -> np.ndarray:
+    array = angles_array(values, names)
+    if (array < 0.0).any():
+        raise InputError(f"{what} of {names[int(np.argmin(array))]} must not be negative")
+    return array
+
+
+@dataclass(frozen=True)
+class ElasticJoints:
+    """A spring and a damper in each joint: tau = -stiffness (q - rest) - damping v.
+
+    Parameters
+    ----------
+    stiffness_nm, damping_nms, rest_rad
+        By joint name: N m/rad, N m s/rad, rad; joints left out have 0.
+
+    Raises
+    ------
+    InputError
+        Unknown joint, negative stiffness or damping.
+    """
+
+    stiffness_nm: Mapping[str, float] = field(default_factory=dict)
+    damping_nms: Mapping[str, float] = field(default_factory=dict)
+    rest_rad: Mapping[str, float] = field(default_factory=dict)
+
+    def torque(self, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
+        """Torque at rest: (19,) N m."""
+        return -_positive(self.stiffness_nm, names, "stiffness") * (q - angles_array(self.rest_rad, names))
+
+    def stiffness(self, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
+        """Diagonal stiffness: (19, 19) N m/rad."""
+        return np.diag(_positive(self.stiffness_nm, names, "stiffness"))
+
+    def damping(self, names: Sequence[str]) -> np.ndarray:
+        """Diagonal damping: (19, 19) N m s/rad."""
+        return np.diag(_positive(self.damping_nms, names, "damping"))
+
+
+# exp(c + angles (hip, knee, ankle) . w), angles in degrees, hip and knee flexion and ankle plantarflexion positive:
+# (joint, sign, c, w_hip, w_knee, w_ankle). Signs: the moment that the joint's positive direction feels.
+_TERMS = (
+    ("hip_flexion", 1.0, 1.4655, -0.0750, -0.0034, 0.0),
+    ("hip_flexion", -1.0, 1.3403, 0.0305, -0.0226, 0.0),
+    ("knee_flexion", 1.0, 1.800, 0.0217, -0.0352, -0.0460),
+    ("knee_flexion", -1.0, -3.971, -0.0128, 0.0495, -0.0004),
+    ("knee_flexion", 1.0, 2.220, 0.0, -0.150, 0.0),
+    ("ankle_dorsiflexion", -1.0, 2.1016, 0.0, -0.0176, -0.0843),
+    ("ankle_dorsiflexion", 1.0, -7.9763, 0.0, 0.0008, 0.1949),
+)
+_OFFSETS = {"hip_flexion": 8.072, "knee_flexion": -4.820, "ankle_dorsiflexion": 1.792}
+_DEGREE = 180.0 / np.pi
+
+
+@dataclass(frozen=True)
+class PassiveLegs:
+    """Passive elastic moments of hip, knee and ankle in the sagittal plane, with the coupling of two-joint muscles.
+
+    Sums of exponentials fitted to ten healthy adults: R. Riener, T. Edrich, "Identification of passive elastic joint
+    moments in the lower extremities", J. Biomech. 32:539-544, 1999 (coefficients compared with public code that cites
+    it; the article was not at hand). Paralysed legs differ: scale them with `factor`. The fitted moments are not the
+    gradient of a potential; `stiffness` is the symmetric part of their derivative, so that B stays symmetric.
+
+    Parameters
+    ----------
+    factor
+        On all moments.
+    damping_nms
+        Damping by joint name, N m s/rad; none by default.
+    """
+
+    factor: float = 1.0
+    damping_nms: Mapping[str, float] = field(default_factory=dict)
+
+    def _each(self, q: np.ndarray, names: Sequence[str]):
+        places = {name: i for i, name in enumerate(names)}
+        for side in SIDES:
+            at = [places[f"{side}_{joint}"] for joint in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")]
+            angles = q[at] * [_DEGREE, _DEGREE, -_DEGREE]
+            for joint, sign, constant, *weights in _TERMS:
+                moment = self.factor * sign * np.exp(constant + np.dot(weights, angles))
+                yield places[f"{side}_{joint}"], at, moment, moment * np.array(weights) * [_DEGREE, _DEGREE, -_DEGREE]
+
+    def torque(self, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
+        """Moments at rest: (19,) N m."""
+        tau = np.zeros(len(names))
+        for i, _, moment, _ in self._each(q, names):
+            tau[i] += moment
+        for side in SIDES:
+            for joint, offset in _OFFSETS.items():
+                tau[list(names).index(f"{side}_{joint}")] += self.factor * offset
+        return tau
+
+    def stiffness(self, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
+        """Symmetric part of the stiffness: (19, 19) N m/rad."""
+        slope = np.zeros((len(names), len(names)))
+        for i, at, _, derivative in self._each(q, names):
+            slope[i, at] -= derivative
+        return 0.5 * (slope + slope.T)
+
+    def damping(self, names: Sequence[str]) -> np.ndarray:
+        """Diagonal damping: (19, 19) N m s/rad."""
+        return np.diag(_positive(self.damping_nms, names, "damping"))

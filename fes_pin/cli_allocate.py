@@ -1,0 +1,85 @@
+"""`fes-pin allocate`: from wanted joint torques to pulse widths."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fes_pin.data.errors import InputError
+
+
+def pairs(values: list[str], what: str) -> dict[str, float]:
+    """Numbers by name from `name=number`.
+
+    Raises
+    ------
+    InputError
+        Not of that form.
+    """
+    result = {}
+    for value in values:
+        name, equal, number = value.partition("=")
+        try:
+            result[name.strip()] = float(number)
+        except ValueError:
+            equal = ""
+        if not equal:
+            raise InputError(f"{what} must read name=number, got {value!r}")
+    return result
+
+
+def allocate(
+    torque: Annotated[
+        list[str] | None, typer.Argument(help="Wanted torques, joint=N m, such as left_knee_flexion=-40.")
+    ] = None,
+    nerve: Annotated[list[str] | None, typer.Option(help="A nerve to stimulate, repeatable; all by default.")] = None,
+    angle: Annotated[list[str] | None, typer.Option(help="Posture, joint=degrees, repeatable.")] = None,
+    least: Annotated[float | None, typer.Option(help="Least reliable recruitment: off, or at least this.")] = None,
+    strength: Annotated[float, typer.Option(help="Strength, 1 is the healthy adult of the table.")] = 1.0,
+    threshold_us: Annotated[float, typer.Option(help="Threshold of the recruitment curve, us.")] = 180.0,
+    saturation_us: Annotated[float, typer.Option(help="Saturation of the recruitment curve, us.")] = 1000.0,
+    walk: Annotated[
+        Path | None, typer.Option(help="Instead of a torque: the folder of the measured walk; how much is attained.")
+    ] = None,
+    nerves: Annotated[bool, typer.Option(help="List the nerves and what they turn, and end.")] = False,
+) -> None:
+    """Pulse widths for wanted joint torques, what is short, and why."""
+    from math import radians
+
+    from fes_pin.stimulate.allocate import allocate as solve
+    from fes_pin.stimulate.nerves import Nerves
+    from fes_pin.stimulate.recruitment import LinearRecruitment
+
+    channels = Nerves(tuple(nerve or ()), strength=strength)
+    if nerves:
+        typer.echo(str(channels))
+        return
+    if walk is not None:
+        typer.echo(walk_table(walk, channels))
+        return
+    if not torque:
+        raise InputError("no torque is wanted: give joint=N m, or --walk, or --nerves")
+    posture = {name: radians(value) for name, value in pairs(angle or [], "--angle").items()}
+    curve = LinearRecruitment(threshold_us, saturation_us)
+    typer.echo(str(solve(pairs(torque, "a torque"), channels, posture, least=least, recruitment=curve)))
+
+
+def walk_table(folder: Path, nerves) -> str:
+    """Per joint of the measured walk: peak torque, rms shortfall, share of samples within 10 % of the peak."""
+    import numpy as np
+
+    from fes_pin.stimulate.measured import read_walk
+    from fes_pin.stimulate.muscles import JOINTS
+    from fes_pin.stimulate.walk import allocate_walk
+
+    walk = read_walk(folder)
+    result = allocate_walk(walk.torque, nerves, walk.q, weights=walk.known.astype(float))
+    lines = [f"{len(walk.time)} samples, {nerves.n} channels, optimal to {result.residual.max():.0e}"]
+    lines.append(f"{'joint':28s}{'peak':>9s}{'short, rms':>12s}{'within 10 %':>13s}")
+    for j in np.flatnonzero(walk.known):
+        peak, short = np.abs(walk.torque[:, j]).max(), result.shortfall[:, j]
+        share = (np.abs(short) <= max(0.1 * peak, 1.0)).mean()
+        lines.append(f"{JOINTS[j]:28s}{peak:6.1f} Nm{np.sqrt((short**2).mean()):9.1f} Nm{100 * share:11.0f} %")
+    return "\n".join(lines)

@@ -1,0 +1,198 @@
+"""`fes-pin body`: the modes of a walking body, which nerves control them, and the body to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fes_pin.data.errors import InputError
+
+app = typer.Typer(help="The walking body: modes, nerves, view.", no_args_is_help=True)
+
+Mass = Annotated[float, typer.Option("--mass", help="kg")]
+Height = Annotated[float, typer.Option("--height", help="m")]
+Sex = Annotated[str, typer.Option(help="male or female: which segment table")]
+Stance = Annotated[str, typer.Option(help="left or right: the foot on the ground")]
+Segments = Annotated[Path | None, typer.Option(help="table of segments (JSON) instead of mass, height, sex")]
+Urdf = Annotated[Path | None, typer.Option(help="URDF of the body instead")]
+Posture = Annotated[str, typer.Option(help="neutral, initial_contact, loading, mid_stance, ...")]
+Slope = Annotated[tuple[float, float], typer.Option(help="alpha beta: horizontal parts of the ground's unit normal")]
+Brace = Annotated[list[str] | None, typer.Option(help="orthosis or joint that is locked; may be repeated")]
+
+
+def _said_in_one_line(command: Callable) -> Callable:
+    """Bad input becomes one line on standard error and exit code 2."""
+
+    @wraps(command)
+    def run(*args, **kwargs):
+        try:
+            return command(*args, **kwargs)
+        except InputError as error:
+            typer.echo(str(error), err=True)
+            raise typer.Exit(2) from None
+
+    return run
+
+
+def _linear(subject: tuple, segments: Path | None, urdf: Path | None, *where):
+    """The linearized body of the common options: `where` is posture, slope and braces."""
+    from fes_pin.body.build import Body  # noqa: PLC0415
+    from fes_pin.body.linearize import linearize  # noqa: PLC0415
+    from fes_pin.body.minimal_sets import ORTHOSES  # noqa: PLC0415
+
+    posture, slope, braces = where
+    if segments is not None and urdf is not None:
+        raise InputError("give a table of segments or a URDF, not both")
+    if urdf is not None:
+        body = Body.from_urdf(urdf)
+    elif segments is not None:
+        body = Body.from_segments(segments, subject[3])
+    else:
+        body = Body.from_subject(*subject)
+    linear = linearize(body, posture, slope)
+    joints = [joint for brace in braces or [] for joint in ORTHOSES.get(brace, (brace,))]
+    return linear.brace(list(dict.fromkeys(joints))) if joints else linear
+
+
+@app.command()
+@_said_in_one_line
+def modes(  # noqa: PLR0917
+    posture: Posture = "mid_stance",
+    mass: Mass = 72.6,
+    height: Height = 1.80,
+    sex: Sex = "male",
+    stance: Stance = "right",
+    segments: Segments = None,
+    urdf: Urdf = None,
+    slope: Slope = (0.0, 0.0),
+    brace: Brace = None,
+    goniometers: Annotated[bool, typer.Option("--goniometers", help="also the fewest that see every fall")] = False,
+) -> None:
+    """How the body falls and swings at a posture: the eigenpairs of A^-1 B."""
+    linear = _linear((mass, height, sex, stance), segments, urdf, posture, slope, brace)
+    typer.echo(f"{linear}\n\n{linear.modes()}")
+    if goniometers:
+        from fes_pin.body.observability import fewest_goniometers  # noqa: PLC0415
+
+        best = fewest_goniometers(linear)
+        typer.echo(f"\nFewest goniometers that see every fall ({len(best)} such sets; the best):\n{best[0]}")
+
+
+@app.command()
+@_said_in_one_line
+def nerves(  # noqa: PLR0917
+    name: Annotated[list[str] | None, typer.Argument(help="nerves to use; all of the table if none is named")] = None,
+    posture: Posture = "mid_stance",
+    mass: Mass = 72.6,
+    height: Height = 1.80,
+    sex: Sex = "male",
+    stance: Stance = "right",
+    segments: Segments = None,
+    urdf: Urdf = None,
+    slope: Slope = (0.0, 0.0),
+    brace: Brace = None,
+    horizon: Annotated[float, typer.Option(help="time allowed to bring a mode back, s")] = 0.3,
+    influence: Annotated[str | None, typer.Option(help="table of influence on `joints` or `modes`")] = None,
+    map_to: Annotated[Path | None, typer.Option("--map", help="heat map of influence: image file")] = None,
+    fewest: Annotated[bool, typer.Option("--fewest", help="search the fewest nerves (with the braces given)")] = False,
+    max_braces: Annotated[int, typer.Option(help="with --fewest: try so many further orthoses (minutes)")] = 0,
+    lean: Annotated[float, typer.Option(help="lean that the fewest nerves must hold, degrees")] = 1.0,
+) -> None:
+    """Which nerves control which modes, what they can hold, and the fewest that do."""
+    from fes_pin.body.attainable import attainable  # noqa: PLC0415
+    from fes_pin.body.controllability import controllability  # noqa: PLC0415
+    from fes_pin.body.inputs import Inputs  # noqa: PLC0415
+    from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto  # noqa: PLC0415
+    from fes_pin.stimulate.nerve_inputs import subject_nerves  # noqa: PLC0415
+    from fes_pin.view.influence import influence_table, plot_influence  # noqa: PLC0415
+
+    linear = _linear((mass, height, sex, stance), segments, urdf, posture, slope, brace)
+    chosen = subject_nerves(linear.body, name or ())
+    result = controllability(linear, chosen, horizon)
+    typer.echo(f"{linear}\n\n{result}\n")
+    weak, strong = (
+        attainable(linear, Inputs.of(chosen, linear).scaled(f)).least_lean_deg for f in chosen.strength_band
+    )
+    typer.echo(f"With these nerves {attainable(linear, chosen)}")
+    typer.echo(
+        f"Strengths are known to a factor of 1.8: the least of these leans is {weak:.1f} to {strong:.1f} degrees."
+    )
+    if influence is not None:
+        typer.echo(f"\n{influence_table(result, influence)}")
+    if map_to is not None:
+        plot_influence(result, map_to)
+        typer.echo(f"wrote {map_to}")
+    if fewest:
+        free = [name for name, joints in ORTHOSES.items() if set(joints) <= set(linear.joint_names)]
+        some = {"braces": free, "max_braces": max_braces} if max_braces else {"alternatives": 3}
+        found = minimal_sets(linear, chosen, lean_deg=lean, **some)
+        found = pareto(found) if max_braces else found
+        typer.echo(f"\nFewest nerves that hold the posture and a lean of {lean:g} degrees in every fall:")
+        typer.echo(
+            "\n".join(map(str, found)) or "none of these nerves' sets does; brace more joints (--brace corset ...)"
+        )
+
+
+@app.command()
+@_said_in_one_line
+def view(  # noqa: PLR0917
+    out: Annotated[Path, typer.Argument(help="HTML page to write")],
+    posture: Posture = "mid_stance",
+    mass: Mass = 72.6,
+    height: Height = 1.80,
+    sex: Sex = "male",
+    stance: Stance = "right",
+    segments: Segments = None,
+    urdf: Urdf = None,
+    slope: Slope = (0.0, 0.0),
+    brace: Brace = None,
+    mode: Annotated[int | None, typer.Option(help="show this mode (1 falls fastest) in motion")] = None,
+    nerve: Annotated[str | None, typer.Option(help="show what this nerve turns")] = None,
+    walk: Annotated[Path | None, typer.Option(help="play OpenSim coordinates (CSV with q_<coordinate>, rad)")] = None,
+) -> None:
+    """A page with the body: a posture, a mode in motion, a nerve's influence, or measured walking."""
+    from fes_pin.stimulate.nerve_inputs import subject_nerves  # noqa: PLC0415
+    from fes_pin.view.viewer import Scene, show_influence, show_mode  # noqa: PLC0415
+
+    if sum(choice is not None for choice in (mode, nerve, walk)) > 1:
+        raise InputError("choose one of --mode, --nerve and --walk")
+    linear = _linear((mass, height, sex, stance), segments, urdf, posture, slope, brace)
+    if mode is not None:
+        found = linear.modes()
+        if not 1 <= mode <= len(found):
+            raise InputError(f"must be between 1 and {len(found)}, got {mode}", column="--mode")
+        scene = show_mode(linear, found[mode - 1])
+    elif nerve is not None:
+        scene = show_influence(linear, subject_nerves(linear.body, [nerve]), nerve)
+    elif walk is not None:
+        scene = _walking(linear.body, walk)
+    else:
+        scene = Scene(linear.body, caption=f"{linear.body}: {posture}").pose(posture)
+    try:
+        scene.write(out)
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror}", file=out) from None
+    typer.echo(f"wrote {out}")
+
+
+def _walking(body, path: Path):
+    import numpy as np  # noqa: PLC0415
+
+    from fes_pin.body.gait import pelvis_turns, postures_of_walk  # noqa: PLC0415
+    from fes_pin.body.joints import JOINT_NAMES  # noqa: PLC0415
+    from fes_pin.view.viewer import show_walk  # noqa: PLC0415
+
+    try:
+        table = np.genfromtxt(path, delimiter=",", names=True)
+        columns = {name: table[name] for name in table.dtype.names or ()}
+        time = table["time"] if "time" in columns else table["time_s"]
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"cannot be read as coordinates: {str(error).splitlines()[0]}", file=path) from None
+    postures = postures_of_walk(columns, body.stance, flat_foot=False)
+    order = [JOINT_NAMES.index(name) for name in body.joint_names]
+    rate = int(np.clip(round(1.0 / float(np.median(np.diff(time)))), 1, 120))
+    return show_walk(body, postures[:, order], rate, f"{path.name} ({body.label})", pelvis_turns(columns))

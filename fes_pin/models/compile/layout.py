@@ -1,0 +1,65 @@
+"""Names, order and sizes of what goes in and out of a program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fes_pin.models.model import Model
+
+WIDTH = 4
+"""Lanes that run side by side: one AVX2 register. With eight, models with sensitivities spill (1.4 times slower)."""
+
+REST_ITERATIONS = 40
+"""Newton steps to the static equilibrium; steps are held to REST_STEP, so 40 of them cross any joint's range."""
+REST_STEP = 0.2
+"""Longest such step, rad."""
+
+TIMING = ("t0", "dt", "step", "shift")
+"""Constants that every program reads: time of the first sample, sample and integration step, whole samples of delay."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Names and order of what goes in and out of a compiled program."""
+
+    kind: str
+    inputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    unknowns: tuple[str, ...]
+    constants: tuple[str, ...]
+    outputs: tuple[str, ...]
+    columns: tuple[str, ...]
+    """Parameters and unknowns with respect to which the program gives sensitivities."""
+
+    @property
+    def values(self) -> tuple[str, ...]:
+        """Everything that is a parameter to the program."""
+        return (*self.parameters, *self.unknowns)
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Lengths of the vectors that a program keeps."""
+
+    state: int
+    memory: int
+    reading: int
+
+    @property
+    def scratch(self) -> int:
+        """Vectors that a run works in: states four times, memories twice, each with one to spare."""
+        return 4 * (self.state + 1) + 2 * (self.memory + 1)
+
+
+def make_layout(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...]) -> Layout:
+    """The layout of a model's program for trials of a kind with these input columns."""
+    rig = model.rig
+    return Layout(
+        kind=kind,
+        inputs=inputs,
+        parameters=tuple(model.parameters()),
+        unknowns=rig.unknowns(kind),
+        constants=(*rig.constant_names(kind), *TIMING),
+        outputs=rig.outputs(kind),
+        columns=columns,
+    )

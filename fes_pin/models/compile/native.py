@@ -1,0 +1,176 @@
+"""Programs as machine code: a whole trial, with sensitivities, WIDTH lanes at a time."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
+
+import numpy as np
+from llvmlite import ir
+
+from fes_pin.models.compile.equations import Equations
+from fes_pin.models.compile.lanes import DOUBLE, INT64, VECTOR, select_lanes, splat
+from fes_pin.models.compile.layout import REST_ITERATIONS, REST_STEP, WIDTH, Layout, Sizes
+from fes_pin.models.compile.lower import Lowering
+from fes_pin.models.compile.machine import MachineCode, compile_object
+
+
+class NativeProgram:
+    """Machine code of one model structure, kind of trial and set of sensitivity columns."""
+
+    def __init__(self, layout: Layout, object_code: bytes) -> None:
+        head, _, body = object_code.partition(b"\n")
+        self.layout, self.sizes = layout, Sizes(**json.loads(head))
+        self._code = MachineCode(body)
+        pointer = ctypes.c_void_p
+        self._run = self._code.function("simulate", ctypes.c_int64, ctypes.c_int64, *[pointer] * 6)
+
+    def run(
+        self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Simulate WIDTH lanes; see `Program`."""
+        n, outputs = inputs.shape[0], len(self.layout.outputs)
+        out = np.empty((n, self.sizes.reading, WIDTH))
+        given = [np.ascontiguousarray(a, dtype=float) for a in (inputs, values, constants)]
+        rest, scratch = np.array(guess, dtype=float), np.zeros((self.sizes.scratch, WIDTH))
+        memory = (*given, rest, out, scratch)  # a name for each: they must live until the machine code returns
+        self._run(n, substeps, *[a.ctypes.data for a in memory])
+        return out[:, :outputs], out[:, outputs:].reshape(n, outputs, len(self.layout.columns), WIDTH)
+
+
+def compile_equations(equations: Equations) -> bytes:
+    """What a `NativeProgram` is made from: its sizes in one line, then object code."""
+    return json.dumps(asdict(equations.sizes)).encode() + b"\n" + compile_object(emit(equations))
+
+
+def emit(equations: Equations) -> str:
+    """LLVM assembly of a program: static equilibrium, then samples of Runge-Kutta steps."""
+    module = ir.Module(name="fes_pin")
+    lowering = Lowering(module)
+    parts = {n: lowering.lower(getattr(equations, n)) for n in ("rest", "start", "sample", "rates", "output")}
+    return str(_Loop(module, equations, parts).module)
+
+
+class _Loop:
+    """The time loop around a model's functions."""
+
+    def __init__(self, module: ir.Module, equations: Equations, parts: dict[str, ir.Function]) -> None:
+        self.module, self.parts, self.equations = module, parts, equations
+        self.sizes = equations.sizes
+        double = ir.PointerType(VECTOR)
+        function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INT64, INT64] + [double] * 6), "simulate")
+        self.n, self.substeps, self.u, self.p, self.c, self.z, self.y, scratch = function.args
+        self.b = ir.IRBuilder(function.append_basic_block())
+        self._carve(scratch)
+        self._constants()
+        self._rest()
+        self._samples()
+        self.b.ret_void()
+
+    def _carve(self, scratch: ir.Value) -> None:
+        """Vectors in the scratch memory: states, stage states, stage rates, their sum, memories old and new."""
+        state, memory = self.sizes.state + 1, self.sizes.memory + 1
+        self.state, self.stage, self.rate, self.total = (self._at(scratch, k * state) for k in range(4))
+        self.memory, self.after = (self._at(scratch, 4 * state + k * memory) for k in range(2))
+        self.t = self.b.alloca(VECTOR)
+        self.since = self.b.alloca(VECTOR)
+        self.g = self.b.alloca(VECTOR, ir.Constant(INT64, 2))
+
+    def _at(self, pointer: ir.Value, index: int | ir.Value) -> ir.Value:
+        return self.b.gep(pointer, [ir.Constant(INT64, index) if isinstance(index, int) else index])
+
+    def _load(self, pointer: ir.Value, index: int | ir.Value = 0) -> ir.Value:
+        return self.b.load(self._at(pointer, index), align=8)
+
+    def _store(self, value: ir.Value, pointer: ir.Value, index: int | ir.Value = 0) -> None:
+        self.b.store(value, self._at(pointer, index), align=8)
+
+    def _constants(self) -> None:
+        names = self.equations.layout.constants
+        self.t0, self.dt, self.step = (self._load(self.c, names.index(n)) for n in ("t0", "dt", "step"))
+
+    def _count(self, end: ir.Value, body: Callable[[ir.Value], None]) -> None:
+        """for k in range(end): body(k)."""
+        b = self.b
+        before, loop, done = b.block, b.append_basic_block(), b.append_basic_block()
+        b.cbranch(b.icmp_signed(">", end, ir.Constant(INT64, 0)), loop, done)
+        b.position_at_end(loop)
+        k = b.phi(INT64)
+        k.add_incoming(ir.Constant(INT64, 0), before)
+        body(k)
+        following = b.add(k, ir.Constant(INT64, 1))
+        k.add_incoming(following, b.block)
+        b.cbranch(b.icmp_signed("<", following, end), loop, done)
+        b.position_at_end(done)
+
+    def _number(self, k: ir.Value) -> ir.Value:
+        """An integer as lanes of doubles."""
+        one = self.b.insert_element(
+            ir.Constant(VECTOR, ir.Undefined), self.b.sitofp(k, DOUBLE), ir.Constant(ir.IntType(32), 0)
+        )
+        mask = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+        return self.b.shuffle_vector(one, one, mask)
+
+    def _rest(self) -> None:
+        b = self.b
+
+        def newton(_: ir.Value) -> None:
+            b.call(self.parts["rest"], [self.z, self.p, self.c, self.g, self._at(self.g, 1)])
+            step = b.fdiv(self._load(self.g), self._load(self.g, 1))
+            step = select_lanes(b, b.fcmp_ordered(">", step, splat(REST_STEP)), splat(REST_STEP), step)
+            step = select_lanes(b, b.fcmp_ordered("<", step, splat(-REST_STEP)), splat(-REST_STEP), step)
+            self._store(b.fsub(self._load(self.z), step), self.z)
+
+        self._count(ir.Constant(INT64, REST_ITERATIONS), newton)
+        b.call(self.parts["start"], [self.z, self.p, self.c, self.state, self.memory])
+
+    def _samples(self) -> None:
+        b, inputs = self.b, len(self.equations.layout.inputs)
+
+        def sample(n: ir.Value) -> None:
+            t = b.fadd(self.t0, b.fmul(self._number(n), self.dt))
+            b.store(t, self.t, align=8)
+            u = self._at(self.u, b.mul(n, ir.Constant(INT64, inputs)))
+            y = self._at(self.y, b.mul(n, ir.Constant(INT64, self.sizes.reading)))
+            b.call(self.parts["sample"], [self.state, self.memory, u, self.t, self.p, self.c, self.after])
+            self._copy(self.after, self.memory, self.sizes.memory)
+            b.call(self.parts["output"], [self.state, self.memory, u, self.t, self.p, self.c, y])
+            self._count(self.substeps, lambda j: self._runge_kutta(j, t, u))
+
+        self._count(self.n, sample)
+
+    def _copy(self, source: ir.Value, target: ir.Value, size: int) -> None:
+        self._count(ir.Constant(INT64, size), lambda i: self._store(self._load(source, i), target, i))
+
+    def _runge_kutta(self, j: ir.Value, sample_time: ir.Value, u: ir.Value) -> None:
+        """One step of the classical Runge-Kutta method of order four."""
+        b = self.b
+        since = b.fmul(self._number(j), self.step)
+        b.store(since, self.since, align=8)
+        begin = b.fadd(sample_time, since)
+        size = ir.Constant(INT64, self.sizes.state)
+        for weight, ahead, at, source in (
+            (1 / 6, 0.5, 0.0, self.state),
+            (1 / 3, 0.5, 0.5, self.stage),
+            (1 / 3, 1.0, 0.5, self.stage),
+            (1 / 6, 0.0, 1.0, self.stage),
+        ):
+            b.store(b.fadd(begin, b.fmul(self.step, splat(at))), self.t, align=8)
+            b.call(self.parts["rates"], [source, self.memory, u, self.t, self.since, self.p, self.c, self.rate])
+            share, forward = b.fmul(self.step, splat(weight)), b.fmul(self.step, splat(ahead))
+            self._count(size, partial(self._advance, at=at, share=share, forward=forward))
+
+    def _advance(self, i: ir.Value, at: float, share: ir.Value, forward: ir.Value) -> None:
+        """Add a stage to the sum, and go to the next stage or, after the last, to the next step."""
+        b = self.b
+        rate, state = self._load(self.rate, i), self._load(self.state, i)
+        total = state if at == 0.0 else self._load(self.total, i)
+        total = b.fadd(total, b.fmul(share, rate))
+        if at == 1.0:
+            self._store(total, self.state, i)
+            return
+        self._store(total, self.total, i)
+        self._store(b.fadd(state, b.fmul(forward, rate)), self.stage, i)

@@ -1,0 +1,72 @@
+"""Programs on CasADi's virtual machine: the oracle of the machine code, and what runs where that cannot be made."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from fes_pin.models.compile.equations import Equations
+from fes_pin.models.compile.layout import REST_ITERATIONS, REST_STEP, WIDTH
+
+
+class VirtualProgram:
+    """The same equations and time loop as the machine code, interpreted lane by lane."""
+
+    def __init__(self, equations: Equations) -> None:
+        self.layout, self.equations = equations.layout, equations
+        self._trajectory = cache(self._make_trajectory)
+
+    def run(
+        self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Simulate WIDTH lanes; see `Program`."""
+        n, outputs = inputs.shape[0], len(self.layout.outputs)
+        out = np.empty((n, self.equations.sizes.reading, WIDTH))
+        for lane in range(WIDTH):
+            p, c = values[:, lane], constants[:, lane]
+            state, memory = self.equations.start(self._rest(float(guess[lane]), p, c), p, c)
+            trajectory = self._trajectory(n, substeps)
+            times = self._times(c, n)
+            ended = trajectory(state, memory, inputs[:, :, lane].T, times, ca.repmat(p, 1, n), ca.repmat(c, 1, n))
+            out[:, :, lane] = np.array(ended[2]).T
+        return out[:, :outputs], out[:, outputs:].reshape(n, outputs, len(self.layout.columns), WIDTH)
+
+    def _times(self, constants: np.ndarray, n: int) -> np.ndarray:
+        """Time of every sample, shape (1, n)."""
+        names = self.layout.constants
+        return (constants[names.index("t0")] + np.arange(n) * constants[names.index("dt")])[None, :]
+
+    def _rest(self, z: float, p: np.ndarray, c: np.ndarray) -> float:
+        for _ in range(REST_ITERATIONS):
+            g, slope = self.equations.rest(z, p, c)
+            with np.errstate(all="ignore"):
+                z -= float(np.clip(np.float64(g) / np.float64(slope), -REST_STEP, REST_STEP))
+        return z
+
+    def _make_trajectory(self, n: int, substeps: int) -> ca.Function:
+        """A whole trial as one function: states and memories from sample to sample, a reading at each."""
+        return self._sample(substeps).mapaccum("trajectory", n, 2)
+
+    def _sample(self, substeps: int) -> ca.Function:
+        """From one sample to the next, by classical Runge-Kutta steps of order four."""
+        e, layout = self.equations, self.layout
+        names = ("state", "memory", "u", "t", "p", "c")
+        sizes = (e.sizes.state, e.sizes.memory, len(layout.inputs), 1, len(layout.values), len(layout.constants))
+        state, memory, u, t, p, c = given = [ca.MX.sym(n, k) for n, k in zip(names, sizes, strict=True)]
+        held = e.sample(state, memory, u, t, p, c)
+        y = e.output(state, held, u, t, p, c)
+        h = c[layout.constants.index("step")]
+        for j in range(substeps):
+
+            def rates(x: Any, at: float, since: Any = j * h) -> Any:
+                return e.rates(x, held, u, t + since + at * h, since, p, c)
+
+            first = rates(state, 0.0)
+            second = rates(state + 0.5 * h * first, 0.5)
+            third = rates(state + 0.5 * h * second, 0.5)
+            fourth = rates(state + h * third, 1.0)
+            state = state + h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+        return ca.Function("sample", given, [state, held, y])

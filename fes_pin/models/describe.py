@@ -1,0 +1,43 @@
+"""Effects in words."""
+
+from __future__ import annotations
+
+import inspect
+
+from fes_pin.models.stage import Effect
+
+
+def sentence(effect: type[Effect]) -> str:
+    """What the effect is, in one sentence."""
+    return inspect.cleandoc(effect.__doc__ or "").split("\n", 1)[0]
+
+
+def equation(effect: type[Effect]) -> str:
+    """The equation of an effect, as its docstring has it: the first indented block."""
+    lines = inspect.cleandoc(effect.__doc__ or "").split("\n")[1:]
+    start = next((i for i, line in enumerate(lines) if line.startswith("    ")), len(lines))
+    block = []
+    for line in lines[start:]:
+        if line.strip() and not line.startswith("    "):
+            break
+        block.append(line[4:])
+    return "\n".join(block).strip("\n").rstrip()
+
+
+def remark(effect: type[Effect], label: str) -> str:
+    """The text after a label such as "Tell-tale:" in an effect's docstring."""
+    text = " ".join(inspect.cleandoc(effect.__doc__ or "").split())
+    after = text.partition(f"{label} ")[2]
+    return after.partition(" Source: ")[0] if label != "Source:" else after
+
+
+def describe(effect: type[Effect]) -> str:
+    """Name, stage, sentence, equation, tell-tale and parameters."""
+    lines = [f"{effect.name} ({effect.stage}; rigs: {', '.join(effect.rigs)})", f"  {sentence(effect)}"]
+    lines += [f"      {line}" for line in equation(effect).split("\n")]
+    lines.append(f"  Tell-tale: {remark(effect, 'Tell-tale:')}")
+    for name, info in effect.parameters().items():
+        absent = f"absent at {info.null:g}" if info.null is not None else "a shape"
+        also = ", a refinement" if info.optional else ""
+        lines.append(f"    {name} [{info.unit or '1'}] in [{info.lower:g}, {info.upper:g}], {absent}{also}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,41 @@
+"""Prediction of a trial from its inputs and conditions alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.trial import Trial
+from fes_pin.models.model import Model
+from fes_pin.models.simulate import simulate
+
+
+def predict(model: Model, trial: Trial) -> Trial:
+    """What the model predicts for a trial: its time and the predicted output columns.
+
+    A joint's initial state is the first sample of `position` and `velocity`, or the conditions `position0` and
+    `velocity0`; nothing else of the outputs is used.
+
+    Raises
+    ------
+    InputError
+        If the trial lacks an input, a condition or its initial state, or the prediction does not stay finite.
+    """
+    rig = model.rig
+    _check(model, trial)
+    simulated = simulate(model, trial)
+    outputs = {n: simulated[n] for n in rig.outputs(trial.kind)}
+    for name, values in outputs.items():
+        if not np.isfinite(values).all():
+            row = int(np.argmin(np.isfinite(values)))
+            raise InputError(f"the prediction of {name} is not finite from sample {row} on: the model is unstable here")
+    return Trial(trial.name, trial.kind, outputs, trial.time, trial.conditions, trial.role)
+
+
+def _check(model: Model, trial: Trial) -> None:
+    needed = {"joint": (), "muscle": (), "ankle": ("load_kg",) if trial.kind == "motion" else ("angle_rad",)}
+    for name in needed.get(model.rig.name, ()):
+        if name not in trial.conditions:
+            raise InputError(f"expected --set {name}=... for a {trial.kind} trial of this rig")
+    if model.rig.name == "joint" and "position" not in trial.columns and "position0" not in trial.conditions:
+        raise InputError("expected a column position (its first sample) or --set position0=...")

@@ -1,0 +1,322 @@
+"""The body to look at: poses, gait, modes in motion, and what a nerve turns, as one HTML page that needs no server.
+
+Pages hold meshcat's own viewer and the drawing commands; they open in any browser, without a network. With `#t=0.4` at
+the end of its address a page stands still at that many seconds.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from fes_pin.body.build import Body
+from fes_pin.body.inputs import Inputs
+from fes_pin.body.joints import JOINTS
+from fes_pin.body.linearize import LinearBody
+from fes_pin.body.modes import Mode
+from fes_pin.data.errors import InputError
+
+FRAMES_A_SECOND = 30
+MODE_SWING_DEG, MODE_PERIOD_S = 12.0, 2.0
+"""How far the joint that moves most is shown to move, and how fast: to be seen, not to scale."""
+_UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""meshcat's cylinders lie along y, coal's along z."""
+
+
+@dataclass
+class Scene:
+    """A body in a pose or in motion.
+
+    Parameters
+    ----------
+    body
+        The body.
+    caption
+        Text shown on the page.
+    fps
+        Frames a second of motions.
+    """
+
+    body: Body
+    caption: str = ""
+    fps: int = FRAMES_A_SECOND
+    frames: list[np.ndarray] = field(default_factory=list)
+    roots: list[pin.SE3] = field(default_factory=list)
+    balls: list[tuple[np.ndarray, float, int]] = field(default_factory=list)
+
+    def pose(self, posture) -> Scene:
+        """Show one posture (as `Body.angles` takes it)."""
+        self.frames = [self.body.angles(posture, check=False)]
+        return self
+
+    def play(self, postures: np.ndarray) -> Scene:
+        """Show postures one after the other: (T, 19) rad in the order of `body.joint_names`.
+
+        Raises
+        ------
+        InputError
+            Wrong shape.
+        """
+        postures = np.asarray(postures, dtype=float)
+        if postures.ndim != 2 or postures.shape[1] != self.body.model.nq or not len(postures):
+            raise InputError(f"frames must be of shape (T, {self.body.model.nq}), got {postures.shape}")
+        self.frames = list(postures)
+        return self
+
+    def carry(self, roots: Sequence[pin.SE3]) -> Scene:
+        """Move the whole body, frame by frame, as a walk does that takes the foot off the ground.
+
+        Raises
+        ------
+        InputError
+            Not one placement a frame.
+        """
+        if len(roots) != len(self.frames):
+            raise InputError(f"{len(self.frames)} frames need as many placements, got {len(roots)}")
+        self.roots = list(roots)
+        return self
+
+    def commands(self) -> list[bytes]:
+        """meshcat's drawing commands, packed."""
+        import umsgpack  # noqa: PLC0415
+
+        _import_meshcat()
+        from meshcat.animation import Animation  # noqa: PLC0415
+        from meshcat.commands import SetAnimation, SetObject, SetProperty, SetTransform  # noqa: PLC0415
+        from meshcat.geometry import Box, MeshLambertMaterial, Sphere  # noqa: PLC0415
+        from meshcat.path import Path as Place  # noqa: PLC0415
+
+        if not self.frames:
+            self.pose("neutral")
+        shapes = pin.buildGeomFromUrdfString(self.body.model, self.body.urdf, pin.GeometryType.VISUAL)
+        out: list = [SetProperty("visible", False, Place(("Grid",))), SetProperty("visible", False, Place(("Axes",)))]
+        out += [
+            SetProperty("top_color", [0.93, 0.95, 0.97], Place(("Background",))),
+            SetProperty("bottom_color", [0.70, 0.75, 0.80], Place(("Background",))),
+            SetTransform(_moved([0.1, 0.0, -0.9]), Place(("meshcat",))),  # the camera looks at the origin
+            SetProperty("position", [1.3, 0.2, 1.8], Place(("Cameras", "default", "rotated", "<object>"))),
+        ]
+        floor = MeshLambertMaterial(color=0x9DAA9D)
+        out.append(SetObject(Box([3.0, 1.6, 0.02]), floor, Place(("meshcat", "floor"))))
+        out.append(SetTransform(_moved([0.0, 0.0, -0.011]), Place(("meshcat", "floor"))))
+        for k, shape in enumerate(shapes.geometryObjects):
+            geometry, _ = _meshcat_geometry(shape.geometry)
+            red, green, blue = (int(255 * c) for c in shape.meshColor[:3])
+            material = MeshLambertMaterial(color=(red << 16) + (green << 8) + blue)
+            out.append(SetObject(geometry, material, Place(("meshcat", "body", str(k)))))
+        for k, (_, radius, colour) in enumerate(self.balls):
+            ball = SetObject(Sphere(radius), MeshLambertMaterial(color=colour), Place(("meshcat", "ball", str(k))))
+            out.append(ball)
+        animation = Animation(default_framerate=self.fps)
+        data, geometry_data = self.body.model.createData(), shapes.createData()
+        for t, q in enumerate(self.frames):
+            pin.updateGeometryPlacements(self.body.model, data, shapes, geometry_data, q)
+            for k, shape in enumerate(shapes.geometryObjects):
+                _, turn = _meshcat_geometry(shape.geometry)
+                place = geometry_data.oMg[k]
+                matrix = (self.roots[t] * place if self.roots else place).homogeneous.copy()
+                matrix[:3, :3] = matrix[:3, :3] @ turn
+                path = Place(("meshcat", "body", str(k)))
+                if t == 0:
+                    out.append(SetTransform(matrix, path))
+                if len(self.frames) > 1:
+                    _key(animation, path, t, matrix)
+        out += [SetTransform(_moved(c), Place(("meshcat", "ball", str(k)))) for k, (c, _, _) in enumerate(self.balls)]
+        if len(self.frames) > 1:
+            out.append(SetAnimation(animation, play=True, repetitions=1_000_000))
+        return [umsgpack.packb(command.lower()) for command in out]
+
+    def html(self) -> str:
+        """The page."""
+        script = (Path(_import_meshcat().__file__).parent / "viewer/dist/main.min.js").read_text()
+        packed = ",\n".join(f'"{base64.b64encode(command).decode()}"' for command in self.commands())
+        return _PAGE.format(script=script, commands=packed, caption=html.escape(self.caption))
+
+    def write(self, path: str | Path) -> Path:
+        """Write the page to a file."""
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(self.html(), encoding="utf-8")
+        return path
+
+
+def show_mode(linear: LinearBody, mode: Mode) -> Scene:
+    """A mode in motion about its posture; a fall is shown to and fro, too, for it can go either way."""
+    body = linear.body
+    q = np.array([linear.whole_posture.get(name, 0.0) for name in body.joint_names])
+    shape = np.zeros(len(q))
+    for name, value in zip(mode.joint_names, mode.one_degree, strict=True):
+        shape[body.joint_names.index(name)] = MODE_SWING_DEG * value
+    count = int(MODE_PERIOD_S * FRAMES_A_SECOND)
+    phases = np.sin(2.0 * np.pi * np.arange(count + 1) / count)
+    return Scene(body, caption=mode.name).play(q + phases[:, None] * shape)
+
+
+def show_walk(
+    body: Body,
+    postures: np.ndarray,
+    fps: int = FRAMES_A_SECOND,
+    caption: str = "Walking",
+    pelvis: np.ndarray | None = None,
+) -> Scene:
+    """Gait playback.
+
+    Parameters
+    ----------
+    body
+        The body.
+    postures
+        Joint angles, (T, 19) rad, in the order of `body.joint_names`.
+    fps
+        Postures a second.
+    caption
+        Text on the page.
+    pelvis
+        Orientation of the pelvis in the world, (T, 3, 3). With it the body walks on the spot, either foot on the
+        ground: it is turned as measured and put down on its lowest foot, hips above the middle of the floor. Without it
+        the stance foot stays where it is.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit.
+    """
+    scene = Scene(body, caption=caption, fps=fps).play(postures)
+    if pelvis is None:
+        return scene
+    if np.shape(pelvis) != (len(scene.frames), 3, 3):
+        raise InputError(f"the pelvis needs shape ({len(scene.frames)}, 3, 3), got {np.shape(pelvis)}")
+    shapes = pin.buildGeomFromUrdfString(body.model, body.urdf, pin.GeometryType.VISUAL)
+    return scene.carry([_put_down(body, shapes, q, turn) for q, turn in zip(scene.frames, pelvis, strict=True)])
+
+
+def _put_down(body: Body, shapes: pin.GeometryModel, q: np.ndarray, turn: np.ndarray) -> pin.SE3:
+    """Where the stance foot's ground must go: the pelvis is turned as given, the lowest sole touches the floor."""
+    data = body.model.createData()
+    pin.framesForwardKinematics(body.model, data, q)
+    pelvis = data.oMf[body.model.getFrameId("pelvis")]
+    other = data.oMi[body.model.getJointId("left_hip_flexion" if body.stance == "right" else "right_hip_flexion")]
+    rotation = turn @ pelvis.rotation.T
+    middle = rotation @ (0.5 * (pelvis.translation + other.translation))
+    placed = shapes.createData()
+    pin.updateGeometryPlacements(body.model, data, shapes, placed, q)
+    lowest = np.inf
+    for k, shape in enumerate(shapes.geometryObjects):
+        if "foot" in shape.name and hasattr(shape.geometry, "halfSide"):
+            corners = shape.geometry.halfSide * np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
+            points = placed.oMg[k].rotation @ corners.T + placed.oMg[k].translation[:, None]
+            lowest = min(lowest, float((rotation @ points)[2].min()))
+    return pin.SE3(rotation, np.array([-middle[0], -middle[1], -lowest if np.isfinite(lowest) else 0.0]))
+
+
+def show_influence(linear: LinearBody, inputs, name: str) -> Scene:
+    """What one nerve turns: a ball at each joint, larger and redder the more of the nerve's torque acts there.
+
+    Raises
+    ------
+    InputError
+        Inputs that are none, or a name that is not among them.
+    """
+    inputs = Inputs.of(inputs, linear).select([name])
+    torque = dict(zip(inputs.joint_names, inputs.matrix[:, 0].tolist(), strict=True))
+    strength = {j.name: float(np.linalg.norm([torque.get(r, 0.0) for r in j.revolutes])) for j in JOINTS}
+    greatest = max(strength.values())
+    posture = linear.whole_posture
+    scene = Scene(linear.body).pose(posture)
+    said = []
+    for joint in JOINTS:
+        share = strength[joint.name] / greatest if greatest > 0.0 else 0.0
+        if share < 0.01:
+            continue
+        scene.balls.append((_centre(linear.body, joint.name, posture), 0.05 + 0.06 * share, _red(share)))
+        said += [f"{r} {torque[r]:+.0f} N m" for r in joint.revolutes if abs(torque.get(r, 0.0)) >= 0.01 * greatest]
+    scene.caption = f"{name}, full recruitment: " + (", ".join(said) or "no torque")
+    return scene
+
+
+def _centre(body: Body, joint: str, posture: Mapping[str, float]) -> np.ndarray:
+    """Where a joint is in the world, (3,) m; its ball lies outside the limb, on the limb's own side."""
+    first = next(j.revolutes[0] for j in JOINTS if j.name == joint)
+    data = body.model.createData()
+    pin.forwardKinematics(body.model, data, body.angles(posture, check=False))
+    return data.oMi[body.model.getJointId(first)].translation + np.array([0.0, _outside(joint), 0.0])
+
+
+def _outside(joint: str) -> float:
+    return {"left": 0.09, "right": -0.09}.get(joint.split("_", maxsplit=1)[0], -0.16)
+
+
+def _red(share: float) -> int:
+    """White to red."""
+    rest = int(230 * (1.0 - share))
+    return (225 << 16) + (rest << 8) + rest
+
+
+def _moved(translation: Sequence[float] | np.ndarray) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def _import_meshcat():
+    """meshcat, without the warning that its import of an old pyzmq module raises (its server is not used here)."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        import meshcat  # noqa: PLC0415
+    return meshcat
+
+
+def _meshcat_geometry(shape):
+    """meshcat's geometry of a coal shape, and the rotation from one's axes to the other's."""
+    import coal  # noqa: PLC0415
+    from meshcat.geometry import Box, Cylinder, Sphere  # noqa: PLC0415
+
+    if isinstance(shape, coal.Sphere):
+        return Sphere(shape.radius), np.eye(3)
+    if isinstance(shape, coal.Cylinder):
+        return Cylinder(2.0 * shape.halfLength, shape.radius), _UPRIGHT
+    if isinstance(shape, coal.Box):
+        return Box((2.0 * shape.halfSide).tolist()), np.eye(3)
+    raise InputError(f"the viewer draws spheres, cylinders and boxes, not {type(shape).__name__}")
+
+
+def _key(animation, place, frame: int, matrix: np.ndarray) -> None:
+    from meshcat.animation import AnimationClip  # noqa: PLC0415
+
+    clip = animation.clips.setdefault(place, AnimationClip(fps=animation.default_framerate))
+    clip.set_property(frame, "position", "vector3", matrix[:3, 3].tolist())
+    clip.set_property(frame, "quaternion", "quaternion", pin.Quaternion(matrix[:3, :3]).coeffs().tolist())
+
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head><meta charset="utf-8"><title>{caption}</title>
+<style>
+body {{ margin: 0; font: 16px system-ui, sans-serif; }}
+#meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
+#caption {{ position: absolute; left: 1em; top: 1em; max-width: 60%; padding: .5em .8em; border-radius: .4em;
+  background: rgba(255, 255, 255, .85); color: #222; }}
+</style></head>
+<body>
+<div id="meshcat-pane"></div><div id="caption">{caption}</div>
+<script>{script}</script>
+<script>
+const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+const commands = [{commands}];
+for (const command of commands) {{
+  viewer.handle_command_bytearray(Uint8Array.from(atob(command), c => c.charCodeAt(0)));
+}}
+const still = /#t=([0-9.]+)/.exec(location.hash);
+if (still) {{ viewer.animator.pause(); viewer.animator.seek(parseFloat(still[1])); }}
+document.body.dataset.ready = "yes";
+</script>
+<script id="embedded-json"></script>
+</body></html>
+"""

@@ -1,0 +1,52 @@
+"""What the tests of the body share: bodies, measured data, and slow oracles."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fes_pin.body.build import Body
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="session")
+def walk() -> Path:
+    """Folder of the measured walk; the test that needs it is skipped, and says so, where there is none."""
+    root = Path(os.environ.get("FES_PIN_DATA", REPOSITORY.parent / "shared"))
+    for folder in (root / "data/walking_subject01", root / "walking_subject01"):
+        if folder.is_dir():
+            return folder
+    pytest.skip(f"no measured walk: neither FES_PIN_DATA nor {root} holds walking_subject01")
+
+
+@pytest.fixture(scope="session")
+def body() -> Body:
+    return Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
+
+
+@pytest.fixture(scope="session")
+def measured_body(walk) -> Body:
+    return Body.from_segments(walk / "reference/subject01_model.json", stance="right")
+
+
+@pytest.fixture(scope="session")
+def jacobi():
+    return jacobi_rotations
+
+
+def jacobi_rotations(Q: np.ndarray, sweeps: int = 60) -> tuple[np.ndarray, np.ndarray]:
+    """The paper's Jacobi iteration: eigenvalues and eigenvectors of a symmetric matrix by plane rotations."""
+    D, V = Q.copy(), np.eye(len(Q))
+    for _ in range(sweeps):
+        if np.abs(D - np.diag(np.diag(D))).max() < 1e-13 * np.abs(D).max():
+            break
+        for p in range(len(Q)):
+            for q in range(p + 1, len(Q)):
+                angle = 0.5 * np.arctan2(2.0 * D[p, q], D[q, q] - D[p, p])
+                c, s = np.cos(angle), np.sin(angle)
+                G = np.eye(len(Q))
+                G[p, p], G[q, q], G[p, q], G[q, p] = c, c, s, -s
+                D, V = G.T @ D @ G, V @ G
+    return np.diag(D).copy(), V

@@ -1,0 +1,130 @@
+"""Pages of the viewer, in a real headless Chromium."""
+
+import os
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from fes_pin.body.controllability import controllability
+from fes_pin.body.linearize import linearize
+from fes_pin.data.errors import InputError
+from fes_pin.stimulate.nerves import Nerves
+from fes_pin.view.influence import influence_table, plot_influence
+from fes_pin.view.viewer import Scene, show_influence, show_mode, show_walk
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """Path of a Chromium; installed by apt where this is root's machine, else the test says that there is none."""
+    names = ("chromium", "chromium-browser", "google-chrome")
+    found = next(filter(None, map(shutil.which, names)), None)
+    if found is None and shutil.which("apt-get") and os.geteuid() == 0:
+        for command in (["apt-get", "update"], ["apt-get", "install", "--yes", "--no-install-recommends", "chromium"]):
+            subprocess.run(command, check=False, capture_output=True, timeout=300)
+        found = shutil.which("chromium")
+    if found is None:
+        pytest.skip(f"no browser: none of {', '.join(names)} is installed, and apt-get could not install chromium")
+    return found
+
+
+@pytest.fixture
+def screenshot(chromium, tmp_path):
+    from matplotlib import image
+
+    def take(page, at=""):
+        out = tmp_path / f"shot{len(list(tmp_path.glob('*.png')))}.png"
+        command = [
+            *(chromium, "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+            *("--window-size=500,600", "--virtual-time-budget=2000", f"--user-data-dir={tmp_path / 'profile'}"),
+            *(f"--screenshot={out}", f"{page.as_uri()}{at}"),
+        ]
+        subprocess.run(command, check=True, capture_output=True, timeout=90)
+        return image.imread(out)[:, :, :3]
+
+    return take
+
+
+def skin(picture):
+    """Pixels of the body's bare parts: orange-pink, neither floor nor sky."""
+    return (picture[..., 0] > 0.55) & (picture[..., 0] - picture[..., 2] > 0.12)
+
+
+def changed(one, other):
+    return float(np.mean(np.abs(one - other).max(axis=2) > 0.1))
+
+
+def test_a_mode_shows_a_body_that_moves(body, screenshot, tmp_path):
+    linear = linearize(body, "mid_stance")
+    page = show_mode(linear, linear.modes()[8]).write(tmp_path / "mode.html")
+    forward, again, back = (screenshot(page, f"#t={t}") for t in (0.5, 0.5, 1.5))
+    assert skin(forward).sum() > 500  # not blank: there is a person
+    assert changed(forward, again) < 1e-4  # it stands still when told to
+    assert changed(forward, back) > 0.01  # and moves with time
+    left, right = (np.flatnonzero(skin(p).any(axis=0)).mean() for p in (forward, back))
+    assert abs(left - right) > 5.0  # the whole body sways
+
+
+def test_a_nerve_paints_the_joints_that_it_turns(body, screenshot, tmp_path):
+    linear = linearize(body, "mid_stance")
+    plain = screenshot(Scene(body).pose("mid_stance").write(tmp_path / "plain.html"))
+    scene = show_influence(linear, Nerves(), "right_femoral")
+    painted = screenshot(scene.write(tmp_path / "nerve.html"))
+
+    def red(p):
+        return ((p[..., 0] > 0.5) & (p[..., 1] < 0.25) & (p[..., 2] < 0.25)).sum()
+
+    assert red(painted) > 100 > red(plain)
+    assert "right_knee_flexion -" in scene.caption
+    assert "left" not in scene.caption
+
+
+def test_a_page_needs_no_network(body, tmp_path):
+    text = Scene(body, caption="<b>&").pose("neutral").write(tmp_path / "a" / "page.html").read_text()
+    assert "src=" not in text.split("<script>")[0]
+    assert "&lt;b&gt;&amp;" in text
+    assert len(text) < 4_000_000
+
+
+def test_walking_has_a_frame_a_posture(body):
+    import umsgpack
+
+    frames = np.zeros((5, 19))
+    frames[:, body.joint_names.index("left_knee_flexion")] = np.linspace(0.0, 1.0, 5)
+    last = umsgpack.unpackb(show_walk(body, frames, fps=10).commands()[-1])
+    assert last["type"] == "set_animation"
+    assert {len(track["keys"]) for part in last["animations"] for track in part["clip"]["tracks"]} == {5}
+    with pytest.raises(InputError, match="frames"):
+        show_walk(body, np.zeros((5, 18)))
+
+
+def test_a_walk_on_the_spot_puts_a_foot_on_the_ground(body):
+    """With the pelvis upright and level, the straight body stands on its sole; with it pitched, on toe or heel."""
+    import pinocchio as pin
+
+    frames = np.zeros((2, 19))
+    tilted = pin.exp3(np.array([0.0, 0.3, 0.0]))
+    scene = show_walk(body, frames, pelvis=np.array([np.eye(3), tilted]))
+    level, pitched = scene.roots
+    assert level.translation[2] == pytest.approx(0.0, abs=1e-5)
+    assert np.allclose(pitched.rotation, tilted)
+    assert pitched.translation[2] > 0.02
+    with pytest.raises(InputError, match="pelvis"):
+        show_walk(body, frames, pelvis=np.eye(3))
+
+
+def test_heat_map_and_table(body, tmp_path):
+    from matplotlib import image
+
+    linear = linearize(body, "mid_stance")
+    result = controllability(linear, Nerves(("right_femoral", "right_tibial")))
+    for on in ("joints", "modes"):
+        picture = image.imread(plot_influence(result, tmp_path / f"{on}.png", on))
+        assert picture[..., :3].std() > 0.05
+        assert len(influence_table(result, on).splitlines()) == 21
+    row = next(line for line in influence_table(result).splitlines() if line.startswith("right_knee_flexion"))
+    i = linear.joint_names.index("right_knee_flexion")
+    assert float(row.split()[1]) == pytest.approx(np.degrees(result.joint_influence[i, 0]), abs=0.5)
+    with pytest.raises(InputError, match="influence"):
+        influence_table(result, "muscles")

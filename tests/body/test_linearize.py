@@ -1,0 +1,241 @@
+"""A, B and C: against finite differences of Pinocchio's own quantities, tilted bodies, and each other."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fes_pin.body.build import GRAVITY, Body
+from fes_pin.body.gait import posture_names
+from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.linearize import ground_normal, linearize, linearize_batch, linearize_chunks, model_on_slope
+from fes_pin.body.passive import ElasticJoints, PassiveLegs
+from fes_pin.data.errors import InputError
+
+slopes = st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
+
+
+def some_posture(body, seed):
+    low, high = body.limits
+    return low + (high - low) * np.random.default_rng(seed).uniform(0.2, 0.8, 19)
+
+
+def derivative(f, x, step=1e-3):
+    """Central differences of fourth order: (n, len(x))."""
+    columns = []
+    for i in range(len(x)):
+        e = np.zeros(len(x))
+        e[i] = step
+        columns.append((8.0 * (f(x + e) - f(x - e)) - (f(x + 2 * e) - f(x - 2 * e))) / (12.0 * step))
+    return np.array(columns).T
+
+
+def potential(model, q):
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    return pin.computePotentialEnergy(model, data)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 10**6), slopes)
+def test_a_b_c_are_what_the_paper_says(seed, slope):
+    body = Body.from_subject(mass_kg=60.0 + seed % 40, height_m=1.7, sex="female", stance=("left", "right")[seed % 2])
+    q = some_posture(body, seed)
+    linear = linearize(body, q, slope)
+    model = model_on_slope(body, slope)
+    data = model.createData()
+    assert np.array_equal(linear.A, linear.A.T)
+    assert np.linalg.eigvalsh(linear.A)[0] > 0.0
+    assert np.array_equal(linear.B, linear.B.T)
+
+    def gravity(x):
+        return pin.computeGeneralizedGravity(model, data, x).copy()
+
+    assert np.abs(linear.B + derivative(gravity, q)).max() < 1e-7 * np.abs(linear.B).max()
+    assert np.abs(linear.C + gravity(q)).max() < 1e-12 * np.abs(linear.C).max()
+    slope_of_energy = derivative(lambda x: np.array([potential(model, x)]), q)[0]
+    assert np.abs(linear.C + slope_of_energy).max() < 1e-7 * np.abs(linear.C).max()
+
+
+def test_kinetic_energy_is_half_v_a_v(body):
+    q, v = some_posture(body, 1), np.random.default_rng(2).normal(size=19)
+    energy = pin.computeKineticEnergy(body.model, body.model.createData(), q, v)
+    assert 0.5 * v @ linearize(body, q).A @ v == pytest.approx(energy, rel=1e-12)
+
+
+@settings(max_examples=10, deadline=None)
+@given(slopes)
+def test_a_slope_is_the_whole_body_tilted_with_its_ground(slope):
+    """Turn the root of the body itself by the rotation that takes up into the normal: same C, same B."""
+    body = Body.from_subject(mass_kg=70.0, height_m=1.7)
+    q = body.angles("mid_stance")
+    normal = ground_normal(slope)
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
+    tilted = pin.Model(body.model)
+    root = tilted.jointPlacements[1]
+    tilted.jointPlacements[1] = pin.SE3(turn, np.zeros(3)) * root
+    data = tilted.createData()
+    linear = linearize(body, "mid_stance", slope)
+    g = pin.computeGeneralizedGravity(tilted, data, q)
+    assert np.abs(linear.C + g).max() < 1e-10 * np.abs(g).max()
+    dg = pin.computeGeneralizedGravityDerivatives(tilted, data, q)
+    assert np.abs(linear.B + dg).max() < 1e-10 * np.abs(dg).max()
+    assert np.abs(linear.A - pin.crba(tilted, data, q)).max() < 1e-12
+
+
+def test_uphill_makes_the_upright_body_lean_back(body):
+    """Ground that rises ahead has a normal that points back; the body, square to it, must be held against falling
+    back."""
+    level, uphill = (linearize(body, "neutral", s).holding_torque for s in ((0.0, 0.0), (-0.05, 0.0)))
+    change = uphill["right_ankle_dorsiflexion"] - level["right_ankle_dorsiflexion"]
+    assert change == pytest.approx(0.05 * body.mass_kg * GRAVITY * 0.95, rel=0.1)  # dorsiflexion pulls it forward again
+
+
+def test_moving_posture_is_the_derivative_of_inverse_dynamics(body):
+    rng = np.random.default_rng(3)
+    q, v, a = some_posture(body, 3), rng.normal(size=19), rng.normal(size=19)
+    linear = linearize(body, q, (0.03, -0.02), rates=v, accelerations=a)
+    model = model_on_slope(body, (0.03, -0.02))
+    data = model.createData()
+    by_angle = derivative(lambda x: pin.rnea(model, data, x, v, a).copy(), q)
+    by_rate = derivative(lambda x: pin.rnea(model, data, q, x, a).copy(), v)
+    assert np.abs(linear.B + by_angle).max() < 1e-7 * np.abs(by_angle).max()
+    assert np.abs(linear.E - by_rate).max() < 1e-7 * np.abs(by_rate).max()
+    assert np.allclose(linear.C, -pin.rnea(model, data, q, v, a), rtol=1e-12)
+    assert not linear.conservative
+    still = linearize(body, q, (0.03, -0.02), rates=np.zeros(19))
+    assert np.abs(still.B - linearize(body, q, (0.03, -0.02)).B).max() < 1e-9
+
+
+def test_linear_equation_predicts_the_nonlinear_body(body):
+    """Acceleration under torques near the posture: error of second order in the deviation."""
+    q = body.angles("mid_stance")
+    linear = linearize(body, "mid_stance")
+    rng = np.random.default_rng(5)
+    direction, torque = rng.normal(size=19), rng.normal(size=19)
+    data = body.model.createData()
+    errors = []
+    for size in (1e-3, 1e-4):
+        gamma = size * direction
+        D = -linear.C + torque * size
+        true = pin.aba(body.model, data, q + gamma, np.zeros(19), D)
+        errors.append(np.abs(np.linalg.solve(linear.A, linear.B @ gamma + linear.C + D) - true).max())
+    assert errors[1] < 0.02 * errors[0]
+
+
+@pytest.mark.parametrize("passive", [PassiveLegs(), PassiveLegs(factor=0.5, damping_nms={"left_knee_flexion": 0.3})])
+def test_passive_legs_have_the_stiffness_of_their_torque(body, passive):
+    q = body.angles("mid_swing")
+    slope = -derivative(lambda x: passive.torque(x, body.joint_names), q, 1e-4)
+    assert np.abs(passive.stiffness(q, body.joint_names) - 0.5 * (slope + slope.T)).max() < 1e-7 * np.abs(slope).max()
+    free, held = linearize(body, "mid_swing"), linearize(body, "mid_swing", passive=passive)
+    assert np.allclose(free.B - held.B, passive.stiffness(q, body.joint_names))
+    assert np.allclose(held.C - free.C, passive.torque(q, body.joint_names))
+    assert held.conservative == (not passive.damping_nms)
+
+
+def test_passive_legs_pull_back_from_the_ends():
+    """Riener and Edrich: a stretched hip flexes, a bent ankle lets go, a hyperextended knee flexes; some N m near
+    rest."""
+    legs, names = PassiveLegs(), JOINT_NAMES
+    index = {n: i for i, n in enumerate(names)}
+
+    def torque(joint, degrees):
+        q = np.zeros(19)
+        q[index[joint]] = np.radians(degrees)
+        return legs.torque(q, names)[index[joint]]
+
+    assert torque("left_hip_flexion", -20.0) > 15.0
+    assert torque("left_hip_flexion", 90.0) < -15.0
+    assert torque("right_ankle_dorsiflexion", 20.0) < -5.0
+    assert torque("right_ankle_dorsiflexion", -40.0) > 0.5
+    assert torque("right_knee_flexion", -5.0) > torque("right_knee_flexion", 5.0) > 0.0
+    assert abs(torque("right_knee_flexion", 45.0)) < 10.0
+
+
+def test_springs_and_dampers_by_name(body):
+    springs = ElasticJoints({"left_knee_flexion": 10.0}, {"lumbar_bending": 2.0}, {"left_knee_flexion": 0.1})
+    linear, free = (
+        linearize(body, {"left_knee_flexion": 0.5}, passive=springs),
+        linearize(body, {"left_knee_flexion": 0.5}),
+    )
+    i, j = body.joint_names.index("left_knee_flexion"), body.joint_names.index("lumbar_bending")
+    assert free.B[i, i] - linear.B[i, i] == pytest.approx(10.0)
+    assert linear.C[i] - free.C[i] == pytest.approx(-4.0)
+    assert linear.E[j, j] == 2.0
+    with pytest.raises(InputError, match="negative"):
+        linearize(body, passive=ElasticJoints({"left_knee_flexion": -1.0}))
+    with pytest.raises(InputError, match="unknown joint"):
+        linearize(body, passive=ElasticJoints({"knee": 1.0}))
+
+
+def test_batch_and_chunks_are_the_single_ones(body):
+    postures = np.array([some_posture(body, seed) for seed in range(7)])
+    A, B, C = linearize_batch(body, postures, (0.05, 0.02))
+    for k, q in enumerate(postures):
+        linear = linearize(body, q, (0.05, 0.02))
+        assert np.abs(A[k] - linear.A).max() < 1e-12
+        assert np.abs(B[k] - linear.B).max() < 1e-9
+        assert np.abs(C[k] - linear.C).max() < 1e-10
+    seen = np.zeros(7, dtype=int)
+    for rows, a, b, c in linearize_chunks(body, postures, (0.05, 0.02), size=3):
+        seen[rows] += 1
+        assert np.array_equal(a, A[rows])
+        assert np.array_equal(b, B[rows])
+        assert np.array_equal(c, C[rows])
+    assert np.all(seen == 1)
+    for wrong in (np.zeros(19), np.zeros((2, 18)), np.full((2, 19), np.nan)):
+        with pytest.raises(InputError, match="shape"):
+            linearize_batch(body, wrong)
+
+
+def test_braces_hold_what_a_constraint_would(body):
+    """Locked joints leave the equations of the others as Lagrange multipliers would."""
+    linear = linearize(body, "mid_stance")
+    locked = ["right_knee_flexion", "lumbar_bending"]
+    braced = linear.brace(locked)
+    D = np.random.default_rng(0).normal(size=19)
+    N = np.zeros((2, 19))
+    for row, name in zip(N, locked, strict=True):
+        row[linear.joint_names.index(name)] = 1.0
+    kkt = np.block([[linear.A, N.T], [N, np.zeros((2, 2))]])
+    whole = np.linalg.solve(kkt, np.concatenate([linear.C + D, np.zeros(2)]))[:19]
+    keep = [linear.joint_names.index(name) for name in braced.joint_names]
+    assert np.allclose(np.linalg.solve(braced.A, braced.C + D[keep]), whole[keep], atol=1e-9)
+    assert braced.whole_posture == pytest.approx(linear.posture)
+    with pytest.raises(InputError, match="not among"):
+        braced.brace(["right_knee_flexion"])
+    with pytest.raises(InputError, match="nothing is left"):
+        linear.brace(linear.joint_names)
+
+
+@pytest.mark.parametrize("name", posture_names())
+@pytest.mark.parametrize("stance", ["left", "right"])
+def test_named_postures_linearize_and_mirror(name, stance):
+    body = Body.from_subject(mass_kg=72.6, height_m=1.80, stance=stance)
+    other = Body.from_subject(mass_kg=72.6, height_m=1.80, stance="left" if stance == "right" else "right")
+    ours, mirrored = (np.linalg.eigvals(linearize(b, name).F) for b in (body, other))
+    assert np.allclose(np.sort(ours.real), np.sort(mirrored.real), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda b: linearize(b, "standing on the head"), "unknown posture"),
+        (lambda b: linearize(b, {"left_knee": 0.1}), "did you mean 'left_knee_flexion'"),
+        (lambda b: linearize(b, {"left_knee_flexion": 3.0}), "171.9 deg is outside its limits -10 to 150 deg"),
+        (lambda b: linearize(b, {"left_knee_flexion": "bent"}), "must be a number"),
+        (lambda b: linearize(b, np.zeros(18)), "19 joint values"),
+        (lambda b: linearize(b, np.full(19, np.nan)), "finite"),
+        (lambda b: linearize(b, slope=(0.8, 0.8)), "slope: alpha^2 + beta^2 must be below 1"),
+        (lambda b: linearize(b, slope=(np.nan, 0.0)), "slope"),
+        (lambda b: linearize(b, slope=0.1), "slope: must be two numbers"),
+        (lambda b: linearize(b, rates={"knee": 1.0}), "unknown joint"),
+    ],
+)
+def test_what_cannot_be_says_so_in_one_line(body, call, says):
+    with pytest.raises(InputError) as error:
+        call(body)
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)

@@ -1,0 +1,120 @@
+"""Smallest sets of nerves and braces, against trying every set; and what bounded inputs can hold."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from fes_pin.body.attainable import attainable, demands
+from fes_pin.body.controllability import controllability
+from fes_pin.body.inputs import Inputs
+from fes_pin.body.linearize import linearize
+from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto
+from fes_pin.data.errors import InputError
+from fes_pin.stimulate.nerves import Nerves
+
+RIGHT = tuple(f"right_{n}" for n in ("superior_gluteal", "hamstrings", "femoral", "obturator", "iliopsoas", "tibial"))
+PEELED = (*ORTHOSES["corset"], *ORTHOSES["left_ankle_foot_orthosis"], *ORTHOSES["right_ankle_foot_orthosis"])
+PEELED = (*PEELED, "left_mtp_extension", "right_mtp_extension", "left_knee_flexion", "left_hip_rotation")
+
+
+@pytest.fixture(scope="module")
+def braced(body):
+    return linearize(body, "neutral").brace(PEELED)
+
+
+@pytest.mark.parametrize("gravity", [True, False])
+@pytest.mark.parametrize("lean", [0.5, 3.0])
+def test_no_smaller_set_holds_the_leans(braced, gravity, lean):
+    nerves = Inputs.of(Nerves(RIGHT), braced)
+
+    def holds(names):
+        return attainable(braced, nerves.select(names), gravity).least_lean_deg >= lean * (1 - 1e-6)
+
+    found = minimal_sets(braced, nerves, gravity=gravity, lean_deg=lean, alternatives=20)
+    working = [size for size in range(len(RIGHT) + 1) if any(holds(n) for n in itertools.combinations(RIGHT, size))]
+    if not working:
+        assert found == []
+        return
+    expected = {n for n in itertools.combinations(RIGHT, working[0]) if holds(n)}
+    assert {s.inputs for s in found} == expected
+    assert all(s.lean_deg >= lean * (1 - 1e-6) for s in found)
+    assert all(s.lean_band_deg[1] >= s.lean_deg for s in found) or gravity
+
+
+def test_no_smaller_set_pulls_both_ways_in_turn(braced):
+    nerves = Inputs.of(Nerves(RIGHT), braced)
+    wanted = demands(braced, nerves, gravity=False)
+
+    def pulls(names):
+        keep = [RIGHT.index(n) for n in names]
+        up, down = (np.maximum(s * wanted.gains[:, keep], 0.0).sum(axis=1) for s in (1.0, -1.0))
+        return np.all(up >= wanted.load) and np.all(down >= wanted.load)
+
+    found = minimal_sets(braced, nerves, together=False, gravity=False, alternatives=20)
+    size = len(found[0].inputs)
+    assert not any(pulls(n) for n in itertools.combinations(RIGHT, size - 1))
+    assert {s.inputs for s in found} == {n for n in itertools.combinations(RIGHT, size) if pulls(n)}
+    assert all(controllability(braced, nerves.select(s.inputs)).controls_falls for s in found)
+
+
+def test_pulling_inputs_need_one_more_than_falls(braced):
+    falls = len(braced.modes().falling)
+    found = minimal_sets(braced, Nerves(RIGHT), gravity=False)
+    assert len(found[0].inputs) >= falls + 1
+    motors = minimal_sets(braced, Inputs.torques(braced.joint_names, limit_nm=200.0), gravity=False, settle_deg=np.inf)
+    assert len(motors[0].inputs) == falls
+
+
+def test_braces_replace_nerves(body):
+    linear = linearize(body, "neutral").brace(("left_mtp_extension", "right_mtp_extension", *ORTHOSES["corset"]))
+    linear = linear.brace(ORTHOSES["left_ankle_foot_orthosis"])
+    names = ("right_ankle_foot_orthosis", "right_knee_lock")
+    answers = minimal_sets(linear, Nerves((*RIGHT, "left_tibial")), braces=names, max_braces=2, lean_deg=0.5)
+    front = pareto(answers)
+    assert [len(s.inputs) for s in front] == sorted((len(s.inputs) for s in front), reverse=True)
+    assert [len(s.braces) for s in front] == sorted(len(s.braces) for s in front)
+    fewest = min(answers, key=lambda s: len(s.inputs))
+    assert "right_knee_lock" in fewest.braces
+    assert all(s.energy > 0.0 for s in answers)
+    assert "nerves" in str(front[0])
+
+
+def test_a_motor_holds_up_to_its_limit(body):
+    """One inverted pendulum, torque limit tau: it holds a lean of tau / stiffness, less what gravity takes."""
+    ankle = linearize(body, "neutral").brace([n for n in body.joint_names if n != "right_ankle_inversion"])
+    motor = Inputs.torques(["right_ankle_inversion"], limit_nm=100.0)
+    found = attainable(ankle, motor)
+    stiffness, torque = ankle.B[0, 0], -ankle.C[0]
+    leans = np.degrees((100.0 - np.array([1.0, -1.0]) * abs(torque)) / stiffness)
+    assert np.sort(found.lean_deg[0]) == pytest.approx(np.sort(leans), rel=1e-6)
+    assert found.effort["right_ankle_inversion"] == pytest.approx(torque, rel=1e-6)
+    weak = attainable(ankle, Inputs.torques(["right_ankle_inversion"], limit_nm=0.5 * abs(torque)))
+    assert not weak.holds
+    assert weak.least_lean_deg == 0.0
+    assert "cannot be held" in str(weak)
+
+
+def test_swinging_modes_must_stay_near(body):
+    """A swing leg let go of does not hold a posture with its knee bent."""
+    leg = linearize(body, "mid_stance").brace([n for n in body.joint_names if n != "left_knee_flexion"])
+    nothing = Inputs.torques(["left_knee_flexion"], limit_nm=0.0)
+    assert leg.modes()[0].kind == "swing"
+    drop = np.degrees(abs(leg.C[0] / leg.B[0, 0]))
+    assert not attainable(leg, nothing, settle_deg=0.9 * drop).holds
+    assert attainable(leg, nothing, settle_deg=1.1 * drop).holds
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"braces": ["plaster"], "max_braces": 1}, "unknown brace"),
+        ({"braces": {"plaster": ["knee"]}, "max_braces": 1}, "unknown joint"),
+        ({"lean_deg": 0.0}, "lean_deg"),
+        ({"max_braces": -1}, "max_braces"),
+        ({"settle_deg": -1.0}, "settle_deg"),
+    ],
+)
+def test_bad_questions(braced, arguments, says):
+    with pytest.raises(InputError, match=says):
+        minimal_sets(braced, Nerves(RIGHT), **arguments)

@@ -1,0 +1,163 @@
+"""The machine code against CasADi's virtual machine: two ways from the same expressions to numbers."""
+
+import logging
+
+import numpy as np
+import pytest
+from models.cases import CASES, KINDS, RIGS, everything, jitter, name_of, trial, with_effect
+
+from fes_pin.data.errors import InputError
+from fes_pin.models.compile import machine, native, program
+from fes_pin.models.compile.equations import derive
+from fes_pin.models.compile.layout import WIDTH, make_layout
+from fes_pin.models.compile.virtual import VirtualProgram
+from fes_pin.models.model import Model
+from fes_pin.models.simulate import Simulator, max_step, simulate, substeps
+
+TOLERANCE = 1e-10
+
+
+def lanes(model, kind, rng, n):
+    """Arguments of `Program.run`: every lane another trial with other parameter values."""
+    rig = model.rig
+    trials = [trial(rig.name, kind, rng, n) for _ in range(WIDTH)]
+    inputs = rig.input_columns(trials[0])
+    layout = make_layout(model, kind, inputs, (*model.fitted_parameters(), *rig.unknowns(kind)))
+    steps = substeps(trials[0].dt, max_step(model))
+    u = np.stack([np.stack([t[c] for c in inputs], axis=1) for t in trials], axis=2)
+    values = [jitter(rng, model.parameters(), model.parameter_info()) | rig.initial_unknowns(t) for t in trials]
+    delays = np.array([v.get("electromechanical_delay.delay_s", 0.0) for v in values])
+    shift = np.floor(delays / trials[0].dt)
+    timing = {"t0": 0.3, "dt": trials[0].dt, "step": trials[0].dt / steps}
+    constants = [{**rig.trial_constants(t), **timing, "shift": k} for t, k in zip(trials, shift, strict=True)]
+    p = np.array([[v[name] for v in values] for name in layout.values])
+    c = np.array([[k[name] for k in constants] for name in layout.constants])
+    return layout, (u, p, c, np.array([rig.guess(t) for t in trials]), steps)
+
+
+def compare(model, kind, n):
+    model = model.acting(kind)
+    layout, arguments = lanes(model, kind, np.random.default_rng(len(model.effects)), n)
+    equations = derive(model, layout)
+    fast = native.NativeProgram(layout, native.compile_equations(equations)).run(*arguments)
+    slow = VirtualProgram(equations).run(*arguments)
+    for one, other in zip(fast, slow, strict=True):
+        assert np.isfinite(other).all()
+        size = np.maximum(np.abs(other).max(axis=0), 1.0)
+        assert (np.abs(one - other) / size).max() <= TOLERANCE
+    assert np.ptp(slow[0], axis=2).max() > 0.0  # the lanes do differ
+    return fast[1]
+
+
+@pytest.mark.parametrize(("effect", "rig", "kind"), CASES, ids=name_of)
+def test_every_effect_is_the_same_on_both(effect, rig, kind):
+    sensitivities = compare(with_effect(rig, effect), kind, 60)
+    assert sensitivities.shape[1:] == (len(RIGS[rig].outputs(kind)), sensitivities.shape[2], WIDTH)
+
+
+@pytest.mark.parametrize(("rig", "kind"), [(r, k) for r in RIGS for k in KINDS[r]])
+def test_all_effects_at_once_are_the_same_on_both(rig, kind):
+    compare(everything(rig), kind, 40)
+
+
+def test_the_guess_is_not_written_to():
+    layout, (u, p, c, guess, steps) = lanes(Model(RIGS["ankle"]), "motion", np.random.default_rng(0), 10)
+    equations, before = derive(Model(RIGS["ankle"]), layout), guess.copy()
+    native.NativeProgram(layout, native.compile_equations(equations)).run(u, p, c, guess, steps)
+    assert np.array_equal(guess, before)
+
+
+@pytest.fixture
+def fresh(monkeypatch, tmp_path):
+    """No program in memory, and a cache folder of its own."""
+    monkeypatch.setattr(program, "_PROGRAMS", {})
+    monkeypatch.setenv("FES_PIN_CACHE", str(tmp_path / "cache"))
+    program._say_slow.cache_clear()
+    return tmp_path / "cache"
+
+
+def answer():
+    model, one = Model(RIGS["muscle"]), trial("muscle", "isometric", np.random.default_rng(1))
+    return simulate(model, one)["force_n"]
+
+
+def test_the_environment_chooses_the_engine(fresh, monkeypatch):
+    expected = answer()
+    monkeypatch.setenv("FES_PIN_ENGINE", "casadi")
+    assert answer() == pytest.approx(expected, abs=1e-10)
+    assert {type(p).__name__ for p in program._PROGRAMS.values()} == {"NativeProgram", "VirtualProgram"}
+    monkeypatch.setenv("FES_PIN_ENGINE", "abacus")
+    with pytest.raises(InputError, match="expected llvm or casadi, found 'abacus'"):
+        answer()
+
+
+@pytest.mark.parametrize("error", [RuntimeError("no such\nprocessor"), NotImplementedError("CasADi operation 99")])
+def test_where_nothing_compiles_the_virtual_machine_runs_and_says_so_once(fresh, monkeypatch, caplog, error):
+    expected = answer()
+    program._PROGRAMS.clear()
+
+    def broken(*_):
+        raise error
+
+    monkeypatch.setattr(native, "compile_equations", broken)
+    monkeypatch.setenv("FES_PIN_CACHE", str(fresh / "other"))
+    with caplog.at_level(logging.WARNING):
+        assert answer() == pytest.approx(expected, abs=1e-10)
+        program._PROGRAMS.clear()
+        answer()
+    assert len(caplog.messages) == 1
+    assert "virtual machine" in caplog.messages[0]
+    assert "\n" not in caplog.messages[0]
+
+
+def test_programs_are_kept_on_disk(fresh, monkeypatch):
+    expected = answer()
+    assert len(list(fresh.iterdir())) == 1
+    program._PROGRAMS.clear()
+    monkeypatch.setattr(native, "compile_equations", None)  # would raise if called
+    assert np.array_equal(answer(), expected)
+
+
+@pytest.mark.parametrize("damage", ["empty", "cut", "flipped", "text"])
+def test_a_damaged_cache_is_ignored_and_mended(fresh, damage):
+    expected = answer()
+    (entry,) = fresh.iterdir()
+    whole = entry.read_bytes()
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 0x10
+    entry.write_bytes({"empty": b"", "cut": whole[:-100], "flipped": bytes(flipped), "text": b"no"}[damage])
+    program._PROGRAMS.clear()
+    assert np.array_equal(answer(), expected)
+    assert entry.read_bytes() == whole
+
+
+def test_a_cache_that_cannot_be_written_is_no_error(fresh, monkeypatch):
+    expected = answer()
+    program._PROGRAMS.clear()
+    fresh.parent.joinpath("a file").write_text("")
+    monkeypatch.setenv("FES_PIN_CACHE", str(fresh.parent / "a file" / "cache"))
+    assert np.array_equal(answer(), expected)
+
+
+def test_programs_outlive_each_other():
+    """An execution engine that is collected must not take the compiler with it."""
+    one = "define void @f(double* %x) {\n  ret void\n}"
+    for _ in range(3):
+        code = machine.MachineCode(machine.compile_object(one))
+        assert code.function("f") is not None
+        del code
+    assert machine.compile_object(one)
+
+
+@pytest.mark.parametrize(("rig", "kind"), [(r, k) for r in RIGS for k in KINDS[r]])
+def test_a_trial_answers_the_same_alone_and_among_others(rig, kind):
+    """Bitwise: 1 trial or 9, of other lengths too, in whatever lane."""
+    rng = np.random.default_rng(3)
+    model = everything(rig)
+    trials = [trial(rig, kind, rng, n) for n in (40, 25, 60, 33, 40, 51, 27, 60, 38)]
+    columns = model.fitted_parameters()
+    together = Simulator(model, trials, columns).run(model.parameters())
+    for one, packed in zip(trials, together, strict=True):
+        (alone,) = Simulator(model, [one], columns).run(model.parameters())
+        assert np.array_equal(alone.readings, packed.readings)
+        assert np.array_equal(alone.sensitivities, packed.sensitivities)
