@@ -32,9 +32,8 @@ noise = profile_intervals(problem, optimum, ANGLE_NOISE_RAD)
 carried = np.sqrt(np.diag(carried_covariance(problem, optimum, curve)))
 for k, name in enumerate(RATIOS):
     own = np.log(noise.maximum(name) / noise.minimum(name)) / 2 / 1.96
-    print(
-        f"{name} = {optimum.ratios[name]:.2f}: +- {100 * own:.1f} % from the trial's noise, +- {100 * carried[k]:.1f} % from F_ANT"
-    )
+    value = optimum.ratios[name]
+    print(f"{name} = {value:.2f}: +- {100 * own:.1f} % from noise, +- {100 * carried[k]:.1f} % from F_ANT")
 
 # %% The picture
 grid = np.linspace(1.2, 2.3, 200)

@@ -68,7 +68,8 @@ for column, (name, (trial, before, after, e_before, e_after, _)) in zip(axes.T, 
     torque.legend(fontsize=11)
     for axis in column[1:3]:
         axis.axvspan(0.9, t[-1], color="0.93")
-    residual.text(0.92, 0.9, "stimulation over", transform=residual.get_xaxis_transform(), fontsize=11, va="top")
+    stimulus.axvspan(0.9, t[-1], color="0.93")
+    stimulus.text(0.95, 500.0, "stimulation over", fontsize=12)
 figure.savefig(OUT / "ankle_complete.png", dpi=100)
 
 # %% The answer

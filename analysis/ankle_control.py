@@ -38,9 +38,7 @@ def changed(gain, tau, stiffness):
 wave, stair = sine(low, 15.0, 0.5, 20.0), steps(low, (0.0, 5.0, 15.0, 8.0, 0.0), 2.0)
 controller = PositionController(model, LOAD)
 gains = controller.gains
-print(
-    f"tuned: one degree is worth {gains.boldness:g} of the muscle; slowest mode of the worst corner {gains.radius:.3f} a pulse"
-)
+print(f"tuned: one degree is worth {gains.boldness:g} of the muscle; worst corner {gains.radius:.3f} a pulse")
 stepped, waved = (
     track(controller, RunningTwin(twin), stair),
     track(PositionController(model, LOAD), RunningTwin(twin), wave),
@@ -105,7 +103,7 @@ figure, axes = plt.subplots(3, 2, figsize=(13, 10), constrained_layout=True)
 shown = (
     ("steps", stepped, (0, 10)),
     (
-        "sine, gain, tau and stiffness off by " + " ".join(f"{100 * f - 100:+.0f} %" for f in worst),
+        "gain, tau, stiffness off by " + ", ".join(f"{100 * f - 100:+.0f} %" for f in worst),
         corners[worst],
         (0, 8),
     ),
@@ -120,7 +118,8 @@ for row, (title, run, span) in zip(axes, shown, strict=True):
     angle.set_title(f"{title}: RMS {run.rms_error_deg():.2f}°", fontsize=12)
     pulse.step(run.time, run.pulse_width_us, where="post", color="tab:blue")
     pulse.axhspan(0.5, 180.0, color="tab:red", alpha=0.15)
-    pulse.text(span[0], 90.0, " never: below threshold", fontsize=11, va="center")
+    white = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+    pulse.text(span[1], 90.0, "never: below threshold", fontsize=11, va="center", ha="right", bbox=white)
     pulse.axhline(1000.0, color="tab:red", lw=1)
     pulse.set(xlim=span, ylim=(-30, 1050))
     pulse.set_ylabel("pulse width (µs)", fontsize=13)
@@ -130,12 +129,12 @@ axes[0, 0].legend(fontsize=11, loc="upper left")
 figure.savefig(OUT / "ankle_control.png", dpi=100)
 
 figure, (force, angle) = plt.subplots(2, 1, figsize=(9, 7), constrained_layout=True)
-force.plot(endured.time, 100 * endured.share, "k", lw=0.8, label="estimated in closed loop")
+force.plot(endured.time, 100 * endured.share, "k", lw=0.8, zorder=3, label="estimated in closed loop")
 force.plot(plan.time, 100 * plan.capacity, color="tab:orange", lw=3, alpha=0.7, label="budget, before the trial")
 force.plot(plan.time, 100 * plan.needed, color="tab:blue", lw=0.4, label="needed of a fresh muscle")
 force.set_ylabel("share of the fresh force (%)", fontsize=13)
 force.set_title("15° peak to peak: the budget lasts", fontsize=13)
-angle.plot(beyond.time, np.degrees(beyond.angle_rad), "k", lw=1, label="joint (twin)")
+angle.plot(beyond.time, np.degrees(beyond.angle_rad), "k", lw=1, zorder=3, label="joint (twin)")
 angle.plot(beyond.time, np.degrees(beyond.reference_rad), color="tab:orange", lw=2, alpha=0.6, label="wanted")
 angle.axvline(warned[0], color="tab:red", lw=2, label="warning")
 angle.axvline(over[0], color="tab:red", lw=2, ls="--", label="first 1° short")

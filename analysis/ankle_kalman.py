@@ -60,8 +60,9 @@ for axis, value, std, truth, label in (
     axis.axhline(truth, color="k", ls="--", lw=1, label="truth (the paper's value)")
     axis.set_ylabel(label, fontsize=13)
     axis.set_ylim(0.8 * truth, 1.2 * truth)
+    axis.set(xscale="log", xlim=(0.05, 8.0))
     axis.set_xlabel("time (s)", fontsize=12)
-    axis.legend(fontsize=11, loc="upper right")
+    axis.legend(fontsize=11, loc="lower right")
 top.set_title("Figure 3: history of both estimates", fontsize=13)
 bottom.plot(step.time, simulated["force_n"], color="tab:orange", lw=3, label="simulated")
 bottom.plot(step.time, step["force_n"], color="k", lw=0.8, label="measured (twin)")
@@ -75,19 +76,15 @@ figure.savefig(OUT / "ankle_kalman.png", dpi=110)
 gain, tau = history.at(5.0)
 low, high = chi2_band(2, runs)
 low1, high1 = chi2_band(1, len(innovations))
-print(
-    f"after 5 s: K = {gain:.4f} ({100 * (gain / 0.65 - 1):+.2f} %), tau = {1e3 * tau:.2f} ms ({100 * (tau / 0.05 - 1):+.2f} %)"
-)
+print(f"after 5 s: K = {gain:.4f} ({100 * (gain / 0.65 - 1):+.2f} %), ", end="")
+print(f"tau = {1e3 * tau:.2f} ms ({100 * (tau / 0.05 - 1):+.2f} %)")
 print(f"NEES at 5 s {np.mean(squares):.3f}, 95 % band [{low:.3f}, {high:.3f}] ({runs} trials)")
 print(f"NIS {np.mean(innovations):.4f}, 95 % band [{low1:.4f}, {high1:.4f}]")
-print(
-    f"batch fit: K = {batch.values['gain']:.4f} +- {batch.std('gain'):.4f}, tau = {1e3 * batch.values['time_constant_s']:.2f}"
-)
-print(
-    f"Kalman:    K = {history.gain[-1]:.4f} +- {history.gain_std[-1]:.4f}, tau = {1e3 * history.time_constant_s[-1]:.2f}"
-)
-print(
-    f"noise of 1 N: plain regression finds tau = {1e3 * plain.at(8)[1]:.1f} ms, this filter {1e3 * ours.at(8)[1]:.1f} ms"
-)
+for label, k, k_std, t in (
+    ("batch fit", batch.values["gain"], batch.std("gain"), batch.values["time_constant_s"]),
+    ("Kalman", history.gain[-1], history.gain_std[-1], history.time_constant_s[-1]),
+):
+    print(f"{label:10s} K = {k:.4f} +- {k_std:.4f}, tau = {1e3 * t:.2f} ms")
+print(f"noise of 1 N: plain regression finds tau = {1e3 * plain.at(8)[1]:.1f} ms, ours {1e3 * ours.at(8)[1]:.1f} ms")
 error = step.residual(simulated, "force_n")
 print(f"figure 4: residual {np.std(error):.3f} N RMS, noise {FORCE_NOISE_N} N")
