@@ -150,7 +150,8 @@ nrmse = 100 * waved.rms_error_deg() / 15.0
 print(
     f"""
 Beside reports for FES ankles (RMSE about 2.8 degrees, NRMSE about 24 %; cross-validated fits of 73 to 76 %): here RMS
-{waved.rms_error_deg():.2f} degrees, NRMSE {nrmse:.1f} % of the range, on a twin: eq. (1) with 2 mrad of white noise, known load, one muscle
+{waved.rms_error_deg():.2f} degrees, NRMSE {nrmse:.1f} % of the range,
+on a twin: eq. (1) with 2 mrad of white noise, known load, one muscle
 that only pulls one way, and errors of the model that were put in one by one. Those reports are of people: two
 muscles, spasticity, electrodes that move, delays and reflexes that no one put in. The twin says that the law is not
 what limits the accuracy, that it bears 30 % of error and fatigue to 60 %, and how it fails (it warns first). It says
