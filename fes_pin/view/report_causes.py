@@ -85,7 +85,7 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
 
 
 def _estimates(fitted: Fit, cause: Cause) -> Markup:
-    rows = []
+    rows: list[list[Content]] = []
     for name, one in cause.parameters.items():
         shown, interval = value_and_interval(fitted, f"{cause.name}.{name}", one.value)
         rows.append([element("code", name), shown, one.unit or "1", interval])

@@ -79,7 +79,7 @@ def styled() -> Iterator[None]:
     """The settings that every figure is drawn with, whatever the user's own are."""
     with mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams.update(_RC)
+        mpl.rcParams.update(_RC)  # type: ignore[arg-type]
         yield
 
 
@@ -139,7 +139,7 @@ def bare(axes: Axes) -> None:
 
 def legend_above(figure: Figure, handles: list[Any], names: list[str]) -> None:
     """One row of legend along the top of a figure."""
-    place = {"loc": "upper left", "bbox_to_anchor": (0.14, 1.0), "borderaxespad": 0.2}
+    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.14, 1.0), "borderaxespad": 0.2}
     figure.legend(handles, names, ncols=len(names), handlelength=1.6, columnspacing=1.3, **place)
 
 
