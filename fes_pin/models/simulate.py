@@ -100,7 +100,7 @@ class _Block:
         self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...], max_step_s: float
     ) -> None:
         first = trials[lanes[0]]
-        rig, model = model.rig, model.acting(first.kind)
+        rig, model = model.rig, model.acting(first.kind, model.rig.input_columns(first))
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
         self.inputs = rig.input_columns(first)
         available = set(model.parameters()) | set(rig.unknowns(first.kind))

@@ -34,9 +34,10 @@ class NativeProgram:
         """Simulate WIDTH lanes; see `Program`."""
         n, outputs = inputs.shape[0], len(self.layout.outputs)
         out = np.empty((n, self.sizes.reading, WIDTH))
-        arguments = [np.ascontiguousarray(a, dtype=float) for a in (inputs, values, constants)]
-        scratch = np.zeros((self.sizes.scratch, WIDTH))
-        self._run(n, substeps, *[a.ctypes.data for a in (*arguments, np.array(guess, dtype=float), out, scratch)])
+        given = [np.ascontiguousarray(a, dtype=float) for a in (inputs, values, constants)]
+        rest, scratch = np.array(guess, dtype=float), np.zeros((self.sizes.scratch, WIDTH))
+        memory = (*given, rest, out, scratch)  # a name for each: they must live until the machine code returns
+        self._run(n, substeps, *[a.ctypes.data for a in memory])
         return out[:, :outputs], out[:, outputs:].reshape(n, outputs, len(self.layout.columns), WIDTH)
 
 

@@ -45,6 +45,10 @@ class Rig:
         """Names of the signals that effects can change, in the order of the path."""
         raise NotImplementedError
 
+    def changeable(self, kind: str, inputs: tuple[str, ...]) -> tuple[str, ...]:
+        """The signals that trials with these input columns have."""
+        return self.signals(kind)
+
     def states(self, kind: str) -> tuple[str, ...]:
         """Names of the continuous states."""
         raise NotImplementedError
