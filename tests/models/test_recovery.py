@@ -16,8 +16,8 @@ from fes_pin.models.simulate import simulate
 NOISE = {"angle_rad": Noise(2e-3), "position": Noise(2e-3), "force_n": Noise(0.2)}
 SHARE_OF_A_DEVIATION = 0.2
 WRONG = {"gain": 0.8, "time_constant_s": 1.4, "inertia_kgm2": 1.3, "damping_nms": 0.7, "inertia_scale": 0.95}
-SAMPLES = {"ankle": 1000, "joint": 500, "muscle": 1000}
-"""A joint from a start 5 % off is out of step with its data after some swings: no fit starts from there."""
+SAMPLES = {"ankle": 1000, "joint": 500, "muscle": 3000}
+"""A joint from a start 5 % off is out of step with its data after some swings; a muscle tires over 10 s and more."""
 
 
 def typical(one, rig):
