@@ -112,6 +112,7 @@ for label, known in (
     )
     halves = run.rms_error_deg(0.0, 30.0), run.rms_error_deg(30.0)
     print(f"on the frame, {label}: RMS {halves[0]:.2f} degrees in the first 30 s, {halves[1]:.2f} in the next")
+print("so this controller does not hold a joint on a frame this light (J / J_frame = 1.3): it knows no frame")
 
 # %% The picture
 figure, axes = plt.subplots(3, 2, figsize=(13, 10), constrained_layout=True)
@@ -166,7 +167,7 @@ print(
     f"""
 Beside reports for FES ankles (RMSE about 2.8 degrees, NRMSE about 24 %; cross-validated fits of 73 to 76 %): here RMS
 {found}, on a twin: eq. (1) with 2 mrad of white noise,
-known load, one muscle that only pulls one way, and errors of the model that were put in by hand. Those reports are of people: two
+known load, one muscle that only pulls one way, and errors of the model put in by hand. Those reports are of people: two
 muscles, spasticity, electrodes that move, delays and reflexes that no one put in. The twin says that the law is not
 what limits the accuracy, that it bears 30 % of error and fatigue to 60 %, and how it fails (it warns first). It says
 nothing about how it would do on a person, and the numbers must not be put in one table."""
