@@ -5,7 +5,6 @@ from models.cases import RIGS, trial
 from scipy.optimize import least_squares
 
 from fes_pin.identify.noise import Noise
-from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import simulate
 
