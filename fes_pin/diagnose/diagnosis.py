@@ -17,7 +17,7 @@ from fes_pin.diagnose.open_set import Remainder, remainder
 from fes_pin.diagnose.search import PARAMETER_PRICE, Search, Searched
 from fes_pin.diagnose.workers import one_thread_each
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import noise_step, thin, thinning
+from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
 from fes_pin.models.effects import effect
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -175,7 +175,7 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     nominal, best = searched.nominal, searched.best
     verdict = "causes_found" if causes else ("unexplained" if left.unexplained else "adequate")
-    in_sample = errors_of(best.model, best.trials, best.noise)
+    in_sample = errors_of(best.model, best.trials, searched.floor)
     return Diagnosis(
         study=study,
         verdict=verdict,
@@ -184,7 +184,7 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         absorbed=_absorbed(searched),
         nominal=nominal,
         extended=best,
-        nominal_error=(_error(nominal), held.nominal.error_percent() if held else None),
+        nominal_error=(_error(nominal, searched.floor), held.nominal.error_percent() if held else None),
         extended_error=(in_sample.error_percent(), held.extended.error_percent() if held else None),
         ceiling_percent=100.0 * float(in_sample.counts.sum() / max(in_sample.spread.sum(), 1e-300)),
         next_experiment=_experiment(searched, causes, study),
@@ -194,17 +194,17 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
     )
 
 
-def _error(fitted: Fit) -> float:
-    return errors_of(fitted.model, fitted.trials, fitted.noise).error_percent()
+def _error(fitted: Fit, floor: NoiseModel) -> float:
+    return errors_of(fitted.model, fitted.trials, floor).error_percent()
 
 
 def _held_out(searched: Searched, test: Sequence[Trial]) -> HeldOut | None:
     if test:
-        return separate(searched.nominal, searched.best, searched.without, test)
+        return separate(searched.nominal, searched.best, searched.without, test, searched.floor)
     if len(searched.nominal.trials) < 2:
         return None
     contenders = sorted((f for fits in searched.rivals.values() for f in fits), key=lambda f: f.sse)[:CONTENDERS]
-    return cross_validate(searched.nominal, searched.best, searched.without, contenders)
+    return cross_validate(searched.nominal, searched.best, searched.without, contenders, searched.floor)
 
 
 def _causes(
@@ -212,9 +212,9 @@ def _causes(
 ) -> tuple[list[Cause], HeldOut | None]:
     best, nominal = searched.best, searched.nominal
     held = _held_out(searched, test)
-    inside = {n: errors_of(f.model, f.trials, best.noise) for n, f in searched.without.items()}
-    inside_nominal = errors_of(nominal.model, nominal.trials, best.noise)
-    inside_best = errors_of(best.model, best.trials, best.noise)
+    inside = {n: errors_of(f.model, f.trials, searched.floor) for n, f in searched.without.items()}
+    inside_nominal = errors_of(nominal.model, nominal.trials, searched.floor)
+    inside_best = errors_of(best.model, best.trials, searched.floor)
     out = []
     for one in best.model.effects:
         name = one.name

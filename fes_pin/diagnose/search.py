@@ -32,6 +32,9 @@ HOPE_LEVEL = 0.1
 """A round of joint fits is left out only if neither a linear promise nor smooth features reach this level."""
 PROMISING = 25.0
 """Linear promise of a further cause, in twice the log-likelihood, that keeps a set from being complete: 5 sigma."""
+SLOWEST_NOISE = 10.0
+"""Standard deviation of a residual over that of its sample-to-sample part beyond which it counts as misfit. First-order
+autoregressive noise has 3.8 at a coefficient of 0.9, 5.5 at 0.95, 12 at 0.99."""
 REFINE_LEVEL = 1e-3
 """Level at which a refinement of an effect's form is adopted."""
 MOST_CAUSES = 3
@@ -66,6 +69,9 @@ class Searched:
         For each cause, fits in which another took its place.
     without
         For each cause, the fit without it.
+    floor
+        The noise that no model can beat: as fitted, or, where the best set leaves more than noise, the sample-to-sample
+        noise of the measurement.
     """
 
     nominal: Fit
@@ -75,7 +81,7 @@ class Searched:
     without: dict[str, Fit]
     family: Family
     scored: list[Scored]
-    singles: list[Fit]
+    floor: NoiseModel
 
 
 class Search:
@@ -175,7 +181,10 @@ class Search:
     def settle(self, names: Names) -> Searched:
         """Everything that is to be said of a set of causes: its rivals, and each cause's part in it."""
         searched = self._finish(names, self.family)
-        return searched if self._complete(names) or not names else self._for_prediction(searched)
+        if self._complete(names):
+            return searched
+        floor = rough_noise(self.model, self.trials)
+        return replace(self._for_prediction(searched) if names else searched, floor=floor)
 
     def _for_prediction(self, searched: Searched) -> Searched:
         """Fit for least open-loop error: what the best set leaves is more than noise, and not to be whitened."""
@@ -196,6 +205,8 @@ class Search:
         The promise is judged by the present noise; noise learned from the set itself can swallow a slow cause.
         """
         fitted, none = self.fits[names], self.fits[()]
+        if slow_misfit(fitted):
+            return False
         promise = max(s.gain for s in self.scores(fitted).scored)
         if promise > max(PROMISING, FORM_SHARE * (none.sse - fitted.sse)):
             return False
@@ -379,9 +390,7 @@ class Search:
             rivals[name] = sorted((self.fits[k] for k in keys), key=lambda f: f.sse)
             p_values[name] = self.p_value(best, without[name], family)
         scored = self.scores(self.fits[()]).scored
-        return Searched(
-            self.fits[()], best, p_values, rivals, without, family, scored, [self.fits[k] for k in self.ranked(1)]
-        )
+        return Searched(self.fits[()], best, p_values, rivals, without, family, scored, best.noise)
 
     def _siblings(self, names: Names, name: str) -> list[Names]:
         """Sets fitted already that differ from `names` in `name` alone."""
@@ -389,6 +398,12 @@ class Search:
         return [
             k for k in self.fits if len(k) == len(names) and rest < set(k) | {""} and rest <= set(k) and name not in k
         ]
+
+
+def slow_misfit(fitted: Fit) -> bool:
+    """True if a residual is so much slower than the sample-to-sample noise that it cannot be told from misfit."""
+    rough, own = rough_noise(Model(fitted.model.rig), fitted.trials), noise_of(fitted)
+    return any(own[n].std > SLOWEST_NOISE * rough[n].std for n in own)
 
 
 def _names(fitted: Fit) -> Names:

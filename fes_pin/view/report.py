@@ -1,10 +1,159 @@
-"""The report of a diagnosis."""
+"""The report of a diagnosis: one page that holds everything it shows."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from fes_pin.data.files import write_text
+from fes_pin.diagnose.diagnosis import Diagnosis
+from fes_pin.diagnose.record import NEXT_FILE
+from fes_pin.diagnose.replay import replay
+from fes_pin.diagnose.text import headline
+from fes_pin.models.describe import sentence
+from fes_pin.models.effects import effect
+from fes_pin.view.page import Content, Markup, element, figure, joined, page, percent, probability, section, table
+from fes_pin.view.plots import stimulus_figure
+from fes_pin.view.report_causes import causes_section, stage_mark, value_and_interval
+from fes_pin.view.report_trials import missing_section, position_unit, trials_section
+from fes_pin.view.style import unit_of
+from fes_pin.view.svg import inline_svg
 
 
-def report_html(d):
-    """Stub."""
-    return "<html></html>"
+def report(diagnosis: Diagnosis, path: str | Path) -> None:
+    """Write the report of a diagnosis, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    write_text(path, report_html(diagnosis))
 
 
-def _(d):
-    return "<html></html>"
+def report_html(diagnosis: Diagnosis) -> str:
+    """The report of a diagnosis as one HTML page that needs nothing else: no network, no script."""
+    replays = replay(diagnosis)
+    parts = [
+        _head(diagnosis),
+        section("Causes", *causes_section(diagnosis)),
+        section("What is left", *_left(diagnosis)),
+        section("Next experiment", *_next(diagnosis)),
+        section("Missing torque and force", *missing_section(diagnosis, replays)),
+        section("Trials", *trials_section(diagnosis, replays)),
+        section("Parameters and noise", *_parameters(diagnosis)),
+        section("The model, to be used", *_use(diagnosis)),
+        element("footer", "Made by fes-pin. Residual = measured - simulated. Intervals are 95 %. SI units."),
+    ]
+    return page(f"{diagnosis.study.name} - diagnosis", joined([p for p in parts if p.text]))
+
+
+def _head(diagnosis: Diagnosis) -> Markup:
+    study = diagnosis.study
+    kinds = " and ".join(f"{n} {kind}" for kind, n in Counter(t.kind for t in study.trials).items())
+    seconds = sum(t.duration for t in study.trials)
+    words = headline(diagnosis)
+    partly = " partly" if diagnosis.causes and diagnosis.remainder.unexplained else ""
+    return element(
+        "header",
+        element("p", f"{study.name} · rig {study.rig} · {kinds} trials, {seconds:.4g} s", class_="eyebrow"),
+        element("h1", words[0].upper() + words[1:], class_=f"verdict {diagnosis.verdict}{partly}"),
+        _facts(diagnosis),
+    )
+
+
+def _facts(diagnosis: Diagnosis) -> Markup:
+    before, after = diagnosis.nominal_error, diagnosis.extended_error
+    left = diagnosis.remainder
+    rows: list[tuple[str, str, str]] = []
+    for k, where in enumerate(("on the fitted trials", "held out")):
+        if before[k] is not None and after[k] is not None:
+            shown = f"{percent(before[k])} → {percent(after[k])}" if diagnosis.causes else percent(before[k])
+            by = diagnosis.held_out_by if k else "nominal → extended" if diagnosis.causes else "nominal"
+            rows.append((f"error E, {where}", shown, by))
+    rows.append(("noise floor of E", percent(diagnosis.ceiling_percent), "no model can be better"))
+    state = "something" if left.unexplained else "nothing"
+    rows.append(("left unexplained", state, probability(left.p_value)))
+    cells = [element("div", element("dt", t), element("dd", v, element("small", note))) for t, v, note in rows]
+    return element("dl", joined(cells), class_="facts")
+
+
+def _left(diagnosis: Diagnosis) -> list[Markup]:
+    left = diagnosis.remainder
+    where = f" It depends most on {left.where}." if left.where else ""
+    told = (
+        f"Something is left that the {'extended' if diagnosis.causes else 'nominal'} model does not explain "
+        f"({probability(left.p_value)}).{where}"
+        if left.unexplained
+        else f"Nothing that smooth functions of the motion could still explain ({probability(left.p_value)})."
+    )
+    out = [element("p", told)]
+    if diagnosis.absorbed:
+        out.append(element("p", "Not testable here, which is not the same as absent: the nominal parameters take up"))
+        rows: list[list[Content]] = [
+            [element("code", n), stage_mark(str(effect(n).stage)), sentence(effect(n))] for n in diagnosis.absorbed
+        ]
+        out.append(table(("cause", "stage", "what it is"), rows))
+    else:
+        out.append(element("p", "Every other cause in the library could have been seen by these data.", class_="soft"))
+    return out
+
+
+def _next(diagnosis: Diagnosis) -> list[Markup]:
+    plan = diagnosis.next_experiment
+    if plan is None:
+        text = "None is needed to tell causes apart." if diagnosis.causes else "There are no causes to tell apart."
+        return [element("p", text, class_="soft")]
+    out = [element("p", f"To separate {' and '.join(plan.separates)}: {plan.why}.")]
+    if plan.trial is None:
+        return out
+    conditions = "".join(f", {n} = {v:g}" for n, v in plan.trial.conditions.items())
+    out.append(
+        element("p", f"A {plan.trial.kind} trial{conditions}; its inputs are in ", element("code", NEXT_FILE), ".")
+    )
+    if plan.trial.columns:
+        drawn = inline_svg(stimulus_figure(plan.trial, position_unit(diagnosis)), "Inputs of the next trial")
+        out.append(figure(drawn, class_="narrow"))
+    return out
+
+
+def _parameters(diagnosis: Diagnosis) -> list[Markup]:
+    nominal, extended = diagnosis.nominal, diagnosis.extended
+    info = extended.model.parameter_info()
+    rows: list[list[Content]] = []
+    for name in extended.free:
+        before = value_and_interval(nominal, name, nominal.values[name]) if name in nominal.free else ("-", "-")
+        after = value_and_interval(extended, name, extended.values[name]) if diagnosis.causes else ("-", "-")
+        start = f"{diagnosis.study.start[name]:.4g}" if name in diagnosis.study.start else "-"
+        rows.append([element("code", name), info[name].unit or "1", start, *before, *after])
+    head = ("parameter", "unit", "start", "nominal", "95 % interval", "extended", "95 % interval")
+    unit = position_unit(diagnosis)
+    noise: list[list[Content]] = [
+        [element("code", n), f"{m.std:.3g}", unit_of(n, unit), str(len(m.ar)) if m.ar else "white"]
+        for n, m in extended.noise.items()
+    ]
+    return [
+        table(head, rows, (2, 3, 4, 5, 6)),
+        table(("noise of", "standard deviation", "unit", "autoregressive order"), noise, (1,)),
+    ]
+
+
+def _use(diagnosis: Diagnosis) -> list[Markup]:
+    settings = {
+        "ankle": " --set load_kg=1.5",
+        "muscle": "",
+        "joint": " --set position0=0.5 --set velocity0=0",
+    }.get(diagnosis.study.rig, "")
+    lines = [f"fes-pin predict model.toml TRIAL.csv{settings} --out PREDICTED.csv"]
+    if diagnosis.study.rig == "ankle":
+        lines.append(
+            "fes-pin predict model.toml TRIAL.csv --set kind=isometric --set angle_rad=1.9 --out PREDICTED.csv"
+        )
+    python = 'import fes_pin as fp\n\nmodel = fp.load_model("model.toml")\npredicted = fp.predict(model, trial)'
+    inputs = ", ".join(diagnosis.model.rig.input_columns(diagnosis.study.trials[0])) or "nothing else"
+    return [
+        element("p", "The ", element("code", "model.toml"), " beside this page is the extended model, whole. "
+                f"TRIAL.csv needs the columns time_s and {inputs}."),
+        element("pre", "\n".join(lines)),
+        element("pre", python),
+    ]  # fmt: skip

@@ -22,8 +22,8 @@ def whiteness(residuals, lags=20):
     """p-value of Ljung and Box for several recordings."""
     total = 0.0
     for r in residuals:
-        n, r = len(r), r - r.mean()
-        rho = np.array([r[k:] @ r[:-k] for k in range(1, lags + 1)]) / (r @ r)
+        n, centred = len(r), r - r.mean()
+        rho = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / (centred @ centred)
         total += n * (n + 2) * float(np.sum(rho**2 / (n - np.arange(1, lags + 1))))
     return scipy.stats.chi2.sf(total, lags * len(residuals))
 
