@@ -296,7 +296,10 @@ class TwoFibreLags(SecondLag):
 
     def rates(self, s):
         size = np.maximum(self.size, 1e-3)
-        return {"short": (s.act - self.own(s, "short")) / (0.6 * size), "long": (s.act - self.own(s, "long")) / (1.4 * size)}
+        return {
+            "short": (s.act - self.own(s, "short")) / (0.6 * size),
+            "long": (s.act - self.own(s, "long")) / (1.4 * size),
+        }
 
     def activation(self, act, s):
         return 0.5 * (self.own(s, "short") + self.own(s, "long"))
@@ -388,4 +391,3 @@ FORMS: tuple[type[Form], ...] = (
     *(Potentiation, SaturatingPotentiation, Delay, DispersedDelay, SecondLag, TwoFibreLags, Asymmetry),
     *(SmoothAsymmetry, ForceLength, Parabola, ForceVelocity, HillForceVelocity),
 )
-

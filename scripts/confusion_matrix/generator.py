@@ -90,7 +90,10 @@ def make(items: Sequence[Item], folder: Path) -> list[Made]:
     quiet = [_size(drafts, k, form) for k, form in enumerate(forms)]
     finest = max([10, *(form.fine for form in forms)])
     run = _run(drafts, [one.sizes for one in drafts], forms, finest, fresh=True)
-    return [_made(one, forms, readings, quiet[0][i] if quiet else None) for i, (one, readings) in enumerate(zip(drafts, run, strict=True))]
+    return [
+        _made(one, forms, readings, quiet[0][i] if quiet else None)
+        for i, (one, readings) in enumerate(zip(drafts, run, strict=True))
+    ]
 
 
 def draft(item: Item, folder: Path) -> Draft:
@@ -176,7 +179,9 @@ def nominal_fit(study: Study, true: Mapping[str, float], model: Model | None = N
 
 def study_of(one: Draft, readings: Sequence[np.ndarray]) -> Study:
     """The study with these readings."""
-    trials = [_trial(one.plant.rig, f"{k:02d}", p, y) for k, (p, y) in enumerate(zip(one.trials, readings, strict=True))]
+    trials = [
+        _trial(one.plant.rig, f"{k:02d}", p, y) for k, (p, y) in enumerate(zip(one.trials, readings, strict=True))
+    ]
     if one.plant.rig == "joint":
         files = {"urdf": one.urdf}
         return Study(one.item.name, "joint", {}, dict(one.plant.start), tuple(trials), files=files)
@@ -247,7 +252,10 @@ TORQUE_SHARE = 0.6
 def _made(one: Draft, forms: Sequence[type[Form]], readings: list[np.ndarray], quiet: list[np.ndarray] | None) -> Made:
     count = len(one.trials)
     noisy = _with_noise(one, readings[:count])
-    fresh = [_trial(one.plant.rig, f"fresh{k}", p, y) for k, (p, y) in enumerate(zip(one.fresh, readings[count:], strict=True))]
+    fresh = [
+        _trial(one.plant.rig, f"fresh{k}", p, y)
+        for k, (p, y) in enumerate(zip(one.fresh, readings[count:], strict=True))
+    ]
     orthogonal = _orthogonal(one, quiet) if one.item.kind == "outside" and quiet else None
     truth = _truth(one, forms)
     return Made(one.item, study_of(one, noisy), tuple(fresh), tuple(one.sizes), tuple(one.distances), truth, orthogonal)

@@ -145,6 +145,6 @@ def draw_trials(rng: np.random.Generator, plant: Plant, motion: int, isometric: 
 
 
 def _joint_trial(rng: np.random.Generator, plant: Plant, shape: str, driven: bool) -> Protocol:
-    start = {"position0": float(rng.choice((-1.0, 1.0)) * rng.uniform(0.4, 1.2)), "velocity0": 0.0}
+    start = {"position0": float(rng.choice((-1.0, 1.0)) * rng.uniform(0.4, 1.0)), "velocity0": 0.0}
     weight = plant.known["mass"] * GRAVITY * plant.known["length"]
-    return Protocol("motion", effort(rng, shape, 0.7 * weight) if driven else None, start)
+    return Protocol("motion", effort(rng, shape, 0.35 * weight) if driven else None, start)
