@@ -19,7 +19,7 @@ from fes_pin.body.build import Body
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.linearize import linearize
-from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets
+from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto
 from fes_pin.stimulate.nerves import Nerves
 
 body = Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
@@ -81,6 +81,17 @@ for posture, angles in POSTURES.items():
             lean = f"lean {lean_text(best.lean_deg)} deg [{low}, {high}]"
             print(line + f"{len(best.inputs)} nerves, {lean}, energy {best.energy:.1e} s")
             print(f"  {'':30s} {', '.join(best.inputs)}")
+
+# %% Which brace saves most nerves? Every pair of orthoses, heel on the ground and trunk held, standing on one leg
+base = linearize(body, POSTURES["standing on one leg"]).brace([*STEPS["heel on the ground"], *STEPS["+ trunk held"]])
+free = [name for name, joints in ORTHOSES.items() if set(joints) <= set(base.joint_names)]
+pairs = minimal_sets(base, legs, braces=free, max_braces=2)
+print("\nFewest nerves for every number of further braces (of all single ones and pairs):")
+for best in pareto(pairs):
+    print(f"  {best}")
+print("\nBy single brace:")
+for best in (s for s in pairs if len(s.braces) == 1):
+    print(f"  {best.braces[0]:28s} {len(best.inputs):2d} nerves, energy {best.energy:.1e} s")
 
 # %% The answer, and a picture
 first = {p: next((s for s in STEPS if table[p, s]), None) for p in POSTURES}

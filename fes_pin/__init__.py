@@ -26,6 +26,12 @@ _WHERE = {
     "diagnose": "fes_pin.diagnose.diagnosis",
     "Diagnosis": "fes_pin.diagnose.diagnosis",
     "report": "fes_pin.view.report",
+    "Body": "fes_pin.body.build",
+    "linearize": "fes_pin.body.linearize",
+    "minimal_sets": "fes_pin.body.minimal_sets",
+    "controllability": "fes_pin.stimulate.nerve_inputs",
+    "allocate": "fes_pin.stimulate.allocate",
+    "Nerves": "fes_pin.stimulate.nerves",
 }
 _CHAPTERS = {"effects": "fes_pin.models.effects", "rigs": "fes_pin.models.rigs"}
 

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fes_pin.cli_allocate import allocate
+from fes_pin.cli_body import app as body
+
 if TYPE_CHECKING:
     from fes_pin.diagnose.diagnosis import Diagnosis
 
@@ -19,6 +22,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(body, name="body")
+app.command()(allocate)
 
 
 @app.command()
@@ -125,16 +130,6 @@ def _progress() -> Iterator[Callable[[float, str], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=1.0)
         yield lambda share, words: bar.update(task, completed=share, description=words)
-
-
-def _subcommands() -> None:
-    """Add the commands of the other chapters, where they are there."""
-    from importlib import import_module  # noqa: PLC0415
-    from importlib.util import find_spec  # noqa: PLC0415
-
-    for module, name in (("fes_pin.cli_body", "body"), ("fes_pin.cli_allocate", "allocate")):
-        if find_spec(module) is not None:
-            app.add_typer(import_module(module).app, name=name)
 
 
 def main() -> None:

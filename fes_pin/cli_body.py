@@ -99,13 +99,14 @@ def nerves(  # noqa: PLR0917
     influence: Annotated[str | None, typer.Option(help="table of influence on `joints` or `modes`")] = None,
     map_to: Annotated[Path | None, typer.Option("--map", help="heat map of influence: image file")] = None,
     fewest: Annotated[bool, typer.Option("--fewest", help="search the fewest nerves (with the braces given)")] = False,
+    max_braces: Annotated[int, typer.Option(help="with --fewest: try so many further orthoses (minutes)")] = 0,
     lean: Annotated[float, typer.Option(help="lean that the fewest nerves must hold, degrees")] = 1.0,
 ) -> None:
     """Which nerves control which modes, what they can hold, and the fewest that do."""
     from fes_pin.body.attainable import attainable  # noqa: PLC0415
     from fes_pin.body.controllability import controllability  # noqa: PLC0415
     from fes_pin.body.inputs import Inputs  # noqa: PLC0415
-    from fes_pin.body.minimal_sets import minimal_sets  # noqa: PLC0415
+    from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto  # noqa: PLC0415
     from fes_pin.stimulate.nerve_inputs import subject_nerves  # noqa: PLC0415
     from fes_pin.view.influence import influence_table, plot_influence  # noqa: PLC0415
 
@@ -126,7 +127,10 @@ def nerves(  # noqa: PLR0917
         plot_influence(result, map_to)
         typer.echo(f"wrote {map_to}")
     if fewest:
-        found = minimal_sets(linear, chosen, lean_deg=lean, alternatives=3)
+        free = [name for name, joints in ORTHOSES.items() if set(joints) <= set(linear.joint_names)]
+        some = {"braces": free, "max_braces": max_braces} if max_braces else {"alternatives": 3}
+        found = minimal_sets(linear, chosen, lean_deg=lean, **some)
+        found = pareto(found) if max_braces else found
         typer.echo(f"\nFewest nerves that hold the posture and a lean of {lean:g} degrees in every fall:")
         typer.echo(
             "\n".join(map(str, found)) or "none of these nerves' sets does; brace more joints (--brace corset ...)"

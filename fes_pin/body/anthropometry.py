@@ -9,8 +9,8 @@ figures were compared with public transcriptions: a MATLAB look-up table by R. G
 (female head 6.69 %, male shank 4.32 %, decimal points); the knee-to-ankle shank of women and the shoulder height rest
 on one. The article itself was not at hand.
 Heights and breadths that de Leva does not give: D. A. Winter, "Biomechanics and Motor Control of Human Movement",
-figure 4.1 (after Drillis and Contini 1966): ankle 0.039 H (compared with public code that cites it), half biacromial
-breadth 0.129 H and foot breadth 0.055 H (from memory; the latter also in such code).
+figure 4.1 (after Drillis and Contini 1966): ankle 0.039 H, half shoulder breadth 0.129 H, foot breadth 0.055 H (each
+compared with public code that cites it; the book was not at hand).
 Hip joint centres 0.095 H apart, MTP centre 0.011 H above the ground, ankle at 0.26 and MTP at 0.72 of the foot's
 length from the heel, forefoot 0.138 of the foot's mass: rounded from the measured and scaled adult of
 `walking_subject01` (hips 0.171 m at 1.80 m; heel markers against joint centres: 0.25-0.27 and 0.70-0.74; toes 0.209 kg

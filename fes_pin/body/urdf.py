@@ -182,11 +182,13 @@ def _trunk_shapes(skeleton: Skeleton, leg: float) -> list[tuple]:
     neck = p.get("neck", lumbar + 0.72 * (vertex - lumbar))
     chest = lumbar + 0.62 * (neck - lumbar)
     across = np.array([0.0, 0.17 * leg, 0.0])
+    radius = max(0.42 * float(np.linalg.norm(vertex - neck)), 0.2 * leg)
+    head = vertex - np.array([0.0, 0.0, radius])
     shapes = [
         *_bone(lumbar, chest, 0.25 * leg, _SHIRT),
         *_bone(chest - across, chest + across, 0.24 * leg, _SHIRT),
-        *_bone(chest, neck, 0.11 * leg, _SKIN),
-        ("sphere", (0.27 * leg,), vertex - [0.0, 0.0, 0.27 * leg], (0.0, 0.0, 0.0), _SKIN),
+        *_bone(chest, head, 0.11 * leg, _SKIN),
+        ("sphere", (radius,), head, (0.0, 0.0, 0.0), _SKIN),
     ]
     for side in SIDES:
         if f"{side}_shoulder" in p:

@@ -17,6 +17,7 @@ from fes_pin.diagnose.open_set import Remainder, remainder
 from fes_pin.diagnose.search import PARAMETER_PRICE, Search, Searched
 from fes_pin.diagnose.workers import one_thread_each
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
 from fes_pin.models.effects import effect
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -132,34 +133,49 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
     tell = progress or (lambda _share, _words: None)
     train, test = split(study)
     with one_thread_each():
-        searched = Search(nominal_model(study), train, seed, tell).run()
+        search = Search(nominal_model(study), train, seed, tell)
+        searched = search.run()
         tell(0.88, "held-out gain")
-        diagnosis = _judge(study, searched, test, seed)
+        diagnosis = _judge(study, search, searched, test, seed)
     tell(1.0, "done")
     return replace(diagnosis, wall_s=time.perf_counter() - began)
 
 
 def split(study: Study) -> tuple[list[Trial], list[Trial]]:
-    """Trials to fit and trials that the study holds out."""
+    """Trials to fit and trials that the study holds out.
+
+    Free motion is fitted at the rate that its noise is modelled at: without an input there is nothing faster to follow.
+    """
     test = [t for t in study.trials if t.role == "held_out"]
-    train = [t for t in study.trials if t.role != "held_out"]
+    train = [
+        t if {"pulse_width_us", "stim", "effort"} & set(t.columns) else thinned(t)
+        for t in study.trials
+        if t.role != "held_out"
+    ]
     if not train:
         raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)
     return train, test
 
 
-def _judge(study: Study, searched: Searched, test: Sequence[Trial], seed: int) -> Diagnosis:
+def thinned(trial: Trial) -> Trial:
+    """Means of samples in a row, at the time step that noise is modelled at."""
+    count = thinning(trial.dt, noise_step([trial.dt]))
+    columns = {n: thin(values, count) for n, values in trial.columns.items()}
+    return Trial(trial.name, trial.kind, columns, thin(trial.time, count), trial.conditions, trial.role)
+
+
+def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Trial], seed: int) -> Diagnosis:
     left = remainder(searched.best, seed)
     causes, held = _causes(searched, left, test, seed)
-    weak = [c.name for c in causes if c.gain_held_out.low <= 0.0]
-    if weak:
-        searched = _without(searched, weak)
+    while weak := [c for c in causes if c.gain_held_out.low <= 0.0]:
+        weakest = min(weak, key=lambda c: c.gain_held_out.low)
+        searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
         left = remainder(searched.best, seed)
         causes, held = _causes(searched, left, test, seed)
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     nominal, best = searched.nominal, searched.best
     verdict = "causes_found" if causes else ("unexplained" if left.unexplained else "adequate")
-    in_sample = errors_of(best.model, best.trials, best.noise)
+    in_sample = errors_of(best.model, best.trials, searched.floor)
     return Diagnosis(
         study=study,
         verdict=verdict,
@@ -168,7 +184,7 @@ def _judge(study: Study, searched: Searched, test: Sequence[Trial], seed: int) -
         absorbed=_absorbed(searched),
         nominal=nominal,
         extended=best,
-        nominal_error=(_error(nominal), held.nominal.error_percent() if held else None),
+        nominal_error=(_error(nominal, searched.floor), held.nominal.error_percent() if held else None),
         extended_error=(in_sample.error_percent(), held.extended.error_percent() if held else None),
         ceiling_percent=100.0 * float(in_sample.counts.sum() / max(in_sample.spread.sum(), 1e-300)),
         next_experiment=_experiment(searched, causes, study),
@@ -178,17 +194,17 @@ def _judge(study: Study, searched: Searched, test: Sequence[Trial], seed: int) -
     )
 
 
-def _error(fitted: Fit) -> float:
-    return errors_of(fitted.model, fitted.trials, fitted.noise).error_percent()
+def _error(fitted: Fit, floor: NoiseModel) -> float:
+    return errors_of(fitted.model, fitted.trials, floor).error_percent()
 
 
 def _held_out(searched: Searched, test: Sequence[Trial]) -> HeldOut | None:
     if test:
-        return separate(searched.nominal, searched.best, searched.without, test)
+        return separate(searched.nominal, searched.best, searched.without, test, searched.floor)
     if len(searched.nominal.trials) < 2:
         return None
     contenders = sorted((f for fits in searched.rivals.values() for f in fits), key=lambda f: f.sse)[:CONTENDERS]
-    return cross_validate(searched.nominal, searched.best, searched.without, contenders)
+    return cross_validate(searched.nominal, searched.best, searched.without, contenders, searched.floor)
 
 
 def _causes(
@@ -196,9 +212,9 @@ def _causes(
 ) -> tuple[list[Cause], HeldOut | None]:
     best, nominal = searched.best, searched.nominal
     held = _held_out(searched, test)
-    inside = {n: errors_of(f.model, f.trials, best.noise) for n, f in searched.without.items()}
-    inside_nominal = errors_of(nominal.model, nominal.trials, best.noise)
-    inside_best = errors_of(best.model, best.trials, best.noise)
+    inside = {n: errors_of(f.model, f.trials, searched.floor) for n, f in searched.without.items()}
+    inside_nominal = errors_of(nominal.model, nominal.trials, searched.floor)
+    inside_best = errors_of(best.model, best.trials, searched.floor)
     out = []
     for one in best.model.effects:
         name = one.name
@@ -245,21 +261,6 @@ def _equivalents(searched: Searched, name: str, left: Remainder) -> tuple[str, .
         if rival.sse + price - best.sse < margin:
             out.append(instead)
     return tuple(sorted(set(out)))
-
-
-def _without(searched: Searched, names: Sequence[str]) -> Searched:
-    """The search's result with some causes withdrawn: none is left, or the best set that lacks them."""
-    kept = [e.name for e in searched.best.model.effects if e.name not in names]
-    if len(kept) == 1 and len(names) == 1:
-        best = searched.without[names[0]]
-        return replace(
-            searched,
-            best=best,
-            without={kept[0]: searched.nominal},
-            rivals={kept[0]: [f for f in searched.singles if f.model.effects[0].name != kept[0]]},
-            p_values={kept[0]: searched.p_values[kept[0]]},
-        )
-    return replace(searched, best=searched.nominal, without={}, rivals={}, p_values={})
 
 
 def _absorbed(searched: Searched) -> tuple[str, ...]:

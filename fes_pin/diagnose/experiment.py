@@ -105,6 +105,12 @@ def _stimuli(study: Study, time: np.ndarray) -> Iterator[tuple[str | None, np.nd
         high = float(study.constants.get("saturation_us", 1000.0))
         for shape in _shapes(time):
             yield "pulse_width_us", np.where(shape > 0, low + (high - low) * shape, 0.0)
+    elif "stim" in study.trials[0].columns:
+        for rate_hz in (8.0, 15.0, 31.0, 45.0):
+            pulse = np.diff(np.floor(time * rate_hz), prepend=-1.0) > 0
+            for on_s, pause_s in ((7.0, 1.0), (1.0, 1.0), (0.3, 0.7)):
+                on = (time % (on_s + pause_s) < on_s) & (time < SECONDS - 0.8)
+                yield "stim", np.where(pulse & on, 1.0, 0.0)
     elif "effort" in study.trials[0].columns:
         size = max(float(np.abs(t["effort"]).max()) for t in study.trials)
         for shape in _shapes(time):

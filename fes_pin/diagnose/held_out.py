@@ -107,7 +107,9 @@ class HeldOut:
     without: dict[str, Errors]
 
 
-def cross_validate(nominal: Fit, best: Fit, without: dict[str, Fit], contenders: Sequence[Fit]) -> HeldOut:
+def cross_validate(
+    nominal: Fit, best: Fit, without: dict[str, Fit], contenders: Sequence[Fit], floor: NoiseModel
+) -> HeldOut:
     """Leave trials out in turn, choose among the contenders again on the others, fit, and predict.
 
     Parameters
@@ -116,7 +118,7 @@ def cross_validate(nominal: Fit, best: Fit, without: dict[str, Fit], contenders:
         Fits of all sets of causes that came near on the whole; each fold chooses anew among them and `best`.
     """
     folds = [f for f in folds_of(nominal.trials) if len(f) < len(nominal.trials)]
-    results = in_parallel(lambda f: _fold(f, nominal, best, without, contenders), folds)
+    results = in_parallel(lambda f: _fold(f, nominal, best, without, contenders, floor), folds)
     keys = list(without)
     return HeldOut(
         _joined([r[0] for r in results]),
@@ -126,7 +128,7 @@ def cross_validate(nominal: Fit, best: Fit, without: dict[str, Fit], contenders:
 
 
 def _fold(
-    held: list[int], nominal: Fit, best: Fit, without: dict[str, Fit], contenders: Sequence[Fit]
+    held: list[int], nominal: Fit, best: Fit, without: dict[str, Fit], contenders: Sequence[Fit], floor: NoiseModel
 ) -> tuple[Errors, Errors, dict[str, Errors]]:
     train = [i for i in range(len(nominal.trials)) if i not in held]
     test = [nominal.trials[i] for i in held]
@@ -136,16 +138,16 @@ def _fold(
         return fit_problem(problem, fit.values, [fit.unknowns[i] for i in train])
 
     chosen = min((fitted(c) for c in (best, *contenders)), key=lambda f: f.sse + 3.84 * len(f.free))
-    rest = {n: errors_of(fitted(f).model, test, best.noise) for n, f in without.items()}
-    return errors_of(fitted(nominal).model, test, best.noise), errors_of(chosen.model, test, best.noise), rest
+    rest = {n: errors_of(fitted(f).model, test, floor) for n, f in without.items()}
+    return errors_of(fitted(nominal).model, test, floor), errors_of(chosen.model, test, floor), rest
 
 
-def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Trial]) -> HeldOut:
+def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Trial], floor: NoiseModel) -> HeldOut:
     """Errors on trials that the study itself holds out."""
     return HeldOut(
-        errors_of(nominal.model, test, best.noise),
-        errors_of(best.model, test, best.noise),
-        {n: errors_of(f.model, test, best.noise) for n, f in without.items()},
+        errors_of(nominal.model, test, floor),
+        errors_of(best.model, test, floor),
+        {n: errors_of(f.model, test, floor) for n, f in without.items()},
     )
 
 
@@ -156,14 +158,15 @@ def _joined(errors: Sequence[Errors]) -> Errors:
 def predictive_error(fitted: Fit) -> float:
     """Logarithm of the mean squared error on trials left out in turn, averaged over trials.
 
-    Each trial's own unknowns are estimated from it; the logarithm keeps one large motion from deciding alone.
+    Fits are for least open-loop error, and each trial's own unknowns are estimated from it; the logarithm keeps one
+    large motion from deciding alone.
     """
+    white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in fitted.noise.items()}
     logarithms = []
     for held in folds_of(fitted.trials):
         train = [i for i in range(len(fitted.trials)) if i not in held]
-        problem = Problem(fitted.model, [fitted.trials[i] for i in train], fitted.noise)
+        problem = Problem(fitted.model, [fitted.trials[i] for i in train], white)
         again = fit_problem(problem, fitted.values, [fitted.unknowns[i] for i in train])
-        white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in fitted.noise.items()}
         for i in held:
             alone = Problem(again.model, [fitted.trials[i]], white, ())
             own = fit_problem(alone, again.values, [fitted.unknowns[i]])

@@ -72,7 +72,8 @@ class Library:
         return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
 
     def _acts(self, effect: type[Effect], nominal: Model) -> bool:
-        return any(effect.signal in nominal.rig.signals(t.kind) for t in self.trials)
+        rig = nominal.rig
+        return any(effect.signal in rig.changeable(t.kind, rig.input_columns(t)) for t in self.trials)
 
     def _probe(self, effect: type[Effect], nominal: Model, fitted: Fit, noise: NoiseModel) -> list[Probe]:
         free = tuple(f"{effect.name}.{n}" for n in effect.amplitudes())

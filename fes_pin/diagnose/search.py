@@ -30,6 +30,11 @@ FORM_SHARE = 0.02
 an error of 14 % in its form leaves 2 % of its likelihood to whatever else comes near."""
 HOPE_LEVEL = 0.1
 """A round of joint fits is left out only if neither a linear promise nor smooth features reach this level."""
+PROMISING = 25.0
+"""Linear promise of a further cause, in twice the log-likelihood, that keeps a set from being complete: 5 sigma."""
+SLOWEST_NOISE = 10.0
+"""Standard deviation of a residual over that of its sample-to-sample part beyond which it counts as misfit. First-order
+autoregressive noise has 3.8 at a coefficient of 0.9, 5.5 at 0.95, 12 at 0.99."""
 REFINE_LEVEL = 1e-3
 """Level at which a refinement of an effect's form is adopted."""
 MOST_CAUSES = 3
@@ -64,6 +69,9 @@ class Searched:
         For each cause, fits in which another took its place.
     without
         For each cause, the fit without it.
+    floor
+        The noise that no model can beat: as fitted, or, where the best set leaves more than noise, the sample-to-sample
+        noise of the measurement.
     """
 
     nominal: Fit
@@ -73,7 +81,7 @@ class Searched:
     without: dict[str, Fit]
     family: Family
     scored: list[Scored]
-    singles: list[Fit]
+    floor: NoiseModel
 
 
 class Search:
@@ -161,14 +169,20 @@ class Search:
         if not self._complete(best):
             best = self._backward(self._by_prediction(best), family)
             self._refine(best)
-        complete = self._complete(best)
         self.refit([(), best, *self.ranked(1), *self.ranked(len(best) or 1)[:JOINT_FITS], *_subsets(best)], best)
-        searched = self._finish(best, family)
-        return searched if complete or not best else self._for_prediction(searched)
+        return self.settle(best)
+
+    def settle(self, names: Names) -> Searched:
+        """Everything that is to be said of a set of causes: its rivals, and each cause's part in it."""
+        searched = self._finish(names, self.family)
+        if self._complete(names):
+            return searched
+        floor = rough_noise(self.model, self.trials)
+        return replace(self._for_prediction(searched) if names else searched, floor=floor)
 
     def _for_prediction(self, searched: Searched) -> Searched:
         """Fit for least open-loop error: what the best set leaves is more than noise, and not to be whitened."""
-        self.noise = whiteless(noise_of(searched.best))
+        learned, self.noise = self.noise, whiteless(noise_of(searched.best))
 
         def again(fitted: Fit) -> Fit:
             return self.fit_from([fitted.model], fitted.unknowns)
@@ -176,11 +190,20 @@ class Search:
         nominal, best = again(searched.nominal), again(searched.best)
         without = {n: again(f) for n, f in searched.without.items()}
         rivals = {n: in_parallel(again, fits) for n, fits in searched.rivals.items()}
+        self.noise = learned
         return replace(searched, nominal=nominal, best=best, without=without, rivals=rivals)
 
     def _complete(self, names: Names) -> bool:
-        """True if a set leaves only noise, as far as its own noise can tell."""
-        fitted = self.fits[names]
+        """True if a set leaves only noise: no further cause promises anything, and neither do smooth features.
+
+        The promise is judged by the present noise; noise learned from the set itself can swallow a slow cause.
+        """
+        fitted, none = self.fits[names], self.fits[()]
+        if slow_misfit(fitted):
+            return False
+        promise = max(s.gain for s in self.scores(fitted).scored)
+        if promise > max(PROMISING, FORM_SHARE * (none.sse - fitted.sse)):
+            return False
         own = fit_problem(Problem(fitted.model, self.trials, noise_of(fitted)), fitted.values, fitted.unknowns)
         return not remainder(own, self.seed).unexplained
 
@@ -196,6 +219,7 @@ class Search:
         self.progress(0.08, "screening")
         scores = self.scores(base)
         family, scored = Family(scores, self.seed), best_by_effect(scores.scored)
+        self.family = family
         self._seeds = best_pairs(scores, SEEDS)
         self.progress(0.12, "every cause, fitted jointly")
         fitted = in_parallel(lambda v: self.extend(base, v), scored.values())
@@ -360,9 +384,7 @@ class Search:
             rivals[name] = sorted((self.fits[k] for k in keys), key=lambda f: f.sse)
             p_values[name] = self.p_value(best, without[name], family)
         scored = self.scores(self.fits[()]).scored
-        return Searched(
-            self.fits[()], best, p_values, rivals, without, family, scored, [self.fits[k] for k in self.ranked(1)]
-        )
+        return Searched(self.fits[()], best, p_values, rivals, without, family, scored, best.noise)
 
     def _siblings(self, names: Names, name: str) -> list[Names]:
         """Sets fitted already that differ from `names` in `name` alone."""
@@ -370,6 +392,12 @@ class Search:
         return [
             k for k in self.fits if len(k) == len(names) and rest < set(k) | {""} and rest <= set(k) and name not in k
         ]
+
+
+def slow_misfit(fitted: Fit) -> bool:
+    """True if a residual is so much slower than the sample-to-sample noise that it cannot be told from misfit."""
+    rough, own = rough_noise(Model(fitted.model.rig), fitted.trials), noise_of(fitted)
+    return any(own[n].std > SLOWEST_NOISE * rough[n].std for n in own)
 
 
 def _names(fitted: Fit) -> Names:

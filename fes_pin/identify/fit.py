@@ -11,7 +11,7 @@ import scipy.stats
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.noise import Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
-from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
+from fes_pin.identify.problem import Linearized, NormalEquations, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
 
 TOLERANCE = 0.01
@@ -134,11 +134,8 @@ class _Search:
             system = normal_equations(self.parts, self.damping)
             if not np.isfinite(system.sse):
                 return True
-            free = self.free_now(system.gradient)
-            move = np.zeros(len(self.x))
-            move[free] = _damped(system.hessian[np.ix_(free, free)], system.gradient[free], self.damping)
-            new_x = np.clip(self.x + move, self.lower, self.upper)
-            move = new_x - self.x
+            move = self._bounded_move(system)
+            new_x = self.x + move
             promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
             locals_ = self._moved(system.local_steps(move))
             if promised < TOLERANCE:
@@ -152,6 +149,21 @@ class _Search:
                 return gained < TOLERANCE
             self.damping = max(self.damping * 10.0, 1e-4)
         return True
+
+    def _bounded_move(self, system: NormalEquations) -> np.ndarray:
+        """Marquardt's step inside the bounds: what would leave them stops there, and the others step anew."""
+        free, move = self.free_now(system.gradient), np.zeros(len(self.x))
+        for _ in range(len(self.x)):
+            held = ~free
+            gradient = system.gradient - system.hessian[:, held] @ move[held]
+            move[free] = _damped(system.hessian[np.ix_(free, free)], gradient[free], self.damping)
+            inside = np.clip(self.x + move, self.lower, self.upper)
+            out = free & (inside != self.x + move)
+            if not out.any():
+                break
+            move[out] = (inside - self.x)[out]
+            free &= ~out
+        return np.clip(self.x + move, self.lower, self.upper) - self.x
 
     def _moved(self, steps: list[np.ndarray]) -> Unknowns:
         if not steps:

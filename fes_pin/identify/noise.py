@@ -127,8 +127,12 @@ def thin(values: np.ndarray, count: int) -> np.ndarray:
     """Means of `count` samples in a row along the first axis; what is left over at the end is dropped."""
     if count == 1:
         return values
-    n = len(values) // count
-    return values[: n * count].reshape(n, count, *values.shape[1:]).mean(axis=1)
+    end = len(values) // count * count
+    total = values[0:end:count].copy()
+    for k in range(1, count):
+        total += values[k:end:count]
+    total /= count
+    return total
 
 
 def _lags(residual: np.ndarray, order: int) -> np.ndarray:

@@ -78,15 +78,15 @@ class Problem:
         """Whitened residuals and sensitivities at a parameter value."""
         out, split = [], len(self.free)
         for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
-            pieces = []
+            residuals, sensitivities = [], []
             for k, name in enumerate(self.model.rig.outputs(trial.kind)):
                 if name not in trial.columns or name not in self.noise:
                     continue
-                residual = trial[name] - simulated.readings[:, k]
-                stacked = np.concatenate([residual[:, None], simulated.sensitivities[:, k]], axis=1)
-                pieces.append(self.noise[name].whiten(stacked, trial.dt))
-            rows = np.concatenate(pieces) if len(pieces) > 1 else pieces[0]
-            out.append(Linearized(rows[:, 0], rows[:, 1 : 1 + split], rows[:, 1 + split :]))
+                noise = self.noise[name]
+                residuals.append(noise.whiten(trial[name] - simulated.readings[:, k], trial.dt))
+                sensitivities.append(noise.whiten(simulated.sensitivities[:, k], trial.dt))
+            rows = np.concatenate(sensitivities) if len(sensitivities) > 1 else sensitivities[0]
+            out.append(Linearized(np.concatenate(residuals), rows[:, :split], rows[:, split:]))
         return out
 
 

@@ -20,6 +20,7 @@ def _either(symbolic: Any, numeric: Any) -> Any:
 
 sin, cos, exp, log = (_either(getattr(ca, n), getattr(np, n)) for n in ("sin", "cos", "exp", "log"))
 tanh, sqrt, fabs = (_either(getattr(ca, n), getattr(np, n)) for n in ("tanh", "sqrt", "fabs"))
+ceil = _either(ca.ceil, np.ceil)
 minimum, maximum = _either(ca.fmin, np.minimum), _either(ca.fmax, np.maximum)
 where = _either(ca.if_else, np.where)
 

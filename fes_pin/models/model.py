@@ -75,9 +75,9 @@ class Model:
             effects.append(dataclasses.replace(effect, **own))
         return Model(rig, tuple(effects))
 
-    def acting(self, kind: str) -> Model:
-        """The same model without the effects that a kind of trial cannot feel."""
-        signals = self.rig.signals(kind)
+    def acting(self, kind: str, inputs: tuple[str, ...] | None = None) -> Model:
+        """The same model without the effects that a kind of trial, with these input columns, cannot feel."""
+        signals = self.rig.signals(kind) if inputs is None else self.rig.changeable(kind, inputs)
         return Model(self.rig, tuple(e for e in self.effects if e.signal in signals))
 
     def structure(self) -> tuple[str, ...]:

@@ -57,14 +57,14 @@ class Simulator:
     ) -> None:
         self.model, self.trials, self.columns = model, tuple(trials), columns
         self.max_step_s = max_step(model) if max_step_s is None else max_step_s
-        self._delayed = any(e.signal == "delay" for e in model.effects)
+        self._delayed = is_delayed(model)
         self._blocks = [_Block(model, self.trials, lanes, columns, self.max_step_s) for lanes in self._groups()]
 
     def _groups(self) -> Iterator[list[int]]:
         """Trials that can share a block: same kind, inputs and integration steps per sample, of similar length."""
         groups: dict[tuple, list[int]] = {}
         for i, trial in enumerate(self.trials):
-            key = (trial.kind, self.model.rig.input_columns(trial), substeps(trial.dt, self.max_step_s))
+            key = (trial.kind, self.model.rig.input_columns(trial), substeps(self.model, trial.dt, self.max_step_s))
             groups.setdefault(key, []).append(i)
         for members in groups.values():
             members.sort(key=lambda i: len(self.trials[i]))
@@ -100,14 +100,14 @@ class _Block:
         self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...], max_step_s: float
     ) -> None:
         first = trials[lanes[0]]
-        rig, model = model.rig, model.acting(first.kind)
+        rig, model = model.rig, model.acting(first.kind, model.rig.input_columns(first))
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
         self.inputs = rig.input_columns(first)
         available = set(model.parameters()) | set(rig.unknowns(first.kind))
         self.columns = columns
         self.program: Program = program(model, first.kind, self.inputs, tuple(c for c in columns if c in available))
         self.layout = self.program.layout
-        self.substeps = substeps(first.dt, max_step_s)
+        self.substeps = substeps(model, first.dt, max_step_s)
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
         constants = [{**rig.trial_constants(t), **_timing(t, self.substeps)} for t in padded]
@@ -161,13 +161,18 @@ def max_step(model: Model) -> float:
     return min([MAX_STEP_S, *(e.max_step_s for e in model.effects)])
 
 
-def substeps(dt: float, max_step_s: float) -> int:
-    """Integration steps per sample."""
-    return max(1, math.ceil(dt / max_step_s - 1e-6))
+def substeps(model: Model, dt: float, max_step_s: float) -> int:
+    """Integration steps per sample; a delay, which ends one of them where the input jumps, needs one more."""
+    return max(1, math.ceil(dt / max_step_s - 1e-6)) + is_delayed(model)
 
 
 def _timing(trial: Trial, steps: int) -> dict[str, float]:
     return {"t0": float(trial.time[0]), "dt": trial.dt, "step": trial.dt / steps, "shift": 0.0}
+
+
+def is_delayed(model: Model) -> bool:
+    """True if the model has an effect that delays the input."""
+    return any(e.signal == "delay" for e in model.effects)
 
 
 def total_delay(model: Model, values: Mapping[str, float]) -> float:

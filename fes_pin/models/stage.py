@@ -152,14 +152,17 @@ class Signals(SimpleNamespace):
 def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, Any]:
     """First-order low pass of `target` that is exact at time constant 0 and never stiff.
 
-    With e = sqrt(T^2 + h^2), h the integration step: x' = (target - x) / e, out = target - T x'.
-    The transfer function (1 + (e - T) s) / (1 + e s) has the low pass's delay T and differs from it only above 1/h.
+    With e = (T^8 + h^8)^(1/8), h the integration step: x' = (target - x) / e, out = target - T x'.
+    The transfer function (1 + (e - T) s) / (1 + e s) has the low pass's delay T. It differs from the low pass where T
+    is below two steps, and then only above 1/h: e - T is h at T = 0, h/1000 at T = 2 h.
 
     Returns
     -------
     out, rate
         The lagged signal and the time derivative of `state`.
     """
-    e = sqrt(time_constant * time_constant + step * step)
+    ratio = time_constant / step
+    fourth = ratio * ratio * ratio * ratio
+    e = step * sqrt(sqrt(sqrt(1.0 + fourth * fourth)))
     rate = (target - state) / e
     return target - time_constant * rate, rate

@@ -9,12 +9,15 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate.allocation import Allocation, AllocationSequence
-from fes_pin.stimulate.box import BoxProgram, solve_sequence
+from fes_pin.stimulate.box import BoxProgram, by_daqp, solve_sequence
+from fes_pin.stimulate.branch import NODES, branch_and_bound, rounded
 from fes_pin.stimulate.certificate import Certifier, residuals, slopes
 from fes_pin.stimulate.efforts import error_then_effort, least_cubes
 from fes_pin.stimulate.muscles import JOINTS
 from fes_pin.stimulate.recruitment import ChannelRecruitment, LinearRecruitment
 
+LEAST_EFFORT = 1e-10
+"""Below this price double precision cannot tell choices apart."""
 LEAST_LEFT = 0.05
 """A channel with less strength left than this costs as if it had this much."""
 EFFORT = 1e-4
@@ -75,6 +78,9 @@ class Allocator:
         Limits of recruitment within 0 and 1, by name or (n,); upper 0 is a channel that is not to be used.
     least
         Least recruitment at which a channel is reliable: r is 0 or at least this; None: any.
+    rounding, nodes
+        With `least`: only round the answer without it, cheaply; else stop the search after so many subproblems. The
+        allocation's `gap` says how much better another choice could be.
     rate
         Greatest change of a recruitment from one call to the next.
     dead
@@ -100,6 +106,8 @@ class Allocator:
         lower=0.0,
         upper=1.0,
         least=None,
+        rounding: bool = False,
+        nodes: int = NODES,
         rate: float = np.inf,
         dead: Sequence[str] = (),
     ) -> None:
@@ -122,13 +130,16 @@ class Allocator:
         self._efforts(effort_kind, lexicographic, getattr(nerves, "left_over", np.ones(self.n)))
         if (self.weights < 0.0).any():
             raise InputError(f"weight of {self.joints[int(np.argmin(self.weights))]} is negative")
-        if (self.effort <= 0.0).any():
-            raise InputError("effort must cost more than 0, or the choice is not unique")
+        if (self.effort < LEAST_EFFORT).any():
+            raise InputError(
+                f"effort must cost {LEAST_EFFORT:g} or more; for torque before any effort ask lexicographic"
+            )
         if not (np.isfinite(change) and change >= 0.0):
             raise InputError(f"change must cost 0 or more, got {change}")
         if not rate > 0.0:
             raise InputError(f"rate must be more than 0, got {rate}")
         self.change, self.rate = float(change), float(rate)
+        self.rounding, self.nodes = bool(rounding), int(nodes)
         self._assemble()
 
     def _efforts(self, kind: str, lexicographic: bool, left_over: np.ndarray) -> None:
@@ -218,7 +229,7 @@ class Allocator:
         note = ""
         if not self.program.solve(f):
             note = "pivoting gave up, DAQP answered"
-            self.program.r[:] = self.ask("daqp", f, lower, upper)
+            self.program.r[:] = by_daqp(self.H, f, lower, upper)
         return self.result(self.program.r.copy(), wanted, lower, upper, before, note=note)
 
     def limits(self, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -265,10 +276,11 @@ class Allocator:
 
     def choose(self, f, wanted, lower, upper, before) -> Allocation:
         """Solve with channels that are off or at least at their least; the certificate is of the choice made."""
-        from fes_pin.stimulate.branch import branch_and_bound
-
         assert self.least is not None
-        choice = branch_and_bound(self.H, f, lower, upper, self.least)
+        if self.rounding:
+            choice = rounded(self.H, f, lower, upper, self.least)
+        else:
+            choice = branch_and_bound(self.H, f, lower, upper, self.least, nodes=self.nodes)
         on = choice.r > 0.0
         held = np.where(on, np.maximum(lower, self.least), 0.0), np.where(on, upper, 0.0)
         note = f"{choice.nodes} choices compared"
@@ -299,7 +311,7 @@ class Allocator:
             raise InputError("least recruitments, cubes and lexicographic are allocated one torque at a time")
         start = np.zeros(self.n) if previous is None else by_name(previous, self.names, "previous recruitment", 0.0)
         F = wanted @ self._from_torque
-        r, _, failed, _, _ = solve_sequence(
+        r = solve_sequence(
             self.H,
             F,
             self.lower,
@@ -308,9 +320,6 @@ class Allocator:
             rate=self.rate,
             previous=start,
         )
-        for k in np.flatnonzero(failed):
-            before = r[k - 1] if k else start
-            r[k] = self(wanted[k], before, solver="daqp").recruitment
         return self.certified(r, wanted, start)
 
     def certified(self, r, wanted, start) -> AllocationSequence:

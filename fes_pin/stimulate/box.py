@@ -14,6 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from fes_pin.data.errors import InputError
 from fes_pin.stimulate.native import Integers, Native, Reals, address
 
 FREE, AT_LOWER, AT_UPPER = 0, 1, 2
@@ -117,7 +118,7 @@ def solve(
     limit: int,
     tolerance: float,
 ):
-    """Solve from the guess in `status` and its P; the number of pivots, or minus that number if it gave up."""
+    """Solve from the guess in `status` and its P; the number of pivots, or minus that number less 1 if it gave up."""
     count = 0
     while True:
         respond(n, f, lower, upper, P, status, r, g)
@@ -137,7 +138,7 @@ def solve(
         if worst < 0:
             break
         if count >= limit:
-            count = -count
+            count = -count - 1
             break
         if status[worst] == 0:
             status[worst] = 1 if r[worst] < lower[worst] or lower[worst] == upper[worst] else 2
@@ -209,7 +210,7 @@ def sequence(
         failed[k] = 0
         if used < 0:
             failed[k] = 1
-            used = -used
+            used = -used - 1
         for i in range(n):
             work[i] = R[k * n + i]
         pivots += used
@@ -260,8 +261,24 @@ class BoxProgram:
         return pivots >= 0
 
 
-def solve_sequence(H, F, lower, upper, *, keep=0.0, rate=np.inf, previous=None, tolerance=1e-12):
-    """Solutions of samples in order, each warm-started from the last.
+def by_daqp(H, f, lower, upper) -> np.ndarray:
+    """The same program by DAQP through qpsolvers, cut to the limits.
+
+    Raises
+    ------
+    InputError
+        DAQP finds no answer either: the program holds numbers beyond what double precision can tell apart.
+    """
+    import qpsolvers
+
+    r = qpsolvers.solve_qp(H, f, lb=lower, ub=upper, solver="daqp")
+    if r is None:
+        raise InputError("no solver finds the allocation: torques or moment arms of too different sizes")
+    return np.clip(r, lower, upper)
+
+
+def solve_sequence(H, F, lower, upper, *, keep=0.0, rate=np.inf, previous=None, tolerance=1e-12) -> np.ndarray:
+    """Solutions (count, n) of samples in order, each warm-started from the last; where pivoting gives up, DAQP's.
 
     Parameters
     ----------
@@ -271,24 +288,40 @@ def solve_sequence(H, F, lower, upper, *, keep=0.0, rate=np.inf, previous=None, 
         (n,) or (count, n).
     keep, rate, previous
         Price of change and its bound per sample, from `previous` (n,), by default 0.
-
-    Returns
-    -------
-    tuple
-        r (count, n), gradients (count, n), which failed (count,) bool, status of the last sample (n,), pivots.
     """
     F = np.array(F, dtype=float, order="C")
     count, n = F.shape
     H, lower, upper = (np.ascontiguousarray(a, dtype=float) for a in (H, lower, upper))
     if lower.ndim != upper.ndim:
         lower, upper = (np.ascontiguousarray(np.broadcast_to(a, (count, n))) for a in (lower, upper))
+    R, start = np.empty((count, n)), 0
+    before = np.zeros(n) if previous is None else np.array(previous, dtype=float)
+    while start < count:
+        each = [a[start:] if a.ndim == d else a for a, d in ((H, 3), (lower, 2), (upper, 2))]
+        R[start:], failed = run(each[0], F[start:].copy(), each[1], each[2], keep, rate, before, tolerance)
+        carries = keep > 0.0 or rate < np.inf
+        for k in start + np.flatnonzero(failed):
+            before = R[k - 1] if k > 0 else before
+            low, high = (a[k] if a.ndim == 2 else a for a in (lower, upper))
+            low, high = np.clip(before - rate, low, high), np.clip(before + rate, low, high)
+            R[k] = by_daqp(H[k] if H.ndim == 3 else H, F[k] - keep * before, low, high)
+            if carries:  # what follows depends on it
+                start, before = int(k) + 1, R[k]
+                break
+        else:
+            break
+    return R
+
+
+def run(H, F, lower, upper, keep: float, rate: float, previous, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """One pass of `sequence` over contiguous arrays (F is used up): solutions, and which samples gave up."""
+    count, n = F.shape
     P, status, R, G = np.empty((n, n)), np.ones(n, dtype=np.int64), np.empty((count, n)), np.empty((count, n))
     failed, work = np.zeros(count, dtype=np.int64), np.zeros(3 * n)
-    if previous is not None:
-        work[:n] = previous
+    work[:n] = previous
     native = compiled()
     native["rebuild"](n, address(H), address(P), address(status))
-    pivots = native["sequence"](
+    native["sequence"](
         count,
         n,
         address(H),
@@ -303,4 +336,4 @@ def solve_sequence(H, F, lower, upper, *, keep=0.0, rate=np.inf, previous=None, 
         PIVOTS_PER_VARIABLE * n,
         tolerance,
     )
-    return R, G, failed.astype(bool), status, pivots
+    return R, failed.astype(bool)

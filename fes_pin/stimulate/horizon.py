@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.allocate import EFFORT, Allocator
+from fes_pin.stimulate.allocate import Allocator
 from fes_pin.stimulate.native import address
-from fes_pin.stimulate.polish import polish
+from fes_pin.stimulate.polish import ROUNDS, polish
 from fes_pin.stimulate.splitting import compiled
 
 ITERATIONS = 2000
@@ -116,6 +117,8 @@ class Horizon:
         Length of the horizon.
     fatigue
         How strength falls with use; None: it does not.
+    rounds
+        Guesses at what is active, some 0.4 ms each for 30 channels, to make the plan exact; more succeed more often.
 
     Raises
     ------
@@ -129,6 +132,7 @@ class Horizon:
     delay_steps: int = 0
     steps: int = 10
     fatigue: Fatigue | None = None
+    rounds: int = ROUNDS
     act: np.ndarray = field(init=False)
     left: np.ndarray = field(init=False)
 
@@ -166,39 +170,64 @@ class Horizon:
         self.whole = np.kron(self.G, self.S) + np.kron(np.eye(n), self.T)
         self.work, self.out = np.empty(7 * steps * n), np.zeros(2)
 
-    def plan(self, torques) -> Plan:
+    def plan(self, torques, *, solver: str = "splitting") -> Plan:
         """Stimulation for the torques ahead, from the present state.
 
         Parameters
         ----------
         torques
             (steps, joints) N m: wanted at the pulses `delay_steps` + 1 ... `delay_steps` + steps ahead.
+        solver
+            `splitting`, then made exact where that succeeds; or any solver that qpsolvers knows (`osqp`, `daqp` ...).
 
         Raises
         ------
         InputError
-            Wrong shape or a torque that is not a number.
+            Wrong shape, a torque that is not a number, unknown solver.
         """
-        p, n, steps = self.program, self.program.n, self.steps
+        p = self.program
         wanted = np.asarray(torques, dtype=float)
-        if wanted.shape != (steps, len(p.joints)):
-            raise InputError(f"torques must be {steps} steps x {len(p.joints)} joints, got shape {wanted.shape}")
+        if wanted.shape != (self.steps, len(p.joints)):
+            raise InputError(f"torques must be {self.steps} steps x {len(p.joints)} joints, got shape {wanted.shape}")
         if not np.isfinite(wanted).all():
             k, j = np.argwhere(~np.isfinite(wanted))[0]
             raise InputError(f"wanted torque of {p.joints[j]} at step {k} is not a finite number")
-        free = self.keep ** np.arange(1, steps + 1)[:, None] * self.act_when_pulses_act()
+        free = self.keep ** np.arange(1, self.steps + 1)[:, None] * self.act_when_pulses_act()
         error = (free @ self.matrix.T - wanted) * p.weights / p.scale
         f = self.response.T @ (error @ self.matrix)
         f[0] -= p.change * self.before
+        low, high = self.limits()
+        count, exact = 0, None
+        if solver == "splitting":
+            count = self.split(f, low, high)
+            exact = polish(self.whole, f, low, high, self.y, self.rounds)
+            if exact is not None:
+                self.x[:], self.y[:] = exact.u, exact.y
+        else:
+            self.ask(solver, f, low, high)
+        if exact is not None or solver != "splitting":
+            self.z[:] = np.vstack([self.x, np.diff(self.x, axis=0)])
+        u = self.feasible(low, high)
+        primal, dual, gap = self.proof(u, f, low, high)
+        achieved = (free + self.response @ u) @ self.matrix.T
+        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, count, exact.rounds if exact else 0)
+
+    def limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """Limits (2 steps - 1, n) of the steps, the first also by the rate, then of the changes."""
+        p, steps, n = self.program, self.steps, self.program.n
         low, high = np.empty((2 * steps - 1, n)), np.empty((2 * steps - 1, n))
         low[:steps], high[:steps] = p.lower, p.upper
         low[0] = np.clip(self.before - p.rate, p.lower, p.upper)
         high[0] = np.clip(self.before + p.rate, p.lower, p.upper)
         low[steps:], high[steps:] = -min(p.rate, 1.0), min(p.rate, 1.0)
+        return low, high
+
+    def split(self, f, low, high) -> int:
+        """Iterate the splitting from where it is; the number of iterations."""
         arrays = (*self.fixed, f, low, high)
-        count = compiled()["split"](
-            n,
-            steps,
+        return compiled()["split"](
+            self.program.n,
+            self.steps,
             *(address(a) for a in arrays),
             PENALTY,
             DAMPING,
@@ -206,14 +235,30 @@ class Horizon:
             ITERATIONS,
             TOLERANCE,
         )
-        exact = polish(self.whole, f, low, high, self.y)
-        if exact is not None:
-            self.x[:], self.y[:] = exact.u, exact.y
-            self.z[:] = np.vstack([exact.u, np.diff(exact.u, axis=0)])
-        u = self.feasible(low, high)
-        primal, dual, gap = self.proof(u, f, low, high)
-        achieved = (free + self.response @ u) @ self.matrix.T
-        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, count, exact.rounds if exact else 0)
+
+    def ask(self, solver: str, f, low, high) -> None:
+        """Solve through qpsolvers; the answer and its multipliers go where the splitting's would."""
+        import qpsolvers
+        from scipy.sparse import csc_matrix
+
+        if solver not in qpsolvers.available_solvers:
+            known = ", ".join(["splitting", *qpsolvers.available_solvers])
+            raise InputError(f"solver {solver!r} is not installed; there are {known}")
+        n, steps = self.program.n, self.steps
+        H = np.kron(self.S, self.G) + np.kron(self.T, np.eye(n))
+        change = (np.eye(steps * n) - np.eye(steps * n, k=-n))[n:]
+        rows = np.vstack([change, -change])
+        bounds = np.concatenate([high[steps:].ravel(), -low[steps:].ravel()])
+        sparse = solver in qpsolvers.sparse_solvers
+        H, rows = (csc_matrix(a) if sparse else a for a in (H, rows))
+        problem = qpsolvers.Problem(H, f.ravel(), rows, bounds, lb=low[:steps].ravel(), ub=high[:steps].ravel())
+        quiet: dict[str, Any] = {"raise_error": False} if solver == "osqp" else {}
+        found = qpsolvers.solve_problem(problem, solver=solver, **quiet)
+        if found.x is None or found.z is None or found.z_box is None:
+            raise InputError(f"solver {solver!r} found no answer")
+        self.x[:] = found.x.reshape(steps, n)
+        up, down = found.z.reshape(2, steps - 1, n)
+        self.y[:] = np.vstack([found.z_box.reshape(steps, n), up - down])
 
     def feasible(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """The splitting's answer, moved into limits and rate step by step."""
@@ -263,6 +308,3 @@ class Horizon:
     def torque(self) -> np.ndarray:
         """Torque that the muscles make now, (joints,) N m."""
         return (self.program.matrix * self.left) @ self.act
-
-
-__all__ = ["EFFORT", "Fatigue", "Horizon", "Plan", "invert_lag"]

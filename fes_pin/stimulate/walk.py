@@ -95,9 +95,7 @@ def allocate_walk(torques, nerves, q, **options) -> WalkAllocation:
     H /= scale
     H[:, range(p.n), range(p.n)] += p.effort + p.change
     F = -np.einsum("knj,kj->kn", weighed, wanted) / scale
-    r, _, failed, _, _ = solve_sequence(H, F, p.lower, p.upper, keep=p.change)
-    for k in np.flatnonzero(failed):
-        raise InputError(f"no allocation found at sample {k}")
+    r = solve_sequence(H, F, p.lower, p.upper, keep=p.change)
     achieved = np.einsum("kjn,kn->kj", matrices, r)
     before = np.vstack([np.zeros(p.n), r[:-1]])
     gradient = np.einsum("knj,kj->kn", weighed, achieved - wanted) / scale + p.effort * r + p.change * (r - before)

@@ -107,12 +107,12 @@ def test_mass_matrix_and_gravity_at_neutral_are_simbodys(free, reference, hip_ce
 
 @pytest.mark.parametrize("posture", ["mid_stance_R_t1.00", "mid_swing_R_t1.60", "double_support_t1.30"])
 def test_mass_matrix_in_walking_postures_is_simbodys_but_for_its_sliding_knee(free, reference, hip_centre, posture):
-    """OpenSim's knee slides by some mm as it bends: 0.6 % of the largest entry is what that may cost."""
+    """OpenSim's knee slides by some mm as it bends: that costs 0.11 % of the largest entry."""
     q, J = mapped(free, reference, posture, hip_centre)
     rows = [reference["coordinate_order"].index(n) for n in SAME_JOINTS]
     M = np.array(reference["postures"][posture]["M"])[np.ix_(rows, rows)]
     ours = J.T @ pin.crba(free.model, free.data, q) @ J
-    assert np.abs(ours - M).max() < 0.006 * np.abs(M).max()
+    assert np.abs(ours - M).max() < 0.0012 * np.abs(M).max()
     assert np.abs(ours - ours.T).max() < 1e-10
 
 
@@ -141,10 +141,10 @@ def test_energy_and_momenta_of_the_walk_are_simbodys(free, walk, hip_centre):
     assert np.all(off <= may / 72.6 + 1e-6)
     # The sliding knee, cm/s on a leg that swings at m/s, costs energy and momenta more: a check of signs and of the
     # tree, not of inertias; those follow segment by segment below.
-    assert np.sqrt(np.mean((ours[:, 0] - whole["KE"]) ** 2)) < 0.05 * whole["KE"].mean()
-    for columns, key in ((slice(1, 4), "p"), (slice(4, 7), "Lcom")):
+    assert np.sqrt(np.mean((ours[:, 0] - whole["KE"]) ** 2)) < 0.038 * whole["KE"].mean()
+    for columns, key, part in ((slice(1, 4), "p", 0.03), (slice(4, 7), "Lcom", 0.08)):
         size = np.sqrt(np.mean(np.sum(turned[key] ** 2, axis=1)))
-        assert np.sqrt(np.mean(np.sum((ours[:, columns] - turned[key]) ** 2, axis=1))) < 0.08 * size, key
+        assert np.sqrt(np.mean(np.sum((ours[:, columns] - turned[key]) ** 2, axis=1))) < part * size, key
 
 
 def test_energy_and_momenta_of_simbodys_motion_with_our_segments(measured_body, walk):

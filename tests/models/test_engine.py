@@ -23,7 +23,7 @@ def lanes(model, kind, rng, n):
     trials = [trial(rig.name, kind, rng, n) for _ in range(WIDTH)]
     inputs = rig.input_columns(trials[0])
     layout = make_layout(model, kind, inputs, (*model.fitted_parameters(), *rig.unknowns(kind)))
-    steps = substeps(trials[0].dt, max_step(model))
+    steps = substeps(model, trials[0].dt, max_step(model))
     u = np.stack([np.stack([t[c] for c in inputs], axis=1) for t in trials], axis=2)
     values = [jitter(rng, model.parameters(), model.parameter_info()) | rig.initial_unknowns(t) for t in trials]
     delays = np.array([v.get("electromechanical_delay.delay_s", 0.0) for v in values])

@@ -75,7 +75,7 @@ def acceleration(model, kind, inputs, constants, states):
     memory = np.zeros(rates.size1_in(1))
 
     def at(state, u=()):
-        out = np.array(rates([state[n] for n in states], memory, list(u), 0.0, 0.0, p, c)).ravel()
+        out = np.array(rates([state[n] for n in states], memory, list(u), 0.0, 0.0, 0.0, p, c)).ravel()
         return dict(zip(states, out, strict=True))["v"]
 
     return at

@@ -102,7 +102,10 @@ def _force_velocity(v, p):
         if v >= 0.0:
             return max((1.0 - v / p["fastest"]) / (1.0 + v / (p["roundness"] * p["fastest"])), 0.0)
         return 1.0 + 0.5 * math.tanh(-2.0 * v * (1.0 + 1.0 / p["roundness"]) / p["fastest"])
-    return math.exp(-p["slope_s_per_rad"] * v)
+    x = p["slope_s_per_rad"] * v
+    if p.get("form") == "exponential":
+        return math.exp(-x)
+    return 1.0 - x + p.get("bend", 0.0) * x * x
 
 
 def fatigue_rate(lost, act, p):
@@ -118,9 +121,13 @@ def joint_torque(x, q, v, t, causes):
     total = 0.0
     if "coulomb_friction" in causes:
         p = causes["coulomb_friction"]
-        sharp = p.get("sharp", 0.002)
         more = 1.0 + p.get("stiction", 0.0) * math.exp(-((v / p.get("stribeck_speed", 1.0)) ** 2))
-        total -= p["torque_nm"] * more * math.tanh(v / sharp)
+        if p.get("form") == "tanh":
+            share = math.tanh(v / p["sharp"])
+        else:
+            ratio = v / p.get("creep_speed", 0.004)
+            share = ratio / (1.0 + ratio**8) ** 0.125
+        total -= p["torque_nm"] * more * share
     if "quadratic_damping" in causes:
         p = causes["quadratic_damping"]
         total -= p["coefficient"] * math.copysign(abs(v) ** p.get("power", 2.0), v)
@@ -138,16 +145,24 @@ def joint_torque(x, q, v, t, causes):
         total -= p["stiffness_nm_per_rad"] * (q - x["relaxed"])
         if p.get("form") == "two":
             total -= p["stiffness_nm_per_rad"] * (q - x["relaxed_too"])
-    if "stretch_reflex" in causes and "third" in x:
+    if "stretch_reflex" in causes and ("third" in x or "pade" in x):
         p = causes["stretch_reflex"]
         side = p.get("side", 1.0)
-        total -= side * p["gain_nms"] * max(side * x["third"], 0.0)
+        late = x["third"] if "third" in x else _pade(x, p["delay_s"])
+        total -= side * p["gain_nms"] * max(side * late, 0.0)
     if "periodic_torque" in causes:
         p = causes["periodic_torque"]
         phase = 2.0 * math.pi * p["frequency_hz"] * t
         total += p["in_phase"] * math.sin(phase) + p.get("quadrature", 0.0) * math.cos(phase)
         total += p.get("second_harmonic", 0.0) * math.sin(2.0 * phase)
     return total
+
+
+def _pade(x, delay):
+    """Pade's (2, 2) delay, (12 - 6 d s + d^2 s^2) / (12 + 6 d s + d^2 s^2), from its states: the input that makes
+    the numerator of the filtered signal, whose second rate is the input's share less the rest."""
+    pulled = x["v"] - x["pade"] - 0.5 * delay * x["pade_rate"]
+    return x["pade"] - 0.5 * delay * x["pade_rate"] + pulled
 
 
 def reading(value, rate, time, rest, causes):

@@ -19,7 +19,7 @@ class _Muscle:
         names += ["second"] if "second_order_activation" in c else []
         names += ["lost"] if "fatigue" in c else []
         names += ["level"] if "potentiation" in c else []
-        return names + (["spill"] if "antagonist_spillover" in c else [])
+        return names + (["spill"] if c.get("antagonist_spillover", {}).get("lag_s") else [])
 
     def muscle_rates(self, x, q, v, held, strength):
         """Rates of the muscle's states and its force."""
@@ -35,7 +35,7 @@ class _Muscle:
         if "potentiation" in c:
             rates["level"] = (act - x["level"]) / c["potentiation"]["decay_s"]
         if "spill" in x:
-            rates["spill"] = (held["spilt"] - x["spill"]) / tau
+            rates["spill"] = (held["spilt"] - x["spill"]) / c["antagonist_spillover"]["lag_s"]
         return rates, strength * drive * force_factor(x, q, v, c)
 
 
@@ -49,7 +49,11 @@ class _Moving:
         names += ["relaxed"] if relaxes else []
         names += ["relaxed_too"] if relaxes and relaxes.get("form") == "two" else []
         reflex = c.get("stretch_reflex")
-        names += ["first", "middle", "third"] if reflex and reflex.get("form") != "pure" else []
+        names += (
+            {None: ["pade", "pade_rate"], "lags": ["first", "middle", "third"], "pure": []}[reflex.get("form")]
+            if reflex
+            else []
+        )
         names += ["frame", "frame_rate"] if "frame_vibration" in c else []
         return names + (["read"] if self.lags() else [])
 
@@ -77,6 +81,10 @@ class _Moving:
             rates["relaxed"] = (q - x["relaxed"]) / p["relaxation_s"]
             if "relaxed_too" in x:
                 rates["relaxed_too"] = (q - x["relaxed_too"]) / (8.0 * p["relaxation_s"])
+        if "pade" in x:
+            delay = c["stretch_reflex"]["delay_s"]
+            rates["pade"] = x["pade_rate"]
+            rates["pade_rate"] = (v - x["pade"] - 0.5 * delay * x["pade_rate"]) * 12.0 / delay**2
         if "third" in x:
             third = c["stretch_reflex"]["delay_s"] / 3.0
             rates["first"] = (v - x["first"]) / third
@@ -146,7 +154,8 @@ class Ankle(_Muscle, _Moving):
         strength = self.nominal["gain"] * self.k["force_scale_n"]
         rates, force = self.muscle_rates(x, q, v, held, strength)
         if self.moves:
-            force -= self.causes.get("antagonist_spillover", {}).get("share", 0.0) * strength * x.get("spill", 0.0)
+            antagonist = x.get("spill", held.get("spilt", 0.0))
+            force -= self.causes.get("antagonist_spillover", {}).get("share", 0.0) * strength * antagonist
             torque = self.static(q, force) - self.nominal["damping_nms"] * v + held.get("disturbance", 0.0)
             share = self.causes.get("load_inertia", {}).get("share", 0.0)
             moved = share * self.load * self.k["com_distance_m"] ** 2

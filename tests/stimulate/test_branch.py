@@ -78,6 +78,22 @@ def test_allocation_with_least_recruitments():
         assert a.certificate.cost >= free(torque).certificate.cost - 1e-12
 
 
+def test_rounded_allocation_is_allowed_and_its_gap_covers_the_best():
+    rng = np.random.default_rng(4)
+    nerves = Nerves([n for n in Nerves().names if n.startswith("left_")][:12])
+    best, cheap, hasty = (Allocator(nerves, least=0.3, **o) for o in ({}, {"rounding": True}, {"nodes": 2}))
+    gaps = []
+    for _ in range(30):
+        torque = nerves.torque_matrix() @ (rng.uniform(0, 0.5, 12) * rng.choice([0, 1], 12)) + rng.normal(size=19) * 5
+        cost = best(torque).certificate.cost
+        for program in (cheap, hasty):
+            a = program(torque)
+            assert ((a.recruitment == 0.0) | (a.recruitment >= 0.3)).all()
+            assert cost - 1e-12 <= a.certificate.cost <= cost + a.gap + 1e-12
+            gaps.append(a.gap)
+    assert max(gaps) > 0.0
+
+
 def test_a_small_torque_is_off_rather_than_too_much_and_says_so():
     a = allocate({"left_knee_flexion": -20.0}, Nerves(["left_femoral"]), least=0.3)
     assert a.recruitment[0] == 0.0

@@ -78,6 +78,19 @@ def test_plans_cost_what_the_exact_solver_finds_within_a_true_gap():
     assert exact > 75
 
 
+@pytest.mark.parametrize(("solver", "gap"), [("daqp", 1e-4), ("osqp", 0.3)])
+def test_other_solvers_plan_the_same_and_are_proven_alike(solver, gap):
+    rng = np.random.default_rng(6)
+    for _ in range(30):
+        horizon = random_horizon(rng)
+        wanted = rng.normal(size=(5, len(horizon.program.joints))) * 40
+        theirs, ours = horizon.plan(wanted, solver=solver), horizon.plan(wanted)
+        assert theirs.gap <= gap
+        H, f, *_ = parts(horizon, wanted)
+        first, second = (0.5 * v @ H @ v + f @ v for v in (theirs.recruitment.ravel(), ours.recruitment.ravel()))
+        assert second - ours.gap - 1e-9 <= first <= second + theirs.gap + 1e-9
+
+
 def test_plan_foretells_what_the_muscles_then_do():
     rng = np.random.default_rng(1)
     for delay in (0, 1, 3):
@@ -201,6 +214,7 @@ def test_inverting_the_lag_gives_back_the_activation():
         lambda p: Horizon(Allocator(np.eye(2), effort=[1e-3, 1e-2])),
         lambda p: Horizon(p).plan(np.zeros((9, 2))),
         lambda p: Horizon(p).plan(np.full((10, 2), np.nan)),
+        lambda p: Horizon(p).plan(np.zeros((10, 2)), solver="abacus"),
         lambda p: Fatigue(-1.0),
     ],
 )

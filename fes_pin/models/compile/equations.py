@@ -4,10 +4,14 @@ With states x, memories m, parameters p and their sensitivities S = dx/dp, R = d
 
     rest     g(z; p) = 0,  dz/dp = -g_p / g_z,   x(0) = x0(z, p),  S(0) = x0_z dz/dp + x0_p
     sample   m+ = D(x, m, u, p),                 R+ = D_x S + D_m R + D_p
-    rates    x' = f(x, m, u, p),                 S' = f_x S + f_m R + f_p
+    rates    x' = f(x, m, u, p),                 S' = f_x S + f_m R + f_p      per time of the integration, see below
     output   y = h(x, m, p),                     dy/dp = h_x S + h_m R + h_p
 
 Only the entries of S and R that can be other than zero are carried.
+
+Delay: whole samples of it shift the input (`shift`). Of the rest f < dt, the input jumps within each sample, at f. The
+J steps of a sample are stretched so that a step ends there: k of them fill [0, f] and J - k fill [f, dt], none longer
+than dt / (J - 1). The stretch is part of the equations, so the sensitivity to the delay is that of the exact jump.
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ from typing import Any
 import casadi as ca
 
 from fes_pin.models.compile.layout import Layout, Sizes
-from fes_pin.models.maths import clip
+from fes_pin.models.maths import ceil, clip, where
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Signals
 
@@ -52,7 +56,9 @@ class _Symbols:
         self.memories = list(rig.memories(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.memories]
         self.x, self.m = _symbols("x", self.states), _symbols("m", self.memories)
         self.p, self.c = _symbols("p", layout.values), _symbols("c", layout.constants)
-        self.u, self.t, self.since, self.z = _symbols("u", layout.inputs), *(ca.SX.sym(n) for n in ("t", "since", "z"))
+        self.u, self.t, self.z = _symbols("u", layout.inputs), ca.SX.sym("t"), ca.SX.sym("z")
+        self.since, self.into = ca.SX.sym("since"), ca.SX.sym("into")
+        self.is_late = any(e.signal == "delay" for e in model.effects)
 
     def vector(self, which: dict[str, Any]) -> ca.SX:
         return ca.vertcat(*which.values()) if which else ca.SX(0, 1)
@@ -72,27 +78,34 @@ class _Symbols:
             c=SimpleNamespace(**self.c),
             initial=SimpleNamespace(**{n: p[n] for n in layout.unknowns}),
             time=self.t - self.c["t0"],
-            since=self.since,
             step=self.c["step"],
+            pace=1.0,
+            delayed=lambda now, before: now,
         )
         s.owned = {
             e.name: {n: states[f"{e.name}.{n}"] for n in e.states} | {n: memories[f"{e.name}.{n}"] for n in e.memories}
             for e in self.model.effects
         }
-        s.delayed = lambda now, before: self._delayed(s, now, before)
+        if self.is_late:
+            s.step = s.c.dt / (s.c.dt / s.c.step - 1.0)
         return s
 
-    def _delayed(self, s: Signals, now: Any, before: Any) -> Any:
-        """What is held between samples, later by the model's delay: exact to an integration step.
-
-        Whole samples of the delay shift the input (`shift`); of the rest f, the steps before f see the sample before.
-        """
-        delay = s.through("delay", 0.0)
-        if not any(e.signal == "delay" for e in self.model.effects):
-            return now
-        rest = delay - s.c.shift * s.c.dt
-        share = clip((rest - s.since) / s.step, 0.0, 1.0)
-        return share * before + (1.0 - share) * now
+    def within_a_sample(self, s: Signals) -> Signals:
+        """The signals at `into` after the start of the step that begins `since` after the sample."""
+        if not self.is_late:
+            s.time = s.time + self.since + self.into
+            return s
+        steps = s.c.dt / s.c.step
+        rest = s.through("delay", 0.0) - s.c.shift * s.c.dt
+        before = clip(ceil(rest / s.c.dt * (steps - 1.0)), 1.0, steps - 1.0)
+        jump = before * s.c.step
+        early = self.since < jump - 0.5 * s.c.step
+        first, second = rest / jump, (s.c.dt - rest) / (s.c.dt - jump)
+        s.pace = where(early, first, second)
+        begun = where(early, self.since * first, rest + (self.since - jump) * second)
+        s.time = s.time + begun + self.into * s.pace
+        s.delayed = lambda now, past: where(early, past, now)
+        return s
 
     def rig(self) -> Any:
         nominal: dict[str, Any] = {n: self.p[n] for n in self.layout.parameters if "." not in n}
@@ -122,10 +135,11 @@ class _Symbols:
         for effect in s.effects:
             for n, value in effect.update(s.of(effect)).items():
                 memories[f"{effect.name}.{n}"] = value
-        s = self.signals(self.x, self.m)
+        s = self.within_a_sample(self.signals(self.x, self.m))
         rates = dict(rig.rates(s))
         for effect in s.effects:
             rates.update({f"{effect.name}.{n}": v for n, v in effect.rate(s.of(effect)).items()})
+        rates = {n: s.pace * v for n, v in rates.items()} if self.is_late else rates
         s = self.signals(self.x, self.m)
         readings = rig.readings(s)
         return [memories[n] for n in self.memories], [rates[n] for n in self.states], list(readings)
@@ -164,7 +178,7 @@ def derive(model: Model, layout: Layout) -> Equations:
     dy = ca.densify(tangent(readings, (x, s), (m, r)))
     state = ca.vertcat(x, _nonzeros(s, s_pattern))
     memory = ca.vertcat(m, _nonzeros(r, r_pattern))
-    t, since, z = sym.t, sym.since, sym.z
+    t, since, into, z = sym.t, sym.since, sym.into, sym.z
     y = ca.vertcat(readings, ca.vec(dy.T) if layout.columns else ca.SX(0, 1))
 
     def function(name: str, ins: list[Any], outs: list[Any]) -> ca.Function:
@@ -179,7 +193,9 @@ def derive(model: Model, layout: Layout) -> Equations:
             [ca.vertcat(x0, _nonzeros(start_s, s_pattern)), ca.vertcat(m0, _nonzeros(start_r, r_pattern))],
         ),
         sample=function("sample", [state, memory, u, t, p, c], [ca.vertcat(after, _nonzeros(r_after, r_pattern))]),
-        rates=function("rates", [state, memory, u, t, since, p, c], [ca.vertcat(rates, _nonzeros(s_rates, s_pattern))]),
+        rates=function(
+            "rates", [state, memory, u, t, since, into, p, c], [ca.vertcat(rates, _nonzeros(s_rates, s_pattern))]
+        ),
         output=function("output", [state, memory, u, t, p, c], [y]),
     )
 

@@ -34,9 +34,10 @@ class NativeProgram:
         """Simulate WIDTH lanes; see `Program`."""
         n, outputs = inputs.shape[0], len(self.layout.outputs)
         out = np.empty((n, self.sizes.reading, WIDTH))
-        arguments = [np.ascontiguousarray(a, dtype=float) for a in (inputs, values, constants)]
-        scratch = np.zeros((self.sizes.scratch, WIDTH))
-        self._run(n, substeps, *[a.ctypes.data for a in (*arguments, np.array(guess, dtype=float), out, scratch)])
+        given = [np.ascontiguousarray(a, dtype=float) for a in (inputs, values, constants)]
+        rest, scratch = np.array(guess, dtype=float), np.zeros((self.sizes.scratch, WIDTH))
+        memory = (*given, rest, out, scratch)  # a name for each: they must live until the machine code returns
+        self._run(n, substeps, *[a.ctypes.data for a in memory])
         return out[:, :outputs], out[:, outputs:].reshape(n, outputs, len(self.layout.columns), WIDTH)
 
 
@@ -75,7 +76,7 @@ class _Loop:
         self.state, self.stage, self.rate, self.total = (self._at(scratch, k * state) for k in range(4))
         self.memory, self.after = (self._at(scratch, 4 * state + k * memory) for k in range(2))
         self.t = self.b.alloca(VECTOR)
-        self.since = self.b.alloca(VECTOR)
+        self.since, self.into = self.b.alloca(VECTOR), self.b.alloca(VECTOR)
         self.g = self.b.alloca(VECTOR, ir.Constant(INT64, 2))
 
     def _at(self, pointer: ir.Value, index: int | ir.Value) -> ir.Value:
@@ -137,19 +138,17 @@ class _Loop:
             b.call(self.parts["sample"], [self.state, self.memory, u, self.t, self.p, self.c, self.after])
             self._copy(self.after, self.memory, self.sizes.memory)
             b.call(self.parts["output"], [self.state, self.memory, u, self.t, self.p, self.c, y])
-            self._count(self.substeps, lambda j: self._runge_kutta(j, t, u))
+            self._count(self.substeps, lambda j: self._runge_kutta(j, u))
 
         self._count(self.n, sample)
 
     def _copy(self, source: ir.Value, target: ir.Value, size: int) -> None:
         self._count(ir.Constant(INT64, size), lambda i: self._store(self._load(source, i), target, i))
 
-    def _runge_kutta(self, j: ir.Value, sample_time: ir.Value, u: ir.Value) -> None:
+    def _runge_kutta(self, j: ir.Value, u: ir.Value) -> None:
         """One step of the classical Runge-Kutta method of order four."""
         b = self.b
-        since = b.fmul(self._number(j), self.step)
-        b.store(since, self.since, align=8)
-        begin = b.fadd(sample_time, since)
+        b.store(b.fmul(self._number(j), self.step), self.since, align=8)
         size = ir.Constant(INT64, self.sizes.state)
         for weight, ahead, at, source in (
             (1 / 6, 0.5, 0.0, self.state),
@@ -157,8 +156,9 @@ class _Loop:
             (1 / 3, 1.0, 0.5, self.stage),
             (1 / 6, 0.0, 1.0, self.stage),
         ):
-            b.store(b.fadd(begin, b.fmul(self.step, splat(at))), self.t, align=8)
-            b.call(self.parts["rates"], [source, self.memory, u, self.t, self.since, self.p, self.c, self.rate])
+            b.store(b.fmul(self.step, splat(at)), self.into, align=8)
+            times = [self.t, self.since, self.into]
+            b.call(self.parts["rates"], [source, self.memory, u, *times, self.p, self.c, self.rate])
             share, forward = b.fmul(self.step, splat(weight)), b.fmul(self.step, splat(ahead))
             self._count(size, partial(self._advance, at=at, share=share, forward=forward))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import threading
 from dataclasses import asdict
 from functools import cache
 from typing import Protocol
@@ -51,6 +52,7 @@ class Program(Protocol):
         """
 
 
+_LOCK = threading.Lock()  # CasADi's expressions are not made for two threads
 _PROGRAMS: dict[tuple[str, tuple[str, ...], Layout], Program] = {}
 
 
@@ -74,8 +76,10 @@ def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str
     layout, engine = make_layout(model, kind, inputs, columns), chosen_engine()
     key = (engine, model.structure(), layout)
     if key not in _PROGRAMS:
-        made = _native(model, layout) if engine == "llvm" else None
-        _PROGRAMS[key] = made or VirtualProgram(derive(model, layout))
+        with _LOCK:
+            if key not in _PROGRAMS:
+                made = _native(model, layout) if engine == "llvm" else None
+                _PROGRAMS[key] = made or VirtualProgram(derive(model, layout))
     return _PROGRAMS[key]
 
 

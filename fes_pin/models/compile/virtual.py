@@ -62,7 +62,7 @@ class VirtualProgram:
         for j in range(substeps):
 
             def rates(x: Any, at: float, since: Any = j * h) -> Any:
-                return e.rates(x, held, u, t + since + at * h, since, p, c)
+                return e.rates(x, held, u, t, since, at * h, p, c)
 
             first = rates(state, 0.0)
             second = rates(state + 0.5 * h * first, 0.5)

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.maths import exp, tanh
+from fes_pin.models.maths import exp, sqrt
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
-
-V_SMOOTH = 0.002
-"""Speed below which dry friction fades, rad/s; far below the speeds of a limb's motion (1 rad/s)."""
 
 STIFFEST = 2.5
 """Largest rate of decay times step that it may show; RK4 is stable to 2.78: Hairer, Wanner, Solving ODEs II, IV.2."""
@@ -20,9 +17,12 @@ STIFFEST = 2.5
 class CoulombFriction(Effect):
     """Dry friction at the joint, with or without more of it at rest (Stribeck).
 
-        torque - T (1 + stiction exp(-(v / stribeck_speed)^2)) tanh(v / (V_SMOOTH + T h / (STIFFEST J)))
+        torque - T x / (1 + x^8)^(1/8),   T = torque_nm (1 + stiction exp(-(v / stribeck_speed)^2))
+        x = (torque + k v) / (T + k creep_speed),   k = STIFFEST J / h,   h the integration step
 
-    h is the integration step: a joint that sticks creeps, as slowly as the step allows.
+    It is T sign(v) in motion, and what holds the joint at rest: k v brings it there within a step. Under a torque below
+    T the joint still creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of
+    small steps x = v / creep_speed.
 
     Tell-tale: the joint comes to rest at other angles from above than from below; free swings shrink by equal steps.
     Source: Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation,
@@ -34,12 +34,18 @@ class CoulombFriction(Effect):
     stribeck_speed: float = parameter(
         1.0, unit="rad/s", lower=1e-2, upper=30.0, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
     )
+    creep_speed: float = parameter(
+        0.004, unit="rad/s", lower=1e-4, upper=0.1, scale=0.002, optional=True, grid=(0.004,)
+    )
 
-    name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "torque", ("ankle", "joint")
+    name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
     dissipative = True
     max_step_s = 6.25e-4
 
     def apply(self, value: Any, s: Any) -> Any:
-        creep = V_SMOOTH + self.torque_nm * s.step / (STIFFEST * s.inertia)
         ratio = s.v / self.stribeck_speed
-        return value - self.torque_nm * (1.0 + self.stiction * exp(-ratio * ratio)) * tanh(s.v / creep)
+        most = self.torque_nm * (1.0 + self.stiction * exp(-ratio * ratio))
+        stopping = STIFFEST * s.inertia / s.step
+        x = (value + stopping * s.v) / (most + stopping * self.creep_speed)
+        fourth = x * x * x * x
+        return value - most * x / sqrt(sqrt(sqrt(1.0 + fourth * fourth)))

@@ -23,7 +23,7 @@ class LoadInertia(Effect):
 
     share: float = parameter(0.5, null=0.0, lower=0.0, upper=3.0, scale=0.1)
 
-    name, stage, signal, rigs = "load_inertia", Stage.JOINT, "acceleration", ("ankle",)
+    name, stage, signal, rigs = "load_inertia", Stage.JOINT, "driving", ("ankle",)
 
     def apply(self, value: Any, s: Any) -> Any:
         moved = self.share * s.load * s.lever * s.lever

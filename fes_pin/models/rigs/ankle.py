@@ -49,7 +49,7 @@ class Ankle(Rig):
 
     def signals(self, kind: str) -> tuple[str, ...]:
         muscle = ("pulse_width", "recruitment", "delay", "time_constant", "activation", "force")
-        joint = ("load", "net_force", "gravity_angle", "torque", "inertia", "acceleration", "reading")
+        joint = ("load", "net_force", "gravity_angle", "torque", "friction", "driving", "acceleration", "reading")
         return muscle + joint if kind == "motion" else muscle
 
     def states(self, kind: str) -> tuple[str, ...]:
@@ -120,9 +120,8 @@ class Ankle(Rig):
         tilted = s.through("gravity_angle", q)
         gravity = c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted)
         cable = c.moment_arm_m * force - c.com_distance_m * (antagonist - s.load * GRAVITY)
-        s.torque = s.through("torque", cable * sin(q) - gravity - self.damping_nms * v)
-        s.inertia = s.through("inertia", self.inertia_kgm2)
-        s.driving = s.torque / s.inertia
+        s.torque = s.through("friction", s.through("torque", cable * sin(q) - gravity - self.damping_nms * v))
+        s.driving = s.through("driving", s.torque / s.inertia)
         s.acceleration = s.through("acceleration", s.driving)
         return {"q": v, "v": s.acceleration}
 

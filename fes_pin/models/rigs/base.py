@@ -21,7 +21,8 @@ class Rig:
     """A rig and its nominal model: fields are what the nominal model fits, `constants` what is known before.
 
     A subclass writes its equations on `Signals`: `s.x` states, `s.m` memories, `s.u` inputs, `s.c` constants of rig
-    and trial, `s.initial` per-trial unknowns, `s.time`, `s.since` (time since the sample began), `s.step`.
+    and trial, `s.initial` per-trial unknowns, `s.time`, `s.step` (no integration step is longer), and
+    `s.delayed(now, before)` for what is held between samples and may come late.
     Each method serves all `kind`s of trial.
     """
 
@@ -43,6 +44,10 @@ class Rig:
     def signals(self, kind: str) -> tuple[str, ...]:
         """Names of the signals that effects can change, in the order of the path."""
         raise NotImplementedError
+
+    def changeable(self, kind: str, inputs: tuple[str, ...]) -> tuple[str, ...]:
+        """The signals that trials with these input columns have."""
+        return self.signals(kind)
 
     def states(self, kind: str) -> tuple[str, ...]:
         """Names of the continuous states."""

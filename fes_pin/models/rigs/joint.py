@@ -30,7 +30,7 @@ class Joint(Rig):
     name = "joint"
 
     def signals(self, kind: str) -> tuple[str, ...]:
-        return ("gravity_angle", "effort", "torque", "inertia", "acceleration", "reading")
+        return ("gravity_angle", "effort", "torque", "friction", "driving", "acceleration", "reading")
 
     def states(self, kind: str) -> tuple[str, ...]:
         return ("q", "v")
@@ -82,9 +82,8 @@ class Joint(Rig):
         tilted = s.through("gravity_angle", c.revolute * s.q)
         gravity = self.gravity_scale * (c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted))
         effort = s.through("effort", getattr(s.u, "effort", 0.0))
-        s.torque = s.through("torque", effort - gravity - self.damping * s.v)
-        s.inertia = s.through("inertia", s.inertia)
-        s.driving = s.torque / s.inertia
+        s.torque = s.through("friction", s.through("torque", effort - gravity - self.damping * s.v))
+        s.driving = s.through("driving", s.torque / s.inertia)
         s.acceleration = s.through("acceleration", s.driving)
         return {"q": s.v, "v": s.acceleration}
 

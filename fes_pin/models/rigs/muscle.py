@@ -32,6 +32,10 @@ class Muscle(Rig):
     def signals(self, kind: str) -> tuple[str, ...]:
         return ("pulse_width", "recruitment", "delay", "time_constant", "activation", "force", "reading")
 
+    def changeable(self, kind: str, inputs: tuple[str, ...]) -> tuple[str, ...]:
+        without_width = {"pulse_width", "recruitment"} if "stim" in inputs else set()
+        return tuple(s for s in self.signals(kind) if s not in without_width)
+
     def states(self, kind: str) -> tuple[str, ...]:
         return ("act",)
 

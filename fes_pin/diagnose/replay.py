@@ -1,0 +1,70 @@
+"""Every trial of a study beside what the nominal and the extended model say of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.diagnosis import Diagnosis
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.models.model import Model
+from fes_pin.models.simulate import Simulator
+
+
+@dataclass(frozen=True)
+class Replay:
+    """One trial, measured and as both models predict it from its inputs.
+
+    Attributes
+    ----------
+    measured, nominal, extended
+        The same time and inputs; `nominal` and `extended` hold the predicted outputs.
+    outputs
+        The measured columns that both models predict.
+    nominal_error, extended_error
+        E of eq. (2) of this trial alone, percent; all channels in units of their noise.
+    """
+
+    measured: Trial
+    nominal: Trial
+    extended: Trial
+    outputs: tuple[str, ...]
+    nominal_error: float
+    extended_error: float
+
+
+def replay(diagnosis: Diagnosis) -> tuple[Replay, ...]:
+    """Every trial of the study as both models of a diagnosis predict it, in the order of the study."""
+    trials, noise = diagnosis.study.trials, diagnosis.extended.noise
+    nominal = _predicted(diagnosis.nominal.model, trials)
+    extended = _predicted(diagnosis.model, trials)
+    made = []
+    for trial, before, after in zip(trials, nominal, extended, strict=True):
+        outputs = tuple(n for n in diagnosis.model.rig.outputs(trial.kind) if n in trial)
+        errors = (error_percent(trial, one, outputs, noise) for one in (before, after))
+        made.append(Replay(trial, before, after, outputs, *errors))
+    return tuple(made)
+
+
+def _predicted(model: Model, trials: Sequence[Trial]) -> list[Trial]:
+    out = []
+    for trial, one in zip(trials, Simulator(model, trials).run(model.parameters()), strict=True):
+        names = model.rig.outputs(trial.kind)
+        out.append(trial.with_columns(**{n: one.readings[:, k] for k, n in enumerate(names)}))
+    return out
+
+
+def error_percent(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> float:
+    """E of eq. (2): squared error over the measurement's squares about its mean, percent.
+
+    With more than one output each is taken in units of its noise.
+    """
+    squares = spread = 0.0
+    for name in outputs:
+        variance = noise[name].std ** 2 if name in noise else 1.0
+        squares += float(np.sum(measured.residual(simulated, name) ** 2)) / variance
+        spread += float(np.sum((measured[name] - measured[name].mean()) ** 2)) / variance
+    return 100.0 * squares / max(spread, 1e-300)

@@ -1,0 +1,142 @@
+"""How figures look: colours by stage and by role, units of columns, axes.
+
+The colours are Okabe and Ito's, which colour-blind readers tell apart (Color Universal Design, 2008). Each has a name,
+under which a page may give it another shade on a dark ground.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+STAGES = {"nerve": "#0072b2", "muscle": "#d55e00", "joint": "#009e73", "rig": "#b8860b", "sensor": "#b2558e"}
+"""Colour of each stage of the signal path; two are darkened, to be read as text on white."""
+MEASURED, NOMINAL, EXTENDED = "#17191c", "#8b8f96", "#56b4e9"
+INK, FAINT, BAND, STIMULUS = "#3d4248", "#c9cdd2", "#eceef1", "#6f7680"
+COLOURS = {
+    **{f"stage-{name}": colour for name, colour in STAGES.items()},
+    "measured": MEASURED,
+    "nominal": NOMINAL,
+    "extended": EXTENDED,
+    "ink": INK,
+    "faint": FAINT,
+    "band": BAND,
+    "stimulus": STIMULUS,
+}
+"""Every colour that a figure uses, by name."""
+
+LABELS = {
+    "angle_rad": ("angle", "rad"),
+    "force_n": ("force", "N"),
+    "pulse_width_us": ("pulse width", "us"),
+    "stim": ("pulses", ""),
+    "activation": ("activation", "1"),
+    "time_s": ("time", "s"),
+}
+WIDTH = 5.4
+"""Width of a figure, inches; a report shows one or two beside each other."""
+
+_RC: Mapping[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"],
+    "font.size": 10.5,
+    "axes.labelsize": 10.5,
+    "xtick.labelsize": 9.5,
+    "ytick.labelsize": 9.5,
+    "legend.fontsize": 9.5,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.use_mathtext": False,
+    "axes.unicode_minus": True,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "path.simplify": True,
+    "path.simplify_threshold": 0.2,
+    "svg.fonttype": "none",
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """The settings that every figure is drawn with, whatever the user's own are."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_RC)
+        yield
+
+
+def label(column: str, position_unit: str = "rad") -> str:
+    """Axis label of a column, with its unit.
+
+    Parameters
+    ----------
+    column
+        Of a trial, or a name of `diagnose.missing`.
+    position_unit
+        "rad" for a revolute joint, "m" for a prismatic one.
+    """
+    effort = "N m" if position_unit == "rad" else "N"
+    place = "angle" if position_unit == "rad" else "position"
+    own = {
+        "position": (place, position_unit),
+        "angle": (place, position_unit),
+        "velocity": ("rate", f"{position_unit}/s"),
+        "rate": ("rate", f"{position_unit}/s"),
+        "effort": ("effort", effort),
+    }
+    name, unit = (own | LABELS).get(column, (column.replace("_", " "), ""))
+    return f"{name} ({unit.replace('us', 'µs')})" if unit else name
+
+
+def unit_of(column: str, position_unit: str = "rad") -> str:
+    """Unit of a column as printed."""
+    text = label(column, position_unit)
+    return text.partition("(")[2].rstrip(")")
+
+
+def thin_curve(time: np.ndarray, values: np.ndarray, points: int = 350) -> tuple[np.ndarray, np.ndarray]:
+    """A curve drawn with few points that keeps every extreme: the least and the greatest of each stretch.
+
+    Parameters
+    ----------
+    time, values
+        Shape (n,).
+    points
+        At most twice as many are returned.
+    """
+    if len(values) <= 2 * points:
+        return time, values
+    edges = np.linspace(0, len(values), points + 1).astype(int)
+    kept = {0, len(values) - 1}
+    for a, b in itertools.pairwise(edges):
+        kept |= {int(a + np.argmin(values[a:b])), int(a + np.argmax(values[a:b]))}
+    chosen = np.array(sorted(kept))
+    return time[chosen], values[chosen]
+
+
+def bare(axes: Axes) -> None:
+    """Take the horizontal axis off: another one beneath has it."""
+    axes.xaxis.set_visible(False)
+
+
+def legend_above(figure: Figure, handles: list[Any], names: list[str]) -> None:
+    """One row of legend along the top of a figure."""
+    figure.legend(
+        handles, names, loc="upper left", bbox_to_anchor=(0.13, 1.0), ncols=len(names), handlelength=1.6,
+        columnspacing=1.3, borderaxespad=0.2,
+    )  # fmt: skip
