@@ -12,7 +12,6 @@ from confusion_matrix.form import Form
 from confusion_matrix.rigs import GRAVITY
 from confusion_matrix.stimuli import DT
 
-
 HOOKS = ("time_constant", "activation", "force", "net_force", "torque", "accelerate")
 
 

@@ -201,6 +201,7 @@ def _run(
     sizes: Sequence[Sequence[float]],
     forms: Sequence[type[Form]],
     steps: int,
+    *,
     fresh: bool = False,
     only: int = 0,
 ) -> list[list[np.ndarray]]:

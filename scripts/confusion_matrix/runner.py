@@ -1,4 +1,4 @@
-"""Runs studies one after the other or in several processes; every result is one line of a file, so it can go on later."""
+"""Runs studies in one process or several; every result is one line of a file, so that a run can go on later."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def run_group(items: Sequence[Item]) -> list[dict[str, Any]]:
 def _judged(made: Any) -> dict[str, Any]:
     try:
         return judge(made)
-    except Exception as error:  # noqa: BLE001
+    except Exception as error:
         item = made.item
         known = {"id": item.name, "kind": item.kind, "rig": item.rig, "causes": list(item.causes), "form": item.form}
         return {**known, "noise": item.noise, "target": item.distance, "error": f"{type(error).__name__}: {error}"}
