@@ -60,7 +60,7 @@ def _linear(subject: tuple, segments: Path | None, urdf: Path | None, *where):
 
 @app.command()
 @_said_in_one_line
-def modes(  # noqa: PLR0917
+def modes(
     posture: Posture = "mid_stance",
     mass: Mass = 72.6,
     height: Height = 1.80,
@@ -84,7 +84,7 @@ def modes(  # noqa: PLR0917
 
 @app.command()
 @_said_in_one_line
-def nerves(  # noqa: PLR0917
+def nerves(
     name: Annotated[list[str] | None, typer.Argument(help="nerves to use; all of the table if none is named")] = None,
     posture: Posture = "mid_stance",
     mass: Mass = 72.6,
@@ -139,7 +139,7 @@ def nerves(  # noqa: PLR0917
 
 @app.command()
 @_said_in_one_line
-def view(  # noqa: PLR0917
+def view(
     out: Annotated[Path, typer.Argument(help="HTML page to write")],
     posture: Posture = "mid_stance",
     mass: Mass = 72.6,

@@ -172,7 +172,7 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
 
 
 def _estimates(fitted: Fit, cause: Cause) -> Markup:
-    rows = []
+    rows: list[list[Markup | str]] = []
     for name, one in cause.parameters.items():
         shown, interval = _value(fitted, f"{cause.name}.{name}", one.value)
         rows.append([element("code", name), shown, one.unit or "1", interval])

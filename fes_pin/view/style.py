@@ -76,7 +76,7 @@ def styled() -> Iterator[None]:
     """The settings that every figure is drawn with, whatever the user's own are."""
     with mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams.update(_RC)
+        mpl.rcParams.update(_RC)  # type: ignore[arg-type]
         yield
 
 
