@@ -1,6 +1,6 @@
 """Position control and the Kalman filter: time per step, and how closely a joint is held.
 
-    .venv/bin/python scripts/benchmarks/control.py
+.venv/bin/python scripts/benchmarks/control.py
 """
 
 import math

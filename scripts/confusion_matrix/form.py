@@ -32,8 +32,8 @@ class Form:
     unit: ClassVar[float] = 1.0
     cap: ClassVar[float] = np.inf
     states: ClassVar[tuple[str, ...]] = ()
-    fine: ClassVar[int] = 10
-    """Integration steps per sample that it needs."""
+    fine: ClassVar[int] = 5
+    """Integration steps per sample that it needs; at 5 (1 kHz) every rig is within d = 0.01 of the engine."""
 
     def __init__(self, size: np.ndarray, p: dict[str, np.ndarray]) -> None:
         self.size, self.p = size, p

@@ -27,8 +27,8 @@ WHITE = {name: Noise(level, (), level, 0.0) for name, level in LEVEL.items()}
 FRESH = 2
 """Motion trials (for a muscle: isometric) of each study that the diagnosis never sees."""
 COARSE = 5
-"""Integration steps per sample while sizes are sought: 1 kHz."""
-CLOSE = 0.08
+"""Integration steps per sample that the bare rigs need: 1 kHz."""
+CLOSE = 0.12
 """Share by which d may miss its target."""
 ROUNDS = 5
 COLUMN = {"ankle": "angle_rad", "joint": "position", "muscle": "force_n"}
@@ -88,7 +88,7 @@ def make(items: Sequence[Item], folder: Path) -> list[Made]:
         angles = np.concatenate([y for y, p in zip(quiet, one.trials, strict=True) if p.kind == "motion"] or [[0.0]])
         one.shapes = [form.draw(one.item.rng(10 + k), angles) for k, form in enumerate(forms)]
     quiet = [_size(drafts, k, form) for k, form in enumerate(forms)]
-    finest = max([10, *(form.fine for form in forms)])
+    finest = max([COARSE, *(form.fine for form in forms)])
     run = _run(drafts, [one.sizes for one in drafts], forms, finest, fresh=True)
     return [
         _made(one, forms, readings, quiet[0][i] if quiet else None)
@@ -133,7 +133,7 @@ def _size(drafts: list[Draft], k: int, form: type[Form]) -> list[list[np.ndarray
         if not open_:
             break
         part = [drafts[i] for i in open_]
-        run = _run(part, [[s] for s in sizes], (form,), COARSE if form.fine <= 10 else 10, only=k)
+        run = _run(part, [[s] for s in sizes], (form,), min(form.fine, 10), only=k)
         for i, size, readings in zip(open_, sizes, run, strict=True):
             d = noncentrality(drafts[i], readings)
             tried[i].append((size, d))

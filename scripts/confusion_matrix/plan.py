@@ -15,6 +15,8 @@ from confusion_matrix.noise import FAMILIES
 FORMS = (*forms_nerve.FORMS, *forms_joint.FORMS, *forms_sensor.FORMS)
 DISTANCES = (15, 40, 150)
 PAIR_DISTANCE = 100
+BLANK_RIGS = ("ankle",) * 8 + ("joint", "muscle")
+"""Rigs of one round's nulls and decoys: 6 studies each."""
 OUTSIDE_DISTANCE = 60
 
 
@@ -102,8 +104,8 @@ def form_of(cause: str, name: str) -> type[Form]:
 def groups(seed: int) -> Iterator[tuple[Item, ...]]:
     """Studies without end, in groups that are simulated together; any beginning of it is a stratified slice.
 
-    One round holds each form of each cause on the ankle at every distance, in noise families that rotate from round to
-    round; nulls and decoys; pairs; causes outside the library; and a share on the other rigs.
+    One round holds each form of each cause on the ankle at d = 40 and 150, every other one at 15 too, in noise families
+    that rotate from round to round; nulls and decoys; pairs; causes outside the library; and a share on the other rigs.
     """
     turn = seed
     while True:
@@ -112,7 +114,7 @@ def groups(seed: int) -> Iterator[tuple[Item, ...]]:
         for number, form in enumerate(FORMS):
             rigs = [rig for rig in form.rigs if rig == "ankle" or (number + turn) % 3 == 0] or [form.rigs[0]]
             cells += [_singles(form, rig, turn, number) for rig in rigs]
-        cells += [_blanks(rig, turn) for rig in ("ankle", "ankle", "ankle", "joint", "muscle")]
+        cells += [_blanks(rig, turn) for rig in BLANK_RIGS]
         cells += [_pair(rng, turn, number) for number in range(12)]
         cells = [tuple(_renumbered(one, k) for one in cell) for k, cell in enumerate(cells)]
         yield from (cells[k] for k in rng.permutation(len(cells)))
@@ -120,7 +122,7 @@ def groups(seed: int) -> Iterator[tuple[Item, ...]]:
 
 
 def _singles(form: type[Form], rig: str, turn: int, number: int) -> tuple[Item, ...]:
-    distances = (OUTSIDE_DISTANCE,) * 2 if form.name == "outside" else DISTANCES
+    distances = (OUTSIDE_DISTANCE,) * 2 if form.name == "outside" else DISTANCES[(number + turn) % 2 :]
     return tuple(
         Item(rig, (form.cause,), form.name, d, FAMILIES[(number + turn + k) % len(FAMILIES)], turn)
         for k, d in enumerate(distances)

@@ -56,10 +56,10 @@ def test_causes_in_the_engines_form_agree_with_it(cause, short, tmp_path):
 
 
 def test_a_study_is_the_same_alone_and_in_company_and_has_its_size(short, tmp_path):
-    items = [Item("ankle", ("coulomb_friction",), "stribeck", d, "process", 3) for d in (15, 40)]
+    items = [Item("ankle", ("quadratic_damping",), "power_2.4", d, "process", 3) for d in (15, 40)]
     alone = generator.make(items[1:], tmp_path)[0]
     together = generator.make(items, tmp_path)
-    assert [made.distances[0] for made in together] == pytest.approx([15, 40], rel=0.09)
+    assert [made.distances[0] for made in together] == pytest.approx([15, 40], rel=0.13)
     for a, b in zip(alone.study.trials, together[1].study.trials, strict=True):
         column = "angle_rad" if a.kind == "motion" else "force_n"
         np.testing.assert_allclose(a[column], b[column], atol=2e-4)

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from confusion_matrix import picture, plan, runner, table
+from confusion_matrix import picture, plan, runner, stimuli, table
 from confusion_matrix.plan import Item
 
 
@@ -68,6 +68,7 @@ def test_any_beginning_is_a_slice():
 
 def test_slice_from_end_to_end_and_again(tmp_path, monkeypatch):
     monkeypatch.setenv("FES_PIN_THREADS", "1")
+    monkeypatch.setattr(stimuli, "DURATION_S", 4.0)
     wanted = [[Item("ankle", ("load_inertia",), "pulley", 150, "ar1", 5)], [Item("muscle", (), "null", 0, "white", 5)]]
     results = tmp_path / "results.jsonl"
     hidden, none = runner.run(wanted, results)
