@@ -164,11 +164,13 @@ def _outside_rows(good: list[Record]) -> list[str]:
 
 
 def _times(good: list[Record]) -> list[str]:
-    walls = [r["wall_s"] for r in good]
-    if not walls:
-        return []
-    text = f"median {np.median(walls):.1f} s, 95 % below {np.quantile(walls, 0.95):.1f} s, worst {max(walls):.1f} s"
-    return [f"wall time of one diagnosis, one thread on a busy machine: {text}"]
+    out = []
+    for key, label in (("wall_s", "wall time of one diagnosis, one thread"), ("cpu_s", "processor time of it")):
+        values = [r[key] for r in good if key in r]
+        if values:
+            spread = f"median {np.median(values):.1f} s, 95 % below {np.quantile(values, 0.95):.1f} s"
+            out.append(f"{label}: {spread}, worst {max(values):.1f} s, {len(values)} studies")
+    return out
 
 
 def _confusions(good: list[Record]) -> list[str]:
