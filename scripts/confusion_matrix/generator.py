@@ -8,12 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from confusion_matrix.dynamics import Lanes, simulate
+from confusion_matrix.drafts import Draft, as_trial, draft, run_trials, sensor_family, study_of, with_noise
 from confusion_matrix.form import Form
-from confusion_matrix.noise import LEVEL, random_torque, sensor_noise
+from confusion_matrix.noise import LEVEL, innovations
 from confusion_matrix.plan import Item
-from confusion_matrix.rigs import Plant, Protocol, draw_plant, draw_trials, urdf_text
-from confusion_matrix.stimuli import times
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, fit_problem
@@ -24,28 +22,11 @@ from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs.base import Rig
 
 WHITE = {name: Noise(level, (), level, 0.0) for name, level in LEVEL.items()}
-FRESH = 2
-"""Motion trials (for a muscle: isometric) of each study that the diagnosis never sees."""
 COARSE = 5
 """Integration steps per sample that the bare rigs need: 1 kHz."""
 CLOSE = 0.12
 """Share by which d may miss its target."""
 ROUNDS = 5
-COLUMN = {"ankle": "angle_rad", "joint": "position", "muscle": "force_n"}
-
-
-@dataclass
-class Draft:
-    """A study before anything is hidden in it."""
-
-    item: Item
-    plant: Plant
-    trials: list[Protocol]
-    fresh: list[Protocol]
-    shapes: list[dict[str, float]]
-    sizes: list[float]
-    distances: list[float]
-    urdf: Path
 
 
 @dataclass(frozen=True)
@@ -58,6 +39,8 @@ class Made:
         Noiseless trials that the study does not hold.
     sizes, distances
         Of each cause alone.
+    felt
+        d of a single cause against the noise as it is; None with a random torque.
     truth
         Parameters of the extended model by name, where the form is the engine's.
     orthogonal
@@ -69,6 +52,7 @@ class Made:
     fresh: tuple[Trial, ...]
     sizes: tuple[float, ...]
     distances: tuple[float, ...]
+    felt: float | None
     truth: Mapping[str, float]
     orthogonal: float | None
 
@@ -83,42 +67,17 @@ def make(items: Sequence[Item], folder: Path) -> list[Made]:
     """
     forms = items[0].forms()
     drafts = [draft(item, folder) for item in items]
-    bare = _run(drafts, [()] * len(drafts), (), COARSE) if forms else []
+    bare = run_trials(drafts, [()] * len(drafts), (), COARSE) if forms else []
     for one, quiet in zip(drafts, bare, strict=False):
         angles = np.concatenate([y for y, p in zip(quiet, one.trials, strict=True) if p.kind == "motion"] or [[0.0]])
         one.shapes = [form.draw(one.item.rng(10 + k), angles) for k, form in enumerate(forms)]
     quiet = [_size(drafts, k, form) for k, form in enumerate(forms)]
     finest = max([COARSE, *(form.fine for form in forms)])
-    run = _run(drafts, [one.sizes for one in drafts], forms, finest, fresh=True)
+    run = run_trials(drafts, [one.sizes for one in drafts], forms, finest, fresh=True)
     return [
         _made(one, forms, readings, quiet[0][i] if quiet else None)
         for i, (one, readings) in enumerate(zip(drafts, run, strict=True))
     ]
-
-
-def draft(item: Item, folder: Path) -> Draft:
-    """The rig and the trials of a study."""
-    rng = item.rng(0)
-    plant = draw_plant(rng, item.rig, 0.03 if item.form == "null" else 0.4)
-    motion = 0 if item.rig == "muscle" else 8
-    isometric = {"ankle": 3 if rng.random() < 2 / 3 else 0, "joint": 0, "muscle": 6}[item.rig]
-    trials = draw_trials(rng, plant, motion, isometric)
-    fresh = draw_trials(item.rng(1), plant, FRESH if motion else 0, 0 if motion else FRESH)
-    if item.rig != "muscle":
-        driven = trials[0].input is not None
-        fresh = [p if driven or item.rig == "ankle" else Protocol(p.kind, None, p.conditions) for p in fresh]
-        fresh = [p if p.input is not None or not driven else _driven(item, plant, p) for p in fresh]
-    urdf = folder / f"{item.name}.urdf"
-    if item.rig == "joint":
-        urdf.write_text(urdf_text(plant.known), encoding="utf-8")
-    return Draft(item, plant, trials, fresh, [], [], [], urdf)
-
-
-def _driven(item: Item, plant: Plant, p: Protocol) -> Protocol:
-    rng = item.rng(2)
-    while (other := draw_trials(rng, plant, 1, 0)[0]).input is None:
-        pass
-    return Protocol(p.kind, other.input, p.conditions)
 
 
 def _size(drafts: list[Draft], k: int, form: type[Form]) -> list[list[np.ndarray]]:
@@ -133,7 +92,7 @@ def _size(drafts: list[Draft], k: int, form: type[Form]) -> list[list[np.ndarray
         if not open_:
             break
         part = [drafts[i] for i in open_]
-        run = _run(part, [[s] for s in sizes], (form,), min(form.fine, 10), only=k)
+        run = run_trials(part, [[s] for s in sizes], (form,), min(form.fine, 10), only=k)
         for i, size, readings in zip(open_, sizes, run, strict=True):
             d = noncentrality(drafts[i], readings)
             tried[i].append((size, d))
@@ -170,110 +129,40 @@ def noncentrality(one: Draft, readings: list[np.ndarray]) -> float:
     return float(np.sqrt(fitted.sse))
 
 
-def nominal_fit(study: Study, true: Mapping[str, float], model: Model | None = None) -> Fit:
-    """Fit a study's nominal model, or one that extends it, from the true values, with white noise at the true level."""
+def felt_noncentrality(one: Draft, readings: list[np.ndarray]) -> float | None:
+    """The same, for the noise that the study has; None where it is a random torque."""
+    family, colour = sensor_family(one)
+    if one.item.noise == "process" and family == "white":
+        return None
+    noise = {}
+    for name, level in LEVEL.items():
+        innovation, ar = innovations(family, name, colour)
+        noise[name] = Noise(innovation, ar, level, 0.0)
+    return float(np.sqrt(nominal_fit(study_of(one, readings), one.plant.true, noise=noise).sse))
+
+
+def nominal_fit(
+    study: Study, true: Mapping[str, float], model: Model | None = None, noise: Mapping[str, Noise] = WHITE
+) -> Fit:
+    """Fit a study's nominal model, or one that extends it, from the true values."""
     extended = model or nominal_model(study)
     with np.errstate(all="ignore"):
-        return fit_problem(Problem(extended, study.trials, WHITE), {**extended.parameters(), **true})
-
-
-def study_of(one: Draft, readings: Sequence[np.ndarray]) -> Study:
-    """The study with these readings."""
-    trials = [
-        _trial(one.plant.rig, f"{k:02d}", p, y) for k, (p, y) in enumerate(zip(one.trials, readings, strict=True))
-    ]
-    if one.plant.rig == "joint":
-        files = {"urdf": one.urdf}
-        return Study(one.item.name, "joint", {}, dict(one.plant.start), tuple(trials), files=files)
-    return Study(one.item.name, one.plant.rig, dict(one.plant.known), dict(one.plant.start), tuple(trials))
-
-
-def _trial(rig: str, name: str, p: Protocol, y: np.ndarray) -> Trial:
-    column = "force_n" if p.kind == "isometric" else COLUMN[rig]
-    drive = "effort" if rig == "joint" else "pulse_width_us"
-    columns = {drive: p.input} if p.input is not None else {}
-    conditions = {n: v for n, v in p.conditions.items() if n not in ("position0", "velocity0")}
-    return Trial(name, p.kind, {**columns, column: y}, times(), conditions)
-
-
-def _run(
-    drafts: Sequence[Draft],
-    sizes: Sequence[Sequence[float]],
-    forms: Sequence[type[Form]],
-    steps: int,
-    *,
-    fresh: bool = False,
-    only: int = 0,
-) -> list[list[np.ndarray]]:
-    """Readings of every trial of every draft, all side by side."""
-    each = [one.trials + (one.fresh if fresh else []) for one in drafts]
-    owner = [i for i, trials in enumerate(each) for _ in trials]
-    flat = [p for trials in each for p in trials]
-    numbers = [drafts[i].plant.numbers() for i in owner]
-    k = {n: np.array([x[n] for x in numbers]) for n in numbers[0]}
-    for name, default in (("load_kg", 0.0), ("angle_rad", 1.8), ("position0", 0.0), ("velocity0", 0.0)):
-        k[name] = np.array([p.conditions.get(name, default) for p in flat])
-    k["number"] = np.concatenate([np.arange(len(trials)) for trials in each])
-    count = len(times())
-    drive = np.stack([p.input if p.input is not None else np.zeros(count) for p in flat], axis=1)
-    moving = np.array([p.kind == "motion" for p in flat])
-    torque = _torques(drafts, each, count) if fresh else None
-    built = []
-    for n, form in enumerate(forms):
-        at = only + n
-        shape = {key: np.array([drafts[i].shapes[at][key] for i in owner]) for key in drafts[0].shapes[at]}
-        built.append(form(np.array([sizes[i][n] for i in owner]), shape))
-    with np.errstate(all="ignore"):
-        y = simulate(Lanes(drafts[0].plant.rig, k, drive, moving, torque), built, steps)
-    out: list[list[np.ndarray]] = [[] for _ in drafts]
-    for lane, i in enumerate(owner):
-        out[i].append(y[:, lane])
-    return out
-
-
-def _torques(drafts: Sequence[Draft], each: Sequence[Sequence[Protocol]], count: int) -> np.ndarray | None:
-    """Random torques of the studies whose noise has them, shape (n, L); fresh trials have none."""
-    if not any(one.item.noise == "process" for one in drafts) or drafts[0].plant.rig == "muscle":
-        return None
-    columns = []
-    for one, trials in zip(drafts, each, strict=True):
-        rng = one.item.rng(3)
-        colour, kind = rng.random(), rng.random()
-        weight = one.plant.numbers()["damping"] / 0.075
-        for n, _ in enumerate(trials):
-            pushed = one.item.noise == "process" and kind < TORQUE_SHARE and n < len(one.trials)
-            columns.append(random_torque(rng, count, weight, colour) if pushed else np.zeros(count))
-    return np.stack(columns, axis=1)
-
-
-TORQUE_SHARE = 0.6
-"""Share of the third noise family that is a random torque; the rest is ARMA noise of the sensor."""
+        return fit_problem(Problem(extended, study.trials, noise), {**extended.parameters(), **true})
 
 
 def _made(one: Draft, forms: Sequence[type[Form]], readings: list[np.ndarray], quiet: list[np.ndarray] | None) -> Made:
     count = len(one.trials)
-    noisy = _with_noise(one, readings[:count])
+    noisy = with_noise(one, readings[:count])
     fresh = [
-        _trial(one.plant.rig, f"fresh{k}", p, y)
+        as_trial(one.plant.rig, f"fresh{k}", p, y)
         for k, (p, y) in enumerate(zip(one.fresh, readings[count:], strict=True))
     ]
     orthogonal = _orthogonal(one, quiet) if one.item.kind == "outside" and quiet else None
     truth = _truth(one, forms)
-    return Made(one.item, study_of(one, noisy), tuple(fresh), tuple(one.sizes), tuple(one.distances), truth, orthogonal)
-
-
-def _with_noise(one: Draft, readings: Sequence[np.ndarray]) -> list[np.ndarray]:
-    rng = one.item.rng(3)
-    colour, kind = rng.random(), rng.random()
-    family = one.item.noise
-    if family == "process":
-        family = "arma" if kind >= TORQUE_SHARE or one.plant.rig == "muscle" else "white"
-    out, own = [], one.item.rng(4)
-    for p, y in zip(one.trials, readings, strict=True):
-        column = "force_n" if p.kind == "isometric" else COLUMN[one.plant.rig]
-        noise = sensor_noise(own, family, column, len(y), colour)
-        out.append(np.round(y + noise, 4 if column == "force_n" else 5))
-    return out
+    felt = felt_noncentrality(one, quiet) if quiet and one.item.kind == "single" else None
+    return Made(
+        one.item, study_of(one, noisy), tuple(fresh), tuple(one.sizes), tuple(one.distances), felt, truth, orthogonal
+    )
 
 
 def _truth(one: Draft, forms: Sequence[type[Form]]) -> dict[str, float]:

@@ -29,6 +29,7 @@ def judge(made: Made) -> dict[str, Any]:
         "noise": item.noise,
         "target": item.distance,
         "d": [round(d, 2) for d in made.distances],
+        "felt": None if made.felt is None else round(made.felt, 2),
         "size": [float(f"{s:.5g}") for s in made.sizes],
         "orthogonal": None if made.orthogonal is None else round(made.orthogonal, 2),
         "verdict": diagnosis.verdict,

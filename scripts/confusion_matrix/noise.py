@@ -20,11 +20,25 @@ def sensor_noise(rng: np.random.Generator, family: str, column: str, count: int,
     colour
         From 0 to 1, one number for a study: where between the family's limits it lies.
     """
+    return LEVEL[column] * _filtered(rng, count, *_polynomials(family, colour))
+
+
+def _polynomials(family: str, colour: float) -> tuple[list[float], list[float]]:
+    """Numerator and denominator of the family's filter."""
     if family == "ar1":
-        return LEVEL[column] * _filtered(rng, count, [1.0], [1.0, -(0.6 + 0.3 * colour)])
+        return [1.0], [1.0, -(0.6 + 0.3 * colour)]
     if family == "arma":
-        return LEVEL[column] * _filtered(rng, count, [1.0, 0.4], [1.0, -(1.1 + 0.3 * colour), 0.3 + 0.2 * colour])
-    return LEVEL[column] * rng.standard_normal(count)
+        return [1.0, 0.4], [1.0, -(1.1 + 0.3 * colour), 0.3 + 0.2 * colour]
+    return [1.0], [1.0]
+
+
+def innovations(family: str, column: str, colour: float) -> tuple[float, tuple[float, ...]]:
+    """The noise as it is, as an autoregression: standard deviation of its innovation, and its coefficients."""
+    b, a = _polynomials(family, colour)
+    response = scipy.signal.lfilter(b, a, np.r_[1.0, np.zeros(2000)])
+    inverse = scipy.signal.lfilter(a, b, np.r_[1.0, np.zeros(12)])
+    last = int(np.flatnonzero(np.abs(inverse) > 1e-4)[-1])
+    return float(LEVEL[column] / np.sqrt(np.sum(response**2))), tuple(float(-x) for x in inverse[1 : last + 1])
 
 
 def _filtered(rng: np.random.Generator, count: int, b: list[float], a: list[float]) -> np.ndarray:

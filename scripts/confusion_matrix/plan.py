@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from confusion_matrix import forms_joint, forms_nerve, forms_sensor
+from confusion_matrix import forms_joint, forms_muscle, forms_nerve, forms_rig, forms_sensor
 from confusion_matrix.form import Form
 from confusion_matrix.noise import FAMILIES
 
-FORMS = (*forms_nerve.FORMS, *forms_joint.FORMS, *forms_sensor.FORMS)
+FORMS = tuple(f for m in (forms_nerve, forms_muscle, forms_joint, forms_rig, forms_sensor) for f in m.FORMS)
 DISTANCES = (15, 40, 150)
 PAIR_DISTANCE = 100
 BLANK_RIGS = ("ankle",) * 8 + ("joint", "muscle")

@@ -85,9 +85,13 @@ def _blank_rows(good: list[Record]) -> list[str]:
 
 def _power_rows(good: list[Record]) -> list[str]:
     wanted = {15: ">= 90 %", 40: ">= 99 %", 150: ">= 99 %"}
-    return [
-        _row(f"something claimed, d = {d}", t, [claims(r) for r in good if in_band(r, d)]) for d, t in wanted.items()
-    ]
+    out = []
+    for d, target in wanted.items():
+        out.append(_row(f"something claimed, d = {d}", target, [claims(r) for r in good if in_band(r, d)]))
+    for low, high in ((12, 25), (25, 80)):
+        hits = [claims(r) for r in good if r["kind"] == "single" and low <= (r.get("felt") or 0) < high]
+        out.append(_row(f"something claimed, d of {low} to {high} against the noise as it is", "", hits))
+    return out
 
 
 def _name_rows(good: list[Record]) -> list[str]:

@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
-from confusion_matrix import generator, noise, plan, stimuli
+from confusion_matrix import drafts, generator, noise, plan, stimuli
 from confusion_matrix.plan import Item
 
 from fes_pin.identify.problem import Problem, whitened_sse
@@ -26,8 +26,8 @@ def short(monkeypatch):
 
 @pytest.mark.parametrize("rig", ["ankle", "joint", "muscle"])
 def test_nominal_rigs_agree_with_the_engine(rig, short, tmp_path):
-    one = generator.draft(Item(rig, (), "null", 0, "white", 1), tmp_path)
-    (readings,) = generator._run([one], [()], (), 5)
+    one = drafts.draft(Item(rig, (), "null", 0, "white", 1), tmp_path)
+    (readings,) = drafts.run_trials([one], [()], (), 5)
     assert generator.noncentrality(one, readings) < 0.05
 
 
@@ -35,12 +35,12 @@ def test_nominal_rigs_agree_with_the_engine(rig, short, tmp_path):
 def test_causes_in_the_engines_form_agree_with_it(cause, short, tmp_path):
     item = Item("ankle", (cause,), "same", 40, "white", 2)
     (form,) = item.forms()
-    one = generator.draft(item, tmp_path)
+    one = drafts.draft(item, tmp_path)
     one.trials = [*one.trials[:3], *one.trials[8:9]]
-    (bare,) = generator._run([one], [()], (), 5)
+    (bare,) = drafts.run_trials([one], [()], (), 5)
     one.shapes, one.sizes = [form.draw(item.rng(10), np.concatenate(bare[:3]))], [form.unit]
-    (readings,) = generator._run([one], [one.sizes], (form,), 10)
-    study = generator.study_of(one, readings)
+    (readings,) = drafts.run_trials([one], [one.sizes], (form,), 10)
+    study = drafts.study_of(one, readings)
     shape = {n: v for n, v in {"side": one.shapes[0].get("side")}.items() if v is not None}
     model = nominal_model(study) + dataclasses.replace(effect(cause)(), **shape)
     truth = generator._truth(one, (form,)) | one.plant.true
