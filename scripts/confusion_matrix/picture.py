@@ -46,7 +46,9 @@ def _matrix(axes: Axes, singles: list[Record]) -> None:
             counts[names.index(r["causes"][0]), columns.index(name)] += share
     total = counts.sum(axis=1, keepdims=True)
     shares = np.divide(counts, total, out=np.full_like(counts, np.nan), where=total > 0)
-    axes.imshow(np.where(shares > 0, shares, np.nan), cmap="GnBu", vmin=0.0, vmax=1.3, aspect="auto")
+    right = np.eye(*shares.shape, dtype=bool)
+    for where, colours in ((right, "GnBu"), (~right, "Oranges")):
+        axes.imshow(np.where(where & (shares > 0), shares, np.nan), cmap=colours, vmin=0.0, vmax=1.3, aspect="auto")
     for i, k in zip(*np.nonzero(np.nan_to_num(shares)), strict=True):
         dark = shares[i, k] > 0.9
         axes.text(k, i, f"{100 * shares[i, k]:.0f}", ha="center", va="center", fontsize=6.5, color="w" if dark else INK)

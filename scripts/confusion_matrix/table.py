@@ -56,12 +56,13 @@ def table(records: Iterable[Record]) -> str:
     """The whole table as text."""
     all_ = sorted(records, key=lambda r: r["id"])
     good = [r for r in all_ if "error" not in r]
-    lines = [f"{len(all_)} studies, {len(all_) - len(good)} of them without an answer", ""]
+    kinds = ", ".join(f"{n} {kind}" for kind, n in sorted(Counter(r["kind"] for r in all_).items()))
+    lines = [f"{len(all_)} studies ({kinds}); {len(all_) - len(good)} of them without an answer", ""]
     lines += [f"{'':66s} {'target':>9s}  {'measured':>8s}  95 % interval      n"]
     rows = [_blank_rows, _power_rows, _name_rows, _set_rows, _pair_rows, _interval_rows, _gain_rows, _outside_rows]
     for make in rows:
         lines += make(good)
-    lines += ["", *_times(good), "", *_confusions(good), "", *_by_cause(good)]
+    lines += ["", *_times(good), "", *_confusions(good), "", *_by_cause(good), "", *failures(good)]
     lines += ["", *[f"no answer: {r['id']}: {r['error']}" for r in all_ if "error" in r]]
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
@@ -199,6 +200,40 @@ def _by_cause(good: list[Record]) -> list[str]:
     return out
 
 
+def _trouble(r: Record) -> str | None:
+    """What is wrong with an answer, in two words; None if nothing is."""
+    if r["kind"] == "single":
+        return _single_trouble(r)
+    right = {
+        "outside": lambda: r["unexplained"],
+        "pair": lambda: both(r),
+    }.get(r["kind"], lambda: not claims(r))()
+    words = {"outside": "outside the library, not unexplained", "pair": "not both of two causes"}
+    return None if right else words.get(r["kind"], f"false alarm, {r['noise']} noise")
+
+
+def _single_trouble(r: Record) -> str | None:
+    if exact(r):
+        return None
+    if not r["sets"]:
+        return "missed"
+    if len(r["sets"]) > 1:
+        return "extra claims"
+    return "set too large" if first(r) else "wrong name"
+
+
+def failures(good: list[Record]) -> list[str]:
+    """Every study that was not answered as it should be, by kind of failure."""
+    kinds: dict[str, list[Record]] = {}
+    for r in good:
+        if trouble := _trouble(r):
+            kinds.setdefault(trouble, []).append(r)
+    out = ["not as it should be; each runs again by scripts/confusion --only ID:"]
+    for trouble, part in sorted(kinds.items()):
+        out += [f" {trouble} ({len(part)})", *(f"  {one_line(r)}" for r in part)]
+    return out
+
+
 def one_line(r: Record) -> str:
     """One result in words."""
     if "error" in r:
@@ -206,4 +241,6 @@ def one_line(r: Record) -> str:
     answer = " and ".join("|".join(s) for s in r["sets"]) or "-"
     ds = ", ".join(f"{d:g}" for d in r["d"]) or "0"
     left = f", remainder in {r['where']}" if r["unexplained"] else ""
-    return f"{r['id']}: d = {ds}; {r['verdict']}: {answer}{left}; share {r['share']}; {r['wall_s']} s"
+    beside = f" ({r['orthogonal']:g} beside the nearest cause)" if r.get("orthogonal") else ""
+    felt = f", {r['felt']:g} in its noise" if r.get("felt") else ""
+    return f"{r['id']}: d = {ds}{felt}{beside}; {r['verdict']}: {answer}{left}; share {r['share']}"

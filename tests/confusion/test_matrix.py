@@ -46,6 +46,7 @@ def test_table_counts():
     assert "50.0 %" in row(text, "both of two causes")
     assert "50.0 %" in row(text, "95 % intervals cover, all parameters, any")
     assert "100.0 %" in row(text, "outside the library, 15 beside")
+    assert " wrong name (1)" in text and " false alarm, ar1 noise (1)" in text and " not both of two causes (1)" in text
     assert "fatigue (ding)" in text and "-> potentiation|fatigue" in text
 
 
