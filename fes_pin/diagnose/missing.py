@@ -133,6 +133,12 @@ def _signals(rig: Rig, trial: Trial, inputs: Mapping[str, np.ndarray]) -> Signal
     )
 
 
+def smoothed(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Time and smooth curve of a signal of any length, by `smooth` on at most `MAX_POINTS` averages."""
+    count = max(1, math.ceil(len(values) / MAX_POINTS))
+    return thin(time, count), smooth(thin(values, count))
+
+
 def smooth(values: np.ndarray) -> np.ndarray:
     """The smoothest curve that leaves no more than the noise, shape (n,).
 

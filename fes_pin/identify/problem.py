@@ -162,5 +162,6 @@ def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> Norma
 
 def whitened_sse(parts: Sequence[Linearized]) -> float:
     """Sum of squared whitened residuals; infinite where the simulation did not stay finite."""
-    total = float(sum(p.residual @ p.residual for p in parts))
+    with np.errstate(over="ignore", invalid="ignore"):
+        total = float(sum(p.residual @ p.residual for p in parts))
     return total if math.isfinite(total) else math.inf

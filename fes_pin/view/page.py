@@ -90,9 +90,11 @@ def page(title: str, body: Markup) -> str:
     )
 
 
-def percent(value: float | None, digits: int = 2) -> str:
+def percent(value: float | None) -> str:
     """A percentage as printed, "-" for none."""
-    return "-" if value is None or not math.isfinite(value) else f"{value:.{digits}f} %"
+    if value is None or not math.isfinite(value):
+        return "-"
+    return f"{value:.3g} %" if value >= 1.0 else f"{value:.2g} %"
 
 
 def rounded(value: float, std: float) -> str:
@@ -109,3 +111,12 @@ def rounded(value: float, std: float) -> str:
 def probability(value: float) -> str:
     """A p-value as printed."""
     return "p < 1e-12" if value < 1e-12 else f"p = {value:.2g}"
+
+
+def key(*entries: tuple[str, str]) -> Markup:
+    """A legend for the figures beneath it: colour names of `style.COLOURS`, and what they stand for."""
+    made = [
+        element("span", Markup(f'<i style="background: var(--{colour})"></i>'), words, class_="entry")
+        for colour, words in entries
+    ]
+    return element("p", joined(made, " "), class_="key")

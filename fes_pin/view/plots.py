@@ -15,7 +15,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as MplPath
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.missing import Missing, binned, explained
+from fes_pin.diagnose.missing import Missing, binned, explained, smoothed
 from fes_pin.diagnose.replay import Replay
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.view.style import (
@@ -24,11 +24,13 @@ from fes_pin.view.style import (
     FAINT,
     MEASURED,
     NOMINAL,
+    PANEL,
     STIMULUS,
     WIDTH,
     bare,
     label,
     legend_above,
+    milli,
     styled,
     thin_curve,
     unit_of,
@@ -41,8 +43,12 @@ PULSES = 400
 INPUTS = ("pulse_width_us", "stim", "effort")
 
 
-def trial_figure(one: Replay, noise: NoiseModel, position_unit: str = "rad", extended: bool = True) -> Figure:
+def trial_figure(
+    one: Replay, noise: NoiseModel, position_unit: str = "rad", extended: bool = True, legend: bool = True
+) -> Figure:
     """One trial: measured over simulated, the residual (measured - simulated) beneath, the stimulus as a strip.
+
+    The residual is drawn as it is, faint, and smoothed.
 
     Parameters
     ----------
@@ -54,34 +60,40 @@ def trial_figure(one: Replay, noise: NoiseModel, position_unit: str = "rad", ext
         "rad" or "m".
     extended
         False where the extended model is the nominal one.
+    legend
+        False where the page has one.
     """
     stimulus = [n for n in INPUTS if n in one.measured.columns]
-    heights = [h for _ in one.outputs for h in (2.0, 1.1)] + [0.42] * len(stimulus)
+    heights = [h for _ in one.outputs for h in (2.0, 1.2)] + [0.42] * len(stimulus)
     with styled():
-        figure = Figure(figsize=(WIDTH, 0.95 + 0.78 * sum(heights)))
-        grid = figure.add_gridspec(
-            len(heights), 1, height_ratios=heights, left=0.16, right=0.985, hspace=0.16,
-            top=1 - 0.32 / figure.get_figheight(), bottom=0.5 / figure.get_figheight(),
-        )  # fmt: skip
+        figure = Figure(figsize=(WIDTH, 0.65 + 0.3 * legend + 0.78 * sum(heights)))
+        total = figure.get_figheight()
+        margins = {"left": 0.165, "right": 0.985, "top": 1 - (0.08 + 0.24 * legend) / total, "bottom": 0.5 / total}
+        grid = figure.add_gridspec(len(heights), 1, height_ratios=heights, hspace=0.16, **margins)
         rows = [figure.add_subplot(grid[k]) for k in range(len(heights))]
         for k, name in enumerate(one.outputs):
             _curves(rows[2 * k], one, name, extended)
             rows[2 * k].set_ylabel(label(name, position_unit))
-            band = 2.0 * noise[name].std if name in noise else 0.0
-            _residuals(rows[2 * k + 1], one, name, extended, band)
-            rows[2 * k + 1].set_ylabel(f"residual\n({unit_of(name, position_unit)})")
+            beneath = rows[2 * k + 1]
+            factor, unit = milli(one.measured.residual(one.nominal, name), unit_of(name, position_unit))
+            band = factor * 2.0 * noise[name].std if name in noise else 0.0
+            beneath.axhspan(-band, band, color=BAND, lw=0)
+            _residuals(beneath, one, name, extended, factor)
+            beneath.set_ylabel(f"residual\n({unit})")
         for axes, name in zip(rows[2 * len(one.outputs) :], stimulus, strict=True):
             _strip(axes, one.measured, name)
-            axes.set_ylabel(_short(label(name, position_unit)), rotation=0, ha="right", va="center", fontsize=9.5)
+            axes.set_ylabel(_short(label(name, position_unit)), rotation=0, ha="center", va="center", fontsize=9.0)
         for axes in rows:
             axes.set_xlim(one.measured.time[0], one.measured.time[-1])
+            axes.yaxis.set_label_coords(-0.125, 0.5)
+        for axes in rows[2 * len(one.outputs) :]:
+            axes.yaxis.set_label_coords(-0.145, 0.4)
         for axes in rows[:-1]:
             bare(axes)
         rows[-1].set_xlabel("time (s)")
-        for axes in rows[: 2 * len(one.outputs)]:
-            axes.yaxis.set_label_coords(-0.125, 0.5)
-        handles, names = rows[0].get_legend_handles_labels()
-        legend_above(figure, handles[::-1], names[::-1])
+        if legend:
+            handles, names = rows[0].get_legend_handles_labels()
+            legend_above(figure, handles[::-1], names[::-1])
     return figure
 
 
@@ -93,18 +105,20 @@ def _curves(axes: Axes, one: Replay, name: str, extended: bool) -> None:
     """Simulations behind, the measurement in front."""
     time = one.measured.time
     if extended:
-        axes.plot(*thin_curve(time, one.extended[name]), color=EXTENDED, lw=3.4, label="extended")
-    axes.plot(*thin_curve(time, one.nominal[name]), color=NOMINAL, lw=1.6, label="nominal")
+        axes.plot(*thin_curve(time, one.extended[name]), color=EXTENDED, lw=4.0, label="extended")
+    axes.plot(*thin_curve(time, one.nominal[name]), color=NOMINAL, lw=1.8, label="nominal")
     axes.plot(*thin_curve(time, one.measured[name]), color=MEASURED, lw=0.9, label="measured")
 
 
-def _residuals(axes: Axes, one: Replay, name: str, extended: bool, band: float) -> None:
-    time = one.measured.time
-    axes.axhspan(-band, band, color=BAND, lw=0)
+def _residuals(axes: Axes, one: Replay, name: str, extended: bool, factor: float) -> None:
+    """Residuals of both models, as they are and smoothed."""
+    models = [(one.nominal, NOMINAL)] + [(one.extended, EXTENDED)] * extended
+    raw = [one.measured.residual(simulated, name) for simulated, _ in models]
     axes.axhline(0.0, color=FAINT, lw=0.7)
-    axes.plot(*thin_curve(time, one.measured.residual(one.nominal, name)), color=NOMINAL, lw=0.9)
-    if extended:
-        axes.plot(*thin_curve(time, one.measured.residual(one.extended, name)), color=EXTENDED, lw=0.9)
+    for residual, (_, colour) in zip(raw, models, strict=True):
+        axes.plot(*thin_curve(one.measured.time, factor * residual, 220), color=colour, lw=0.6, alpha=0.4)
+    for residual, (_, colour) in zip(raw, models, strict=True):
+        axes.plot(*thin_curve(*smoothed(one.measured.time, factor * residual), 220), color=colour, lw=1.9)
     axes.locator_params(axis="y", nbins=4)
 
 
@@ -122,14 +136,16 @@ def _strip(axes: Axes, trial: Trial, name: str) -> None:
     axes.fill_between(*thin_curve(time, values), step="post", color=STIMULUS, alpha=0.55, lw=0)
     low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
     axes.set_ylim(low, high if high > low else low + 1.0)
-    axes.set_yticks([low, high] if low < 0.0 < high else [high if high > 0 else low], minor=False)
-    axes.tick_params(axis="y", labelsize=8.5)
+    ends = [low, high] if low < 0.0 < high else [high if high > 0 else low]
+    axes.set_yticks(ends, [f"{v:.0f}" if abs(v) >= 100 else f"{v:.3g}" for v in ends], fontsize=8.5)
 
 
-def missing_figure(before: Sequence[Missing], after: Sequence[Missing], position_unit: str = "rad") -> Figure:
-    """Missing torque (or force) against angle, rate, activation, stimulus and time.
+def missing_figure(
+    before: Sequence[Missing], after: Sequence[Missing], name: str, position_unit: str = "rad", legend: bool = True
+) -> Figure:
+    """Missing torque (or force) against one variable.
 
-    Dots are instants of all trials; the line joins the medians of bins of equal width. The percentage says how much of
+    Dots are instants of all trials; the lines join the medians of bins of equal width. The percentage says how much of
     the variance is a function of that variable alone.
 
     Parameters
@@ -138,26 +154,30 @@ def missing_figure(before: Sequence[Missing], after: Sequence[Missing], position
         Of the nominal model, trial by trial, all of one kind.
     after
         Of the extended model; empty where it is the nominal one.
+    name
+        Of the variable.
+    position_unit, legend
+        As in `trial_figure`.
     """
-    names = list(before[0].against)
-    columns = 2
-    rows = -(-len(names) // columns)
     with styled():
-        figure = Figure(figsize=(2 * WIDTH, 0.45 + 2.45 * rows))
-        height = figure.get_figheight()
-        margins = {"left": 0.085, "right": 0.985, "top": 1 - 0.62 / height, "bottom": 0.55 / height}
-        grid = figure.add_gridspec(rows, columns, **margins, hspace=0.48, wspace=0.24)
-        limit = _limit(before)
-        for k, name in enumerate(names):
-            axes = figure.add_subplot(grid[k // columns, k % columns])
-            _against(axes, before, after, name)
-            axes.set(ylim=(-limit, limit), xlabel=label(name, position_unit))
-            if k % columns == 0:
-                axes.set_ylabel(f"missing {before[0].kind} ({before[0].unit})")
-            if k == 0:
-                handles, texts = axes.get_legend_handles_labels()
-                figure.legend(handles, texts, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=3, borderaxespad=0.2)
+        figure = Figure(figsize=(PANEL, 2.5 + 0.25 * legend))
+        axes = figure.add_axes((0.19, 0.19, 0.79, 0.72 - 0.08 * legend))
+        factor, unit = milli(np.concatenate([m.value for m in before]), before[0].unit)
+        _against(axes, before, after, name, factor)
+        limit = factor * _limit(before)
+        axes.set(ylim=(-limit, limit), xlabel=label(name, position_unit))
+        axes.set_ylabel(f"missing {before[0].kind} ({unit})")
+        axes.yaxis.set_label_coords(-0.17, 0.5)
+        axes.locator_params(axis="both", nbins=5)
+        if legend:
+            legend_above(figure, *axes.get_legend_handles_labels())
     return figure
+
+
+def share(before: Sequence[Missing], name: str) -> float:
+    """Share of the missing input's variance that is a function of one variable alone, 0 to 1."""
+    x, value = _joined(before, name)
+    return explained(value, x)
 
 
 def _joined(many: Sequence[Missing], name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -170,14 +190,15 @@ def _limit(many: Sequence[Missing]) -> float:
     return max(1.15 * float(np.quantile(values, 0.995)), 1e-12)
 
 
-def _against(axes: Axes, before: Sequence[Missing], after: Sequence[Missing], name: str) -> None:
+def _against(axes: Axes, before: Sequence[Missing], after: Sequence[Missing], name: str, factor: float) -> None:
     x, value = _joined(before, name)
     axes.axhline(0.0, color=FAINT, lw=0.7)
     chosen = _spread(x, value)
-    _dots(axes, x[chosen], value[chosen])
-    axes.plot(*_medians(x, value), color=MEASURED, lw=1.8, marker="o", ms=3.2, label="nominal, median")
+    _dots(axes, x[chosen], factor * value[chosen])
+    axes.plot(*_medians(x, factor * value), color=MEASURED, lw=1.8, marker="o", ms=3.4, label="nominal")
     if after:
-        axes.plot(*_medians(*_joined(after, name)), color=EXTENDED, lw=2.4, label="extended, median")
+        at, left = _joined(after, name)
+        axes.plot(*_medians(at, factor * left), color=EXTENDED, lw=2.6, label="extended")
     axes.set_title(f"{100 * explained(value, x):.0f} % of its variance", fontsize=9.5, loc="right", pad=3)
 
 
@@ -198,7 +219,6 @@ def _dots(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
     path.should_simplify = False
     pen = {"lw": 2.4, "edgecolor": NOMINAL, "alpha": 0.6, "capstyle": "round"}
     axes.add_patch(PathPatch(path, fill=False, **pen))
-    axes.plot([], [], ".", color=NOMINAL, ms=5, mew=0, label="nominal, instants")
 
 
 def _medians(x: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

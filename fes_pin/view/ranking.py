@@ -48,6 +48,7 @@ def rivals_figure(diagnosis: Diagnosis, cause: Cause) -> Figure:
         names = [n for n, _ in rivals]
         colours = [_colour(n) for n in names]
         axes.set_xscale("log")
+        axes.minorticks_off()
         axes.axvspan(LEAST, SEPARABLE, color=BAND, lw=0)
         for k, (value, colour) in enumerate(zip(values, colours, strict=True)):
             near = names[k] in cause.equivalents

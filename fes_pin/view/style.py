@@ -43,6 +43,9 @@ LABELS = {
 WIDTH = 5.4
 """Width of a figure, inches; a report shows one or two beside each other."""
 
+PANEL = 4.3
+"""Width of a panel of the missing torque, inches."""
+
 _RC: Mapping[str, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"],
@@ -60,7 +63,7 @@ _RC: Mapping[str, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.limits": (-4, 5),
     "axes.formatter.use_mathtext": False,
     "axes.unicode_minus": True,
     "lines.solid_capstyle": "round",
@@ -136,7 +139,11 @@ def bare(axes: Axes) -> None:
 
 def legend_above(figure: Figure, handles: list[Any], names: list[str]) -> None:
     """One row of legend along the top of a figure."""
-    figure.legend(
-        handles, names, loc="upper left", bbox_to_anchor=(0.13, 1.0), ncols=len(names), handlelength=1.6,
-        columnspacing=1.3, borderaxespad=0.2,
-    )  # fmt: skip
+    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.14, 1.0), "borderaxespad": 0.2}
+    figure.legend(handles, names, ncols=len(names), handlelength=1.6, columnspacing=1.3, **place)
+
+
+def milli(values: np.ndarray, unit: str) -> tuple[float, str]:
+    """Factor and unit in which small values have short numbers: thousandths where they are below a twentieth."""
+    largest = float(np.quantile(np.abs(values), 0.995)) if len(values) else 0.0
+    return (1e3, f"m{unit}") if 0.0 < largest < 0.05 and unit else (1.0, unit)

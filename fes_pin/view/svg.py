@@ -11,11 +11,9 @@ from matplotlib.figure import Figure
 
 from fes_pin.view.style import COLOURS, styled
 
-_PRECISION = re.compile(r"(\d\.\d{2})\d+")
 _PATH = re.compile(r' d="[^"]*"')
-_TENTH = re.compile(r"(\d\.\d)\d+")
+_TENTH = re.compile(r"(\.\d)\d+(?: \n)?")
 """Curves are drawn to a tenth of a point."""
-_SPACE = re.compile(r" ?\n?([MLQCz]) ?")
 _COLOUR = re.compile("|".join(COLOURS.values()))
 _NAMES = {colour: name for name, colour in COLOURS.items()}
 
@@ -43,9 +41,8 @@ def inline_svg(figure: Figure, description: str) -> str:
     assert box is not None
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = re.sub(r'<g id="[^"]*"', "<g", body)
-    body = _PRECISION.sub(r"\1", body)
     body = _COLOUR.sub(lambda found: f"var(--{_NAMES[found[0]]}, {found[0]})", body)
-    body = _PATH.sub(lambda found: _SPACE.sub(r"\1", _TENTH.sub(r"\1", found[0])), body)
+    body = _PATH.sub(lambda found: _TENTH.sub(r"\1", found[0]), body)
     body = re.sub(r"\n\s*", "\n", body)
     label = html.escape(description, quote=True)
     return (

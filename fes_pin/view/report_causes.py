@@ -1,0 +1,104 @@
+"""The part of the report that names the causes."""
+
+from __future__ import annotations
+
+from fes_pin.diagnose.diagnosis import Cause, Diagnosis
+from fes_pin.identify.fit import Fit
+from fes_pin.models.describe import equation, remark, sentence
+from fes_pin.models.effects import effect
+from fes_pin.view.page import Content, Markup, element, figure, probability, rounded, table
+from fes_pin.view.ranking import gain_figure, rivals_figure, shown_rivals
+from fes_pin.view.svg import inline_svg
+
+
+def stage_mark(stage: str) -> Markup:
+    """A stage of the signal path, in its colour."""
+    return element("span", stage, class_=f"stage {stage}")
+
+
+def causes_section(diagnosis: Diagnosis) -> list[Markup]:
+    """The causes: a table, their gains, and a card for each."""
+    if not diagnosis.causes:
+        return [element("p", "None is named: no cause in the library earned its place on these data.")]
+    rows: list[list[Content]] = [
+        [
+            element("code", c.name),
+            stage_mark(c.stage),
+            _gain_text(c),
+            probability(c.p_value).removeprefix("p = ").removeprefix("p "),
+            ", ".join(c.equivalents) or "-",
+        ]
+        for c in diagnosis.causes
+    ]
+    shown = inline_svg(gain_figure(diagnosis.causes), "Held-out gain of each cause")
+    caption = (
+        "Gain on held-out trials with its 95 % interval: percent of the nominal model's squared error above noise."
+    )
+    return [
+        table(("cause", "stage", "held-out gain [95 %]", "p", "cannot be told from"), rows, (2, 3)),
+        figure(shown, caption, "narrow"),
+        *(_cause(diagnosis, c) for c in diagnosis.causes),
+    ]
+
+
+def _rivals(diagnosis: Diagnosis, cause: Cause) -> Markup:
+    if not shown_rivals(diagnosis, cause):
+        return Markup("")
+    shown = inline_svg(rivals_figure(diagnosis, cause), f"Rivals of {cause.name} by their shortfall")
+    caption = (
+        f"Rivals in place of {cause.name}: by how much twice the log-likelihood of the whole fit falls. Hollow, or in "
+        "the grey band: not told apart. Colours are the stages of the signal path."
+    )
+    return figure(shown, caption, "narrow")
+
+
+def _gain_text(cause: Cause) -> str:
+    held = cause.gain_held_out
+    return f"{held.percent:.0f} % [{held.low:.0f}, {held.high:.0f}]"
+
+
+def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
+    kind = effect(cause.name)
+    told = (
+        f"These data cannot tell it from {', '.join(cause.equivalents)}: read them as one set."
+        if cause.equivalents
+        else "These data tell it apart from every other cause in the library."
+    )
+    gain = (
+        f"It removes {_gain_text(cause)} of the error above the noise on held-out trials "
+        f"({cause.gain_fit:.0f} % on the fitted ones)."
+    )
+    return element(
+        "article",
+        element(
+            "div",
+            element("h3", element("code", cause.name), " ", stage_mark(cause.stage)),
+            element("p", sentence(kind)),
+            element("pre", equation(kind)),
+            _estimates(diagnosis.extended, cause),
+            element("p", gain, " ", told),
+            element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}", class_="soft"),
+            _rivals(diagnosis, cause),
+        ),
+        class_=f"cause {cause.stage}",
+    )
+
+
+def _estimates(fitted: Fit, cause: Cause) -> Markup:
+    rows: list[list[Content]] = []
+    for name, one in cause.parameters.items():
+        shown, interval = value_and_interval(fitted, f"{cause.name}.{name}", one.value)
+        rows.append([element("code", name), shown, one.unit or "1", interval])
+    return table(("parameter", "value", "unit", "95 % interval"), rows, (1, 3))
+
+
+def value_and_interval(fitted: Fit, name: str, value: float) -> tuple[str, str]:
+    """Value and interval of a parameter as printed."""
+    if name not in fitted.free:
+        return f"{value:.4g}", "held"
+    std = fitted.std(name)
+    if name in fitted.not_identified():
+        return f"{value:.3g}", "not identified"
+    low, high = fitted.interval(name)
+    at = " at its bound" if name in fitted.at_bound else ""
+    return rounded(value, std), f"[{rounded(low, std)}, {rounded(high, std)}]{at}"
