@@ -294,8 +294,8 @@ def test_a_joint_starts_at_its_first_sample(pendulum, monkeypatch, case):
     true = read_swing(pendulum, model, time)
     names = [n for n in columns.split(",") if n]
     data = {n: true[n].copy() for n in names}
-    for n in data:
-        data[n][50:] = 99.0
+    for values in data.values():
+        values[50:] = 99.0
     table = np.column_stack([time, *data.values()]).tolist()
     rows = [",".join(["time_s", *names]), *(",".join(map(repr, row)) for row in table)]
     (pendulum / "in.csv").write_text("\n".join(rows) + "\n")
