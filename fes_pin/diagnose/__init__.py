@@ -1,1 +1,20 @@
-"""What a simulation gets wrong, and its cause by name."""
+"""What a simulation gets wrong, and its cause by name; the chapter is callable: `fes_pin.diagnose(study)`."""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+from typing import Any
+
+
+class _Chapter(ModuleType):
+    """The chapter and its verb share a name, so the chapter answers a call."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """See `fes_pin.diagnose.diagnosis.diagnose`."""
+        from fes_pin.diagnose.diagnosis import diagnose  # noqa: PLC0415
+
+        return diagnose(*args, **kwargs)
+
+
+sys.modules[__name__].__class__ = _Chapter
