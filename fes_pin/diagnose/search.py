@@ -110,12 +110,18 @@ class Search:
         return best
 
     def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:
-        """Fit a base with one more effect, from its most promising shapes."""
+        """Fit a base with one more effect, from its most promising shapes.
+
+        Amplitudes start at their linear estimate; where that falls over (a stiffness below zero), at their nulls.
+        """
         starts = []
         for one in scored[:STARTS]:
             effect = _with_amplitudes(one.probe.effect, one.amplitudes)
             starts.append(base.model + effect)
-        return self.fit_from(starts, base.unknowns)
+        fitted = self.fit_from(starts, base.unknowns)
+        if np.isfinite(fitted.sse):
+            return fitted
+        return self.fit_from([base.model + one.probe.effect for one in scored[:STARTS]], base.unknowns)
 
     def scores(self, base: Fit) -> Scores:
         """Promise of every effect that a fit does not have."""

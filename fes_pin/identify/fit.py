@@ -287,6 +287,8 @@ def _damped(hessian: np.ndarray, gradient: np.ndarray, damping: float) -> np.nda
 
 def _covariance(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Inverse information of the free parameters; infinite variance along what is not identified, 0 at a bound."""
+    if not np.isfinite(hessian).all():
+        return np.full_like(hessian, np.inf)
     out = np.zeros_like(hessian)
     inner = hessian[np.ix_(free, free)]
     diagonal = np.diag(inner).copy()
@@ -305,5 +307,5 @@ def _covariance(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
 def _decrement(hessian: np.ndarray, gradient: np.ndarray, free: np.ndarray) -> float:
     """Largest gain in twice the log-likelihood that a step of one free parameter alone still promises."""
     diagonal = np.diag(hessian)
-    good = free & (diagonal > 0)
+    good = free & (diagonal > 0) & np.isfinite(gradient)
     return float(np.max(gradient[good] ** 2 / diagonal[good], initial=0.0))

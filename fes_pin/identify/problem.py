@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -160,5 +161,7 @@ def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> Norma
 
 
 def whitened_sse(parts: Sequence[Linearized]) -> float:
-    """Sum of squared whitened residuals."""
-    return float(sum(p.residual @ p.residual for p in parts))
+    """Sum of squared whitened residuals; infinite where the simulation did not stay finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        total = float(sum(p.residual @ p.residual for p in parts))
+    return total if math.isfinite(total) else math.inf

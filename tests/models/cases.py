@@ -73,6 +73,8 @@ def with_effect(rig, effect):
     one = effect()
     if rig == "joint" and "angle_rad" in effect.parameters():
         one = effect(angle_rad=0.1)
+    if effect.name == "electromechanical_delay":
+        one = effect(delay_s=0.0117)  # a whole number of samples has a kink in every reading
     return Model(RIGS[rig]) + one
 
 

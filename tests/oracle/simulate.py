@@ -11,6 +11,8 @@ from oracle.rigs import Ankle, Joint, Muscle
 
 RIGS = {"ankle": Ankle, "joint": Joint, "muscle": Muscle}
 RTOL, ATOL = 1e-10, 1e-12
+HISTORY_S = 2.5e-3
+"""Time between the velocities that a reflex with a pure delay remembers."""
 
 
 def rig_of(constants):
@@ -81,6 +83,8 @@ def _integrate(rig, time, drives):
     for values, late in drives.values():
         changed = np.flatnonzero(np.diff(values, prepend=0.0))
         jumps.append(time[changed] + late)
+    if rig.causes.get("stretch_reflex", {}).get("form") == "pure":
+        jumps.append(np.arange(0.0, end, HISTORY_S))
     edges = np.unique(np.round(np.concatenate(jumps), 12))
     edges = edges[(edges >= 0.0) & (edges <= end)]
     edges = edges[np.concatenate([[True], np.diff(edges) > 1e-9])]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.maths import clip
+from fes_pin.models.maths import where
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 
@@ -35,4 +35,6 @@ class RecruitmentHysteresis(Effect):
         return {"followed": self._play(s.commanded, s)}
 
     def _play(self, width: Any, s: Any) -> Any:
-        return clip(s.own.followed, width - self.half_width_us, width + self.half_width_us)
+        # strict comparisons, unlike clip, keep the derivative of the side that pulls also at half width 0
+        b, low, high = s.own.followed, width - self.half_width_us, width + self.half_width_us
+        return where(b < low, low, where(b > high, high, b))

@@ -1,0 +1,82 @@
+"""What swings when the stimulation is over? The paper's figure 5, its misfit named by the tool, removed, and measured.
+
+.venv/bin/python analysis/ankle_complete.py        -> out/ankle_complete.png
+"""
+
+# %% Both ankles as studies of eight trials, each on a frame that the model does not know
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from fes_pin.data.paper import PRINTED, STEPWISE, paper_study, paper_twin
+from fes_pin.data.twin import RunningTwin, staircase
+from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.identify.ratios import RatioProblem, ankle_of, error_percent, least_error
+from fes_pin.models.simulate import simulate
+
+OUT = Path(__file__).parents[1] / "out"
+OUT.mkdir(exist_ok=True)
+answers = {}
+for name in PRINTED:
+    study = paper_study(name, frame=True)
+    trial = study.trials[0]
+    paper = RatioProblem(ankle_of(paper_twin(name)), [trial])
+    optimum = least_error(paper)
+    diagnosis = diagnose(study)
+    print(diagnosis, "\n")
+    before, after = simulate(paper.model_at(optimum.x), trial), simulate(diagnosis.model, trial)
+    answers[name] = (
+        trial,
+        before,
+        after,
+        optimum.error_percent,
+        error_percent([trial["angle_rad"]], [after["angle_rad"]]),
+        diagnosis,
+    )
+
+# %% The internal variables that only a simulation shows: total and passive torque of the twin
+torques = {}
+for name in PRINTED:
+    running, rows = RunningTwin(paper_twin(name, frame=True)), []
+    for width in staircase(list(STEPWISE)):
+        rows.append((running.torque_nm, running.antagonist_nm))
+        running.step(float(width), 1.0 / 225.0)
+    torques[name] = np.array(rows).T
+
+# %% The picture
+figure, axes = plt.subplots(4, 2, figsize=(12, 11), sharex=True, constrained_layout=True)
+for column, (name, (trial, before, after, e_before, e_after, _)) in zip(axes.T, answers.items(), strict=True):
+    t = trial.time
+    stimulus, angle, residual, torque = column
+    stimulus.plot(t, trial["pulse_width_us"], "k")
+    stimulus.set_ylabel("pulse width (µs)", fontsize=12)
+    stimulus.set_title(f"trial {name}, load {trial.conditions['load_kg']:g} kg", fontsize=13)
+    angle.plot(t, np.degrees(before["angle_rad"]), color="tab:red", lw=2, label=f"eq. (1), E = {e_before:.2f} %")
+    angle.plot(t, np.degrees(after["angle_rad"]), color="tab:green", lw=3, label=f"with the frame, E = {e_after:.2f} %")
+    angle.plot(t, np.degrees(trial["angle_rad"]), "k", lw=0.9, label="measured (twin)")
+    angle.set_ylabel("angle (deg)", fontsize=12)
+    angle.legend(fontsize=11, loc="upper right")
+    angle.margins(y=0.35)
+    for simulated, color in ((before, "tab:red"), (after, "tab:green")):
+        residual.plot(t, np.degrees(trial.residual(simulated, "angle_rad")), color=color)
+    residual.set_ylabel("measured -\nsimulated (deg)", fontsize=12)
+    torque.plot(t, torques[name][0], "tab:blue", label="total torque")
+    torque.plot(t, torques[name][1], "tab:purple", ls="--", label="passive antagonist")
+    torque.set_ylabel("torque (N m)", fontsize=12)
+    torque.set_xlabel("time (s)", fontsize=12)
+    torque.legend(fontsize=11)
+    for axis in column[1:3]:
+        axis.axvspan(0.9, t[-1], color="0.93")
+    stimulus.axvspan(0.9, t[-1], color="0.93")
+    stimulus.text(0.95, 500.0, "stimulation over", fontsize=12)
+figure.savefig(OUT / "ankle_complete.png", dpi=100)
+
+# %% The answer
+for name, (_, _, _, e_before, e_after, diagnosis) in answers.items():
+    causes = ", ".join(c.name for c in diagnosis.causes) or "none"
+    j = diagnosis.model.parameters()["inertia_kgm2"]
+    print(
+        f"{name}: cause named: {causes}; E {e_before:.2f} -> {e_after:.3f} % (paper {PRINTED[name].error_percent} %); "
+        f"k2 = l / J moves from {PRINTED[name].ratios['k2']:.0f} to {0.08 / j:.1f} 1/(kg m)"
+    )

@@ -1,0 +1,254 @@
+"""Gain and time constant of a muscle, pulse by pulse, by a Kalman filter on isometric force.
+
+Between two samples the muscle of section II-3-1 does exactly
+
+    F+ = alpha F + beta r,    alpha = exp(-dt / tau),  beta = (1 - alpha) K F_ref,    y = F + noise
+
+which is linear in what is sought. `GainFilter` carries the state (F, alpha, beta): its measurement is linear, and of
+its one product, alpha F, mean and covariance are propagated exactly (for a Gaussian), not linearised. So its bands mean
+what they say, which `nees` and `nis` test. `RegressionFilter` is the plain linear filter on (alpha, beta) with the
+measured force as regressor; it is what a linear Kalman filter for these two usually is, and it takes the noise of the
+regressor for motion: its tau comes out short.
+
+Source: Dombre, Fournier and Coiffet, section II-3-1, figure 3; Bar-Shalom, Li and Kirubarajan, Estimation with
+Applications to Tracking and Navigation, Wiley 2001, section 5.4 (NEES, NIS).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.trial import Trial
+
+START_TIME_CONSTANT_S = 0.1
+"""Where the search for tau starts, s: twice the paper's; its band reaches from 0 to beyond 1 s."""
+START_ALPHA_STD = 0.1
+GAIN_95 = float(scipy.stats.norm.ppf(0.975))
+
+
+@dataclass(frozen=True)
+class Recruitment:
+    """Straight recruitment from threshold to saturation, and the force that belongs to gain 1."""
+
+    threshold_us: float = 180.0
+    saturation_us: float = 1000.0
+    force_scale_n: float = 1.0
+
+    @classmethod
+    def of(cls, constants: Mapping[str, float]) -> Recruitment:
+        """From the `[rig]` numbers of a study."""
+        names = ("threshold_us", "saturation_us", "force_scale_n")
+        return cls(**{n: float(constants[n]) for n in names if n in constants})
+
+    def __call__(self, pulse_width_us: float) -> float:
+        share = (pulse_width_us - self.threshold_us) / (self.saturation_us - self.threshold_us)
+        return min(max(share, 0.0), 1.0)
+
+
+class GainFilter:
+    """Kalman filter of (F, alpha, beta), one sample at a time.
+
+    Parameters
+    ----------
+    dt
+        Time between samples, s.
+    recruitment
+        Known curve, and F_ref.
+    noise_std
+        Of the measured force, N.
+    greatest_gain
+        A bound on what K can be: the start knows no more than that K is of this size.
+    wander
+        Standard deviation that the gain's size may change by in a second, as a share of it: 0 for a gain that is
+        constant, more for a muscle that tires.
+
+    Attributes
+    ----------
+    x, p
+        Mean (3,) and covariance (3, 3) of (F, alpha, beta).
+    nis
+        Normalised innovation squared of the last sample; one degree of freedom.
+    """
+
+    def __init__(
+        self,
+        dt: float,
+        recruitment: Recruitment,
+        noise_std: float,
+        greatest_gain: float = 2.0,
+        wander: float = 0.0,
+    ) -> None:
+        if not (dt > 0.0 and noise_std > 0.0 and math.isfinite(dt) and math.isfinite(noise_std)):
+            raise InputError(f"expected a time step and a noise above 0, found {dt:g} s and {noise_std:g} N")
+        self.dt, self.recruitment, self.noise_std, self.wander = dt, recruitment, noise_std, wander
+        alpha = math.exp(-dt / START_TIME_CONSTANT_S)
+        beta = (1.0 - alpha) * 0.5 * greatest_gain * recruitment.force_scale_n
+        self.x = np.array([0.0, alpha, beta])
+        self.p = np.diag([noise_std**2, START_ALPHA_STD**2, beta**2])
+        self.nis = math.nan
+
+    def step(self, force_n: float, pulse_width_us: float) -> None:
+        """Take in one measured force (NaN: none), and the pulse width that is held from now on."""
+        if math.isfinite(force_n):
+            self._correct(force_n)
+        self._predict(self.recruitment(pulse_width_us))
+
+    def _correct(self, force_n: float) -> None:
+        innovation = force_n - self.x[0]
+        size = self.p[0, 0] + self.noise_std**2
+        self.nis = float(innovation * innovation / size)
+        gain = self.p[:, 0] / size
+        self.x = self.x + gain * innovation
+        keep = np.eye(3) - np.outer(gain, [1.0, 0.0, 0.0])
+        self.p = keep @ self.p @ keep.T + self.noise_std**2 * np.outer(gain, gain)
+        self.corrected = self.x.copy(), self.p.copy()
+
+    def _predict(self, r: float) -> None:
+        force, alpha, beta = self.x
+        p, moves = self.p, np.array([[alpha, force, r], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        self.x = np.array([alpha * force + p[0, 1] + beta * r, alpha, beta])
+        self.p = moves @ p @ moves.T
+        self.p[0, 0] += p[0, 0] * p[1, 1] + p[0, 1] ** 2
+        self.p[2, 2] += (self.wander * beta) ** 2 * self.dt
+
+    def gain_and_time_constant(self) -> tuple[float, float]:
+        """K and tau in s, from the means."""
+        return _physical(self.x[1], self.x[2], self.dt, self.recruitment.force_scale_n)
+
+    def stds(self) -> tuple[float, float]:
+        """Standard deviations of K and of tau in s, to first order."""
+        slope = _slope(self.x[1], self.x[2], self.dt, self.recruitment.force_scale_n)
+        covariance = slope @ self.p[1:, 1:] @ slope.T
+        return float(np.sqrt(covariance[0, 0])), float(np.sqrt(covariance[1, 1]))
+
+
+class RegressionFilter:
+    """Plain linear Kalman filter of (alpha, beta): the measured force explains the next one.
+
+    Same parameters as `GainFilter`; its innovation is y+ - alpha y - beta r, whose noise it takes for white.
+    """
+
+    def __init__(self, dt: float, recruitment: Recruitment, noise_std: float, greatest_gain: float = 2.0) -> None:
+        start = GainFilter(dt, recruitment, noise_std, greatest_gain)
+        self.dt, self.recruitment, self.noise_std = dt, recruitment, noise_std
+        self.x, self.p = start.x[1:], start.p[1:, 1:]
+        self.before: np.ndarray | None = None
+        self.nis = math.nan
+
+    def step(self, force_n: float, pulse_width_us: float) -> None:
+        """Take in one measured force, and the pulse width that is held from now on."""
+        if self.before is not None:
+            size = float(self.before @ self.p @ self.before) + 2.0 * self.noise_std**2
+            innovation = force_n - float(self.before @ self.x)
+            gain = self.p @ self.before / size
+            self.nis = innovation**2 / size
+            self.x, self.p = self.x + gain * innovation, self.p - np.outer(gain, gain) * size
+        self.before = np.array([force_n, self.recruitment(pulse_width_us)])
+
+    def gain_and_time_constant(self) -> tuple[float, float]:
+        """K and tau in s."""
+        return _physical(self.x[0], self.x[1], self.dt, self.recruitment.force_scale_n)
+
+    def stds(self) -> tuple[float, float]:
+        """Standard deviations of K and of tau in s that the filter believes."""
+        slope = _slope(self.x[0], self.x[1], self.dt, self.recruitment.force_scale_n)
+        covariance = slope @ self.p @ slope.T
+        return float(np.sqrt(covariance[0, 0])), float(np.sqrt(covariance[1, 1]))
+
+
+def _physical(alpha: float, beta: float, dt: float, force_scale: float) -> tuple[float, float]:
+    alpha = min(max(alpha, 1e-6), 1.0 - 1e-6)
+    return float(beta / ((1.0 - alpha) * force_scale)), float(-dt / math.log(alpha))
+
+
+def _slope(alpha: float, beta: float, dt: float, force_scale: float) -> np.ndarray:
+    """Derivative of (K, tau) by (alpha, beta), shape (2, 2)."""
+    alpha = min(max(alpha, 1e-6), 1.0 - 1e-6)
+    left = (1.0 - alpha) * force_scale
+    return np.array([[beta / left / (1.0 - alpha), 1.0 / left], [dt / (alpha * math.log(alpha) ** 2), 0.0]])
+
+
+@dataclass(frozen=True)
+class GainHistory:
+    """The estimates over a trial: the paper's figure 3.
+
+    Attributes
+    ----------
+    time
+        Shape (n,), s.
+    gain, gain_std
+        K and its standard deviation, shape (n,).
+    time_constant_s, time_constant_std_s
+        tau and its standard deviation, shape (n,).
+    nis
+        Normalised innovations squared, shape (n,).
+    """
+
+    time: np.ndarray
+    gain: np.ndarray
+    gain_std: np.ndarray
+    time_constant_s: np.ndarray
+    time_constant_std_s: np.ndarray
+    nis: np.ndarray
+
+    def at(self, time: float) -> tuple[float, float]:
+        """K and tau in s, as known at a time."""
+        k = int(np.searchsorted(self.time, time, side="right")) - 1
+        return float(self.gain[k]), float(self.time_constant_s[k])
+
+
+def track_gain(
+    trial: Trial, constants: Mapping[str, float], noise_std: float, plain: bool = False, wander: float = 0.0
+) -> GainHistory:
+    """Run the filter over an isometric trial.
+
+    Parameters
+    ----------
+    constants
+        The `[rig]` numbers of its study.
+    noise_std
+        N.
+    plain
+        Use `RegressionFilter`.
+
+    Raises
+    ------
+    InputError
+        For a trial without measured force or pulse widths.
+    """
+    for column in ("force_n", "pulse_width_us"):
+        if column not in trial:
+            raise InputError(f"trial {trial.name} has no column {column}; gain and time constant need isometric trials")
+    recruitment = Recruitment.of(constants)
+    filter_: GainFilter | RegressionFilter
+    if plain:
+        filter_ = RegressionFilter(trial.dt, recruitment, noise_std)
+    else:
+        filter_ = GainFilter(trial.dt, recruitment, noise_std, wander=wander)
+    rows = []
+    for force, width in zip(trial["force_n"], trial["pulse_width_us"], strict=True):
+        filter_.step(float(force), float(width))
+        (gain, tau), (gain_std, tau_std) = filter_.gain_and_time_constant(), filter_.stds()
+        rows.append((gain, gain_std, tau, tau_std, filter_.nis))
+    return GainHistory(trial.time, *np.array(rows).T)
+
+
+def nees(filter_: GainFilter, gain: float, time_constant_s: float) -> float:
+    """Normalised estimation error squared of (alpha, beta) against the truth: two degrees of freedom."""
+    alpha = math.exp(-filter_.dt / time_constant_s)
+    truth = np.array([alpha, (1.0 - alpha) * gain * filter_.recruitment.force_scale_n])
+    error = filter_.x[1:] - truth
+    return float(error @ np.linalg.solve(filter_.p[1:, 1:], error))
+
+
+def chi2_band(degrees: int, runs: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Band of the mean of `runs` independent chi-squared numbers: where NEES and NIS of an honest filter lie."""
+    tail = 0.5 * (1.0 - confidence)
+    low, high = scipy.stats.chi2.ppf([tail, 1.0 - tail], degrees * runs) / runs
+    return float(low), float(high)

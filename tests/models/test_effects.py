@@ -1,0 +1,189 @@
+"""What every effect promises; the tests find the effects, and each rig they name, by themselves."""
+
+import inspect
+import math
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from models.cases import CASES, EFFECTS_OF_RIGS, JOINT, RIGS, everything, name_of, trial, with_effect
+
+from fes_pin.data.trial import Trial
+from fes_pin.models.compile.equations import derive
+from fes_pin.models.compile.layout import make_layout
+from fes_pin.models.compile.virtual import VirtualProgram
+from fes_pin.models.effects import EFFECTS, effect, effects_for
+from fes_pin.models.model import Model
+from fes_pin.models.rigs import Joint
+from fes_pin.models.simulate import Simulator, max_step, simulate
+
+GOLDEN = Path(__file__).with_name("causes.txt")
+NOT_YET = {"pulse_summation"}
+CASE = pytest.mark.parametrize(("one", "rig", "kind"), CASES, ids=name_of)
+
+
+def golden():
+    rows = [line.split() for line in GOLDEN.read_text().splitlines() if not line.startswith("#")]
+    return {name: (stage, set(rigs)) for name, stage, *rigs in rows}
+
+
+def test_names_stages_and_rigs_are_the_canonical_ones():
+    canonical = {n: row for n, row in golden().items() if row[0] != "body"}
+    assert {e.name for e in EFFECTS} == set(canonical) - NOT_YET
+    for one in EFFECTS:
+        stage, rigs = canonical[one.name]
+        assert (one.stage, set(one.rigs)) == (stage, rigs)
+
+
+def test_the_golden_table_is_the_contract(shared):
+    contract = tomllib.loads((shared / "contract" / "effects.toml").read_text())
+    assert golden() == {n: (c["stage"], set(c["rigs"])) for n, c in contract.items()}
+
+
+@pytest.mark.parametrize("one", EFFECTS, ids=name_of)
+def test_the_docstring_has_sentence_equation_tell_tale_and_source(one):
+    text = inspect.getdoc(one)
+    assert text.split("\n")[0].endswith(".")
+    assert re.search(r"^\n {4}\S", text[text.index("\n") :], re.MULTILINE), "no indented equation"
+    assert "\nTell-tale: " in text
+    assert "\nSource: " in text
+    assert issubclass(one, type(one.absent()))
+
+
+@pytest.mark.parametrize("one", EFFECTS, ids=name_of)
+def test_parameters_are_inside_their_bounds(one):
+    assert one.amplitudes(), "nothing switches it off"
+    for name, info in one.parameters().items():
+        assert info.lower <= getattr(one(), name) <= info.upper
+        assert info.null is None or info.lower <= info.null <= info.upper
+        assert all(info.lower <= g <= info.upper for g in info.grid)
+        assert info.scale > 0
+        assert info.fitted or info.grid, "a choice needs something to choose from"
+
+
+def test_effects_are_found_by_name_and_rig():
+    assert effect("fatigue").name == "fatigue"
+    with pytest.raises(KeyError, match="no effect 'tiredness'"):
+        effect("tiredness")
+    assert {e.name for e in effects_for("muscle")} == {e.name for e, rig in EFFECTS_OF_RIGS if rig == "muscle"}
+
+
+def run(model, trials, columns=(), max_step_s=None, values=None):
+    simulator = Simulator(model, trials, tuple(columns), max_step_s=max_step_s)
+    return simulator.run({**model.parameters(), **(values or {})})
+
+
+def trials_of(rig, kind, seed, count=2, n=300):
+    rng = np.random.default_rng(seed)
+    return [trial(rig, kind, rng, n) for _ in range(count)]
+
+
+@CASE
+def test_identity_at_the_null(one, rig, kind):
+    """At the same integration step the readings are those of the nominal model, to rounding."""
+    model, trials = Model(RIGS[rig]) + one.absent(), trials_of(rig, kind, 1)
+    step = max_step(model)
+    for with_it, without in zip(
+        run(model, trials, max_step_s=step), run(Model(RIGS[rig]), trials, max_step_s=step), strict=True
+    ):
+        scale = np.abs(without.readings).max()
+        assert np.abs(with_it.readings - without.readings).max() <= 1e-13 * max(scale, 1.0)
+
+
+@CASE
+def test_continuity_towards_the_null(one, rig, kind):
+    """A small amplitude changes the readings in proportion, and as its sensitivity at the null says."""
+    model, trials = with_effect(rig, one), trials_of(rig, kind, 2)
+    keys = {f"{one.name}.{n}": one.parameters()[n] for n in one.amplitudes()}
+    nulls = {k: info.null for k, info in keys.items()}
+    at_null = run(model, trials, keys, values=nulls)
+    for j, (key, info) in enumerate(keys.items()):
+        small = 1e-3 * info.scale
+        near, nearer = (run(model, trials, values={**nulls, key: info.null + s}) for s in (small, 0.1 * small))
+        for base, a, b in zip(at_null, near, nearer, strict=True):
+            slope = base.sensitivities[..., j]
+            felt = np.abs(a.readings - base.readings).max()
+            tenth = np.abs(b.readings - base.readings - 0.1 * small * slope).max()
+            assert tenth <= 0.02 * np.abs(0.1 * small * slope).max() + 1e-11
+            assert felt <= 2.0 * np.abs(small * slope).max() + 1e-11
+
+
+@CASE
+def test_sensitivities_are_central_differences(one, rig, kind):
+    model = with_effect(rig, one).acting(kind)
+    trials = trials_of(rig, kind, 3)
+    unknowns = RIGS[rig].unknowns(kind)
+    names = (*model.fitted_parameters(), *unknowns)
+    info, values = model.parameter_info(), model.parameters()
+    initial = [dict(RIGS[rig].initial_unknowns(t)) for t in trials]
+    simulator = Simulator(model, trials, names)
+    exact = simulator.run(values, initial)
+    for j, name in enumerate(names):
+        step = 1e-6 * (1.0 if name in unknowns else info[name].scale)
+
+        def moved(by, name=name):
+            if name in unknowns:
+                return Simulator(model, trials).run(values, [{**u, name: u[name] + by} for u in initial])
+            return Simulator(model, trials).run({**values, name: values[name] + by}, initial)
+
+        for sens, up, down in zip(exact, moved(step), moved(-step), strict=True):
+            difference = (up.readings - down.readings) / (2.0 * step)
+            column = sens.sensitivities[..., j]
+            size = np.abs(column).max() + 1e-3 * np.abs(sens.readings).max() / (step * 1e6)
+            assert np.abs(difference - column).max() <= 2e-5 * size, name
+
+
+@pytest.mark.parametrize(("one", "rig", "kind"), [c for c in CASES if c[1] != "joint"], ids=name_of)
+def test_a_trial_starts_at_rest(one, rig, kind):
+    """All rates vanish at the start, with the effect on; only a joint is given in motion."""
+    model, (first,) = with_effect(rig, one).acting(kind), trials_of(rig, kind, 4, count=1)
+    layout = make_layout(model, kind, RIGS[rig].input_columns(first), ())
+    program = VirtualProgram(derive(model, layout))
+    timing = {"t0": 0.0, "dt": first.dt, "step": first.dt / 4, "shift": 0.0}
+    p = np.array([model.parameters()[n] for n in layout.values])
+    c = np.array([{**RIGS[rig].trial_constants(first), **timing}[n] for n in layout.constants])
+    z = program._rest(RIGS[rig].guess(first), p, c)
+    state, memory = program.equations.start(z, p, c)
+    held = program.equations.sample(state, memory, [0.0], 0.0, p, c)
+    rates = np.array(program.equations.rates(state, held, [0.0], 0.0, 0.0, 0.0, p, c)).ravel()
+    assert np.abs(rates).max() <= 1e-9
+
+
+@pytest.mark.parametrize("rig", ["ankle", "muscle"])
+def test_nothing_moves_without_a_stimulus(rig):
+    """All effects at once but those that act by the clock."""
+    model = everything(rig)
+    for name in ("periodic_torque", "sensor_drift", "mains_hum"):
+        model = model - name
+    for kind in ("motion", "isometric") if rig == "ankle" else ("isometric",):
+        (still,) = trials_of(rig, kind, 5, count=1)
+        still = still.with_columns(pulse_width_us=np.zeros(len(still)))
+        (answer,) = run(model, [still])
+        assert np.ptp(answer.readings) <= 1e-9
+
+
+@pytest.mark.parametrize("one", [e for e in EFFECTS if e.dissipative], ids=name_of)
+@pytest.mark.parametrize("speed", [0.05, 1.0, 4.0])
+def test_dissipative_effects_add_no_energy(one, speed):
+    """Free swings without damping: the energy falls at every sample; with a spring inside it never passes the first."""
+    bare = Joint(1.0, 0.0, 1.0, constants=JOINT)
+    time = np.arange(4000) * 1e-3
+    swing = Trial("swing", "motion", {}, time, {"position0": 0.9 * speed / 4.0, "velocity0": speed})
+    frictionless, answer = simulate(Model(bare), swing), simulate(Model(bare) + one(), swing)
+
+    def energy(t):
+        q, v = t["position"], t["velocity"]
+        height = JOINT["gravity_cos"] * np.sin(q) - JOINT["gravity_sin"] * np.cos(q)
+        return 0.5 * JOINT["inertia"] * v * v + height + math.hypot(JOINT["gravity_cos"], JOINT["gravity_sin"])
+
+    start = energy(answer)[0]
+    assert np.abs(energy(frictionless) - start).max() <= 1e-9 * start  # the measure itself
+    grown = energy(answer) - start if one.states else np.diff(energy(answer))
+    assert grown.max() <= 1e-9 * start
+    assert energy(answer)[-1] < 0.999 * start
+
+
+def test_those_that_only_take_energy_say_so():
+    assert {e.name for e in EFFECTS if e.dissipative} == {"coulomb_friction", "quadratic_damping", "passive_relaxation"}
