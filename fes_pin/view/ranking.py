@@ -39,7 +39,7 @@ def rivals_figure(diagnosis: Diagnosis, cause: Cause) -> Figure:
     """The rivals of one cause by their shortfall, on a logarithmic axis.
 
     The shortfall is by how much twice the log-likelihood of the whole fit falls with the rival in the cause's place.
-    Rivals in the grey band fall short by no more than chance does; a hollow dot is a rival that is not told apart.
+    The grey band is what chance alone makes; a hollow dot is a rival that is not told apart.
     """
     rivals = shown_rivals(diagnosis, cause)
     figure, axes = _rows_figure(len(rivals))

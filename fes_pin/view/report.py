@@ -120,7 +120,7 @@ def _next(diagnosis: Diagnosis) -> list[Markup]:
         return out
     conditions = "".join(f", {n} = {v:g}" for n, v in plan.trial.conditions.items())
     out.append(
-        element("p", f"A {plan.trial.kind} trial{conditions}; its inputs are in ", element("code", NEXT_FILE), ".")
+        element("p", f"Its kind: {plan.trial.kind}{conditions}; its inputs are in ", element("code", NEXT_FILE), ".")
     )
     if plan.trial.columns:
         drawn = inline_svg(stimulus_figure(plan.trial, position_unit(diagnosis)), "Inputs of the next trial")

@@ -46,8 +46,8 @@ def _rivals(diagnosis: Diagnosis, cause: Cause) -> Markup:
         return Markup("")
     shown = inline_svg(rivals_figure(diagnosis, cause), f"Rivals of {cause.name} by their shortfall")
     caption = (
-        f"Rivals in place of {cause.name}: by how much twice the log-likelihood of the whole fit falls. Hollow, or in "
-        "the grey band: not told apart. Colours are the stages of the signal path."
+        f"Rivals in place of {cause.name}: by how much twice the log-likelihood of the whole fit falls. Hollow: not "
+        "told apart; the grey band is what chance alone makes. Colours are the stages of the signal path."
     )
     return figure(shown, caption, "narrow")
 
