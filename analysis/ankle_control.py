@@ -112,7 +112,6 @@ for label, known in (
     )
     halves = run.rms_error_deg(0.0, 30.0), run.rms_error_deg(30.0)
     print(f"on the frame, {label}: RMS {halves[0]:.2f} degrees in the first 30 s, {halves[1]:.2f} in the next")
-print("so this controller does not hold a joint on a frame this light (J / J_frame = 1.3): it knows no frame")
 
 # %% The picture
 figure, axes = plt.subplots(3, 2, figsize=(13, 10), constrained_layout=True)

@@ -133,7 +133,8 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
     tell = progress or (lambda _share, _words: None)
     train, test = split(study)
     with one_thread_each():
-        search = Search(nominal_model(study), train, seed, tell)
+        recorded = [t for t in study.trials if t.role != "held_out"]
+        search = Search(nominal_model(study), train, recorded, seed, tell)
         searched = search.run()
         tell(0.88, "held-out gain")
         diagnosis = _judge(study, search, searched, test, seed)
@@ -251,7 +252,7 @@ def _equivalents(searched: Searched, name: str, left: Remainder) -> tuple[str, .
 
     Where the best set itself leaves something unexplained, its order among its rivals is no surer than that.
     """
-    best = searched.best
+    best = searched.judged
     others = {e.name for e in best.model.effects} - {name}
     margin = SEPARABLE + left.excess
     out = []
@@ -272,7 +273,7 @@ def _absorbed(searched: Searched) -> tuple[str, ...]:
 
 
 def _ranking(searched: Searched) -> dict[str, tuple[Ranked, ...]]:
-    best = searched.best.sse
+    best = searched.judged.sse
     return {
         name: tuple(Ranked(tuple(e.name for e in f.model.effects), f.sse - best) for f in rivals)
         for name, rivals in searched.rivals.items()
@@ -284,7 +285,7 @@ def _experiment(searched: Searched, causes: Sequence[Cause], study: Study) -> Ne
         for other in cause.equivalents:
             for rival in searched.rivals[cause.name]:
                 if other in {e.name for e in rival.model.effects}:
-                    return next_experiment(searched.best, rival, (cause.name, other), study)
+                    return next_experiment(searched.judged, rival, (cause.name, other), study)
     return None
 
 

@@ -67,6 +67,8 @@ class Searched:
         Family-wise, of each cause of `best`, beside the others.
     rivals
         For each cause, fits in which another took its place.
+    judged
+        The best set, fitted as its rivals are.
     without
         For each cause, the fit without it.
     floor
@@ -78,6 +80,7 @@ class Searched:
     best: Fit
     p_values: dict[str, float]
     rivals: dict[str, list[Fit]]
+    judged: Fit
     without: dict[str, Fit]
     family: Family
     scored: list[Scored]
@@ -85,10 +88,13 @@ class Searched:
 
 
 class Search:
-    """One search on one set of trials."""
+    """One search on one set of trials; `recorded` are the same trials before any thinning."""
 
-    def __init__(self, model: Model, trials: Sequence[Trial], seed: int, progress: Progress) -> None:
+    def __init__(
+        self, model: Model, trials: Sequence[Trial], recorded: Sequence[Trial], seed: int, progress: Progress
+    ) -> None:
         self.model, self.trials, self.seed, self.progress = Model(model.rig), tuple(trials), seed, progress
+        self.recorded = tuple(recorded)
         self.library = Library(self.model, trials)
         self.noise: NoiseModel = {}
         self.fits: dict[Names, Fit] = {}
@@ -187,17 +193,18 @@ class Search:
         return replace(self._for_prediction(searched) if names else searched, floor=floor)
 
     def _for_prediction(self, searched: Searched) -> Searched:
-        """Fit for least open-loop error: what the best set leaves is more than noise, and not to be whitened."""
-        learned, self.noise = self.noise, whiteless(noise_of(searched.best))
+        """Fit for least open-loop error, to the trials as recorded.
+
+        What the best set leaves is more than noise, and not to be whitened. Rivals stay as they were judged.
+        """
+        noise = whiteless(noise_of(searched.best))
 
         def again(fitted: Fit) -> Fit:
-            return self.fit_from([fitted.model], fitted.unknowns)
+            return fit_problem(Problem(fitted.model, self.recorded, noise), fitted.values)
 
-        nominal, best = again(searched.nominal), again(searched.best)
-        without = {n: again(f) for n, f in searched.without.items()}
-        rivals = {n: in_parallel(again, fits) for n, fits in searched.rivals.items()}
-        self.noise = learned
-        return replace(searched, nominal=nominal, best=best, without=without, rivals=rivals)
+        nominal, best, *rest = in_parallel(again, [searched.nominal, searched.best, *searched.without.values()])
+        without = dict(zip(searched.without, rest, strict=True))
+        return replace(searched, nominal=nominal, best=best, without=without)
 
     def _complete(self, names: Names) -> bool:
         """True if a set leaves only noise: no further cause promises anything, and neither do smooth features.
@@ -390,7 +397,7 @@ class Search:
             rivals[name] = sorted((self.fits[k] for k in keys), key=lambda f: f.sse)
             p_values[name] = self.p_value(best, without[name], family)
         scored = self.scores(self.fits[()]).scored
-        return Searched(self.fits[()], best, p_values, rivals, without, family, scored, best.noise)
+        return Searched(self.fits[()], best, p_values, rivals, best, without, family, scored, best.noise)
 
     def _siblings(self, names: Names, name: str) -> list[Names]:
         """Sets fitted already that differ from `names` in `name` alone."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,10 @@ def load_model(path: str | Path) -> Model:
     if not isinstance(fitted, list) or not set(map(str, fitted)) <= set(kind.parameters()):
         raise document.error("fitted", f"expected names among {', '.join(kind.parameters())}")
     nominal = _numbers(document, "nominal", set(kind.parameters()))
-    model = Model(kind(**nominal, constants=_numbers(document, "constants", None), fitted=tuple(fitted)))
+    constants = _numbers(document, "constants", None)
+    if missing := set(kind.needed) - set(constants):
+        raise document.error("constants", f"expected {', '.join(sorted(missing))} as well")
+    model = Model(kind(**nominal, constants=constants, fitted=tuple(fitted)))
     listed = document.table("effects")
     for name in listed:
         try:
@@ -78,8 +82,8 @@ def _numbers(
     for name, value in values.items():
         if known is not None and name not in known:
             raise document.error(f"{key}.{name}", f"unknown; expected one of {', '.join(sorted(known))}")
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise document.error(f"{key}.{name}", f"expected a number, found {value!r}")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise document.error(f"{key}.{name}", f"expected a finite number, found {value!r}")
     if known is not None and (missing := known - set(values)):
         raise document.error(key, f"expected {', '.join(sorted(missing))} as well")
     return {n: float(v) for n, v in values.items()}

@@ -142,7 +142,8 @@ class JointObserver:
     angle_std_rad
         Noise of the potentiometer.
     torque_wander
-        Standard deviation of the unknown torque's change in a second, N m.
+        Standard deviation of the unknown torque's change in a second, N m: quicker ones answer a
+        swinging frame and feed it (0.05 does), slower ones leave play uncompensated (0.01 does).
     share_wander
         The same of the gain's share; 0.02 follows a muscle that loses 40 % in 30 s.
     share_std
@@ -160,7 +161,7 @@ class JointObserver:
         self,
         dynamics: AnkleDynamics,
         angle_std_rad: float = 2e-3,
-        torque_wander: float = 0.05,
+        torque_wander: float = 0.03,
         share_wander: float = 0.02,
         share_std: float = 0.3,
     ) -> None:

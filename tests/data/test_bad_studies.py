@@ -4,7 +4,7 @@
 import re
 
 import pytest
-import studies
+from data import studies
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import read_study

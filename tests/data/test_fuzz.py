@@ -1,7 +1,7 @@
 """Whatever stands in a study's files, reading gives a study or one line of error."""
 
 import pytest
-import studies
+from data import studies
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

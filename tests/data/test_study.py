@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-import studies
+from data import studies
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

@@ -45,7 +45,7 @@ class Ankle(Rig):
     inertia_kgm2: float = parameter(1e-3, unit="kg m2", lower=1e-6, upper=10.0, scale=2e-4)
     damping_nms: float = parameter(0.06, unit="N m s", lower=0.0, upper=100.0, scale=0.01)
 
-    name = "ankle"
+    name, needed = "ankle", CONSTANTS
 
     def signals(self, kind: str) -> tuple[str, ...]:
         muscle = ("pulse_width", "recruitment", "delay", "time_constant", "activation", "force")

@@ -31,6 +31,8 @@ class Rig:
 
     name: ClassVar[str]
     inputs: ClassVar[Mapping[str, str]]
+    needed: ClassVar[tuple[str, ...]] = ()
+    """Constants without which there are no equations."""
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:

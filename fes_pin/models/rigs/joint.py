@@ -27,7 +27,7 @@ class Joint(Rig):
     damping: float = parameter(0.0, unit="N m s/rad", lower=0.0, upper=1e4, scale=1e-3)
     gravity_scale: float = parameter(1.0, lower=-10.0, upper=10.0, scale=0.1)
 
-    name = "joint"
+    name, needed = "joint", ("inertia", "gravity_cos", "gravity_sin", "revolute")
 
     def signals(self, kind: str) -> tuple[str, ...]:
         return ("gravity_angle", "effort", "torque", "friction", "driving", "acceleration", "reading")
@@ -48,7 +48,7 @@ class Joint(Rig):
         return ("effort",) if "effort" in trial.columns else ()
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
-        return ("inertia", "gravity_cos", "gravity_sin", "revolute")
+        return self.needed
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         return {name: float(self.constants[name]) for name in self.constant_names(trial.kind)}

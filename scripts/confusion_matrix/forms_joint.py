@@ -1,0 +1,217 @@
+"""Causes at the joint."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from confusion_matrix.form import Form
+
+BOTH = ("ankle", "joint")
+
+
+class Friction(Form):
+    cause, rigs, unit, cap, fine = "coulomb_friction", BOTH, 0.003, 0.06, 20
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"torque_nm": size}
+
+    def torque(self, torque, s):
+        creep = 0.002 + self.size * s.h / (2.0 * s.k["inertia"])
+        return torque - self.size * np.tanh(s.v / creep)
+
+
+class Stiction(Friction):
+    name = "stribeck"
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def torque(self, torque, s):
+        creep = 0.006 + 1.5 * self.size * s.h / (2.0 * s.k["inertia"])
+        more = 1.0 + 0.5 * np.exp(-np.abs(s.v) / 0.3)
+        return torque - self.size * more * s.v / np.sqrt(s.v**2 + creep**2)
+
+
+class Drag(Form):
+    cause, rigs, unit, cap = "quadratic_damping", BOTH, 0.005, 0.08
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"coefficient": size}
+
+    def torque(self, torque, s):
+        return torque - self.size * s.v * np.abs(s.v)
+
+
+class SteeperDrag(Drag):
+    name = "power_2.4"
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def torque(self, torque, s):
+        return torque - self.size * s.v * np.abs(s.v) ** 1.4
+
+
+class Stop(Form):
+    cause, rigs, unit, cap = "joint_stop", BOTH, 0.3, 20.0
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"angle": float(np.quantile(angles, rng.uniform(0.8, 0.95)))}
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"stiffness": size, "angle_rad": p["angle"]}
+
+    def torque(self, torque, s):
+        return torque - self.size * np.maximum(s.q - self.p["angle"], 0.0)
+
+
+class QuadraticStop(Stop):
+    name, cap = "quadratic", 200.0
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def torque(self, torque, s):
+        depth = np.maximum(s.q - self.p["angle"], 0.0)
+        return torque - 10.0 * self.size * depth**2
+
+
+class Spring(Form):
+    cause, rigs, unit, cap = "parallel_stiffness", BOTH, 0.05, 3.0
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"angle": float(np.quantile(angles, rng.uniform(0.2, 0.8)))}
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"stiffness_nm_per_rad": size, "rest_angle_rad": p["angle"]}
+
+    def torque(self, torque, s):
+        return torque - self.size * (s.q - self.p["angle"])
+
+
+class HardeningSpring(Spring):
+    name = "hardening"
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def torque(self, torque, s):
+        away = s.q - self.p["angle"]
+        return torque - self.size * away * (1.0 + 4.0 * away**2)
+
+
+class Maxwell(Form):
+    cause, rigs, unit, cap, states = "passive_relaxation", BOTH, 0.05, 2.0, ("relaxed",)
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"time": float(rng.uniform(0.2, 0.6))}
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"stiffness_nm_per_rad": size, "relaxation_s": p["time"]}
+
+    def rest(self, name, q):
+        return q
+
+    def rates(self, s):
+        return {"relaxed": (s.q - self.own(s, "relaxed")) / self.p["time"]}
+
+    def torque(self, torque, s):
+        return torque - self.size * (s.q - self.own(s, "relaxed"))
+
+
+class TwoMaxwell(Maxwell):
+    name, states = "two_elements", ("relaxed", "slow")
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def rates(self, s):
+        slow = (s.q - self.own(s, "slow")) / (5.0 * self.p["time"])
+        return {**super().rates(s), "slow": slow}
+
+    def torque(self, torque, s):
+        return torque - self.size * (1.5 * s.q - self.own(s, "relaxed") - 0.5 * self.own(s, "slow"))
+
+
+class LoadInertia(Form):
+    cause, unit, cap = "load_inertia", 0.1, 3.0
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"share": size}
+
+    def accelerate(self, acceleration, s):
+        moved, j = self.size * s.load * s.k["com_distance_m"] ** 2, s.k["inertia"]
+        sine, cosine = np.sin(s.q), np.cos(s.q)
+        return (acceleration * j - moved * sine * cosine * s.v**2) / (j + moved * sine**2)
+
+
+class PulleyInertia(LoadInertia):
+    name = "pulley"
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def accelerate(self, acceleration, s):
+        moved, j = self.size * s.load * s.k["com_distance_m"] ** 2, s.k["inertia"]
+        return acceleration * j / (j + moved)
+
+
+class Reflex(Form):
+    cause, unit, cap, states = "stretch_reflex", 0.005, 0.06, ("follow", "change")
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"delay": float(rng.uniform(0.035, 0.06)), "side": float(rng.choice((-1.0, 1.0), p=(0.3, 0.7)))}
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"gain_nms": size, "delay_s": p["delay"]}
+
+    def rates(self, s):
+        pace, change = 1.0 / self.p["delay"], self.own(s, "change")
+        return {"follow": change, "change": 12.0 * pace**2 * (s.v - self.own(s, "follow")) - 6.0 * pace * change}
+
+    def torque(self, torque, s):
+        late = s.v - self.p["delay"] * self.own(s, "change")
+        return torque - self.p["side"] * self.size * np.maximum(self.p["side"] * late, 0.0)
+
+
+class PureReflex(Reflex):
+    name, states = "pure_delay", ()
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def begin(self, s, lanes):
+        self.back = np.maximum(np.round(self.p["delay"] / s.h).astype(int), 1)
+        self.past = np.zeros((int(self.back.max()) + 1, len(self.size)))
+        self.late = np.zeros(len(self.size))
+
+    def passed(self, v, step):
+        self.past[step % len(self.past)] = v
+        self.late = self.past[(step - self.back) % len(self.past), np.arange(len(v))]
+
+    def torque(self, torque, s):
+        return torque - self.p["side"] * self.size * np.maximum(self.p["side"] * self.late, 0.0)
+
+
+FORMS: tuple[type[Form], ...] = (
+    *(Friction, Stiction, Drag, SteeperDrag, Stop, QuadraticStop, Spring, HardeningSpring, Maxwell, TwoMaxwell),
+    *(LoadInertia, PulleyInertia, Reflex, PureReflex),
+)

@@ -1,0 +1,135 @@
+"""Causes in the rig: what holds the joint, drives it and loads it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from confusion_matrix.form import Form
+
+BOTH = ("ankle", "joint")
+
+
+class EffortOffset(Form):
+    cause, rigs, unit, cap = "effort_offset", ("joint",), 0.005, 0.5
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"sign": float(rng.choice((-1.0, 1.0)))}
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"offset": size * p["sign"]}
+
+    def begin(self, s, lanes):
+        s.offset = s.offset + self.size * self.p["sign"]
+
+
+class Tilt(Form):
+    cause, rigs, unit, cap = "base_tilt", BOTH, 0.02, 0.5
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"sign": float(rng.choice((-1.0, 1.0)))}
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"tilt_rad": size * p["sign"]}
+
+    def begin(self, s, lanes):
+        s.tilt = s.tilt + self.size * self.p["sign"]
+
+
+class LoadError(Form):
+    cause, unit, cap = "load_error", 0.003, 0.3
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"sign": float(rng.choice((-1.0, 1.0)))}
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"error": size * p["sign"]}
+
+    def begin(self, s, lanes):
+        s.load = s.load * (1.0 + self.size * self.p["sign"])
+
+
+class Frame(Form):
+    cause, rigs, unit, cap, states = "frame_vibration", BOTH, 0.05, 1.0, ("phi", "rate")
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"hz": float(rng.uniform(6.0, 14.0)), "zeta": float(rng.uniform(0.03, 0.08))}
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"coupling": size, "frequency_hz": p["hz"], "damping_ratio": p["zeta"]}
+
+    def accelerate(self, acceleration, s):
+        omega = 2.0 * math.pi * self.p["hz"]
+        spring = omega**2 * self.own(s, "phi") + 2.0 * self.p["zeta"] * omega * self.own(s, "rate")
+        self.swing = -spring - self.size * acceleration
+        return acceleration - self.swing
+
+    def rates(self, s):
+        return {"phi": self.own(s, "rate"), "rate": self.swing * s.moving}
+
+
+class FrameSeen(Frame):
+    """The sensor sees part of the frame's own swing beside the joint's angle."""
+
+    name = "sensor_on_frame"
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def sensed(self, y, s):
+        return y + 0.3 * self.own(s, "phi")
+
+
+class Breathing(Form):
+    cause, rigs, unit, cap = "periodic_torque", BOTH, 0.002, 0.2
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"hz": float(rng.uniform(0.2, 0.5)), "phase": float(rng.uniform(0.0, 2.0 * math.pi))}
+
+    @classmethod
+    def truth(cls, size, p):
+        in_phase, quadrature = size * math.cos(p["phase"]), size * math.sin(p["phase"])
+        return {"in_phase": in_phase, "quadrature": quadrature, "frequency_hz": p["hz"]}
+
+    def torque(self, torque, s):
+        return torque + self.size * np.sin(2.0 * math.pi * self.p["hz"] * s.t + self.p["phase"])
+
+
+class BreathingWithHarmonic(Breathing):
+    name = "harmonic"
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def torque(self, torque, s):
+        phase = 2.0 * math.pi * self.p["hz"] * s.t + self.p["phase"]
+        return torque + self.size * (np.sin(phase) + 0.3 * np.sin(2.0 * phase + 1.0))
+
+
+class BreathingUnlocked(BreathingWithHarmonic):
+    """Each trial begins at another phase."""
+
+    name = "own_phase"
+
+    def begin(self, s, lanes):
+        self.begins = self.p["phase"] + 2.399963 * lanes.k["number"]
+
+    def torque(self, torque, s):
+        return torque + self.size * np.sin(2.0 * math.pi * self.p["hz"] * s.t + self.begins)
+
+
+FORMS: tuple[type[Form], ...] = (
+    *(EffortOffset, Tilt, LoadError, Frame, FrameSeen, Breathing, BreathingWithHarmonic, BreathingUnlocked),
+)

@@ -1,0 +1,246 @@
+"""What a set of results amounts to, beside what is asked for."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from confusion_matrix.noise import FAMILIES
+
+Record = dict[str, Any]
+SINGLE_BANDS = {15: (0.0, 25.0), 40: (25.0, 80.0), 150: (80.0, math.inf)}
+"""d of a study as it came out, by the target whose row it counts in."""
+
+
+def wilson(hits: int, count: int) -> tuple[float, float]:
+    """95 % interval of a share, after Wilson, J. Am. Stat. Assoc. 22 (1927)."""
+    if not count:
+        return 0.0, 1.0
+    z, p = 1.959964, hits / count
+    middle = p + z * z / (2 * count)
+    half = z * math.sqrt(p * (1 - p) / count + z * z / (4 * count * count))
+    return max(0.0, (middle - half) / (1 + z * z / count)), min(1.0, (middle + half) / (1 + z * z / count))
+
+
+def claims(r: Record) -> bool:
+    return r["verdict"] != "adequate"
+
+
+def first(r: Record) -> bool:
+    """The true cause is in the first set."""
+    return bool(r["sets"]) and r["causes"][0] in r["sets"][0]
+
+
+def exact(r: Record) -> bool:
+    """One claim, a set of one, the right one."""
+    return r["sets"] == [list(r["causes"])]
+
+
+def both(r: Record) -> bool:
+    """Each of two causes is in a set, in sets of their own."""
+    a, b = r["causes"]
+    holding = [{k for k, s in enumerate(r["sets"]) if c in s} for c in (a, b)]
+    return bool(holding[0] and holding[1]) and len(holding[0] | holding[1]) > 1
+
+
+def in_band(r: Record, target: int) -> bool:
+    low, high = SINGLE_BANDS[target]
+    return r["kind"] == "single" and low <= r["d"][0] < high
+
+
+def table(records: Iterable[Record]) -> str:
+    """The whole table as text."""
+    all_ = sorted(records, key=lambda r: r["id"])
+    good = [r for r in all_ if "error" not in r]
+    kinds = ", ".join(f"{n} {kind}" for kind, n in sorted(Counter(r["kind"] for r in all_).items()))
+    lines = [f"{len(all_)} studies ({kinds}); {len(all_) - len(good)} of them without an answer", ""]
+    lines += [f"{'':66s} {'target':>9s}  {'measured':>8s}  95 % interval      n"]
+    rows = [_blank_rows, _power_rows, _name_rows, _set_rows, _pair_rows, _interval_rows, _gain_rows, _outside_rows]
+    for make in rows:
+        lines += make(good)
+    lines += ["", *_times(good), "", *_confusions(good), "", *_by_cause(good), "", *failures(good)]
+    lines += ["", *[f"no answer: {r['id']}: {r['error']}" for r in all_ if "error" in r]]
+    return "\n".join(line.rstrip() for line in lines).rstrip()
+
+
+def _row(label: str, target: str, hits: Sequence[bool]) -> str:
+    if not hits:
+        return f"{label:66s} {target:>9s}  {'-':>8s}  {'-':>13s} {0:6d}"
+    low, high = wilson(sum(hits), len(hits))
+    between = f"{100 * low:5.1f} - {100 * high:5.1f}"
+    return f"{label:66s} {target:>9s}  {100 * sum(hits) / len(hits):6.1f} %  {between:>13s} {len(hits):6d}"
+
+
+def _blank_rows(good: list[Record]) -> list[str]:
+    out = []
+    for kind in ("null", "decoy"):
+        for family in FAMILIES:
+            hits = [claims(r) for r in good if r["kind"] == kind and r["noise"] == family]
+            out.append(_row(f"false alarms, {kind}s, {family} noise", "<= 5 %", hits))
+    return out
+
+
+def _power_rows(good: list[Record]) -> list[str]:
+    wanted = {15: ">= 90 %", 40: ">= 99 %", 150: ">= 99 %"}
+    out = []
+    for d, target in wanted.items():
+        out.append(_row(f"something claimed, d = {d}", target, [claims(r) for r in good if in_band(r, d)]))
+    for low, high in ((12, 25), (25, 80)):
+        hits = [claims(r) for r in good if r["kind"] == "single" and low <= (r.get("felt") or 0) < high]
+        out.append(_row(f"something claimed, d of {low} to {high} against the noise as it is", "", hits))
+    return out
+
+
+def _name_rows(good: list[Record]) -> list[str]:
+    def rows(label: str, targets: dict[int, str], test: Callable[[Record], bool], same: bool | None) -> list[str]:
+        out = []
+        for d, t in targets.items():
+            part = [r for r in good if in_band(r, d) and same in (None, r["form"] == "same")]
+            out.append(_row(f"{label}, d = {d}", t, [test(r) for r in part]))
+        return out
+
+    return [
+        *rows("true cause in the first set", {15: "", 40: ">= 97 %", 150: ">= 99 %"}, first, None),
+        *rows("named exactly, the engine's form", {15: "", 40: ">= 90 %", 150: ">= 97 %"}, exact, True),
+        *rows("named exactly, another form", {15: "", 40: ">= 80 %", 150: ">= 90 %"}, exact, False),
+    ]
+
+
+def _set_rows(good: list[Record]) -> list[str]:
+    out = []
+    for d in SINGLE_BANDS:
+        sizes = [len(r["sets"][0]) for r in good if in_band(r, d) and r["sets"]]
+        extra = [len(r["sets"]) > 1 for r in good if in_band(r, d)]
+        mean = f"{np.mean(sizes):8.2f}" if sizes else f"{'-':>8s}"
+        out.append(f"{f'mean size of the first set, d = {d}':66s} {'<= 1.3':>9s}  {mean}  {'':13s} {len(sizes):6d}")
+        out.append(_row(f"more than one cause claimed, d = {d}", "", extra))
+    return out
+
+
+def _pair_rows(good: list[Record]) -> list[str]:
+    return [_row("both of two causes found, d = 100 each", ">= 90 %", [both(r) for r in good if r["kind"] == "pair"])]
+
+
+def _interval_rows(good: list[Record]) -> list[str]:
+    out = []
+    for label, wanted in (("all parameters", None), ("of the cause", True), ("nominal", False)):
+        for family in (*FAMILIES, None):
+            hits = [
+                abs(value - truth) <= 1.959964 * std
+                for r in good
+                if r["kind"] == "single" and family in (None, r["noise"])
+                for name, truth, value, std in r["parameters"]
+                if wanted in (None, "." in name)
+            ]
+            if family is None or wanted is None:
+                out.append(_row(f"95 % intervals cover, {label}, {family or 'any'} noise", "93-97 %", hits))
+    return out
+
+
+def _gain_rows(good: list[Record]) -> list[str]:
+    out = []
+    for d, target in ((40, ">= 90 %"), (150, ">= 96 %")):
+        shares = [r["share"] for r in good if in_band(r, d) and r["share"] is not None]
+        label = f"share of the fresh trials' excess removed, median (mean), d = {d}"
+        if shares:
+            capped = np.maximum(shares, -1.0)
+            text = f"{100 * np.median(shares):6.1f} %  ({100 * np.mean(capped):.1f} %)"
+            out.append(f"{label:66s} {target:>9s}  {text:24s} {len(shares):5d}")
+            out.append(_row(f"  at least that, d = {d}", "", [s >= float(target.strip(">=% ")) / 100 for s in shares]))
+        out.append(_row(f"  below 0, d = {d}", "<= 2 %", [s < 0 for s in shares]))
+    return out
+
+
+def _outside_rows(good: list[Record]) -> list[str]:
+    part = [r for r in good if r["kind"] == "outside"]
+    far = [r for r in part if (r["orthogonal"] or 0) >= 15]
+    return [
+        _row(
+            "outside the library, 15 beside its nearest cause: unexplained", ">= 85 %", [r["unexplained"] for r in far]
+        ),
+        _row(
+            "outside the library, nearer than that: unexplained", "", [r["unexplained"] for r in part if r not in far]
+        ),
+    ]
+
+
+def _times(good: list[Record]) -> list[str]:
+    out = []
+    for key, label in (("wall_s", "wall time of one diagnosis, one thread"), ("cpu_s", "processor time of it")):
+        values = [r[key] for r in good if key in r]
+        if values:
+            spread = f"median {np.median(values):.1f} s, 95 % below {np.quantile(values, 0.95):.1f} s"
+            out.append(f"{label}: {spread}, worst {max(values):.1f} s, {len(values)} studies")
+    return out
+
+
+def _confusions(good: list[Record]) -> list[str]:
+    """What is taken for what, singles at d of 25 and above."""
+    wrong: Counter[tuple[str, str]] = Counter()
+    for r in good:
+        if r["kind"] == "single" and r["d"][0] >= 25 and not exact(r):
+            answer = " and ".join("|".join(s) for s in r["sets"]) or r["verdict"]
+            wrong[f"{r['causes'][0]} ({r['form']})", answer] += 1
+    lines = [f"  {true:48s} -> {answer}  x{n}" for (true, answer), n in sorted(wrong.items())]
+    return ["not named exactly, singles with d >= 25 (| separates the members of a set):", *(lines or ["  none"])]
+
+
+def _by_cause(good: list[Record]) -> list[str]:
+    out = ["by cause and form, singles with d >= 25: named exactly / in the first set / studies"]
+    cells: dict[tuple[str, str], list[Record]] = {}
+    for r in good:
+        if r["kind"] == "single" and r["d"][0] >= 25:
+            cells.setdefault((r["causes"][0], r["form"]), []).append(r)
+    for (cause, form), part in sorted(cells.items()):
+        out.append(f"  {cause:26s} {form:18s} {sum(map(exact, part)):3d} {sum(map(first, part)):3d} {len(part):3d}")
+    return out
+
+
+def _trouble(r: Record) -> str | None:
+    """What is wrong with an answer, in two words; None if nothing is."""
+    if r["kind"] == "single":
+        return _single_trouble(r)
+    right = {
+        "outside": lambda: r["unexplained"],
+        "pair": lambda: both(r),
+    }.get(r["kind"], lambda: not claims(r))()
+    words = {"outside": "outside the library, not unexplained", "pair": "not both of two causes"}
+    return None if right else words.get(r["kind"], f"false alarm, {r['noise']} noise")
+
+
+def _single_trouble(r: Record) -> str | None:
+    if exact(r):
+        return None
+    if not r["sets"]:
+        return "missed"
+    if len(r["sets"]) > 1:
+        return "extra claims"
+    return "set too large" if first(r) else "wrong name"
+
+
+def failures(good: list[Record]) -> list[str]:
+    """Every study that was not answered as it should be, by kind of failure."""
+    kinds: dict[str, list[Record]] = {}
+    for r in good:
+        if trouble := _trouble(r):
+            kinds.setdefault(trouble, []).append(r)
+    out = ["not as it should be; each runs again by scripts/confusion --only ID:"]
+    for trouble, part in sorted(kinds.items()):
+        out += [f" {trouble} ({len(part)})", *(f"  {one_line(r)}" for r in part)]
+    return out
+
+
+def one_line(r: Record) -> str:
+    """One result in words."""
+    if "error" in r:
+        return f"{r['id']}: no answer: {r['error']}"
+    answer = " and ".join("|".join(s) for s in r["sets"]) or "-"
+    ds = ", ".join(f"{d:g}" for d in r["d"]) or "0"
+    left = f", remainder in {r['where']}" if r["unexplained"] else ""
+    beside = f" ({r['orthogonal']:g} beside the nearest cause)" if r.get("orthogonal") else ""
+    felt = f", {r['felt']:g} in its noise" if r.get("felt") else ""
+    return f"{r['id']}: d = {ds}{felt}{beside}; {r['verdict']}: {answer}{left}; share {r['share']}"
