@@ -82,7 +82,8 @@ def missing_input(model: Model, measured: Trial, simulated: Trial) -> Missing:
     residual = smooth(thin(measured.residual(simulated, output), count))
     stimulus = {n: thin(measured[n], count) for n in rig.input_columns(measured)}
     driven = {n: thin(v, count) for n, v in activation(rig, measured).items()}
-    against = {"time_s": thin(measured.time - measured.time[0], count), **driven, **stimulus}
+    shown = {n: v for n, v in stimulus.items() if n != "stim"}  # a pulse is an event, not a value to plot against
+    against = {"time_s": thin(measured.time - measured.time[0], count), **driven, **shown}
     if "v" not in rig.states(measured.kind):
         return Missing(measured.name, "force", "N", residual, against)
     q = thin(simulated[output], count)

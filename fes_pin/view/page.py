@@ -41,7 +41,9 @@ def joined(parts: Sequence[Markup], between: str = "\n") -> Markup:
     return Markup(between.join(p.text for p in parts))
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[Content]], numbers: Sequence[int] = ()) -> Markup:
+def table(
+    head: Sequence[str], rows: Sequence[Sequence[Content]], numbers: Sequence[int] = (), prose: bool = False
+) -> Markup:
     """A table that scrolls by itself where it is too wide.
 
     Parameters
@@ -52,6 +54,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[Content]], numbers: Seque
         Cells, row by row.
     numbers
         Columns that are set flush right.
+    prose
+        True if the last column is text that may break.
     """
 
     def cells(tag: str, row: Sequence[Content]) -> Markup:
@@ -62,7 +66,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[Content]], numbers: Seque
     return element(
         "div",
         element("table", element("thead", cells("th", head)), element("tbody", body)),
-        class_="scroll",
+        class_="scroll prose" if prose else "scroll",
         tabindex="0",
     )
 
@@ -106,6 +110,11 @@ def rounded(value: float, std: float) -> str:
         lead = math.floor(math.log10(abs(value))) if value else 0
         return f"{value:.{min(max(lead + digits, 0), 8)}e}"
     return f"{value:.{max(digits, 0)}f}"
+
+
+def unit_text(unit: str) -> str:
+    """A unit as printed: with its exponents and the micro sign; "1" for a pure number."""
+    return unit.replace("m2", "m²").replace("us", "µs") or "1"
 
 
 def probability(value: float) -> str:

@@ -119,6 +119,8 @@ def _residuals(axes: Axes, one: Replay, name: str, extended: bool, factor: float
         axes.plot(*thin_curve(one.measured.time, factor * residual, 220), color=colour, lw=0.6, alpha=0.4)
     for residual, (_, colour) in zip(raw, models, strict=True):
         axes.plot(*thin_curve(*smoothed(one.measured.time, factor * residual), 220), color=colour, lw=1.9)
+    limit = 1.1 * factor * max(float(np.abs(r).max()) for r in raw)
+    axes.set_ylim(-limit or -1.0, limit or 1.0)
     axes.locator_params(axis="y", nbins=4)
 
 
@@ -233,7 +235,7 @@ def stimulus_figure(trial: Trial, position_unit: str = "rad") -> Figure:
         figure = Figure(figsize=(WIDTH, 0.6 + 1.0 * len(names)))
         for k, name in enumerate(names):
             axes = figure.add_subplot(len(names), 1, k + 1)
-            axes.fill_between(*thin_curve(trial.time, trial[name]), step="post", color=STIMULUS, alpha=0.55, lw=0)
+            _strip(axes, trial, name)
             axes.set(ylabel=label(name, position_unit), xlim=(trial.time[0], trial.time[-1]), xlabel="time (s)")
         figure.subplots_adjust(left=0.16, right=0.985, bottom=0.48 / figure.get_figheight(), top=0.96)
     return figure

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from fes_pin.diagnose.diagnosis import SEPARABLE, Cause, Diagnosis
 from fes_pin.models.effects import effect
-from fes_pin.view.style import BAND, FAINT, INK, STAGES, WIDTH, styled
+from fes_pin.view.style import BAND, FAINT, INK, PANEL, STAGES, styled
 
 RIVALS = 7
 """Rivals shown of each cause."""
@@ -39,7 +39,7 @@ def rivals_figure(diagnosis: Diagnosis, cause: Cause) -> Figure:
     """The rivals of one cause by their shortfall, on a logarithmic axis.
 
     The shortfall is by how much twice the log-likelihood of the whole fit falls with the rival in the cause's place.
-    Rivals in the grey band fall short by no more than chance does; a hollow dot is a rival that is not told apart.
+    The grey band is what chance alone makes; a hollow dot is a rival that is not told apart.
     """
     rivals = shown_rivals(diagnosis, cause)
     figure, axes = _rows_figure(len(rivals))
@@ -55,7 +55,7 @@ def rivals_figure(diagnosis: Diagnosis, cause: Cause) -> Figure:
             axes.plot([LEAST, value], [k, k], color=colour, lw=1.2, alpha=0.6)
             axes.plot([value], [k], "o", color=colour, ms=6, mfc="none" if near else colour, mew=1.6)
         _rows(axes, names, colours)
-        axes.set(xlim=(LEAST, max(30.0, 2.5 * float(values.max()))), xlabel="shortfall in 2 log-likelihood (1)")
+        axes.set(xlim=(LEAST, max(30.0, 2.5 * float(values.max()))), xlabel="shortfall, 2 log-lik. (1)")
     return figure
 
 
@@ -63,9 +63,9 @@ def _rows_figure(count: int) -> tuple[Figure, Axes]:
     """A figure with room for rows of horizontal bars."""
     with styled():
         height = 0.3 * count + 0.12
-        figure = Figure(figsize=(WIDTH, height + 0.65))
+        figure = Figure(figsize=(PANEL, height + 0.65))
         total = figure.get_figheight()
-        return figure, figure.add_axes((0.37, 0.58 / total, 0.6, height / total))
+        return figure, figure.add_axes((0.45, 0.58 / total, 0.52, height / total))
 
 
 def shown_rivals(diagnosis: Diagnosis, cause: Cause) -> list[tuple[str, float]]:

@@ -12,7 +12,19 @@ from fes_pin.diagnose.replay import replay
 from fes_pin.diagnose.text import headline
 from fes_pin.models.describe import sentence
 from fes_pin.models.effects import effect
-from fes_pin.view.page import Content, Markup, element, figure, joined, page, percent, probability, section, table
+from fes_pin.view.page import (
+    Content,
+    Markup,
+    element,
+    figure,
+    joined,
+    page,
+    percent,
+    probability,
+    section,
+    table,
+    unit_text,
+)
 from fes_pin.view.plots import stimulus_figure
 from fes_pin.view.report_causes import causes_section, stage_mark, value_and_interval
 from fes_pin.view.report_trials import missing_section, position_unit, trials_section
@@ -38,7 +50,7 @@ def report_html(diagnosis: Diagnosis) -> str:
         _head(diagnosis),
         section("Causes", *causes_section(diagnosis)),
         section("What is left", *_left(diagnosis)),
-        section("Next experiment", *_next(diagnosis)),
+        section("Next experiment", *(_next(diagnosis) if diagnosis.causes else [])),
         section("Missing torque and force", *missing_section(diagnosis, replays)),
         section("Trials", *trials_section(diagnosis, replays)),
         section("Parameters and noise", *_parameters(diagnosis)),
@@ -93,7 +105,7 @@ def _left(diagnosis: Diagnosis) -> list[Markup]:
         rows: list[list[Content]] = [
             [element("code", n), stage_mark(str(effect(n).stage)), sentence(effect(n))] for n in diagnosis.absorbed
         ]
-        out.append(table(("cause", "stage", "what it is"), rows))
+        out.append(table(("cause", "stage", "what it is"), rows, prose=True))
     else:
         out.append(element("p", "Every other cause in the library could have been seen by these data.", class_="soft"))
     return out
@@ -102,14 +114,13 @@ def _left(diagnosis: Diagnosis) -> list[Markup]:
 def _next(diagnosis: Diagnosis) -> list[Markup]:
     plan = diagnosis.next_experiment
     if plan is None:
-        text = "None is needed to tell causes apart." if diagnosis.causes else "There are no causes to tell apart."
-        return [element("p", text, class_="soft")]
+        return [element("p", "None is needed to tell causes apart.", class_="soft")]
     out = [element("p", f"To separate {' and '.join(plan.separates)}: {plan.why}.")]
     if plan.trial is None:
         return out
     conditions = "".join(f", {n} = {v:g}" for n, v in plan.trial.conditions.items())
     out.append(
-        element("p", f"A {plan.trial.kind} trial{conditions}; its inputs are in ", element("code", NEXT_FILE), ".")
+        element("p", f"Its kind: {plan.trial.kind}{conditions}; its inputs are in ", element("code", NEXT_FILE), ".")
     )
     if plan.trial.columns:
         drawn = inline_svg(stimulus_figure(plan.trial, position_unit(diagnosis)), "Inputs of the next trial")
@@ -118,42 +129,41 @@ def _next(diagnosis: Diagnosis) -> list[Markup]:
 
 
 def _parameters(diagnosis: Diagnosis) -> list[Markup]:
-    nominal, extended = diagnosis.nominal, diagnosis.extended
-    info = extended.model.parameter_info()
+    fits = [diagnosis.nominal, diagnosis.extended] if diagnosis.causes else [diagnosis.nominal]
+    info = diagnosis.model.parameter_info()
     rows: list[list[Content]] = []
-    for name in extended.free:
-        before = value_and_interval(nominal, name, nominal.values[name]) if name in nominal.free else ("-", "-")
-        after = value_and_interval(extended, name, extended.values[name]) if diagnosis.causes else ("-", "-")
+    for name in fits[-1].free:
         start = f"{diagnosis.study.start[name]:.4g}" if name in diagnosis.study.start else "-"
-        rows.append([element("code", name), info[name].unit or "1", start, *before, *after])
+        cells = [value_and_interval(f, name, f.values[name]) if name in f.free else ("-", "-") for f in fits]
+        rows.append(
+            [element("code", name), unit_text(info[name].unit), start, *(text for pair in cells for text in pair)]
+        )
     head = ("parameter", "unit", "start", "nominal", "95 % interval", "extended", "95 % interval")
     unit = position_unit(diagnosis)
     noise: list[list[Content]] = [
         [element("code", n), f"{m.std:.3g}", unit_of(n, unit), str(len(m.ar)) if m.ar else "white"]
-        for n, m in extended.noise.items()
+        for n, m in diagnosis.extended.noise.items()
     ]
     return [
-        table(head, rows, (2, 3, 4, 5, 6)),
+        table(head[: 3 + 2 * len(fits)], rows, range(2, 7)),
         table(("noise of", "standard deviation", "unit", "autoregressive order"), noise, (1,)),
     ]
 
 
 def _use(diagnosis: Diagnosis) -> list[Markup]:
+    rig = diagnosis.model.rig
     settings = {
-        "ankle": " --set load_kg=1.5",
-        "muscle": "",
-        "joint": " --set position0=0.5 --set velocity0=0",
-    }.get(diagnosis.study.rig, "")
-    lines = [f"fes-pin predict model.toml TRIAL.csv{settings} --out PREDICTED.csv"]
-    if diagnosis.study.rig == "ankle":
-        lines.append(
-            "fes-pin predict model.toml TRIAL.csv --set kind=isometric --set angle_rad=1.9 --out PREDICTED.csv"
-        )
+        "ankle": ("--set load_kg=1.5", "--set kind=isometric --set angle_rad=1.9"),
+        "joint": ("--set position0=0.5 --set velocity0=0",),
+    }.get(rig.name, ("",))
+    lines = [f"fes-pin predict model.toml TRIAL.csv {one} --out PREDICTED.csv".replace("  ", " ") for one in settings]
+    columns = " and ".join(("time_s", *rig.input_columns(diagnosis.study.trials[0])))
+    first = " A column position gives the initial state by its first sample." if rig.name == "joint" else ""
+    which = "extended" if diagnosis.causes else "fitted nominal"
+    words = f" beside this page is the {which} model, whole. TRIAL.csv needs {columns}.{first}"
     python = 'import fes_pin as fp\n\nmodel = fp.load_model("model.toml")\npredicted = fp.predict(model, trial)'
-    inputs = ", ".join(diagnosis.model.rig.input_columns(diagnosis.study.trials[0])) or "nothing else"
     return [
-        element("p", "The ", element("code", "model.toml"), " beside this page is the extended model, whole. "
-                f"TRIAL.csv needs the columns time_s and {inputs}."),
+        element("p", "The file ", element("code", "model.toml"), words),
         element("pre", "\n".join(lines)),
         element("pre", python),
-    ]  # fmt: skip
+    ]

@@ -6,7 +6,7 @@ from fes_pin.diagnose.diagnosis import Cause, Diagnosis
 from fes_pin.identify.fit import Fit
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.models.effects import effect
-from fes_pin.view.page import Content, Markup, element, figure, probability, rounded, table
+from fes_pin.view.page import Content, Markup, element, figure, probability, rounded, table, unit_text
 from fes_pin.view.ranking import gain_figure, rivals_figure, shown_rivals
 from fes_pin.view.svg import inline_svg
 
@@ -46,8 +46,8 @@ def _rivals(diagnosis: Diagnosis, cause: Cause) -> Markup:
         return Markup("")
     shown = inline_svg(rivals_figure(diagnosis, cause), f"Rivals of {cause.name} by their shortfall")
     caption = (
-        f"Rivals in place of {cause.name}: by how much twice the log-likelihood of the whole fit falls. Hollow, or in "
-        "the grey band: not told apart. Colours are the stages of the signal path."
+        f"Rivals in place of {cause.name}: by how much twice the log-likelihood of the whole fit falls. Hollow: not "
+        "told apart; the grey band is what chance alone makes. Colours are the stages of the signal path."
     )
     return figure(shown, caption, "narrow")
 
@@ -88,7 +88,7 @@ def _estimates(fitted: Fit, cause: Cause) -> Markup:
     rows: list[list[Content]] = []
     for name, one in cause.parameters.items():
         shown, interval = value_and_interval(fitted, f"{cause.name}.{name}", one.value)
-        rows.append([element("code", name), shown, one.unit or "1", interval])
+        rows.append([element("code", name), shown, unit_text(one.unit), interval])
     return table(("parameter", "value", "unit", "95 % interval"), rows, (1, 3))
 
 
