@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 import scipy.stats
+from threadpoolctl import ThreadpoolController
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.noise import Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
@@ -235,10 +237,16 @@ def fit(
     -------
     Fit
     """
-    if noise is not None:
+    with _linear_algebra().limit(limits=1):  # products this small are slower on several threads
+        if noise is None:
+            first = fit_problem(Problem(model, trials, rough_noise(model, trials)), model.parameters())
+            model, noise = first.model, noise_of(first)
         return fit_problem(Problem(model, trials, noise), model.parameters(), max_iterations=max_iterations)
-    first = fit_problem(Problem(model, trials, rough_noise(model, trials)), model.parameters())
-    return fit(first.model, trials, noise_of(first), max_iterations)
+
+
+@cache
+def _linear_algebra() -> ThreadpoolController:
+    return ThreadpoolController()
 
 
 def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import subprocess
 import sys
 import time
@@ -15,8 +16,10 @@ import numpy as np
 import scipy.integrate
 import scipy.optimize
 
+from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import fit
+from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle
 from fes_pin.models.simulate import Simulator
@@ -52,17 +55,18 @@ def _trial(seconds: float, rate: float, seed: int = 0) -> Trial:
 
 def _rates(t: float, x: np.ndarray, r: float, p: dict[str, float]) -> list[float]:
     """Eq. (1) in plain Python, as one would write it for solve_ivp."""
-    k, (act, q, v) = KNOWN, x
-    passive = k["f0_n"] * (np.exp(k["f1_per_rad"] * (q - k["theta_r_rad"])) - 1.0) if q > k["theta_r_rad"] else 0.0
-    force = p["gain"] * k["force_scale_n"] * act
-    torque = (k["moment_arm_m"] * force - k["com_distance_m"] * (passive - 9.81)) * np.sin(q)
-    torque += k["foot_mass_kg"] * 9.81 * k["com_distance_m"] * np.cos(q) - p["damping_nms"] * v
+    act, q, v = x
+    passive = p["f0_n"] * (np.exp(p["f1_per_rad"] * (q - p["theta_r_rad"])) - 1.0) if q > p["theta_r_rad"] else 0.0
+    force = p["gain"] * p["force_scale_n"] * act
+    torque = (p["moment_arm_m"] * force - p["com_distance_m"] * (passive - p["load_kg"] * 9.81)) * np.sin(q)
+    torque += p["foot_mass_kg"] * 9.81 * p["com_distance_m"] * np.cos(q) - p["damping_nms"] * v
     return [(r - act) / p["time_constant_s"], v, torque / p["inertia_kgm2"]]
 
 
 def _scipy(trial: Trial, p: dict[str, float], **how: float | str) -> np.ndarray:
     """The angle by solve_ivp, restarted where the pulse width jumps."""
-    r = np.clip((trial["pulse_width_us"] - 180.0) / 820.0, 0.0, 1.0)
+    p = {**p, "load_kg": trial.conditions["load_kg"]}
+    r = np.clip((trial["pulse_width_us"] - p["threshold_us"]) / (p["saturation_us"] - p["threshold_us"]), 0.0, 1.0)
     rest = scipy.optimize.brentq(lambda q: _rates(0.0, np.array([0.0, q, 0.0]), 0.0, p)[2], 0.5, 3.0, xtol=1e-14)
     x, angle = np.array([0.0, rest, 0.0]), np.empty(len(trial))
     edges = np.r_[0, np.flatnonzero(np.diff(r)) + 1, len(r)]
@@ -87,39 +91,55 @@ def _simulation() -> list[Row]:
     trial, model = _trial(10.0, 1000.0), Model(Ankle(constants=KNOWN, **TRUE))
     simulator = Simulator(model, [trial])
     angle = simulator.run(TRUE)[0].readings[:, 0]
-    exact = _scipy(trial, TRUE, method="DOP853", rtol=1e-12, atol=1e-13)
+    exact = _scipy(trial, KNOWN | TRUE, method="DOP853", rtol=1e-12, atol=1e-13)
     ours = _median(lambda: simulator.run(TRUE), 31)
-    theirs = _median(lambda: _scipy(trial, TRUE, method="LSODA", rtol=1e-6), 5)
+    four = Simulator(model, [trial] * WIDTH)
+    packed = _median(lambda: four.run(TRUE), 31) / WIDTH
+    bent = Simulator(model, [trial] * WIDTH, tuple(TRUE))
+    sensitive = _median(lambda: bent.run(TRUE), 31) / WIDTH
+    theirs = _median(lambda: _scipy(trial, KNOWN | TRUE, method="LSODA", rtol=1e-6), 5)
     return [
-        ("one simulation, 10 s at 1 kHz", 1e3 * ours, None, "ms"),
+        ("one simulation, 10 s at 1 kHz, alone in its block of lanes", 1e3 * ours, None, "ms"),
+        (f"one of {WIDTH} that fill a block", 1e3 * packed, None, "ms"),
+        (f"one of {WIDTH}, with sensitivities to 4 parameters", 1e3 * sensitive, None, "ms"),
         ("times faster than solve_ivp LSODA, rtol 1e-6", theirs / ours, 50.0, "x"),
         ("largest angle error", float(np.abs(angle - exact).max()), 1e-6, "rad"),
     ]
 
 
-def _fits() -> list[Row]:
-    rng = np.random.default_rng(1)
-    trials = []
+def _motions() -> tuple[str, dict[str, float], dict[str, float], list[Trial]]:
+    """A practice study's motion trials, or eight of our own: name, constants, start values, trials."""
+    shared = Path(os.environ.get("FES_PIN_DATA") or Path(__file__).parents[3] / "shared")
+    if (shared / "practice" / "n00_none").is_dir():
+        study = read_study(shared / "practice" / "n00_none")
+        motions = [t for t in study.trials if t.kind == "motion"]
+        return study.name, dict(study.constants), dict(study.start), motions
+    rng, trials = np.random.default_rng(1), []
     for k in range(8):
         bare = _trial(8.0, 200.0, seed=k)
-        angle = _scipy(bare, TRUE, method="LSODA", rtol=1e-8, atol=1e-10)
+        angle = _scipy(bare, KNOWN | TRUE, method="LSODA", rtol=1e-8, atol=1e-10)
         trials.append(bare.with_columns(angle_rad=angle + 0.002 * rng.standard_normal(len(bare))))
-    model = Model(Ankle(constants=KNOWN, **START))
+    return "eight trials", KNOWN, START, trials
+
+
+def _fits() -> list[Row]:
+    name, known, start, trials = _motions()
+    model = Model(Ankle(constants=known, **start))
     fit(model, trials)
     ours = _median(lambda: fit(model, trials), 7)
-    names = list(START)
+    names = list(start)
 
     def residual(x: np.ndarray) -> np.ndarray:
-        p = dict(zip(names, x, strict=True))
+        p = {**known, **dict(zip(names, x, strict=True))}
         return np.concatenate([t["angle_rad"] - _scipy(t, p, method="LSODA", rtol=1e-6) for t in trials])
 
     began = time.perf_counter()
-    found = scipy.optimize.least_squares(residual, list(START.values()), x_scale=list(START.values()), diff_step=1e-4)
+    found = scipy.optimize.least_squares(residual, list(start.values()), x_scale=list(start.values()), diff_step=1e-4)
     theirs = time.perf_counter() - began
     mine = fit(model, trials).values
     apart = max(abs(found.x[k] / mine[n] - 1.0) for k, n in enumerate(names))
     return [
-        ("fit of the nominal ankle to eight trials", 1e3 * ours, None, "ms"),
+        (f"fit of the nominal ankle to {name} ({len(trials)} motion trials)", 1e3 * ours, None, "ms"),
         ("times faster than solve_ivp + least_squares", theirs / ours, 300.0, "x"),
         ("largest relative difference of the two fits' parameters", apart, None, "1"),
     ]

@@ -1,6 +1,7 @@
 """The machine code against CasADi's virtual machine: two ways from the same expressions to numbers."""
 
 import logging
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from fes_pin.models.compile import machine, native, program
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import WIDTH, make_layout
 from fes_pin.models.compile.virtual import VirtualProgram
+from fes_pin.models.effects.sensor_offset import SensorOffset
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator, max_step, simulate, substeps
 
@@ -137,6 +139,29 @@ def test_a_cache_that_cannot_be_written_is_no_error(fresh, monkeypatch):
     fresh.parent.joinpath("a file").write_text("")
     monkeypatch.setenv("FES_PIN_CACHE", str(fresh.parent / "a file" / "cache"))
     assert np.array_equal(answer(), expected)
+
+
+@dataclass(frozen=True)
+class Offset(SensorOffset):
+    """Somebody's own effect under a name that is taken, with twice the size."""
+
+    def apply(self, value, s):
+        return value + 2.0 * self.offset
+
+
+def test_an_effect_of_the_same_name_is_another_program(fresh):
+    one = trial("muscle", "isometric", np.random.default_rng(1))
+    bare, ours, theirs = (
+        simulate(model, one)["force_n"]
+        for model in (
+            Model(RIGS["muscle"]),
+            Model(RIGS["muscle"]) + SensorOffset(0.5),
+            Model(RIGS["muscle"]) + Offset(0.5),
+        )
+    )
+    assert ours - bare == pytest.approx(0.5)
+    assert theirs - bare == pytest.approx(1.0)
+    assert len(list(fresh.iterdir())) == 2  # whose source may change unseen is not kept
 
 
 def test_programs_outlive_each_other():

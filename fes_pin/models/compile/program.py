@@ -53,7 +53,7 @@ class Program(Protocol):
 
 
 _LOCK = threading.Lock()  # CasADi's expressions are not made for two threads
-_PROGRAMS: dict[tuple[str, tuple[str, ...], Layout], Program] = {}
+_PROGRAMS: dict[tuple[str, tuple[type, ...], Layout], Program] = {}
 
 
 def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...]) -> Program:
@@ -74,7 +74,7 @@ def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str
         If FES_PIN_ENGINE names no engine.
     """
     layout, engine = make_layout(model, kind, inputs, columns), chosen_engine()
-    key = (engine, model.structure(), layout)
+    key = (engine, _classes(model), layout)
     if key not in _PROGRAMS:
         with _LOCK:
             if key not in _PROGRAMS:
@@ -91,13 +91,21 @@ def chosen_engine() -> str:
     return engine
 
 
+def _classes(model: Model) -> tuple[type, ...]:
+    """What writes the equations: the classes of rig and effects, also somebody else's of the same name."""
+    return (type(model.rig), *(type(e) for e in model.effects))
+
+
 def _native(model: Model, layout: Layout) -> Program | None:
     """Machine code from the cache or compiled; None if it cannot be made here."""
     try:
         from fes_pin.models.compile import machine, native  # noqa: PLC0415 - llvmlite may be missing
         from fes_pin.models.compile.signature import source_signature  # noqa: PLC0415
 
-        path = machine.cached_path(json.dumps([source_signature(), model.structure(), asdict(layout)]), ".program")
+        classes = [f"{c.__module__}.{c.__qualname__}" for c in _classes(model)]
+        if not all(name.startswith("fes_pin.") for name in classes):  # the signature knows only our own source
+            return native.NativeProgram(layout, native.compile_equations(derive(model, layout)))
+        path = machine.cached_path(json.dumps([source_signature(), classes, asdict(layout)]), ".program")
         stored = machine.read_cached(path)
         if stored is None:
             stored = native.compile_equations(derive(model, layout))
