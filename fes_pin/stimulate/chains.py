@@ -313,8 +313,35 @@ def direction(
     return 0
 
 
+def factor(
+    n: int,
+    r: int,
+    steps: int,
+    rows: int,
+    keep: float,
+    change: float,
+    V: Reals,
+    VT: Reals,
+    price: Reals,
+    held: Reals,
+    springs: Reals,
+    ratio: Reals,
+    inverse: Reals,
+    Q: Reals,
+    W: Reals,
+    K: Reals,
+    p: Reals,
+    c: Reals,
+):
+    """Everything that `direction` needs for these springs."""
+    chain(n, steps, rows, price, change, held, springs, ratio, inverse, c)
+    couple(n, r, steps, keep, V, VT, ratio, inverse, Q, W, K)
+    eliminate(r * steps, K, p, c)
+    return 0
+
+
 FUNCTIONS = (
     *(add_rows, lag, lag_back, differences, gather, torques, pulled, slopes),
-    *(chain, unchain, add_products, couple, eliminate, substitute, direction),
+    *(chain, unchain, add_products, couple, eliminate, substitute, factor, direction),
 )
 """In the order in which they call each other, to be compiled together."""
