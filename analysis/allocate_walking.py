@@ -14,10 +14,10 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.stimulate.allocate import Allocator, allocate
 from fes_pin.stimulate.attainable import Attainable
 from fes_pin.stimulate.measured import read_walk
-from fes_pin.stimulate.muscles import JOINTS
 from fes_pin.stimulate.nerves import Nerves
 from fes_pin.stimulate.recruitment import LinearRecruitment
 from fes_pin.stimulate.walk import allocate_walk, clipped, direction_error, rescaled
@@ -43,7 +43,7 @@ def both_sides(names):
 
 # %% Attained: every joint that counts within 10 % of its peak torque; strengths are known to a factor of 1.8
 def attained(result, joints):
-    index = [JOINTS.index(j) for j in joints]
+    index = [JOINT_NAMES.index(j) for j in joints]
     met = np.abs(result.shortfall[:, index]) <= np.maximum(0.1 * np.abs(walk.torque[:, index]).max(0), 1.0)
     return met.all(1).mean(), met.mean()
 
@@ -55,7 +55,7 @@ for name, nerves in SETS.items():
     row = []
     for strength in (1 / 1.8, 1.0, 1.8):
         channels = Nerves(both_sides(nerves), strength=strength)
-        sagittal = allocate_walk(walk.torque, channels, walk.q, weights=np.isin(JOINTS, SAGITTAL).astype(float))
+        sagittal = allocate_walk(walk.torque, channels, walk.q, weights=np.isin(JOINT_NAMES, SAGITTAL).astype(float))
         full = allocate_walk(walk.torque, channels, walk.q, weights=weights)
         assert max(sagittal.residual.max(), full.residual.max()) < 1e-9
         row.append((attained(sagittal, SAGITTAL)[0], *attained(full, walk.known_joints)))
@@ -77,7 +77,7 @@ for name, (sagittal, _) in results.items():
         print(f"   {100 * count / len(walk.time):3.0f} % of samples: {reason}")
 
 # %% Against the rules of thumb: least squares without limits, then clip or rescale
-index = [JOINTS.index(j) for j in SAGITTAL]
+index = [JOINT_NAMES.index(j) for j in SAGITTAL]
 errors = {}
 for name, (sagittal, _) in results.items():
     rules = {"this": sagittal.achieved[:, index]}
@@ -104,7 +104,7 @@ sagittal, _ = results[chosen]
 figure, axes = plt.subplots(2, 3, figsize=(13, 7.2), constrained_layout=True)
 titles = ("right hip, flexion +", "right knee, flexion +", "right ankle, dorsiflexion +")
 for axis, joint, title in zip(axes[0], SAGITTAL[3:], titles, strict=True):
-    j = JOINTS.index(joint)
+    j = JOINT_NAMES.index(joint)
     axis.plot(walk.time, walk.torque[:, j], color="0.25", lw=2.2, label="measured walking")
     axis.plot(
         walk.time,
@@ -135,7 +135,7 @@ wide = Attainable(Nerves(both_sides(SETS["every leg nerve"])), walk.q[60]).outli
 )
 axes[1, 1].fill(*wide.T, color="tab:blue", alpha=0.15, label="every leg nerve")
 axes[1, 1].fill(*outline.T, color="tab:orange", alpha=0.35, label="four a leg")
-knee, ankle = (walk.torque[:, JOINTS.index(j)] for j in ("right_knee_flexion", "right_ankle_dorsiflexion"))
+knee, ankle = (walk.torque[:, JOINT_NAMES.index(j)] for j in ("right_knee_flexion", "right_ankle_dorsiflexion"))
 axes[1, 1].plot(knee, ankle, color="0.25", lw=1.5, label="measured walking")
 axes[1, 1].set(
     title="attainable torque, knee and ankle", xlabel="knee flexion (N m)", ylabel="ankle dorsiflexion (N m)"
@@ -159,6 +159,6 @@ figure.savefig(out / "allocate_walking.png", dpi=110)
 share = {name: attained(sagittal, SAGITTAL)[0] for name, (sagittal, _) in results.items()}
 print(f"Four nerves a leg make {100 * share[chosen]:.0f} % of the samples of walking (sagittal hip, knee and ankle).")
 example = allocate(
-    dict(zip(JOINTS, walk.torque[60], strict=True)), Nerves(both_sides(SETS[chosen])), walk.q[60], weights=weights
+    dict(zip(JOINT_NAMES, walk.torque[60], strict=True)), Nerves(both_sides(SETS[chosen])), walk.q[60], weights=weights
 )
 print(example)

@@ -70,8 +70,8 @@ def walk_table(folder: Path, nerves) -> str:
     """Per joint of the measured walk: peak torque, rms shortfall, share of samples within 10 % of the peak."""
     import numpy as np
 
+    from fes_pin.body.joints import JOINT_NAMES
     from fes_pin.stimulate.measured import read_walk
-    from fes_pin.stimulate.muscles import JOINTS
     from fes_pin.stimulate.walk import allocate_walk
 
     walk = read_walk(folder)
@@ -81,5 +81,5 @@ def walk_table(folder: Path, nerves) -> str:
     for j in np.flatnonzero(walk.known):
         peak, short = np.abs(walk.torque[:, j]).max(), result.shortfall[:, j]
         share = (np.abs(short) <= max(0.1 * peak, 1.0)).mean()
-        lines.append(f"{JOINTS[j]:28s}{peak:6.1f} Nm{np.sqrt((short**2).mean()):9.1f} Nm{100 * share:11.0f} %")
+        lines.append(f"{JOINT_NAMES[j]:28s}{peak:6.1f} Nm{np.sqrt((short**2).mean()):9.1f} Nm{100 * share:11.0f} %")
     return "\n".join(lines)

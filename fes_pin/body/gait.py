@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fes_pin.body.joints import JOINT_NAMES, SIDES, mirrored
+from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, mirrored
 from fes_pin.data.errors import InputError
 
 TABLE = Path(__file__).with_name("gait_postures.csv")
 """Degrees, right stance; made by scripts/generate_postures from the measured walk."""
-_MIRROR_SIGN = {"lumbar_bending": -1.0, "lumbar_rotation": -1.0}
 
 
 @lru_cache(maxsize=1)
@@ -43,12 +42,12 @@ def posture_angles(name: str, stance: str) -> dict[str, float]:
     angles = _table()[name]
     if stance == "right":
         return dict(angles)
-    return {mirrored(joint): _MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
+    return {mirrored(joint): MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
 
 
 def mirror(angles: Mapping[str, float]) -> dict[str, float]:
     """A posture seen in a mirror: left and right change places."""
-    return {mirrored(joint): _MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
+    return {mirrored(joint): MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
 
 
 # Axes of OpenSim's ankle and subtalar joints of the right leg (gait2354, `subject01_model.json`), in our axes.

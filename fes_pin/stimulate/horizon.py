@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.allocate import Allocator
+from fes_pin.stimulate.allocator import Allocator
 from fes_pin.stimulate.horizon_program import NO_ROOM, HorizonProgram, Solution
 
 

@@ -17,11 +17,11 @@ if __name__ == "__main__":
 
 import numpy as np
 
+from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate.allocate import Allocator, allocate
 from fes_pin.stimulate.horizon import Horizon
 from fes_pin.stimulate.measured import read_walk
-from fes_pin.stimulate.muscles import JOINTS
 from fes_pin.stimulate.nerves import Nerves
 from fes_pin.stimulate.walk import allocate_walk, clipped, direction_error, rescaled
 
@@ -157,10 +157,10 @@ def walking() -> list[tuple]:
     except InputError:
         return []
     sagittal = [
-        j for j, name in enumerate(JOINTS) if name.endswith(("hip_flexion", "knee_flexion", "ankle_dorsiflexion"))
+        j for j, name in enumerate(JOINT_NAMES) if name.endswith(("hip_flexion", "knee_flexion", "ankle_dorsiflexion"))
     ]
     nerves = [f"{s}_{n}" for s in ("left", "right") for n in ("femoral", "hamstrings", "tibial", "deep_peroneal")]
-    weights = np.isin(np.arange(len(JOINTS)), sagittal).astype(float)
+    weights = np.isin(np.arange(len(JOINT_NAMES)), sagittal).astype(float)
     result = allocate_walk(walk.torque, Nerves(nerves), walk.q, weights=weights)
     wanted, matrices = walk.torque[:, sagittal], result.matrices[:, sagittal]
     made = {"this": result.achieved[:, sagittal]}
@@ -196,7 +196,7 @@ def off_or_enough() -> list[tuple]:
 
 def run() -> list[tuple]:
     """Rows (name, measured, target or None, unit)."""
-    assert len(JOINTS) == 19
+    assert len(JOINT_NAMES) == 19
     return [*batch(), *against_osqp(), *single_call(), *horizon(), *off_or_enough(), *walking()]
 
 

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate import certificate
 from fes_pin.stimulate.allocate import Allocator, allocate
 from fes_pin.stimulate.certificate import Certifier, residuals, slopes
-from fes_pin.stimulate.muscles import JOINTS
 from fes_pin.stimulate.nerves import Nerves
 from fes_pin.stimulate.recruitment import LinearRecruitment, SigmoidRecruitment
 
@@ -120,7 +120,7 @@ def test_sequence_equals_single_allocations_and_certifies_itself():
 def test_words_name_the_saturated_nerve():
     a = allocate({"left_ankle_dorsiflexion": -400.0}, Nerves(["left_tibial", "right_femoral"]))
     assert a.reasons[0].startswith("left ankle dorsiflexion") and a.reasons[0].endswith("left tibial saturated")
-    short = -400.0 - a.achieved[JOINTS.index("left_ankle_dorsiflexion")]
+    short = -400.0 - a.achieved[JOINT_NAMES.index("left_ankle_dorsiflexion")]
     assert f"{abs(short):.1f} N m short" in a.reasons[0]
     assert a.active == {"left_tibial": "saturated", "right_femoral": "off"}
     assert a.multipliers["left_tibial"] > 0.0
@@ -213,7 +213,7 @@ def test_lexicographic_reaches_the_least_error_then_the_least_effort():
 def test_fatigue_moves_the_load_to_fresh_channels():
     names = ["left_hamstrings", "left_biceps_short_head"]
     torque = {"left_knee_flexion": 8.0}
-    weights = {j: float(j == "left_knee_flexion") for j in JOINTS}
+    weights = {j: float(j == "left_knee_flexion") for j in JOINT_NAMES}
     tired = Nerves(names).tired(left_hamstrings=0.3)
     plain = allocate(torque, tired, weights=weights)
     spared = allocate(torque, tired, weights=weights, effort_kind="fatigue")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate.allocate import Allocator
 from fes_pin.stimulate.measured import data_folder, read_walk
-from fes_pin.stimulate.muscles import JOINTS
 from fes_pin.stimulate.nerves import Nerves
 from fes_pin.stimulate.walk import allocate_walk, clipped, direction_error, rescaled
 
@@ -94,11 +94,11 @@ def test_measured_walking_is_attained_by_the_nerves_of_the_leg_and_not_by_four()
         pytest.skip("the measured walk is not here")
     walk = read_walk()
     assert len(walk.time) == 157 and walk.known.sum() == 15
-    knee, ankle = (JOINTS.index(f"right_{j}") for j in ("knee_flexion", "ankle_dorsiflexion"))
+    knee, ankle = (JOINT_NAMES.index(f"right_{j}") for j in ("knee_flexion", "ankle_dorsiflexion"))
     assert walk.q[:, knee].max() == pytest.approx(1.2, abs=0.1)  # a knee flexes some 65 degrees in swing
     assert -150 < walk.torque[:, ankle].min() < -100  # push-off
-    sagittal = [j for j in JOINTS if j.endswith(("hip_flexion", "knee_flexion", "ankle_dorsiflexion"))]
-    weights = np.isin(JOINTS, sagittal).astype(float)
+    sagittal = [j for j in JOINT_NAMES if j.endswith(("hip_flexion", "knee_flexion", "ankle_dorsiflexion"))]
+    weights = np.isin(JOINT_NAMES, sagittal).astype(float)
     legs = [n for n in Nerves().names if not n.endswith(("erector_spinae", "abdominals"))]
     four = [n for n in legs if n.split("_", 1)[1] in ("femoral", "hamstrings", "tibial", "deep_peroneal")]
     missed = []
