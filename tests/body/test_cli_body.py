@@ -66,6 +66,7 @@ def test_view_plays_the_measured_walk(walk, tmp_path):
         (("modes", "--brace", "plaster"), "cannot brace 'plaster'"),
         (("modes", "--urdf", "none.urdf"), "none.urdf"),
         (("nerves", "right_vagus"), "unknown nerve"),
+        (("view",), "--live"),
         (("view", "a.html", "--mode", "99"), "--mode"),
         (("view", "a.html", "--mode", "1", "--nerve", "right_tibial"), "choose one"),
         (("view", "a.html", "--walk", "none.csv"), "none.csv"),
