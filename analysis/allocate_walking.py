@@ -1,6 +1,9 @@
 """Which part of walking can stimulated nerves make, which pulse widths do it, and what is short, and why?
 
-Measured walking (two strides, one adult) gives the joint torques; four sets of nerves are asked for them.
+Measured walking (two strides, one adult) gives the joint torques; what ligaments and resting muscle give by themselves
+(Riener and Edrich 1999, healthy legs) is taken off; four sets of nerves are asked for the rest. Levers of the trunk's
+muscles are round figures of the size that imaging gives (Jorgensen et al. 2001, McGill et al. 1993), constant over
+posture: read "legs and trunk" as a sign and a size, no more (fes_pin/stimulate/tables/SOURCE.md).
 Run the cells, or `python analysis/allocate_walking.py`; the picture goes to out/allocate_walking.png.
 """
 
@@ -15,6 +18,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.passive import PassiveLegs
 from fes_pin.stimulate.allocate import Allocator, allocate
 from fes_pin.stimulate.attainable import Attainable
 from fes_pin.stimulate.measured import read_walk
@@ -22,7 +26,8 @@ from fes_pin.stimulate.nerves import Nerves
 from fes_pin.stimulate.recruitment import LinearRecruitment
 from fes_pin.stimulate.walk import allocate_walk, clipped, direction_error, rescaled
 
-walk = read_walk()
+measured = read_walk()
+walk = measured.active(PassiveLegs())
 weights = walk.known.astype(float)
 LEG = [n.removeprefix("left_") for n in Nerves().names if n.startswith("left_")]
 TRUNK = ("erector_spinae", "abdominals")
@@ -44,10 +49,14 @@ def both_sides(names):
 # %% Attained: every joint that counts within 10 % of its peak torque; strengths are known to a factor of 1.8
 def attained(result, joints):
     index = [JOINT_NAMES.index(j) for j in joints]
-    met = np.abs(result.shortfall[:, index]) <= np.maximum(0.1 * np.abs(walk.torque[:, index]).max(0), 1.0)
+    met = np.abs(result.shortfall[:, index]) <= np.maximum(0.1 * np.abs(result.wanted[:, index]).max(0), 1.0)
     return met.all(1).mean(), met.mean()
 
 
+given = measured.torque - walk.torque
+for joint in SAGITTAL[3:]:
+    j = JOINT_NAMES.index(joint)
+    print(f"{joint:28s} by itself {given[:, j].min():+6.1f} to {given[:, j].max():+6.1f} N m")
 print(f"{len(walk.time)} samples, {walk.time[-1] - walk.time[0]:.2f} s; joints within 10 % of their peak torque")
 print(f"{'nerves':22s} {'all sagittal':>24s} {'all in 3-D':>20s} {'joint samples':>16s}   (weak, table, strong)")
 results = {}
@@ -63,6 +72,19 @@ for name, nerves in SETS.items():
             results[name] = (sagittal, full)
     cells = [" - ".join(f"{100 * r[k]:3.0f}" for r in row) + " %" for k in range(3)]
     print(f"{name:22s} {cells[0]:>24s} {cells[1]:>20s} {cells[2]:>16s}")
+
+# %% What it changes that joints give torque by themselves; paralysed legs may give less, or with contractures more
+alone = {}
+sagittal_only = np.isin(JOINT_NAMES, SAGITTAL).astype(float)
+for name, nerves in SETS.items():
+    cells = []
+    for factor in (0.0, 0.5, 1.0, 2.0):
+        wanted = measured.active(PassiveLegs(factor)).torque
+        found = allocate_walk(wanted, Nerves(both_sides(nerves)), walk.q, weights=sagittal_only)
+        cells.append(f"{factor:g}: {100 * attained(found, SAGITTAL)[0]:3.0f} %")
+        if factor == 0.0:
+            alone[name] = attained(found, SAGITTAL)[0]
+    print(f"{name:22s} all sagittal, passive torque of healthy legs times {', '.join(cells)}")
 
 # %% What is short, and why: the worst joint of every sample, counted
 for name, (sagittal, _) in results.items():
@@ -157,7 +179,10 @@ figure.savefig(out / "allocate_walking.png", dpi=110)
 
 # %% The number
 share = {name: attained(sagittal, SAGITTAL)[0] for name, (sagittal, _) in results.items()}
-print(f"Four nerves a leg make {100 * share[chosen]:.0f} % of the samples of walking (sagittal hip, knee and ankle).")
+print(
+    f"Four nerves a leg make {100 * alone[chosen]:.0f} % of the samples of walking (sagittal hip, knee and ankle) "
+    f"if joints give nothing by themselves, {100 * share[chosen]:.0f} % with the passive torque of healthy legs."
+)
 example = allocate(
     dict(zip(JOINT_NAMES, walk.torque[60], strict=True)), Nerves(both_sides(SETS[chosen])), walk.q[60], weights=weights
 )

@@ -43,6 +43,10 @@ def allocate(
     walk: Annotated[
         Path | None, typer.Option(help="Instead of a torque: the folder of the measured walk; how much is attained.")
     ] = None,
+    passive: Annotated[
+        float,
+        typer.Option(help="With --walk: what joints give by themselves, 1 for healthy legs."),
+    ] = 0.0,
     nerves: Annotated[bool, typer.Option(help="List the nerves and what they turn, and end.")] = False,
 ) -> None:
     """Pulse widths for wanted joint torques, what is short, and why."""
@@ -57,7 +61,7 @@ def allocate(
         typer.echo(str(channels))
         return
     if walk is not None:
-        typer.echo(walk_table(walk, channels))
+        typer.echo(walk_table(walk, channels, passive))
         return
     if not torque:
         raise InputError("no torque is wanted: give joint=N m, or --walk, or --nerves")
@@ -66,15 +70,18 @@ def allocate(
     typer.echo(str(solve(pairs(torque, "a torque"), channels, posture, least=least, recruitment=curve)))
 
 
-def walk_table(folder: Path, nerves) -> str:
+def walk_table(folder: Path, nerves, passive: float = 0.0) -> str:
     """Per joint of the measured walk: peak torque, rms shortfall, share of samples within 10 % of the peak."""
     import numpy as np
 
     from fes_pin.body.joints import JOINT_NAMES
+    from fes_pin.body.passive import PassiveLegs
     from fes_pin.stimulate.measured import read_walk
     from fes_pin.stimulate.walk import allocate_walk
 
-    walk = read_walk(folder)
+    if not 0.0 <= passive <= 10.0:
+        raise InputError(f"--passive must lie between 0 and 10, got {passive}")
+    walk = read_walk(folder).active(PassiveLegs(passive))
     result = allocate_walk(walk.torque, nerves, walk.q, weights=walk.known.astype(float))
     lines = [f"{len(walk.time)} samples, {nerves.n} channels, optimal to {result.residual.max():.0e}"]
     lines.append(f"{'joint':28s}{'peak':>9s}{'short, rms':>12s}{'within 10 %':>13s}")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.passive import Passive
 from fes_pin.data.errors import InputError
 
 REFERENCE = {
@@ -46,6 +47,20 @@ class MeasuredWalk:
     def known_joints(self) -> tuple[str, ...]:
         """Names of the joints whose torque is known."""
         return tuple(name for name, known in zip(JOINT_NAMES, self.known, strict=True) if known)
+
+    def active(self, passive: Passive) -> MeasuredWalk:
+        """The same walk with the torque that muscles must make: what inverse dynamics gives less the passive torque.
+
+        Parameters
+        ----------
+        passive
+            `PassiveLegs` or `ElasticJoints` of `fes_pin.body.passive`, damping included; joints whose torque is not
+            known stay at 0.
+        """
+        order = list(JOINT_NAMES)
+        rates = np.gradient(self.q, self.time, axis=0)
+        given = np.array([passive.torque(q, order) for q in self.q]) - rates @ passive.damping(order)
+        return replace(self, torque=np.where(self.known, self.torque - given, 0.0))
 
 
 def data_folder() -> Path:

@@ -49,6 +49,62 @@ def test_two_thousand_random_problems_are_optimal_and_within_threshold_and_satur
     assert "optimal to" in str(a)
 
 
+def test_two_thousand_random_problems_cost_what_a_reference_solver_finds():
+    """DAQP on the program written out from its definition, without any code of the allocator."""
+    import daqp
+
+    rng = np.random.default_rng(11)
+    for _ in range(2000):
+        matrix, torque, options = random_problem(rng)
+        a = Allocator(matrix, **options)(torque)
+        n, weights = matrix.shape[1], options["weights"]
+        alive = np.where(options["upper"] > 0.0, matrix, 0.0)
+        squares = alive.T @ (weights[:, None] * alive)
+        scale = squares.diagonal().max() or 1.0
+        H, f = squares / scale + options["effort"] * np.eye(n), -(torque * weights) @ alive / scale
+        none = np.zeros((0, n))
+        x, _, flag, _ = daqp.solve(H, f, none, options["upper"], options["lower"], np.zeros(n, dtype=np.int32))
+        assert flag == 1
+        allowed = np.clip(x, options["lower"], options["upper"])  # DAQP keeps limits to 1e-6
+        ours, theirs, least = (0.5 * v @ H @ v + f @ v for v in (a.recruitment, allowed, x))
+        assert least - 1e-6 * (1.0 + np.abs(f).sum()) <= ours <= theirs + 1e-12
+
+
+def test_channels_that_die_in_the_middle_of_random_runs():
+    """Rate limit and price of change carry on from what was in force; the dead are off at once and stay off."""
+    rng, curve = np.random.default_rng(12), LinearRecruitment()
+    for _ in range(150):
+        matrix, _, options = random_problem(rng)
+        options.update(rate=rng.choice([0.05, 0.3, np.inf]), change=rng.choice([0.0, 1e-2]))
+        before, program = np.zeros(matrix.shape[1]), Allocator(matrix, **options)
+        dead: list[str] = []
+        for k in range(12):
+            if k == 6:
+                dead = [n for n in program.names if rng.random() < 0.4]
+                program = Allocator(matrix, dead=dead, **options)
+            a = program(rng.normal(size=len(matrix)) * 60, before)
+            off = np.isin(program.names, dead)
+            assert (a.recruitment[off] == 0.0).all() and (a.pulse_width_us[off] == 0.0).all()
+            moved = np.abs(a.recruitment - np.clip(before, program.lower, program.upper))
+            assert (moved <= options["rate"] + 1e-12).all()
+            assert a.certificate.is_optimal(1e-11)
+            within_limits(a, curve)
+            before = a.recruitment
+
+
+def test_a_refused_torque_leaves_the_run_as_it_was():
+    torque, again = {"left_knee_flexion": -60.0}, Allocator(LEFT, rate=0.05)
+    program = Allocator(LEFT, rate=0.05)
+    for _ in range(3):
+        program(torque)
+        again(torque)
+        with pytest.raises(InputError, match="finite"):
+            program({"left_knee_flexion": float("nan")})
+        with pytest.raises(InputError, match="solver"):
+            program(torque, solver="abacus")
+    np.testing.assert_array_equal(program(torque).recruitment, again(torque).recruitment)
+
+
 @pytest.mark.parametrize("solver", ["daqp", "osqp"])
 def test_other_solvers_give_the_same_allocation_and_cost_no_less(solver):
     rng = np.random.default_rng(1)

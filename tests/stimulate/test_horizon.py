@@ -113,6 +113,28 @@ def test_a_plan_does_not_depend_on_the_plans_before_it():
     np.testing.assert_array_equal(horizon.plan(wanted).recruitment, first.recruitment)
 
 
+def test_channels_that_die_in_the_middle_of_random_runs_and_torques_that_are_refused():
+    rng = np.random.default_rng(15)
+    for _ in range(60):
+        horizon = random_horizon(rng, 6, fatigue=Fatigue(1.0, 3.0, 0.1))
+        p = horizon.program
+        for k in range(8):
+            if k == 4:
+                dead = [n for n in p.names if rng.random() < 0.5]
+                options = {"weights": p.weights, "effort": p.effort, "rate": p.rate, "change": p.change}
+                horizon.carry_on(Allocator(p.nominal, lower=p.lower, upper=p.upper, dead=dead, **options))
+                p = horizon.program
+            act, left, before = horizon.act, horizon.left, horizon.before
+            with pytest.raises(InputError):
+                horizon.advance(np.full((6, len(p.joints)), np.nan))
+            assert horizon.act is act and horizon.left is left and horizon.before is before
+            plan = horizon.advance(random_torque(rng, horizon))
+            assert plan.rounds > 0 and plan.gap <= 1e-9
+            assert (plan.recruitment[:, p.upper == 0.0] == 0.0).all()
+            moved = np.diff(np.vstack([np.clip(before, p.lower, p.upper), plan.recruitment]), axis=0)
+            assert np.abs(moved).max() <= p.rate + 1e-12
+
+
 def test_a_wrong_plan_has_a_gap_that_covers_what_it_loses():
     """The proof knows nothing of the solver: plans and multipliers made up."""
     rng = np.random.default_rng(10)
