@@ -94,6 +94,8 @@ class HorizonProgram:
             if settled:
                 break
             self.u[:], self.y[:] = near, multipliers
+        if not settled:
+            self.u[:] = np.where(lower[:size], self.low[:size], np.where(upper[:size], self.high[:size], self.u))
         self.y[rows:] = 0.0
         shape = self.steps, self.n
         return Solution(self.u.reshape(shape).copy(), self.y.reshape(-1, self.n).copy(), iterations, settled)

@@ -292,6 +292,7 @@ def test_where_no_guess_settles_the_interior_plan_is_given_and_proven(monkeypatc
     for _ in range(100):
         plan = (horizon := random_horizon(rng)).plan(random_torque(rng, horizon))
         assert plan.rounds == 0 and plan.gap <= 1e-6
+        assert not ((plan.recruitment > 0.0) & (plan.recruitment < 1e-9)).any()  # off is off, not a pulse at threshold
 
 
 def test_fatigue_is_carried_from_pulse_to_pulse_and_the_plan_knows_it():
