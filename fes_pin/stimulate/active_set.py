@@ -13,12 +13,21 @@ from fes_pin.stimulate.native import Reals
 
 
 def exchange(
-    size: int, every: int, slack: float, held: Reals, low: Reals, high: Reals, y: Reals, d: Reals, guess: Reals
+    size: int,
+    every: int,
+    slack: float,
+    large: float,
+    held: Reals,
+    low: Reals,
+    high: Reals,
+    y: Reals,
+    d: Reals,
+    guess: Reals,
 ):
     """Let go of limits that push the wrong way, take up those that rows d violate; the number of changes."""
     wrong = 0
     for i in range(every):
-        now = 0.0 if guess[i] * y[i] < -slack else guess[i]
+        now = 0.0 if guess[i] * y[i] < -slack * large else guess[i]
         now = 1.0 if d[i] > high[i] + slack else -1.0 if d[i] < low[i] - slack else now
         now = now if i >= size or held[i if i < size else 0] == 0.0 else 0.0
         wrong += 1 if now != guess[i] else 0
@@ -59,10 +68,12 @@ def finish(
     rounds: int,
     stiff: float,
     slack: float,
+    large: float,
 ):
     """Make u and y exact for the limits in `guess` (1 upper, -1 lower, 0 free), exchanging wrong ones.
 
-    The number of guesses, or 0 if none settled within so many rounds.
+    The number of guesses, or 0 if none settled within so many rounds. `slack` is rounding of plans, times `large` of
+    slopes.
     """
     size = n * steps
     every = n * rows
@@ -84,7 +95,7 @@ def finish(
                 b[i] = -g[i] - b[i]
                 off = abs(b[i]) if held[i] == 0.0 else 0.0
                 missed = off if off > missed else missed
-            if missed < slack:
+            if missed < slack * large:
                 break
             gather(n, steps, rows, d, work)
             for i in range(size):
@@ -93,7 +104,7 @@ def finish(
             for i in range(size):
                 u[i] += b[i]
         differences(n, steps, rows, u, d)
-        wrong = exchange(size, every, slack, held, low, high, y, d, guess)
-        if wrong == 0 and missed < slack:
+        wrong = exchange(size, every, slack, large, held, low, high, y, d, guess)
+        if wrong == 0 and missed < slack * large:
             return count + 1
     return 0

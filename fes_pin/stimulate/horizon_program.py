@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.data.errors import InputError
 from fes_pin.stimulate.interior import compiled
 from fes_pin.stimulate.native import address
 
@@ -14,7 +15,8 @@ RANK = 1e-14
 NO_ROOM, WALL = 1e-10, 1e30
 """Limits nearer than this hold a step where it is, by a spring of this stiffness."""
 STAGES = ((1e-9, 3), (1e-12, 10))
-"""Residual at which the interior iterations end, and guesses at what is active that follow; then once more."""
+"""Residual at which the interior iterations end, and guesses at what is active that follow; then once more. Of slopes
+that are larger than 1: torques far beyond what the channels make."""
 ITERATIONS = 60
 STIFF, SLACK = 1e4, 1e-11
 """Penalty of the method of multipliers; violations and wrong multipliers up to this are rounding."""
@@ -73,29 +75,37 @@ class HorizonProgram:
         self.native = compiled()
 
     def solve(self, f: np.ndarray, low: np.ndarray, high: np.ndarray) -> Solution:
-        """The plan for a linear term (steps, n) under limits and rates (2 steps - 1, n) each."""
+        """The plan for a linear term (steps, n) under limits and rates (2 steps - 1, n) each.
+
+        Raises
+        ------
+        InputError
+            Numbers beyond what double precision can tell apart.
+        """
         self.f[:], self.low[:], self.high[:] = f.ravel(), low.ravel(), high.ravel()
         size, rows = len(self.u), self.rows * self.n
         self.held[:] = np.where(self.high[:size] - self.low[:size] <= NO_ROOM, WALL, 0.0)
         places = [address(a) for a in (self.low, self.high, self.held, self.u)]
         self.native["centre"](self.n, self.steps, self.rows, *places)
-        iterations, begun = 0, 0
+        iterations, begun, large = 0, 0, max(1.0, float(np.abs(self.f).max(initial=0.0)))
         for tolerance, rounds in STAGES:
             inside = [address(a) for a in (self.u, self.below, self.above, self.z, self.y)]
             limit = ITERATIONS - iterations
-            iterations += self.native["interior"](*self.head, *inside, *self.tail, limit, tolerance, begun)
+            iterations += self.native["interior"](*self.head, *inside, *self.tail, limit, tolerance * large, begun)
             begun = 1
             lower, upper = self.z[:rows] > self.below[:rows], self.z[rows : 2 * rows] > self.above[:rows]
             self.guess[:rows] = np.subtract(upper, lower, dtype=float)
             self.guess[:size][self.held > 0.0] = 0.0
             near, multipliers = self.u.copy(), self.y.copy()
             try_ = [address(a) for a in (self.u, self.guess, self.y)]
-            settled = self.native["finish"](*self.head, *try_, *self.tail, rounds, STIFF, SLACK)
+            settled = self.native["finish"](*self.head, *try_, *self.tail, rounds, STIFF, SLACK, large)
             if settled:
                 break
             self.u[:], self.y[:] = near, multipliers
         if not settled:
             self.u[:] = np.where(lower[:size], self.low[:size], np.where(upper[:size], self.high[:size], self.u))
+        if not (np.isfinite(self.u).all() and np.isfinite(self.y).all()):
+            raise InputError("no plan can be found: torques or moment arms of too different sizes")
         self.y[rows:] = 0.0
         shape = self.steps, self.n
         return Solution(self.u.reshape(shape).copy(), self.y.reshape(-1, self.n).copy(), iterations, settled)

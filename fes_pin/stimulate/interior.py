@@ -56,7 +56,7 @@ def begin(
         slope = abs(g[i]) if held[i] == 0.0 else 0.0
         most = slope if slope > most else most
     start = 0.1 * most
-    start = 1e-6 if start < 1e-6 else 1.0 if start > 1.0 else start
+    start = 1e-6 if start < 1e-6 else start
     for i in range(every):
         below[i] = d[i] - low[i]
         above[i] = high[i] - d[i]

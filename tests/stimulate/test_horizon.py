@@ -104,6 +104,33 @@ def test_plans_cost_what_the_exact_solver_finds():
         assert best - 1e-6 * size <= ours <= best + 1e-6 * size  # DAQP's own bounds are kept to 1e-6
 
 
+@pytest.mark.parametrize("size", [1e3, 1e6, 1e9])
+def test_torques_far_beyond_what_channels_make_are_met_at_the_limits(size):
+    rng = np.random.default_rng(16)
+    for _ in range(50):
+        horizon = random_horizon(rng)
+        wanted = rng.normal(size=(5, len(horizon.program.joints))) * size
+        plan = horizon.plan(wanted)
+        f = parts(horizon, wanted)[1]
+        assert plan.dual <= 1e-10 * max(1.0, np.abs(f).max())
+        low, high = horizon.limits()
+        assert ((plan.recruitment >= low[:5]) & (plan.recruitment <= high[:5])).all()
+
+
+def test_numbers_beyond_double_precision_are_refused_or_met_at_the_limits():
+    rng, refused = np.random.default_rng(17), 0
+    for _ in range(60):
+        horizon = random_horizon(rng)
+        try:
+            plan = horizon.plan(rng.normal(size=(5, len(horizon.program.joints))) * 1e150)
+        except InputError as error:
+            refused += "too different sizes" in str(error)
+            continue
+        low, high = horizon.limits()
+        assert ((plan.recruitment >= low[:5]) & (plan.recruitment <= high[:5])).all()
+    assert refused > 5
+
+
 def test_a_plan_does_not_depend_on_the_plans_before_it():
     rng = np.random.default_rng(9)
     horizon = random_horizon(rng)
@@ -266,7 +293,7 @@ def test_machine_code_equals_the_same_source_interpreted():
     for _ in range(6):
         program, *_ = some_program(rng)
         n, steps = program.n, program.steps
-        f = rng.normal(size=(steps, n)) * 0.3
+        f = rng.uniform(-0.9, 0.9, (steps, n))
         low, high = np.zeros((2 * steps - 1, n)), np.ones((2 * steps - 1, n))
         low[steps:], high[steps:] = -0.2, 0.2
         found = program.solve(f, low, high)
@@ -282,7 +309,7 @@ def test_machine_code_equals_the_same_source_interpreted():
         assert abs(count - found.iterations) <= 1
         rows = program.rows * n
         guess = (z[rows : 2 * rows] > above[:rows]).astype(float) - (z[:rows] > below[:rows])
-        assert interior.finish(*head, *system, *limits, u, guess, y, *scratch, 3, 1e4, 1e-11) == found.rounds
+        assert interior.finish(*head, *system, *limits, u, guess, y, *scratch, 3, 1e4, 1e-11, 1.0) == found.rounds
         np.testing.assert_allclose(u.reshape(steps, n), found.u, atol=1e-10)
 
 
