@@ -197,7 +197,7 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         verdict=verdict,
         causes=tuple(causes),
         remainder=left,
-        absorbed=_absorbed(searched),
+        absorbed=_absorbed(searched, search.library.silent()),
         nominal=nominal,
         extended=best,
         nominal_error=(_error(nominal, searched.floor), held.nominal.error_percent() if held else None),
@@ -289,12 +289,12 @@ def _equivalents(searched: Searched, name: str, left: Remainder) -> tuple[str, .
     return tuple(sorted(set(out)))
 
 
-def _absorbed(searched: Searched) -> tuple[str, ...]:
+def _absorbed(searched: Searched, silent: Sequence[str]) -> tuple[str, ...]:
+    """Causes that these data could not show: taken up by the nominal parameters, or without effect in any trial."""
     found = {e.name for e in searched.best.model.effects}
     by_effect = best_by_effect(searched.scored)
-    return tuple(
-        sorted(n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < ABSORBED_BELOW)
-    )
+    taken = {n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < ABSORBED_BELOW}
+    return tuple(sorted(taken | set(silent)))
 
 
 def _ranking(searched: Searched) -> dict[str, tuple[Ranked, ...]]:
