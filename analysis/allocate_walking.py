@@ -127,7 +127,7 @@ figure, axes = plt.subplots(2, 3, figsize=(13, 7.2), constrained_layout=True)
 titles = ("right hip, flexion +", "right knee, flexion +", "right ankle, dorsiflexion +")
 for axis, joint, title in zip(axes[0], SAGITTAL[3:], titles, strict=True):
     j = JOINT_NAMES.index(joint)
-    axis.plot(walk.time, walk.torque[:, j], color="0.25", lw=2.2, label="measured walking")
+    axis.plot(walk.time, walk.torque[:, j], color="0.25", lw=2.2, label="measured walking, less passive torque")
     axis.plot(
         walk.time,
         sagittal.achieved[:, j],
@@ -140,7 +140,7 @@ for axis, joint, title in zip(axes[0], SAGITTAL[3:], titles, strict=True):
     )
     axis.set(title=title, xlabel="time (s)", ylabel="torque (N m)")
     axis.margins(x=0)
-axes[0, 0].set_ylim(-115, 45)
+axes[0, 0].set_ylim(-135, 45)
 axes[0, 0].legend(fontsize=8, loc="lower left")
 names = sagittal.allocator.names
 right = [i for i, n in enumerate(names) if n.startswith("right_")]

@@ -50,8 +50,9 @@ def allocate(
     nerves: Annotated[bool, typer.Option(help="List the nerves and what they turn, and end.")] = False,
 ) -> None:
     """Pulse widths for wanted joint torques, what is short, and why."""
-    from math import radians
+    from math import degrees, radians
 
+    from fes_pin.body.joints import known_joint, limits_of
     from fes_pin.stimulate.allocate import allocate as solve
     from fes_pin.stimulate.nerves import Nerves
     from fes_pin.stimulate.recruitment import LinearRecruitment
@@ -66,6 +67,10 @@ def allocate(
     if not torque:
         raise InputError("no torque is wanted: give joint=N m, or --walk, or --nerves")
     posture = {name: radians(value) for name, value in pairs(angle or [], "--angle").items()}
+    for name, value in posture.items():
+        low, high = limits_of(known_joint(name))
+        if not low <= value <= high:
+            raise InputError(f"{name} must lie within {degrees(low):.0f} to {degrees(high):.0f} degrees")
     curve = LinearRecruitment(threshold_us, saturation_us)
     typer.echo(str(solve(pairs(torque, "a torque"), channels, posture, least=least, recruitment=curve)))
 

@@ -115,7 +115,10 @@ def nerves(
     if influence is not None:
         typer.echo(f"\n{influence_table(result, influence)}")
     if map_to is not None:
-        plot_influence(result, map_to)
+        try:
+            plot_influence(result, map_to)
+        except (OSError, ValueError) as error:
+            raise InputError(f"cannot be written: {str(error).splitlines()[0]}", file=map_to) from None
         typer.echo(f"wrote {map_to}")
     if fewest:
         free = [name for name, joints in ORTHOSES.items() if set(joints) <= set(linear.joint_names)]
@@ -187,12 +190,17 @@ def _walking(body, path: Path):
     from fes_pin.view.viewer import show_walk  # noqa: PLC0415
 
     try:
-        table = np.genfromtxt(path, delimiter=",", names=True)
+        table = np.atleast_1d(np.genfromtxt(path, delimiter=",", names=True))
         columns = {name: table[name] for name in table.dtype.names or ()}
-        time = table["time"] if "time" in columns else table["time_s"]
-    except (OSError, ValueError, TypeError) as error:
+        time = columns["time"] if "time" in columns else columns["time_s"]
+    except (OSError, ValueError, TypeError, KeyError) as error:
         raise InputError(f"cannot be read as coordinates: {str(error).splitlines()[0]}", file=path) from None
-    postures = postures_of_walk(columns, body.stance, flat_foot=False)
+    if len(time) < 2 or not (np.diff(time) > 0.0).all():
+        raise InputError("needs two or more samples, and times that rise", file=path)
+    try:
+        postures, turns = postures_of_walk(columns, body.stance, flat_foot=False), pelvis_turns(columns)
+    except InputError as error:
+        raise InputError(error.message, file=path, column=error.column) from None
     order = [JOINT_NAMES.index(name) for name in body.joint_names]
     rate = int(np.clip(round(1.0 / float(np.median(np.diff(time)))), 1, 120))
-    return show_walk(body, postures[:, order], rate, f"{path.name} ({body.label})", pelvis_turns(columns))
+    return show_walk(body, postures[:, order], rate, f"{path.name} ({body.label})", turns)

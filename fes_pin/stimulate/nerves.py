@@ -180,4 +180,6 @@ class Nerves:
             order = np.argsort(-np.abs(column))[:3]
             parts = [f"{JOINT_NAMES[i]} {column[i]:+.0f} N m" for i in order if abs(column[i]) >= 1.0]
             lines.append(f"  {name:28s} {', '.join(parts)}")
+        if np.abs(matrix[16:]).max(initial=0.0) > 0.0:
+            lines.append("Levers at the trunk are round figures, constant over posture: a sign and a size (SOURCE.md).")
         return "\n".join(lines)

@@ -109,6 +109,11 @@ def test_fatigue_strength_and_size_scale_the_columns():
     assert (np.abs(low) <= np.abs(fresh)).all() and (np.abs(fresh) <= np.abs(high)).all()
 
 
+def test_a_list_of_nerves_says_how_rough_the_trunk_is():
+    assert "round figures" in str(Nerves(["left_erector_spinae"]))
+    assert "round figures" not in str(Nerves(["left_femoral"]))
+
+
 def test_a_nerve_is_the_sum_of_its_muscles():
     q = random_angles(1)[0]
     muscles = Nerves.muscles("right_tibial")
