@@ -18,10 +18,10 @@ from fes_pin.models.simulate import Simulator
 from fes_pin.models.stage import Effect, Stage
 
 TURN = 2.0 * np.pi
-FEWEST, MOST = 3.0, 40.0
+FEWEST, MOST = 3.0, 30.0
 """Waves within the range of motion: fewer are smooth enough for the library and the polynomials in the angle; more would
 be shorter than a degree on the paper's ankle."""
-STEP = 0.5
+STEP = 0.75
 """Between two wave numbers of the scan, waves within the range: half of what the range can resolve."""
 AT_ONCE = 4
 """Wave numbers that one simulation carries."""
