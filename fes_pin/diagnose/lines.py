@@ -20,6 +20,8 @@ HIGHEST = 0.96
 """Highest frequency, as a share of half the sampling rate."""
 NEIGHBOURS = 201
 """Frequencies, half a resolution apart, whose median is the level that a line stands out from."""
+MEDIAN_EFFICIENCY = 0.64
+"""Of a median against a mean as a measure of level: 2 / pi."""
 CLIP = 4.0
 """Innovations beyond this, in standard deviations, count as this."""
 ACTIVATION_S = 0.05
@@ -32,7 +34,7 @@ def line_p_value(pieces: Sequence[Innovations]) -> tuple[float, str]:
     A line of frequency f and amplitude g_t (1, or the activation) has in the innovations e of trial i the Fourier
     coefficient F_i(f) = sum_t g_t e_t exp(-2 pi i f t). Under the null 2 |sum F_i|^2 / sum g^2, for lines of the same
     phase in every trial, is chi-square of 2 degrees and sum_i 2 |F_i|^2 / sum_t g_t^2, for lines of any phase, of twice
-    the number of trials; both are divided by the median of the latter around f, over its degrees. The smallest of all
+    the number of trials; both are compared with the median of the latter around f, by Fisher's F. The smallest of all
     p-values is corrected for the number of frequencies and for these four tests.
     """
     found = [
@@ -81,9 +83,16 @@ def _lines(rows: Sequence[tuple[Innovations, np.ndarray | None]]) -> tuple[float
     degrees = 2 * len(used)
     median = scipy.stats.chi2.median(degrees)
     level = np.maximum(scipy.ndimage.median_filter(apart, NEIGHBOURS, mode="nearest") / median, 1e-12)[inside]
-    one_phase = float(np.max(2.0 * np.abs(together[inside]) ** 2 / power / level))
-    any_phase = float(np.max(apart[inside] / level))
+    one_phase = float(np.max(np.abs(together[inside]) ** 2 / power / level))
+    any_phase = float(np.max(apart[inside] / level)) / degrees
+    known = MEDIAN_EFFICIENCY * degrees * 0.5 * NEIGHBOURS * _fullness([g for _, g in used])
     count = int(inside.sum())
     return tuple(
-        min(1.0, count * float(scipy.stats.chi2.sf(x, k))) for x, k in ((one_phase, 2), (any_phase, degrees))
+        min(1.0, count * float(scipy.stats.f.sf(x, k, known))) for x, k in ((one_phase, 2), (any_phase, degrees))
     )
+
+
+def _fullness(amplitudes: Sequence[np.ndarray]) -> float:
+    """Share of the samples that carry the power; neighbouring frequencies are as much fewer."""
+    g = np.concatenate(amplitudes) ** 2
+    return float(g.sum() ** 2 / (len(g) * (g @ g)))
