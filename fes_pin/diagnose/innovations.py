@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, noise_of
-from fes_pin.identify.noise import Noise, thinning
+from fes_pin.identify.noise import ORDERS, Noise, thinning
 from fes_pin.identify.problem import Problem
 
 
@@ -29,9 +29,9 @@ class Innovations:
     dt: float
 
 
-def under_own_noise(fitted: Fit) -> Fit:
-    """The same model, linearized where it is under the noise that its residuals show."""
-    noise = noise_of(fitted)
+def under_own_noise(fitted: Fit, longest: int = ORDERS[-1]) -> Fit:
+    """The same model, linearized where it is under the noise that its residuals show; `longest` as in `noise_of`."""
+    noise = noise_of(fitted, longest)
     parts = Problem(fitted.model, fitted.trials, noise, fitted.free).linearize(fitted.values, fitted.unknowns)
     return replace(fitted, noise=noise, parts=tuple(parts))
 

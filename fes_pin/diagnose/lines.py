@@ -20,6 +20,9 @@ HIGHEST = 0.96
 """Highest frequency, as a share of half the sampling rate."""
 NEIGHBOURS = 201
 """Frequencies, half a resolution apart, whose median is the level that a line stands out from."""
+LONGEST_NOISE = 4
+"""Order of the noise that lines are looked for under: enough that its slope does not matter between neighbouring
+frequencies, and too little to take a line for noise."""
 MEDIAN_EFFICIENCY = 0.64
 """Of a median against a mean as a measure of level: 2 / pi."""
 CLIP = 4.0

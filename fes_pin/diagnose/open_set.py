@@ -19,7 +19,7 @@ from fes_pin.diagnose.bursts import burst_p_value
 from fes_pin.diagnose.detents import detent_p_value
 from fes_pin.diagnose.innovations import channels, under_own_noise
 from fes_pin.diagnose.library import Projection
-from fes_pin.diagnose.lines import line_p_value
+from fes_pin.diagnose.lines import LONGEST_NOISE, line_p_value
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
@@ -164,7 +164,7 @@ def _others(fitted: Fit) -> list[tuple[float, str]]:
     own = under_own_noise(fitted)
     groups = channels(own)
     bursts = min(burst_p_value([e.values for e in pieces], noise, pieces[0].dt) for noise, pieces in groups)
-    line, where = min(line_p_value(pieces) for _, pieces in groups)
+    line, where = min(line_p_value(pieces) for _, pieces in channels(under_own_noise(fitted, LONGEST_NOISE)))
     detents = detent_p_value(own, Projection(own.parts))
     return [
         (len(groups) * bursts / SHARES["burst"], "time"),
