@@ -27,9 +27,9 @@ def burst_p_value(innovations: Sequence[np.ndarray], noise: Noise, dt: float) ->
     reading answers as it answers the noise leaves g as it is. With
     z_t = sum_s g_s e_(t+s) / |g|, Gaussian noise has excess kurtosis 0 in z, whatever its spectrum; deviations at times
     of their own raise it, even those that the noise model has taken for slow noise. The statistic sum_t H4(z_t), H4 the
-    fourth Hermite polynomial, has variance 24 n sum_s rho_s^4 and third cumulant 1728 n sum_st (rho_s rho_t rho_(s-t))^2
-    under the null, with rho the autocorrelation of g; see `_tail`. The smallest p-value of all shapes is corrected for
-    their number.
+    fourth Hermite polynomial, has under the null the variance 24 n sum_s rho_s^4 and the third cumulant
+    1728 n sum_st (rho_s rho_t rho_(s-t))^2, with rho the autocorrelation of g; see
+    `_tail`. The smallest p-value of all shapes is corrected for their number.
 
     Parameters
     ----------

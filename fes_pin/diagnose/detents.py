@@ -1,4 +1,4 @@
-"""Torque that repeats with the angle over short distances, as of a detent or a bent gear: a scan over its wave number."""
+"""Torque that repeats with the angle over short distances, as of detents: a scan over its wave number."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from fes_pin.models.stage import Effect, Stage
 
 TURN = 2.0 * np.pi
 FEWEST, MOST = 3.0, 30.0
-"""Waves within the range of motion: fewer are smooth enough for the library and the polynomials in the angle; more would
-be shorter than a degree on the paper's ankle."""
+"""Waves within the range of motion: fewer are smooth enough for the library and the polynomials in the angle, more
+would be about a degree long on a joint that moves by half a radian."""
 STEP = 0.75
-"""Between two wave numbers of the scan, waves within the range: half of what the range can resolve."""
+"""Between two wave numbers of the scan, waves within the range: three quarters of what the range can resolve."""
 AT_ONCE = 4
 """Wave numbers that one simulation carries."""
 
@@ -35,7 +35,7 @@ def _amplitude() -> Any:
 class Ripple(Effect):
     """Torque of four neighbouring wave numbers; a probe, not a cause.
 
-        torque + sum_j  a_j sin((k + j step) q) + b_j cos((k + j step) q)
+    torque + sum_j  a_j sin((k + j step) q) + b_j cos((k + j step) q)
     """
 
     a0: float = _amplitude()
@@ -65,8 +65,8 @@ class Ripple(Effect):
 def detent_p_value(fitted: Fit, projection: Projection) -> float:
     """p-value of the strongest short wave of torque in the angle; 1 where no joint moves.
 
-    Each wave number has a chi-square of two degrees beside what the fit takes up. All of them are divided by what half of
-    them stay below, since noise that is not quite whitened raises them all.
+    Each wave number has a chi-square of two degrees beside what the fit takes up. All of them are divided by
+    what half of them stay below, since noise that is not quite whitened raises them all.
     """
     rig = Model(fitted.model.rig)
     moving = [rig.rig.name in Ripple.rigs and "torque" in rig.rig.signals(t.kind) for t in fitted.trials]
