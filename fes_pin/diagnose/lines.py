@@ -19,7 +19,8 @@ LOWEST_HZ = 2.0
 HIGHEST = 0.96
 """Highest frequency, as a share of half the sampling rate."""
 NEIGHBOURS = 201
-"""Frequencies, half a resolution apart, whose median is the level that a line stands out from."""
+"""Frequencies, half a resolution apart, whose median is the level that a line stands out from; half as many at the ends
+of the spectrum, where they are mirrored."""
 LONGEST_NOISE = 4
 """Order of the noise that lines are looked for under: enough that its slope does not matter between neighbouring
 frequencies, and too little to take a line for noise."""
@@ -85,10 +86,10 @@ def _lines(rows: Sequence[tuple[Innovations, np.ndarray | None]]) -> tuple[float
         return ()
     degrees = 2 * len(used)
     median = scipy.stats.chi2.median(degrees)
-    level = np.maximum(scipy.ndimage.median_filter(apart, NEIGHBOURS, mode="nearest") / median, 1e-12)[inside]
+    level = np.maximum(scipy.ndimage.median_filter(apart, NEIGHBOURS, mode="reflect") / median, 1e-12)[inside]
     one_phase = float(np.max(np.abs(together[inside]) ** 2 / power / level))
     any_phase = float(np.max(apart[inside] / level)) / degrees
-    known = MEDIAN_EFFICIENCY * degrees * 0.5 * NEIGHBOURS * _fullness([g for _, g in used])
+    known = MEDIAN_EFFICIENCY * degrees * 0.25 * NEIGHBOURS * _fullness([g for _, g in used])
     count = int(inside.sum())
     return tuple(
         min(1.0, count * float(scipy.stats.f.sf(x, k, known))) for x, k in ((one_phase, 2), (any_phase, degrees))
