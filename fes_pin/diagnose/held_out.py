@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,7 +10,7 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import Fit, fit_problem
-from fes_pin.identify.noise import Noise, NoiseModel
+from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
@@ -134,7 +133,7 @@ def _fold(
     test = [nominal.trials[i] for i in held]
 
     def fitted(fit: Fit) -> Fit:
-        problem = Problem(fit.model, [fit.trials[i] for i in train], fit.noise)
+        problem = Problem(fit.model, [fit.trials[i] for i in train], fit.noise, own_start=fit.own_start)
         return fit_problem(problem, fit.values, [fit.unknowns[i] for i in train])
 
     chosen = min((fitted(c) for c in (best, *contenders)), key=lambda f: f.sse + 3.84 * len(f.free))
@@ -153,22 +152,3 @@ def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Tr
 
 def _joined(errors: Sequence[Errors]) -> Errors:
     return Errors(*(np.concatenate([getattr(e, name) for e in errors]) for name in ("squares", "spread", "counts")))
-
-
-def predictive_error(fitted: Fit) -> float:
-    """Logarithm of the mean squared error on trials left out in turn, averaged over trials.
-
-    Fits are for least open-loop error, and each trial's own unknowns are estimated from it; the logarithm keeps one
-    large motion from deciding alone.
-    """
-    white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in fitted.noise.items()}
-    logarithms = []
-    for held in folds_of(fitted.trials):
-        train = [i for i in range(len(fitted.trials)) if i not in held]
-        problem = Problem(fitted.model, [fitted.trials[i] for i in train], white)
-        again = fit_problem(problem, fitted.values, [fitted.unknowns[i] for i in train])
-        for i in held:
-            alone = Problem(again.model, [fitted.trials[i]], white, ())
-            own = fit_problem(alone, again.values, [fitted.unknowns[i]])
-            logarithms.append(math.log(max(own.sse / max(own.samples, 1), 1e-12)))
-    return float(np.mean(logarithms))

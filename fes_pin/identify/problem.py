@@ -48,6 +48,8 @@ class Problem:
         By output column; a column that is missing here weighs nothing.
     free
         The parameters that sensitivities are wanted for; the model's fitted ones by default.
+    own_start
+        Estimate each trial's unknowns; without it they stay as the first sample says, as in a prediction.
     """
 
     def __init__(
@@ -56,11 +58,13 @@ class Problem:
         trials: Sequence[Trial],
         noise: NoiseModel,
         free: tuple[str, ...] | None = None,
+        *,
+        own_start: bool = True,
     ) -> None:
         self.model, self.trials, self.noise = model, tuple(trials), noise
         self.free = model.fitted_parameters() if free is None else free
         self.limits = limits_of(model, self.trials)
-        self.unknown_names = model.rig.unknowns(self.trials[0].kind) if self.trials else ()
+        self.unknown_names = model.rig.unknowns(self.trials[0].kind) if self.trials and own_start else ()
         self.simulator = Simulator(model, self.trials, (*self.free, *self.unknown_names))
 
     def start_unknowns(self) -> Unknowns:
