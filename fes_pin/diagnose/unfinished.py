@@ -84,7 +84,7 @@ def fit_for_prediction(fits: Sequence[Fit], recorded: Sequence[Trial]) -> list[F
 
     A prediction starts each trial from its first sample. A model can be fitted starting that way too, so that its
     parameters serve it, or with each trial's initial state estimated, which is better where a first sample says little.
-    Where the first sample tells the whole state, the way that predicts trials left out better, from their first samples, is taken for all.
+    Where the first sample tells the whole state, the way is taken for all that predicts trials left out better.
     """
     best, own_start = fits[0], fits[0].own_start
     noise = whiteless(noise_of(best))
