@@ -21,6 +21,8 @@ STARTS = 2
 """Shapes that a joint fit starts from."""
 LOOK = 15
 """Iterations of a first look. Most fits end in fewer; the others go on only while they are among the best."""
+GLANCE = 5
+"""Iterations after which the best start of a refinement is chosen, which alone goes on."""
 PURSUED = 6
 """Best sets of a size that go on until they converge."""
 PARAMETER_PRICE = 3.84
@@ -48,6 +50,7 @@ class JointFits:
         self._problems: dict[tuple, Problem] = {}
         self._looks: dict[Names, int] = {}
         self._scores: dict[int, tuple[Fit, Scores]] = {}
+        self._refinements: dict[int, tuple[Fit, Fit | None]] = {}
 
     def problem(self, model: Model) -> Problem:
         """The problem of a model's structure, under the present noise."""
@@ -113,6 +116,7 @@ class JointFits:
         """Fit under this noise from now on."""
         self.noise = noise
         self._scores.clear()
+        self._refinements.clear()
 
     def first_noise(self, base: Fit) -> None:
         """The noise of the nominal model, beside everything that the library could explain: only to rank causes."""
@@ -150,8 +154,13 @@ class JointFits:
         What a refinement adds must be told from nothing: a form that the data do not determine explains nothing.
         """
         base = self.fits[names]
-        starts = [s for name in names for s in _refined(base.model, name)]
-        fitted = in_parallel(lambda s: self.fit_from([s], base.unknowns), starts)
+        if id(base) not in self._refinements:
+            self._refinements[id(base)] = (base, self._refinement(base))
+        return self._refinements[id(base)][1]
+
+    def _refinement(self, base: Fit) -> Fit | None:
+        starts = [s for name in names_of(base) for s in _refined(base.model, name)]
+        fitted = in_parallel(lambda s: self.fit_from([s], base.unknowns, GLANCE), starts)
         if not fitted:
             return None
         best = min(fitted, key=lambda f: f.sse)
