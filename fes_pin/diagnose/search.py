@@ -49,6 +49,8 @@ class Searched:
     floor
         The noise that no model can beat: as fitted, or, where the best set leaves more than noise, the sample-to-sample
         noise of the measurement.
+    complete
+        Whether the best set leaves only noise.
     """
 
     nominal: Fit
@@ -60,6 +62,7 @@ class Searched:
     family: Family
     scored: list[Scored]
     floor: NoiseModel
+    complete: bool = True
 
 
 class Search:
@@ -69,7 +72,7 @@ class Search:
         self, model: Model, trials: Sequence[Trial], recorded: Sequence[Trial], seed: int, progress: Progress
     ) -> None:
         self.sets, self.seed, self.progress = JointFits(model, trials), seed, progress
-        self.recorded = tuple(recorded)
+        self.recorded, self.library = tuple(recorded), self.sets.library
 
     def run(self) -> Searched:
         """Search."""
@@ -106,7 +109,7 @@ class Search:
         if self.claims.complete(names):
             return searched
         floor = rough_noise(self.sets.model, self.sets.trials)
-        return replace(self._for_prediction(searched) if names else searched, floor=floor)
+        return replace(self._for_prediction(searched) if names else searched, floor=floor, complete=False)
 
     def _for_prediction(self, searched: Searched) -> Searched:
         """Fit for least open-loop error, to the trials as recorded; rivals stay as they were judged."""
