@@ -133,6 +133,17 @@ def test_a_start_that_cannot_be_simulated_is_infinitely_bad():
     assert math.isinf(fitted.sse) and math.isinf(fitted.std("damping"))
 
 
+def test_without_their_own_start_trials_begin_as_measured():
+    model, trials = trials_of("joint", np.random.default_rng(5), velocity=True)
+    start = off(model).parameters()
+    held = fit_problem(Problem(model, trials, WHITE, own_start=False), start)
+    free = fit_problem(Problem(model, trials, WHITE), start)
+    assert free.own_start and not held.own_start
+    for unknowns, one in zip(held.unknowns, trials, strict=True):
+        assert unknowns == {"initial_position": one["position"][0], "initial_velocity": one["velocity"][0]}
+    assert held.converged and free.sse < held.sse
+
+
 def test_unequal_lengths_and_rates():
     """One joint recorded at 200 Hz, 500 Hz and 1 kHz, for 4, 3 and 2 s: one fit, one noise, the truth within it."""
     rng = np.random.default_rng(8)
