@@ -134,13 +134,15 @@ def test_a_start_that_cannot_be_simulated_is_infinitely_bad():
 
 
 def test_without_their_own_start_trials_begin_as_measured():
-    model, trials = trials_of("joint", np.random.default_rng(5), velocity=True)
+    model, told = trials_of("joint", np.random.default_rng(5), velocity=True)
+    trials = [Trial(t.name, t.kind, t.columns, t.time) for t in told]
     start = off(model).parameters()
     held = fit_problem(Problem(model, trials, WHITE, own_start=False), start)
     free = fit_problem(Problem(model, trials, WHITE), start)
     assert free.own_start and not held.own_start
     for unknowns, one in zip(held.unknowns, trials, strict=True):
         assert unknowns == {"initial_position": one["position"][0], "initial_velocity": one["velocity"][0]}
+        assert not held.parts[0].local.size
     assert held.converged and free.sse < held.sse
 
 
