@@ -11,7 +11,7 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem
-from fes_pin.identify.noise import Noise, NoiseModel
+from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
@@ -198,22 +198,3 @@ def _evidence(without: np.ndarray, extended: np.ndarray) -> Evidence:
 
 def _joined(errors: Sequence[Errors]) -> Errors:
     return Errors(*(np.concatenate([getattr(e, name) for e in errors]) for name in ("squares", "spread", "counts")))
-
-
-def predictive_error(fitted: Fit) -> float:
-    """Logarithm of the mean squared error on trials left out in turn, averaged over trials.
-
-    Fits are for least open-loop error, and each trial's own unknowns are estimated from it; the logarithm keeps one
-    large motion from deciding alone.
-    """
-    white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in fitted.noise.items()}
-    logarithms = []
-    for held in folds_of(fitted.trials):
-        train = [i for i in range(len(fitted.trials)) if i not in held]
-        problem = Problem(fitted.model, [fitted.trials[i] for i in train], white)
-        again = fit_problem(problem, fitted.values, [fitted.unknowns[i] for i in train])
-        for i in held:
-            alone = Problem(again.model, [fitted.trials[i]], white, ())
-            own = fit_problem(alone, again.values, [fitted.unknowns[i]])
-            logarithms.append(math.log(max(own.sse / max(own.samples, 1), 1e-12)))
-    return float(np.mean(logarithms))
