@@ -14,11 +14,11 @@ from fes_pin.diagnose.experiment import NextExperiment, next_experiment
 from fes_pin.diagnose.held_out import Errors, Gain, HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.library import best_by_effect
 from fes_pin.diagnose.open_set import Remainder, remainder
-from fes_pin.diagnose.search import PARAMETER_PRICE, Search, Searched
+from fes_pin.diagnose.search import Search, Searched
 from fes_pin.diagnose.workers import one_thread_each
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
-from fes_pin.models.effects import effect
+from fes_pin.identify.own import amplitude
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 
@@ -238,7 +238,9 @@ def _estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
     info, values, out = fitted.model.parameter_info(), fitted.values, {}
     (one,) = (e for e in fitted.model.effects if e.name == name)
     refined = one.refined()
-    for n in effect(name).parameters():
+    if one.each_trial:
+        out["amplitude"] = ParameterEstimate(*amplitude(fitted, one), one.parameters()[one.unknowns()[0]].unit)
+    for n in one.common():
         key = f"{name}.{n}"
         if info[key].optional and not refined:
             continue
@@ -258,8 +260,7 @@ def _equivalents(searched: Searched, name: str, left: Remainder) -> tuple[str, .
     out = []
     for rival in searched.rivals[name]:
         (instead,) = {e.name for e in rival.model.effects} - others
-        price = PARAMETER_PRICE * (len(rival.free) - len(best.free))
-        if rival.sse + price - best.sse < margin:
+        if rival.price - best.price < margin:
             out.append(instead)
     return tuple(sorted(set(out)))
 

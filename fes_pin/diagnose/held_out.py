@@ -12,9 +12,9 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.noise import Noise, NoiseModel
+from fes_pin.identify.own import predictions
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
-from fes_pin.models.simulate import Simulator
 
 FOLDS = 5
 RESAMPLES = 2000
@@ -53,17 +53,19 @@ class Errors:
 
 
 def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
-    """Open-loop errors of a model that starts each trial as a prediction does."""
-    simulated = Simulator(model, trials).run(model.parameters())
+    """Open-loop errors of a model that starts each trial as a prediction does.
+
+    What is each trial's own is estimated from other parts of it than those that it is judged on; see `identify.own`.
+    """
     squares, spread, counts = [], [], []
     pieces = 1 if len(trials) >= 5 else 10
-    for trial, one in zip(trials, simulated, strict=True):
+    for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
         total, around = np.zeros(len(trial)), np.zeros(len(trial))
         channels = 0
         for k, name in enumerate(model.rig.outputs(trial.kind)):
             if name in trial.columns and name in noise:
                 variance = noise[name].std ** 2
-                total += (trial[name] - one.readings[:, k]) ** 2 / variance
+                total += (trial[name] - readings[:, k]) ** 2 / variance
                 around += (trial[name] - trial[name].mean()) ** 2 / variance
                 channels += 1
         for a, b in zip(np.array_split(total, pieces), np.array_split(around, pieces), strict=True):
@@ -137,7 +139,7 @@ def _fold(
         problem = Problem(fit.model, [fit.trials[i] for i in train], fit.noise)
         return fit_problem(problem, fit.values, [fit.unknowns[i] for i in train])
 
-    chosen = min((fitted(c) for c in (best, *contenders)), key=lambda f: f.sse + 3.84 * len(f.free))
+    chosen = min((fitted(c) for c in (best, *contenders)), key=lambda f: f.price)
     rest = {n: errors_of(fitted(f).model, test, floor) for n, f in without.items()}
     return errors_of(fitted(nominal).model, test, floor), errors_of(chosen.model, test, floor), rest
 
@@ -170,5 +172,17 @@ def predictive_error(fitted: Fit) -> float:
         for i in held:
             alone = Problem(again.model, [fitted.trials[i]], white, ())
             own = fit_problem(alone, again.values, [fitted.unknowns[i]])
-            logarithms.append(math.log(max(own.sse / max(own.samples, 1), 1e-12)))
+            logarithms.append(math.log(max(_open_loop(own) / max(own.samples, 1), 1e-12)))
     return float(np.mean(logarithms))
+
+
+def _open_loop(own: Fit) -> float:
+    """Squared errors on a trial from its estimated initial state, in units of white noise."""
+    if not own.model.own_unknowns():
+        return own.sse
+    (trial,) = own.trials
+    (readings,) = predictions(own.model, own.trials, own.noise, own.unknowns)
+    names = [n for n in own.model.rig.outputs(trial.kind) if n in trial.columns and n in own.noise]
+    outputs = list(own.model.rig.outputs(trial.kind))
+    left = [own.noise[n].whiten(trial[n] - readings[:, outputs.index(n)], trial.dt) for n in names]
+    return float(sum(r @ r for r in left))

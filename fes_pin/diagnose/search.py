@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.stats
@@ -48,8 +49,6 @@ JOINT_FITS = 8
 """Extensions of a round that are fitted jointly, best linear promise first."""
 STARTS = 2
 """Shapes that a joint fit starts from."""
-PARAMETER_PRICE = 3.84
-"""Twice the log-likelihood that one more parameter must earn: chi-square with one degree of freedom at 95 %."""
 
 Names = tuple[str, ...]
 Progress = Callable[[float, str], None]
@@ -110,7 +109,7 @@ class Search:
             problem = self._problems[key]
             problem.noise = self.noise
             fitted = fit_problem(problem, start.parameters(), unknowns)
-            if best is None or fitted.sse < best.sse or not np.isfinite(best.sse):
+            if best is None or fitted.price < best.price or not np.isfinite(best.sse):
                 best = fitted
         assert best is not None
         return best
@@ -137,7 +136,8 @@ class Search:
         """The noise of the nominal model, beside everything that the library could explain: only to rank causes."""
         white = whiteless(noise_of(base))
         probes = self.library.probes(base, white, exclude=())
-        self.noise = rich_noise(base, white, [p.columns for p in probes])
+        varying = {p.name: [q.columns for q in probes if q.name == p.name] for p in probes if p.effect.varies}
+        self.noise = rich_noise(base, white, [p.columns for p in probes], list(varying.values()))
 
     def refit(self, names: Iterable[Names], noise_from: Names) -> None:
         """Fit sets of causes again under the noise that one of them leaves, and forget all others."""
@@ -147,13 +147,9 @@ class Search:
         fitted = in_parallel(lambda n: self.fit_from([old[n].model], old[n].unknowns), kept)
         self.fits = dict(zip(kept, fitted, strict=True))
 
-    def price(self, fitted: Fit) -> float:
-        """Twice the negative log-likelihood, with what its parameters must earn."""
-        return fitted.sse + PARAMETER_PRICE * len(fitted.free)
-
     def ranked(self, size: int) -> list[Names]:
         """Sets of a size, cheapest first."""
-        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (self.price(self.fits[n]), n))
+        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (self.fits[n].price, n))
 
     def run(self) -> Searched:
         """Search."""
@@ -293,7 +289,7 @@ class Search:
         It must be significant under the present noise, and either under the noise that the smaller model leaves (which
         can swallow a slow cause) or against the spread between trials (which no noise model enters).
         """
-        degrees = max(len(larger.free) - len(smaller.free), 1)
+        degrees = max(larger.degrees - smaller.degrees, 1)
         p_value = family.p_value(smaller.sse - larger.sse, degrees)
         coherent = family.adjusted(coherence_p_value(smaller, larger, degrees))
         if coherent < p_value:
@@ -310,7 +306,7 @@ class Search:
         """Adopt refinements of the effects' forms that the data demand."""
         refined, base = self._refinement(names), self.fits[names]
         if refined is not None:
-            degrees = max(len(refined.free) - len(base.free), 1)
+            degrees = max(refined.degrees - base.degrees, 1)
             if scipy.stats.chi2.sf(base.sse - refined.sse, degrees) < REFINE_LEVEL:
                 self.fits[names] = refined
 
@@ -446,7 +442,7 @@ def _both(model: Model, first: Scored, second: Scored) -> Model:
 def _with_amplitudes(effect: Effect, amplitudes: dict[str, float]) -> Effect:
     """The effect at a linear estimate of its amplitudes, or a step from its null where that says nothing."""
     info = effect.parameters()
-    values = {}
+    values: dict[str, Any] = {}
     for name, value in amplitudes.items():
         null, one = info[name].null, info[name]
         assert null is not None
@@ -455,4 +451,4 @@ def _with_amplitudes(effect: Effect, amplitudes: dict[str, float]) -> Effect:
         values[name] = (
             null + step if abs(value - null) < 1e-6 * one.scale else float(np.clip(value, null - far, null + far))
         )
-    return type(effect)(**{**{n: getattr(effect, n) for n in info}, **values})
+    return replace(effect, **values)

@@ -81,10 +81,10 @@ class Simulator:
         values
             Every parameter of the model, by name.
         unknowns
-            For each trial its own unknowns, if the rig has any; by default as estimated from its first samples.
+            For each trial its own unknowns, if the model has any; by default as `Model.initial_unknowns` says.
         """
         if unknowns is None:
-            unknowns = [self.model.rig.initial_unknowns(t) for t in self.trials]
+            unknowns = [self.model.initial_unknowns(t) for t in self.trials]
         delay = total_delay(self.model, values) if self._delayed else 0.0
         out: list[Simulated | None] = [None] * len(self.trials)
         for block in self._blocks:
@@ -103,7 +103,7 @@ class _Block:
         rig, model = model.rig, model.acting(first.kind, model.rig.input_columns(first))
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
         self.inputs = rig.input_columns(first)
-        available = set(model.parameters()) | set(rig.unknowns(first.kind))
+        available = set(model.parameters()) | set(model.unknowns(first.kind))
         self.columns = columns
         self.program: Program = program(model, first.kind, self.inputs, tuple(c for c in columns if c in available))
         self.layout = self.program.layout

@@ -10,7 +10,7 @@ import numpy as np
 
 from confusion_matrix.generator import Made
 from fes_pin.diagnose.diagnosis import Diagnosis, diagnose
-from fes_pin.models.simulate import simulate
+from fes_pin.identify.own import predictions
 
 
 def judge(made: Made) -> dict[str, Any]:
@@ -55,15 +55,15 @@ def _parameters(made: Made, diagnosis: Diagnosis) -> list[list[Any]]:
 
 
 def _share(made: Made, diagnosis: Diagnosis) -> float | None:
-    """Share of the nominal model's squared error on fresh noiseless trials that the extended model removes."""
+    """Share of the nominal model's squared error on fresh noiseless trials the extended model removes (`identify.own`)."""
     if not made.item.causes:
         return None
     errors = []
     for fitted in (diagnosis.nominal, diagnosis.extended):
         total = 0.0
         for trial in made.fresh:
-            simulated = simulate(fitted.model, trial)
+            (readings,) = predictions(fitted.model, [trial], fitted.noise)
             column = "force_n" if trial.kind == "isometric" else fitted.model.rig.output(trial.kind)
-            total += float(np.sum(trial.residual(simulated, column) ** 2))
+            total += float(np.sum((trial[column] - readings[:, 0]) ** 2))
         errors.append(total)
     return round(1.0 - errors[1] / errors[0], 4) if errors[0] > 0 and math.isfinite(errors[1]) else None
