@@ -58,7 +58,7 @@ class Library:
         shapes = effect.shapes()
         start: dict[str, Any] = {n: _near_null(effect, n) for n in effect.amplitudes()}
         return [
-            effect(**start, **dict(zip(shapes, values, strict=True)))
+            effect(**{**start, **dict(zip(shapes, values, strict=True))})
             for values in itertools.product(*(grids[n] for n in shapes))
         ]
 

@@ -96,12 +96,12 @@ def amplitude(fitted: Fit, effect: Effect) -> tuple[float, float]:
     have no unit in common; what the uncertainty of the single values adds to their squares is taken off.
     """
     names = (*fitted.model.rig.unknowns(fitted.trials[0].kind), *fitted.model.own_unknowns())
-    own = [names.index(f"{effect.name}.{n}") for n in effect.unknowns()]
+    own = np.array([names.index(f"{effect.name}.{n}") for n in effect.unknowns()])
     slopes = [slope for _, slope in normal_equations(fitted.parts).eliminated]
     squares, spread, kind = [], [], None
     for trial, part, unknowns, slope in zip(fitted.trials, fitted.parts, fitted.unknowns, slopes, strict=True):
         felt = np.flatnonzero(part.local.any(axis=0))
-        if not set(own) <= set(felt.tolist()) or (kind or trial.kind) != trial.kind:
+        if not np.isin(own, felt).all() or (kind or trial.kind) != trial.kind:
             continue
         kind = trial.kind
         value = np.array([unknowns[names[k]] for k in own])

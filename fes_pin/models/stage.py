@@ -145,7 +145,8 @@ class Effect:
     @classmethod
     def absent(cls) -> Effect:
         """The effect at its null."""
-        return cls(**{n: i.null for n, i in cls.parameters().items() if i.null is not None})
+        nulls: dict[str, Any] = {n: i.null for n, i in cls.parameters().items() if i.null is not None}
+        return cls(**nulls)
 
 
 class Signals(SimpleNamespace):

@@ -55,7 +55,7 @@ def _parameters(made: Made, diagnosis: Diagnosis) -> list[list[Any]]:
 
 
 def _share(made: Made, diagnosis: Diagnosis) -> float | None:
-    """Share of the nominal model's squared error on fresh noiseless trials the extended model removes (`identify.own`)."""
+    """Share of the nominal model's squared error on fresh noiseless trials that the extended model removes."""
     if not made.item.causes:
         return None
     errors = []
