@@ -38,10 +38,10 @@ def predictions(
     initial
         Initial states of the trials; by default as predictions start.
     """
-    start = [model.initial_unknowns(t) for t in trials]
+    simulator, values = Simulator(model, trials), model.parameters()
+    start = simulator.start(values)
     if initial is not None:
         start = [{**one, **{n: i[n] for n in i if "." not in n}} for one, i in zip(start, initial, strict=True)]
-    simulator, values = Simulator(model, trials), model.parameters()
     if not model.own_unknowns():
         return [s.readings for s in simulator.run(values, start)]
     halves = [_halves(len(t)) for t in trials]
