@@ -11,6 +11,12 @@ HEADLINES = {
     "unexplained": "the model misses something, and nothing in the library explains it.",
 }
 
+EACH_TRIAL = (
+    "size and phase are each trial's own; in a held-out trial its other parts tell them, and a prediction from inputs "
+    "alone leaves the effect out"
+)
+"""What is said of effects whose amplitudes are each trial's own."""
+
 
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict in one sentence."""
@@ -55,6 +61,9 @@ def footnotes(diagnosis: Diagnosis) -> list[str]:
     lines.append(
         f"{'something is' if left.unexplained else 'nothing'} left unexplained (p = {left.p_value:.2g}{where})"
     )
+    own = [e.name for e in diagnosis.model.effects if e.each_trial]
+    if own:
+        lines.append(f"{', '.join(own)}: {EACH_TRIAL}")
     if diagnosis.absorbed:
         lines.append(f"not testable here: {', '.join(diagnosis.absorbed)}")
     if diagnosis.next_experiment:
