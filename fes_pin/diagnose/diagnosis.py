@@ -8,10 +8,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.spikes import without_spikes
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.experiment import NextExperiment, next_experiment
-from fes_pin.diagnose.held_out import Errors, Gain, HeldOut, cross_validate, errors_of, gain, separate
+from fes_pin.diagnose.held_out import Errors, Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.library import best_by_effect
 from fes_pin.diagnose.open_set import Remainder, remainder
 from fes_pin.diagnose.search import Search, Searched
@@ -26,6 +27,8 @@ ABSORBED_BELOW = 0.04
 """Share of its norm that an effect's sensitivity must keep beside the nominal parameters to be testable."""
 SEPARABLE = 2.71
 """Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: 1.645 squared (DESIGN 6.5)."""
+REFUSED_LEVEL = 1e-6
+"""Level of a cause at which something is there even if held-out trials refuse the name."""
 CONTENDERS = 4
 """Sets that each fold chooses among anew."""
 
@@ -50,6 +53,16 @@ class Cause:
     p_value: float
     gain_fit: float
     gain_held_out: Gain
+    evidence: Evidence | None = None
+
+    def helps(self, complete: bool) -> bool:
+        """True if trials that took no part speak for it.
+
+        Where the model leaves only noise the interval is that of their likelihood, and their open-loop errors must fall
+        too; else it is that of the errors.
+        """
+        known = self.evidence if complete else None
+        return self.gain_held_out.percent > 0.0 and (known.low if known else self.gain_held_out.low) > 0.0
 
 
 @dataclass(frozen=True)
@@ -76,6 +89,8 @@ class Diagnosis:
         Causes that these data could not show.
     ranking
         For each cause, its rivals by shortfall in twice the log-likelihood.
+    left_out
+        Samples taken for spikes, by trial and column; in `study` they hold what their neighbours say.
     """
 
     study: Study
@@ -91,6 +106,7 @@ class Diagnosis:
     next_experiment: NextExperiment | None
     ranking: dict[str, tuple[Ranked, ...]]
     held_out_by: str
+    left_out: dict[str, dict[str, tuple[int, ...]]]
     wall_s: float = field(compare=False)
 
     @property
@@ -131,6 +147,7 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
     """
     began = time.perf_counter()
     tell = progress or (lambda _share, _words: None)
+    study, left_out = despiked_study(study)
     train, test = split(study)
     with one_thread_each():
         recorded = [t for t in study.trials if t.role != "held_out"]
@@ -139,7 +156,22 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
         tell(0.88, "held-out gain")
         diagnosis = _judge(study, search, searched, test, seed)
     tell(1.0, "done")
-    return replace(diagnosis, wall_s=time.perf_counter() - began)
+    return replace(diagnosis, left_out=left_out, wall_s=time.perf_counter() - began)
+
+
+def despiked_study(study: Study) -> tuple[Study, dict[str, dict[str, tuple[int, ...]]]]:
+    """A study without the spikes of its measured columns, and which samples they were, by trial and column.
+
+    A sample that its neighbours replace is no evidence of its own: intervals are too narrow by half the share of such
+    samples, half a percent where one in a hundred is a spike.
+    """
+    rig, trials, found = nominal_model(study).rig, [], {}
+    for trial in study.trials:
+        clean, spikes = without_spikes(trial, rig.outputs(trial.kind))
+        trials.append(clean)
+        if spikes:
+            found[trial.name] = spikes
+    return (replace(study, trials=tuple(trials)) if found else study), found
 
 
 def split(study: Study) -> tuple[list[Trial], list[Trial]]:
@@ -168,11 +200,14 @@ def thinned(trial: Trial) -> Trial:
 def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Trial], seed: int) -> Diagnosis:
     left = remainder(searched.best, seed)
     causes, held = _causes(searched, left, test, seed)
-    while weak := [c for c in causes if c.gain_held_out.low <= 0.0]:
+    refused: list[Cause] = []
+    while weak := [c for c in causes if not c.helps(searched.complete)]:
         weakest = min(weak, key=lambda c: c.gain_held_out.low)
+        refused.append(weakest)
         searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
         left = remainder(searched.best, seed)
         causes, held = _causes(searched, left, test, seed)
+    left = _with_refused(left, refused)
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     nominal, best = searched.nominal, searched.best
     verdict = "causes_found" if causes else ("unexplained" if left.unexplained else "adequate")
@@ -182,7 +217,7 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         verdict=verdict,
         causes=tuple(causes),
         remainder=left,
-        absorbed=_absorbed(searched),
+        absorbed=_absorbed(searched, search.library.silent()),
         nominal=nominal,
         extended=best,
         nominal_error=(_error(nominal, searched.floor), held.nominal.error_percent() if held else None),
@@ -191,8 +226,18 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         next_experiment=_experiment(searched, causes, study),
         ranking=_ranking(searched),
         held_out_by="the study's held-out trials" if test else "cross-validation over trials",
+        left_out={},
         wall_s=0.0,
     )
+
+
+def _with_refused(left: Remainder, refused: Sequence[Cause]) -> Remainder:
+    """A remainder also where a cause was certain, but trials that took no part did not bear out its form."""
+    certain = [c for c in refused if c.p_value < REFUSED_LEVEL]
+    if left.unexplained or not certain:
+        return left
+    surest = min(certain, key=lambda c: c.p_value)
+    return replace(left, unexplained=True, p_value=surest.p_value, where=surest.stage)
 
 
 def _error(fitted: Fit, floor: NoiseModel) -> float:
@@ -219,7 +264,7 @@ def _causes(
     out = []
     for one in best.model.effects:
         name = one.name
-        measured = held or HeldOut(inside_nominal, inside_best, inside)
+        measured = held or HeldOut(inside_nominal, inside_best, inside, {})
         out.append(
             Cause(
                 name=name,
@@ -229,6 +274,7 @@ def _causes(
                 p_value=searched.p_values[name],
                 gain_fit=gain(inside_nominal, inside[name], inside_best, seed).percent,
                 gain_held_out=gain(measured.nominal, measured.without[name], measured.extended, seed),
+                evidence=measured.evidence.get(name),
             )
         )
     return out, held
@@ -265,12 +311,12 @@ def _equivalents(searched: Searched, name: str, left: Remainder) -> tuple[str, .
     return tuple(sorted(set(out)))
 
 
-def _absorbed(searched: Searched) -> tuple[str, ...]:
+def _absorbed(searched: Searched, silent: Sequence[str]) -> tuple[str, ...]:
+    """Causes that these data could not show: taken up by the nominal parameters, or without effect in any trial."""
     found = {e.name for e in searched.best.model.effects}
     by_effect = best_by_effect(searched.scored)
-    return tuple(
-        sorted(n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < ABSORBED_BELOW)
-    )
+    taken = {n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < ABSORBED_BELOW}
+    return tuple(sorted(taken | set(silent)))
 
 
 def _ranking(searched: Searched) -> dict[str, tuple[Ranked, ...]]:

@@ -50,7 +50,7 @@ class Library:
 
     def __init__(self, model: Model, trials: Sequence[Trial]) -> None:
         self.effects = effects_for(model.rig.name)
-        self.trials = tuple(trials)
+        self.model, self.trials = Model(model.rig), tuple(trials)
         self.measured = measured_columns(model, trials)
         self._problems: dict[str, Problem] = {}
 
@@ -73,6 +73,10 @@ class Library:
         nominal = Model(fitted.model.rig)
         wanted = [e for e in self.effects if e.name not in exclude and self._acts(e, nominal)]
         return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
+
+    def silent(self) -> tuple[str, ...]:
+        """Names of the effects that act in none of the trials: of a joint, where all are isometric."""
+        return tuple(e.name for e in self.effects if not self._acts(e, self.model))
 
     def _acts(self, effect: type[Effect], nominal: Model) -> bool:
         rig = nominal.rig

@@ -26,9 +26,9 @@ from fes_pin.models.stage import Effect
 CLAIM_LEVEL = 0.01
 """Family-wise error of each round of claims; with the test of the remainder (0.01) a diagnosis stays below 5 %, with
 room for noise that is not quite autoregressive."""
-FORM_SHARE = 0.02
+FORM_SHARE = 0.05
 """A further cause must explain at least this share of what all causes do: a real cause differs from its equation, and
-an error of 14 % in its form leaves 2 % of its likelihood to whatever else comes near."""
+an error of 22 % in its form leaves 5 % of its likelihood to whatever else comes near."""
 HOPE_LEVEL = 0.1
 """A round of joint fits is left out only if neither a linear promise nor smooth features reach this level."""
 PROMISING = 25.0
@@ -73,6 +73,8 @@ class Searched:
     floor
         The noise that no model can beat: as fitted, or, where the best set leaves more than noise, the sample-to-sample
         noise of the measurement.
+    complete
+        Whether the best set leaves only noise.
     """
 
     nominal: Fit
@@ -84,6 +86,7 @@ class Searched:
     family: Family
     scored: list[Scored]
     floor: NoiseModel
+    complete: bool = True
 
 
 class Search:
@@ -186,7 +189,7 @@ class Search:
         if self._complete(names):
             return searched
         floor = rough_noise(self.model, self.trials)
-        return replace(self._for_prediction(searched) if names else searched, floor=floor)
+        return replace(self._for_prediction(searched) if names else searched, floor=floor, complete=False)
 
     def _for_prediction(self, searched: Searched) -> Searched:
         """Fit for least open-loop error, to the trials as recorded.

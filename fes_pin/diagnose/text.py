@@ -61,6 +61,8 @@ def footnotes(diagnosis: Diagnosis) -> list[str]:
     lines.append(
         f"{'something is' if left.unexplained else 'nothing'} left unexplained (p = {left.p_value:.2g}{where})"
     )
+    if diagnosis.left_out:
+        lines.append(f"left out as spikes: {left_out_text(diagnosis)}")
     own = [e.name for e in diagnosis.model.effects if e.each_trial]
     if own:
         lines.append(f"{', '.join(own)}: {EACH_TRIAL}")
@@ -69,6 +71,16 @@ def footnotes(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.next_experiment:
         lines.append(f"next experiment: {diagnosis.next_experiment.why}")
     return lines
+
+
+def left_out_text(diagnosis: Diagnosis) -> str:
+    """How many samples of which trial were taken for spikes."""
+    lengths = {t.name: len(t) for t in diagnosis.study.trials}
+    return ", ".join(
+        f"{len(k)} of {lengths[t]} samples of {n} in {t}"
+        for t, columns in diagnosis.left_out.items()
+        for n, k in columns.items()
+    )
 
 
 def verdict_text(diagnosis: Diagnosis) -> str:
