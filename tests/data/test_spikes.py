@@ -32,6 +32,19 @@ def test_one_in_a_hundred(height):
     assert np.array_equal(out[~mask], clean[~mask])
 
 
+def test_what_stays():
+    """At 15 deviations nearly all are found, at 8 few: the README says so."""
+    shares = []
+    for height in (8.0, 15.0):
+        rng, found, there = np.random.default_rng(7), 0, 0
+        for seed in range(10):
+            hit = rng.random(len(TIME)) < 0.01
+            _, mask = despiked(smooth(seed) + np.where(hit, 2e-3 * height * rng.choice([-1.0, 1.0], len(TIME)), 0.0))
+            found, there = found + int((mask & hit).sum()), there + int(hit.sum())
+        shares.append(found / there)
+    assert shares[0] < 0.5 and shares[1] > 0.95
+
+
 STEEP = {
     "step": np.where(TIME > 4.0, 1.0, 0.0),
     "onset": np.maximum(TIME - 4.0, 0.0) * 50.0,
