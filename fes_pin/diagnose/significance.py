@@ -29,7 +29,7 @@ class Family:
         norms = np.sqrt(np.maximum(np.diag(scores.gram), 0.0))
         scale = 1.0 / np.where(norms > 0, norms, 1.0)
         self.tests = _effective_tests(scores.gram * np.outer(scale, scale), scores.blocks, seed)
-        self.tests += len(scores.scored) - len(scores.blocks)
+        self.tests += sum(s.probe.effect.each_trial for s in scores.scored)
 
     def p_value(self, gain: float, degrees: int) -> float:
         """Family-wise p-value of a drop in twice the negative log-likelihood."""
