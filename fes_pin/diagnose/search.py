@@ -14,7 +14,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.held_out import predictive_error
 from fes_pin.diagnose.library import Library, Projection, Scored, Scores, best_by_effect, best_pairs
 from fes_pin.diagnose.noise_floor import rich_noise, whiteless
-from fes_pin.diagnose.open_set import remainder
+from fes_pin.diagnose.open_set import smooth_remainder
 from fes_pin.diagnose.significance import Family, coherence_p_value
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import Fit, fit_problem, noise_of, rough_noise
@@ -24,7 +24,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 
 CLAIM_LEVEL = 0.01
-"""Family-wise error of each round of claims; with the test of the remainder (0.01) a diagnosis stays below 5 %, with
+"""Family-wise error of each round of claims; with the tests of the remainder (0.02) a diagnosis stays below 5 %, with
 room for noise that is not quite autoregressive."""
 FORM_SHARE = 0.05
 """A further cause must explain at least this share of what all causes do: a real cause differs from its equation, and
@@ -217,7 +217,7 @@ class Search:
         if promise > max(PROMISING, FORM_SHARE * (none.sse - fitted.sse)):
             return False
         own = fit_problem(Problem(fitted.model, self.trials, noise_of(fitted)), fitted.values, fitted.unknowns)
-        return not remainder(own, self.seed).unexplained
+        return not smooth_remainder(own, self.seed).unexplained
 
     def _nominal(self) -> None:
         self.progress(0.02, "nominal model")
@@ -277,7 +277,7 @@ class Search:
         gain = best.sse - promise
         if gain > 0.5 * FORM_SHARE * (none.sse - best.sse) and family.p_value(gain, 1) < HOPE_LEVEL:
             return True
-        return remainder(best, self.seed).p_value < HOPE_LEVEL
+        return smooth_remainder(best, self.seed).p_value < HOPE_LEVEL
 
     def _better(self, names: Names, best: Names, family: Family) -> bool:
         """True if a larger set earns its place beside the best smaller one."""

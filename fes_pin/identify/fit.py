@@ -12,7 +12,7 @@ import scipy.stats
 from threadpoolctl import ThreadpoolController
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
+from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, NormalEquations, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
 
@@ -282,8 +282,8 @@ def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
     return out
 
 
-def noise_of(fitted: Fit) -> dict[str, Noise]:
-    """The noise that a fit's residuals show, by output column."""
+def noise_of(fitted: Fit, longest: int = ORDERS[-1]) -> dict[str, Noise]:
+    """The noise that a fit's residuals show, by output column, with autoregressions up to the order `longest`."""
     problem = Problem(fitted.model, fitted.trials, fitted.noise, free=())
     step = noise_step([t.dt for t in fitted.trials])
     columns: dict[str, list[np.ndarray]] = {}
@@ -293,7 +293,7 @@ def noise_of(fitted: Fit) -> dict[str, Noise]:
             columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
             squares.setdefault(name, []).append(float(np.mean(residual**2)))
     return {
-        name: estimate_noise(pieces, fitted.degrees, math.sqrt(float(np.mean(squares[name]))), step)
+        name: estimate_noise(pieces, fitted.degrees, math.sqrt(float(np.mean(squares[name]))), step, longest)
         for name, pieces in columns.items()
     }
 
