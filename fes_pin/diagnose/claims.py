@@ -92,7 +92,7 @@ class Claims:
         return self._p_values[key][2]
 
     def _p_value(self, larger: Fit, smaller: Fit) -> float:
-        degrees = max(len(larger.free) - len(smaller.free), 1)
+        degrees = max(larger.degrees - smaller.degrees, 1)
         p_value = self.family.p_value(smaller.sse - larger.sse, degrees)
         coherent = self.family.adjusted(coherence_p_value(smaller, larger, degrees))
         if coherent < p_value or p_value >= CLAIM_LEVEL:
@@ -102,7 +102,7 @@ class Claims:
 
     def demanded(self, refined: Fit, base: Fit) -> bool:
         """True if the data demand a refinement of an effect's form."""
-        degrees = max(len(refined.free) - len(base.free), 1)
+        degrees = max(refined.degrees - base.degrees, 1)
         return bool(scipy.stats.chi2.sf(base.sse - refined.sse, degrees) < REFINE_LEVEL)
 
 
