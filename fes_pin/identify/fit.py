@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import scipy.stats
@@ -113,6 +113,12 @@ class Fit:
         """
         own = len(self.model.own_unknowns())
         return len(self.free) + sum(int(p.local[:, -own:].any(axis=0).sum()) for p in self.parts if own)
+
+    @cached_property
+    def plain(self) -> float:
+        """Sum of squared residuals over the variance of a single sample, not whitened."""
+        white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in self.noise.items()}
+        return whitened_sse(Problem(self.model, self.trials, white, ()).linearize(self.values, self.unknowns))
 
     @property
     def price(self) -> float:
