@@ -11,7 +11,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.experiment import NextExperiment, next_experiment
+from fes_pin.diagnose.experiment import SEPARABLE, NextExperiment, next_experiment
 from fes_pin.diagnose.held_out import Errors, Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.library import best_by_effect
 from fes_pin.diagnose.open_set import Remainder, remainder
@@ -25,8 +25,6 @@ from fes_pin.models.nominal import nominal_model
 
 ABSORBED_BELOW = 0.04
 """Share of its norm that an effect's sensitivity must keep beside the nominal parameters to be testable."""
-SEPARABLE = 2.71
-"""Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: 1.645 squared (DESIGN 6.5)."""
 REFUSED_LEVEL = 1e-6
 """Level of a cause at which something is there even if held-out trials refuse the name."""
 CONTENDERS = 4

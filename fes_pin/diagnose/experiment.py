@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +10,20 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.problem import Problem, normal_equations
+from fes_pin.identify.problem import Linearized, NormalEquations, Problem, measured_columns, normal_equations
 
-DECIDED = 1.645**2 * 4.0
-"""Separation (squared) of two fitted models at which a likelihood ratio decides between them 95 times in 100."""
+SEPARABLE = 2.71
+"""Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: 1.645 squared (DESIGN 6.5)."""
+SURE = 1.645
+"""Standard deviations of a likelihood ratio that 95 in 100 stay within, on one side."""
+MOST_REPEATS = 50
 SECONDS = 8.0
+ROOM = 0.5
+"""Share of the measured range by which a proposed trial may leave it on either side: a model is not known beyond."""
+QUIET_S = 0.4
+"""At the beginning and the end of a trial the stimulus is as the shapes have it."""
+ROUNDS, CHILDREN = 24, 4
+"""Of the refinement: that many times, so many changed stimuli are compared with the best so far."""
 
 
 @dataclass(frozen=True)
@@ -29,94 +38,216 @@ class NextExperiment:
         The pair.
     trial
         Its inputs and conditions, without outputs; None where no input of the rig separates the pair.
+    promised
+        What the trial is expected to add to the lead of the first cause if it is the true one, and to that of the
+        second if that is, in twice the log-likelihood.
     """
 
     why: str
     separates: tuple[str, str]
     trial: Trial | None
+    promised: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What a trial is expected to add to the lead of the better of two models, in twice the log-likelihood.
+
+    With r the whitened difference of the two predictions, J the sensitivities of the model that is wrong and H the
+    information that its parameters have from the data they were fitted to, `repeats` = n trials add
+
+        D(n) = n r'r - (n J'r)' (H + n J'J)^-1 (n J'r),
+
+    the distance that its parameters cannot take up without leaving those data. The ratio of likelihoods has mean D and
+    standard deviation 2 sqrt(D).
+
+    Attributes
+    ----------
+    lead
+        What the better model is ahead by without the trial.
+    news
+        Normal equations of the trial alone: if the better model is true, and if the other is.
+    known
+        Information of the model that is wrong, in the same order.
+    """
+
+    lead: float
+    news: tuple[NormalEquations, NormalEquations]
+    known: tuple[np.ndarray, np.ndarray]
+
+    def distance(self, way: int, repeats: int = 1) -> float:
+        """D(n) if the better model is true (`way` 0) or the other one (1)."""
+        new, known = self.news[way], self.known[way]
+        hessian, gradient = known + repeats * new.hessian, repeats * new.gradient
+        scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+        step = np.linalg.lstsq(hessian / np.outer(scale, scale), gradient / scale, rcond=1e-10)[0]
+        return float(max(repeats * (new.sse - new.local_gain) - gradient @ (step / scale), 0.0))
+
+    def margin(self, repeats: int = 1) -> float:
+        """How far the true model is ahead afterwards 95 times in 100, whichever of the two it is."""
+        leads = (self.lead, -self.lead)
+        distances = [self.distance(way, repeats) for way in (0, 1)]
+        return min(m + d - 2.0 * SURE * np.sqrt(d) for m, d in zip(leads, distances, strict=True))
+
+    @property
+    def worth(self) -> float:
+        """The smaller of the two distances: what trials are compared by."""
+        return min(self.distance(0), self.distance(1))
+
+    def repeats(self) -> int | None:
+        """How often the trial must be run to decide 95 times in 100; None if that is too often."""
+        return next((n for n in range(1, MOST_REPEATS + 1) if self.margin(n) >= SEPARABLE), None)
 
 
 def next_experiment(best: Fit, rival: Fit, pair: tuple[str, str], study: Study) -> NextExperiment:
-    """The feasible trial on which two fitted models differ most, after the rival has been fitted to it as well.
+    """The feasible trial on which two fitted models differ most, after the one that is wrong has been fitted to it too.
 
-    The separation is the squared distance of the predictions in units of the noise, less what the rival's parameters
-    can take up without leaving the data that it was fitted to.
+    Either of the two may be the wrong one: trials are compared by the smaller separation. The best of a dozen stimuli
+    under every condition is then refined, a stretch of it at a time.
     """
-    best_trial, best_distance = None, 0.0
-    for trial in candidates(study):
-        distance = separation(best, rival, trial)
-        if distance > best_distance:
-            best_trial, best_distance = trial, distance
     names = f"{pair[0]} and {pair[1]}"
-    if best_trial is None or best_distance < 1.0:
+    found = _best(best, rival, list(candidates(study)), study)
+    if found is None:
+        return NextExperiment(f"no trial was found for {names} that stays near what has been measured", pair, None)
+    promise, trial = _refined(best, rival, found, study)
+    if promise.worth < 1.0:
         why = (
-            f"no stimulus or load of this rig separates {names}: the models differ by {best_distance:.2g} squared "
+            f"no stimulus or load of this rig separates {names}: the models differ by {promise.worth:.2g} squared "
             "noise units at most; turn the rig's base, or add a sensor on the other side of the joint or frame"
         )
         return NextExperiment(why, pair, None)
-    repeats = max(1, int(np.ceil(DECIDED / best_distance)))
-    often = "once decides" if repeats == 1 else f"{repeats} repeats decide"
-    why = f"on this trial {names} differ by {best_distance:.3g} squared noise units; {often} 95 times in 100"
-    return NextExperiment(why, pair, best_trial)
+    why = f"on this trial {names} differ by {promise.worth:.3g} squared noise units; {_often(promise.repeats())}"
+    return NextExperiment(why, pair, trial, (promise.distance(0), promise.distance(1)))
 
 
-def separation(best: Fit, rival: Fit, trial: Trial) -> float:
-    """Squared distance between what two fits predict of a trial, after the rival is adapted."""
-    size = {n: v for n, v in best.unknowns[0].items() if n in best.model.own_unknowns()}
-    start = {**best.model.initial_unknowns(trial), **size}
-    (one,) = Problem(best.model, [trial], best.noise, ()).simulator.run(best.values, [start])
-    names = best.model.rig.outputs(trial.kind)
-    measured = trial.with_columns(**{n: one.readings[:, k] for k, n in enumerate(names)})
-    parts = Problem(rival.model, [measured], best.noise, rival.free).linearize(
-        rival.values, [rival.model.initial_unknowns(measured)]
+def _often(repeats: int | None) -> str:
+    if repeats is None:
+        return "it is evidence, but repeats of it alone do not decide 95 times in 100: diagnose again with it"
+    return f"{'once decides' if repeats == 1 else f'{repeats} repeats decide'} 95 times in 100"
+
+
+def promises(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study) -> list[Promise | None]:
+    """What each trial promises; None for one that leaves what the study has measured, or is not finite."""
+    problem = Problem(best.model, trials, best.noise, best.free)
+    own = {n: v for n, v in best.unknowns[0].items() if n in best.model.own_unknowns()}
+    begin = [{**best.model.initial_unknowns(t), **own} for t in trials]
+    measured = []
+    for trial, one in zip(trials, problem.simulator.run(best.values, begin), strict=True):
+        names = best.model.rig.outputs(trial.kind)
+        measured.append(trial.with_columns(**{n: one.readings[:, k] for k, n in enumerate(names)}))
+    ranges = _ranges(measured_columns(best.model, study.trials))
+    kept = [all(_inside(t[n], r) for n, r in ranges.items() if n in t) for t in measured]
+    inside = [t for t, keep in zip(measured, kept, strict=True) if keep]
+    if not inside:
+        return [None] * len(trials)
+    begin = [u for u, keep in zip(begin, kept, strict=True) if keep]
+    if_best = Problem(rival.model, inside, best.noise, rival.free).linearize(
+        rival.values, [rival.model.initial_unknowns(t) for t in inside]
     )
-    known, new = normal_equations(rival.parts), normal_equations(parts)
-    hessian = known.hessian + new.hessian
-    step = np.linalg.lstsq(hessian, new.gradient, rcond=1e-12)[0]
-    return float(max(new.sse - new.gradient @ step, 0.0))
+    slopes = Problem(best.model, inside, best.noise, best.free).linearize(best.values, begin)
+    if_rival = [Linearized(-r.residual, b.jacobian, b.local) for r, b in zip(if_best, slopes, strict=True)]
+    known = (normal_equations(rival.parts).hessian, normal_equations(best.parts).hessian)
+    lead = rival.price - best.price
+    found = iter(zip(if_best, if_rival, strict=True))
+    return [Promise(lead, _equations(*next(found)), known) if keep else None for keep in kept]
+
+
+def _equations(one: Linearized, other: Linearized) -> tuple[NormalEquations, NormalEquations]:
+    return normal_equations([one]), normal_equations([other])
+
+
+def _ranges(measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    """Where each output may go: what was measured, and some room."""
+    ends = {n: (float(y.min()), float(y.max())) for n, y in measured.items()}
+    return {n: (low - ROOM * (high - low), high + ROOM * (high - low)) for n, (low, high) in ends.items()}
+
+
+def _inside(values: np.ndarray, limits: tuple[float, float]) -> bool:
+    return bool(np.isfinite(values).all() and values.min() >= limits[0] and values.max() <= limits[1])
+
+
+def _best(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study) -> tuple[Promise, Trial] | None:
+    promised = zip(promises(best, rival, trials, study), trials, strict=True)
+    found = [(p, t) for p, t in promised if p is not None and np.isfinite(p.worth)]
+    return max(found, key=lambda pair: pair[0].worth, default=None)
+
+
+def _refined(best: Fit, rival: Fit, found: tuple[Promise, Trial], study: Study) -> tuple[Promise, Trial]:
+    """The trial with stretches of its stimulus held at other levels, where that separates better."""
+    rng = np.random.default_rng(7)
+    column = next((n for n in ("pulse_width_us", "effort") if n in found[1].columns), None)
+    if column is None:
+        return found
+    for _ in range(ROUNDS):
+        children = [_changed(found[1], column, study, rng) for _ in range(CHILDREN)]
+        better = _best(best, rival, children, study)
+        if better is not None and better[0].worth > found[0].worth:
+            found = better
+    return found
+
+
+def _changed(trial: Trial, column: str, study: Study, rng: np.random.Generator) -> Trial:
+    """The same trial with one stretch of 0.1 to 2 s at another level; it stays at rest where it begins and ends."""
+    values, time = trial[column].copy(), trial.time
+    begin = rng.uniform(QUIET_S, time[-1] - QUIET_S)
+    length = np.exp(rng.uniform(np.log(0.1), np.log(2.0)))
+    stretch = (time >= begin) & (time < min(begin + length, time[-1] - QUIET_S))
+    values[stretch] = _driven(study, column, np.full(int(stretch.sum()), rng.choice([0.0, rng.random(), 1.0])))
+    return trial.with_columns(**{column: values})
 
 
 def candidates(study: Study) -> Iterator[Trial]:
     """Trials that the rig can run as it is: its loads and held angles, with a dozen stimuli."""
-    first = study.trials[0]
-    dt = first.dt
+    dt = study.trials[0].dt
     time = np.arange(0.0, SECONDS, dt)
-    seen = {(t.kind, tuple(sorted((n, v) for n, v in t.conditions.items() if n != "start_s"))) for t in study.trials}
-    if study.rig == "joint":
-        starts = [float(t["position"][0]) for t in study.trials]
-        seen = {("motion", (("position0", round(p, 4)), ("velocity0", 0.0))) for p in (min(starts), max(starts))}
-    for kind, conditions in sorted(_widened(seen)):
+    for kind, conditions in sorted(_conditions(study)):
         for column, values in _stimuli(study, time):
             yield Trial("next", kind, {column: values} if column else {}, time, dict(conditions))
 
 
-def _widened(seen: set[tuple[str, tuple[tuple[str, float], ...]]]) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
-    """The conditions of a study, and half and once and a half its loads."""
+def _conditions(study: Study) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
+    """The conditions of a study, half and once and a half its loads, and angles held where it has moved."""
+    if study.rig == "joint":
+        starts = [float(t["position"][0]) for t in study.trials]
+        released = np.quantile(starts, (0.0, 0.25, 0.5, 0.75, 1.0))
+        return {("motion", (("position0", round(float(p), 4)), ("velocity0", 0.0))) for p in released}
+    seen = {(t.kind, tuple(sorted((n, v) for n, v in t.conditions.items() if n != "start_s"))) for t in study.trials}
+    moved = np.concatenate([[], *(t["angle_rad"] for t in study.trials if t.kind == "motion" and "angle_rad" in t)])
     out = set(seen)
     for kind, conditions in seen:
+        others = {}
         values = dict(conditions)
         if "load_kg" in values:
-            for factor in (0.5, 1.5):
-                out.add((kind, tuple(sorted({**values, "load_kg": round(factor * values["load_kg"], 3)}.items()))))
+            others["load_kg"] = [factor * values["load_kg"] for factor in (0.5, 1.5)]
+        elif "angle_rad" in values and moved.size:
+            others["angle_rad"] = list(np.quantile(moved, (0.05, 0.95)))
+        for name, many in others.items():
+            out |= {(kind, tuple(sorted({**values, name: round(float(v), 3)}.items()))) for v in many}
     return out
 
 
+def _driven(study: Study, column: str, shape: np.ndarray) -> np.ndarray:
+    """A stimulus of a shape from 0 (off) to 1: pulse widths from threshold to saturation, efforts of both signs."""
+    if column == "effort":
+        size = max(float(np.abs(t["effort"]).max()) for t in study.trials if "effort" in t)
+        return np.where(shape > 0, size * (2.0 * shape - 1.0), 0.0)
+    low = float(study.constants.get("threshold_us", 180.0))
+    high = float(study.constants.get("saturation_us", 1000.0))
+    return np.where(shape > 0, np.round(low + (high - low) * shape), 0.0)
+
+
 def _stimuli(study: Study, time: np.ndarray) -> Iterator[tuple[str | None, np.ndarray]]:
-    if "pulse_width_us" in study.trials[0].columns:
-        low = float(study.constants.get("threshold_us", 180.0))
-        high = float(study.constants.get("saturation_us", 1000.0))
+    first = study.trials[0].columns
+    column = next((n for n in ("pulse_width_us", "effort") if n in first), None)
+    if column is not None:
         for shape in _shapes(time):
-            yield "pulse_width_us", np.where(shape > 0, low + (high - low) * shape, 0.0)
-    elif "stim" in study.trials[0].columns:
+            yield column, _driven(study, column, shape)
+    elif "stim" in first:
         for rate_hz in (8.0, 15.0, 31.0, 45.0):
             pulse = np.diff(np.floor(time * rate_hz), prepend=-1.0) > 0
             for on_s, pause_s in ((7.0, 1.0), (1.0, 1.0), (0.3, 0.7)):
                 on = (time % (on_s + pause_s) < on_s) & (time < SECONDS - 0.8)
                 yield "stim", np.where(pulse & on, 1.0, 0.0)
-    elif "effort" in study.trials[0].columns:
-        size = max(float(np.abs(t["effort"]).max()) for t in study.trials)
-        for shape in _shapes(time):
-            yield "effort", size * (2.0 * shape - 1.0)
     else:
         yield None, time
 

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fes_pin.diagnose.diagnosis import SEPARABLE, Cause, Diagnosis
+from fes_pin.diagnose.diagnosis import Cause, Diagnosis
+from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.models.effects import effect
 from fes_pin.view.style import BAND, FAINT, INK, PANEL, STAGES, styled
 
