@@ -128,14 +128,13 @@ for pair in PAIRS:
         study = ankle.study()
         found = [diagnose(study)]
         first, promised, came, words = state(found[0], true), [], [], []
-        while len(came) < MOST_TRIALS and (plan := found[-1].next_experiment) and set(plan.separates) == set(pair):
-            if plan.trial is None:
-                break
+        while len(came) < MOST_TRIALS and (plan := found[-1].next_experiment) and plan.trial is not None:
             trial = ankle.run(replace(plan.trial, name=f"next{len(came)}"))
             study = replace(study, trials=(*study.trials, trial))
             found.append(diagnose(study))
-            before, after = (lead(d, true, other) for d in found[-2:])
-            promised.append(plan.promised[plan.separates.index(true)])
+            rival = next(n for n in plan.separates[::-1] if n != true)
+            before, after = (lead(d, true, rival) for d in found[-2:])
+            promised.append(plan.promised[plan.separates.index(true)] if true in plan.separates else math.nan)
             came.append(after - before)
             words.append(f"{before:.1f} -> {after:.1f} ({came[-1]:.0f}, promised {promised[-1]:.0f})")
         last = state(found[-1], true)

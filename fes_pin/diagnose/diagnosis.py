@@ -327,10 +327,14 @@ def _ranking(searched: Searched) -> dict[str, tuple[Ranked, ...]]:
 
 def _experiment(searched: Searched, causes: Sequence[Cause], study: Study) -> NextExperiment | None:
     for cause in causes:
-        for other in cause.equivalents:
-            for rival in searched.rivals[cause.name]:
-                if other in {e.name for e in rival.model.effects}:
-                    return next_experiment(searched.judged, rival, (cause.name, other), study)
+        others = {e.name for e in searched.judged.model.effects} - {cause.name}
+        rivals: dict[str, Fit] = {}
+        for rival in sorted(searched.rivals[cause.name], key=lambda f: f.price):
+            (instead,) = {e.name for e in rival.model.effects} - others
+            if instead in cause.equivalents:
+                rivals.setdefault(instead, rival)
+        if rivals:
+            return next_experiment(searched.judged, rivals, cause.name, study)
     return None
 
 

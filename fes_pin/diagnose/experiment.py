@@ -35,7 +35,7 @@ class NextExperiment:
     why
         In words.
     separates
-        The pair.
+        The pair; of several rivals the one that the trial separates least.
     trial
         Its inputs and conditions, without outputs; None where no input of the rig separates the pair.
     promised
@@ -99,24 +99,39 @@ class Promise:
         return next((n for n in range(1, MOST_REPEATS + 1) if self.margin(n) >= SEPARABLE), None)
 
 
-def next_experiment(best: Fit, rival: Fit, pair: tuple[str, str], study: Study) -> NextExperiment:
-    """The feasible trial on which two fitted models differ most, after the one that is wrong has been fitted to it too.
+def next_experiment(best: Fit, rivals: Mapping[str, Fit], name: str, study: Study) -> NextExperiment:
+    """The feasible trial on which a model differs most from its rivals, each after it has been fitted to it too.
 
-    Either of the two may be the wrong one: trials are compared by the smaller separation. The best of a dozen stimuli
-    under every condition is then refined, a stretch of it at a time.
+    Either of two may be the wrong one: trials are compared by the smaller separation, and by that of the closest rival.
+    The best of a dozen stimuli under every condition is then refined, a stretch of it at a time.
+
+    Parameters
+    ----------
+    best, rivals
+        The best model, and by the name of a cause what has this in the place of `name`; all fitted to the same data.
+    name
+        The cause of the best model that the rivals lack.
+    study
+        What the rig is and has been run under.
     """
-    names = f"{pair[0]} and {pair[1]}"
-    found = _best(best, rival, list(candidates(study)), study)
+    found = _best(best, rivals, list(candidates(study)), study)
     if found is None:
-        return NextExperiment(f"no trial was found for {names} that stays near what has been measured", pair, None)
-    promise, trial = _refined(best, rival, found, study)
+        pair = (name, next(iter(rivals)))
+        why = f"no trial was found for {' and '.join(pair)} that stays near what has been measured"
+        return NextExperiment(why, pair, None)
+    promised, trial = _refined(best, rivals, found, study)
+    closest = min(promised, key=lambda n: promised[n].worth)
+    pair, promise = (name, closest), promised[closest]
     if promise.worth < 1.0:
         why = (
-            f"no stimulus or load of this rig separates {names}: the models differ by {promise.worth:.2g} squared "
-            "noise units at most; turn the rig's base, or add a sensor on the other side of the joint or frame"
+            f"no stimulus or load of this rig separates {name} and {closest}: the models differ by "
+            f"{promise.worth:.2g} squared noise units at most; turn the rig's base, or add a sensor on the other side "
+            "of the joint or frame"
         )
         return NextExperiment(why, pair, None)
-    why = f"on this trial {names} differ by {promise.worth:.3g} squared noise units; {_often(promise.repeats())}"
+    others = ", the other rivals by more" if len(rivals) > 1 else ""
+    differ = f"{name} and {closest} differ by {promise.worth:.3g} squared noise units{others}"
+    why = f"on this trial {differ}; {_often(promise.repeats())}"
     return NextExperiment(why, pair, trial, (promise.distance(0), promise.distance(1)))
 
 
@@ -166,13 +181,25 @@ def _inside(values: np.ndarray, limits: tuple[float, float]) -> bool:
     return bool(np.isfinite(values).all() and values.min() >= limits[0] and values.max() <= limits[1])
 
 
-def _best(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study) -> tuple[Promise, Trial] | None:
-    promised = zip(promises(best, rival, trials, study), trials, strict=True)
-    found = [(p, t) for p, t in promised if p is not None and np.isfinite(p.worth)]
-    return max(found, key=lambda pair: pair[0].worth, default=None)
+Found = tuple[dict[str, Promise], Trial]
 
 
-def _refined(best: Fit, rival: Fit, found: tuple[Promise, Trial], study: Study) -> tuple[Promise, Trial]:
+def _best(best: Fit, rivals: Mapping[str, Fit], trials: Sequence[Trial], study: Study) -> Found | None:
+    """The trial that separates the closest rival best, and what it promises of each."""
+    each = {n: promises(best, rival, trials, study) for n, rival in rivals.items()}
+    found: list[Found] = []
+    for k, trial in enumerate(trials):
+        of_trial = {n: p for n, many in each.items() if (p := many[k]) is not None and np.isfinite(p.worth)}
+        if len(of_trial) == len(rivals):
+            found.append((of_trial, trial))
+    return max(found, key=_worth, default=None)
+
+
+def _worth(found: Found) -> float:
+    return min(p.worth for p in found[0].values())
+
+
+def _refined(best: Fit, rivals: Mapping[str, Fit], found: Found, study: Study) -> Found:
     """The trial with stretches of its stimulus held at other levels, where that separates better."""
     rng = np.random.default_rng(7)
     column = next((n for n in ("pulse_width_us", "effort") if n in found[1].columns), None)
@@ -180,8 +207,8 @@ def _refined(best: Fit, rival: Fit, found: tuple[Promise, Trial], study: Study) 
         return found
     for _ in range(ROUNDS):
         children = [_changed(found[1], column, study, rng) for _ in range(CHILDREN)]
-        better = _best(best, rival, children, study)
-        if better is not None and better[0].worth > found[0].worth:
+        better = _best(best, rivals, children, study)
+        if better is not None and _worth(better) > _worth(found):
             found = better
     return found
 

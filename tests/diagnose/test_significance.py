@@ -5,19 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.stats
-from diagnose.hidden import shortened, study_of
-from identify.rigs import WHITE, off, trials_of
+from diagnose.hidden import study_of
+from identify.rigs import WHITE, trials_of
 
-from fes_pin.data.trial import read_trial, trial_csv
-from fes_pin.diagnose.experiment import next_experiment
 from fes_pin.diagnose.held_out import folds_of
 from fes_pin.diagnose.library import Scores
 from fes_pin.diagnose.open_set import remainder
 from fes_pin.diagnose.significance import Family, coherence_p_value
 from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import Linearized
-from fes_pin.models.effects import effect
-from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
 
 
@@ -107,29 +103,3 @@ def test_folds_leave_out_whole_trials_of_every_kind():
         left = [t for i, t in enumerate(trials) if i not in fold]
         assert {t.kind for t in left} == {"motion", "isometric"}
         assert {t.conditions.get("load_kg") for t in left} >= {1.0, 1.5}
-
-
-def test_the_next_experiment_can_be_read_back_and_predicted(tmp_path):
-    study = shortened(study_of("ankle", ("coulomb_friction",), seed=5, duration_s=3.0), ("motion",))
-    model = nominal_model(study)
-    best = fit(model + effect("coulomb_friction")(), study.trials, WHITE)
-    rival = fit(model + effect("quadratic_damping")(0.01), study.trials, WHITE)
-    plan = next_experiment(best, rival, ("coulomb_friction", "quadratic_damping"), study)
-    assert plan.trial is not None and plan.separates == ("coulomb_friction", "quadratic_damping")
-    assert "squared noise units" in plan.why
-    (tmp_path / "next.csv").write_text(trial_csv(plan.trial))
-    back = read_trial(
-        tmp_path / "next.csv", rig="ankle", kind=plan.trial.kind, conditions=plan.trial.conditions, inputs_only=True
-    )
-    one, other = predict(best.model, back), predict(rival.model, back)
-    assert np.abs(one["angle_rad"] - other["angle_rad"]).max() > 1e-3
-    width = back["pulse_width_us"]
-    assert width.min() >= 0.0 and width.max() <= study.constants["saturation_us"] + 1e-9
-    assert back.conditions["load_kg"] <= 1.5 * max(t.conditions["load_kg"] for t in study.trials)
-
-
-def test_what_no_input_separates_says_so():
-    study = study_of("muscle", n_isometric=2, duration_s=2.0)
-    same = fit(off(nominal_model(study)), study.trials, WHITE)
-    plan = next_experiment(same, same, ("one", "other"), study)
-    assert plan.trial is None and "separates one and other" in plan.why
