@@ -136,13 +136,16 @@ for pair in PAIRS:
             before, after = (lead(d, true, rival) for d in found[-2:])
             promised.append(plan.promised[plan.separates.index(true)] if true in plan.separates else math.nan)
             came.append(after - before)
-            words.append(f"{before:.1f} -> {after:.1f} ({came[-1]:.0f}, promised {promised[-1]:.0f})")
+            numbers = f"{before:.1f} -> {after:.1f} ({came[-1]:.0f}, promised {promised[-1]:.0f})"
+            words.append(numbers if math.isfinite(came[-1] + promised[-1]) else f"for {' | '.join(plan.separates)}")
         last = state(found[-1], true)
+        if last != "resolved":
+            words.append(" ".join(" | ".join((c.name, *c.equivalents)) for c in found[-1].causes) or "nothing is named")
         stories[pair, seed] = (true, first, last, promised, came, found)
         print(f"  {true:26s}{first:>9s}  {'; '.join(words)}{'; ' if words else ''}{last}")
 
 # %% The picture: the first study's proposed trial, what both rivals had said of it, and all leads before and after
-true, _, _, _, _, found = stories[PAIRS[0], 0]
+true, _, _, promised, came, found = stories[PAIRS[0], 0]
 before, trial = found[0].study, found[1].study.trials[-1]
 column = "force_n" if trial.kind == "isometric" else "angle_rad"
 said = {}
@@ -151,45 +154,53 @@ for name in PAIRS[0]:
     said[name] = simulate(rival.model, trial)[column]
 colours = {DELAY: "tab:orange", LAG: "tab:blue", LOAD: "tab:orange", OFFSET: "tab:blue"}
 words = {DELAY: "delay", LAG: "second lag", LOAD: "load error", OFFSET: "sensor offset"}
-most = trial.time[np.argmax(np.convolve(np.abs(said[DELAY] - said[LAG]), np.ones(40), "same"))]
-figure, ((stimulus, leads), (near, residual)) = plt.subplots(2, 2, figsize=(12, 7.5), constrained_layout=True)
+middle = np.abs(trial.time - SECONDS / 2) < SECONDS / 4
+most = trial.time[np.argmax(np.abs(said[DELAY] - said[LAG]) * middle)]
+figure, ((stimulus, leads), (near, evidence)) = plt.subplots(2, 2, figsize=(12, 7.5), constrained_layout=True)
 stimulus.plot(trial.time, trial["pulse_width_us"], "k", lw=0.9)
-stimulus.axvspan(most - 0.3, most + 0.3, color="0.9")
+stimulus.axvspan(most - 0.04, most + 0.04, color="0.75")
 conditions = ", ".join(f"{n} = {v:g}" for n, v in trial.conditions.items())
 stimulus.set(xlabel="time (s)", ylabel="pulse width (µs)", title=f"proposed: {trial.kind}, {conditions}")
 for name, y in said.items():
     near.plot(trial.time, y, color=colours[name], lw=2.5, label=f"predicted with a {words[name]}")
-    smooth = np.convolve(trial[column] - y, np.ones(5) / 5, "same")
-    residual.plot(trial.time, smooth, color=colours[name], lw=0.9, label=f"with a {words[name]}")
 near.plot(trial.time, trial[column], "k.", ms=5, label=f"measured; true: {words[true]}")
-window = np.abs(trial.time - most) < 0.3
-near.set(xlim=(most - 0.3, most + 0.3), xlabel="time (s)", ylabel=column, title="where the rivals differ most (grey)")
+window = np.abs(trial.time - most) < 0.04
+near.set(xlim=(most - 0.04, most + 0.04), xlabel="time (s)", ylabel=column, title="at one of its edges (grey above)")
 near.set_ylim(trial[column][window].min() - 1.0, trial[column][window].max() + 1.0)
 near.legend(fontsize=10)
-residual.set(xlabel="time (s)", ylabel=column, title="measured - predicted, means of 5 samples")
-residual.legend(fontsize=10)
+false = LAG if true == DELAY else DELAY
+missed = {n: (trial[column] - y) ** 2 / NOISE[column] ** 2 for n, y in said.items()}
+evidence.plot(trial.time, np.cumsum(missed[false] - missed[true]), "k", label="rivals as fitted to the study")
+evidence.axhline(promised[0], color="tab:green", ls="--", label="promised, the wrong one fitted anew")
+evidence.axhline(came[0], color="tab:red", ls=":", label="came, both fitted anew")
+evidence.set(
+    xlabel="time (s)", ylabel="twice the log-likelihood", title=f"evidence for the {words[true]} as the trial runs"
+)
+evidence.legend(fontsize=10)
 for place, pair in enumerate(PAIRS):
     for seed in range(STUDIES):
-        true, _, _, _, came, found = stories[pair, seed]
-        if came:
-            heights = [lead(d, true, pair[1 - pair.index(true)]) for d in found]
+        hid, _, _, _, runs, all_of = stories[pair, seed]
+        if runs:
+            heights = [lead(d, hid, pair[1 - pair.index(hid)]) for d in all_of]
             at = 5 * place + np.arange(len(heights))
-            leads.plot(at, heights, "o-", color=colours[true], ms=5, lw=1.2)
+            leads.plot(at, heights, "o-", color=colours[hid], ms=5, lw=1.2)
 leads.axhspan(-2.71, 2.71, color="0.9")
 leads.set_yscale("symlog", linthresh=5.0)
-leads.set_xlim(-0.5, 8.5)
+leads.set(xlim=(-0.5, 8.5), ylim=(-10.0, 1e4))
 leads.set_xticks([0, 1, 5, 6, 7, 8], ["study", "+ trial", "study", "+ 1", "+ 2", "+ 3"])
 leads.set(
-    ylabel="lead of the true cause\n(twice the log-likelihood)", title="lags (left), load or offset (right); grey: open"
+    ylabel="lead of the true cause\n(twice the log-likelihood)", title="ten studies of each pair; grey: still open"
 )
+leads.text(-0.3, 7e3, "true: delay (orange),\nsecond lag (blue)", va="top")
+leads.text(8.3, 7e3, "true: load error (orange),\nsensor offset (blue)", va="top", ha="right")
 figure.savefig(OUT / "confounded_pair.png", dpi=100)
 
 # %% The answer
 for pair in PAIRS:
     of = [stories[pair, seed] for seed in range(STUDIES)]
-    open_ = [one for one in of if one[4]]
+    open_ = [one for one in of if one[1] == "open"]
     ends = [one[2] for one in open_]
-    share = [c / p for one in open_ for c, p in zip(one[4], one[3], strict=True)]
+    share = [c / p for one in open_ for c, p in zip(one[4], one[3], strict=True) if math.isfinite(c + p)]
     once = sum(one[2] == "resolved" and len(one[4]) == 1 for one in open_)
     ahead = sum(lead(one[5][0], one[0], pair[1 - pair.index(one[0])]) > 0.0 for one in open_)
     print(
