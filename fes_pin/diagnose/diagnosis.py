@@ -265,7 +265,7 @@ def _estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
     refined = one.refined()
     for n in effect(name).parameters():
         key = f"{name}.{n}"
-        if info[key].optional and not refined:
+        if info[key].optional and n not in refined:
             continue
         std = fitted.std(key) if key in fitted.free else 0.0
         out[n] = ParameterEstimate(values[key], std, info[key].unit)
