@@ -1,6 +1,9 @@
 """Which part of walking can stimulated nerves make, which pulse widths do it, and what is short, and why?
 
-Measured walking (two strides, one adult) gives the joint torques; four sets of nerves are asked for them.
+Measured walking (two strides, one adult) gives the joint torques; what ligaments and resting muscle give by themselves
+(Riener and Edrich 1999, healthy legs) is taken off; four sets of nerves are asked for the rest. Levers of the trunk's
+muscles are round figures of the size that imaging gives (Jorgensen et al. 2001, McGill et al. 1993), constant over
+posture: read "legs and trunk" as a sign and a size, no more (fes_pin/stimulate/tables/SOURCE.md).
 Run the cells, or `python analysis/allocate_walking.py`; the picture goes to out/allocate_walking.png.
 """
 
@@ -14,15 +17,17 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.passive import PassiveLegs
 from fes_pin.stimulate.allocate import Allocator, allocate
 from fes_pin.stimulate.attainable import Attainable
 from fes_pin.stimulate.measured import read_walk
-from fes_pin.stimulate.muscles import JOINTS
 from fes_pin.stimulate.nerves import Nerves
 from fes_pin.stimulate.recruitment import LinearRecruitment
 from fes_pin.stimulate.walk import allocate_walk, clipped, direction_error, rescaled
 
-walk = read_walk()
+measured = read_walk()
+walk = measured.active(PassiveLegs())
 weights = walk.known.astype(float)
 LEG = [n.removeprefix("left_") for n in Nerves().names if n.startswith("left_")]
 TRUNK = ("erector_spinae", "abdominals")
@@ -43,11 +48,15 @@ def both_sides(names):
 
 # %% Attained: every joint that counts within 10 % of its peak torque; strengths are known to a factor of 1.8
 def attained(result, joints):
-    index = [JOINTS.index(j) for j in joints]
-    met = np.abs(result.shortfall[:, index]) <= np.maximum(0.1 * np.abs(walk.torque[:, index]).max(0), 1.0)
+    index = [JOINT_NAMES.index(j) for j in joints]
+    met = np.abs(result.shortfall[:, index]) <= np.maximum(0.1 * np.abs(result.wanted[:, index]).max(0), 1.0)
     return met.all(1).mean(), met.mean()
 
 
+given = measured.torque - walk.torque
+for joint in SAGITTAL[3:]:
+    j = JOINT_NAMES.index(joint)
+    print(f"{joint:28s} by itself {given[:, j].min():+6.1f} to {given[:, j].max():+6.1f} N m")
 print(f"{len(walk.time)} samples, {walk.time[-1] - walk.time[0]:.2f} s; joints within 10 % of their peak torque")
 print(f"{'nerves':22s} {'all sagittal':>24s} {'all in 3-D':>20s} {'joint samples':>16s}   (weak, table, strong)")
 results = {}
@@ -55,7 +64,7 @@ for name, nerves in SETS.items():
     row = []
     for strength in (1 / 1.8, 1.0, 1.8):
         channels = Nerves(both_sides(nerves), strength=strength)
-        sagittal = allocate_walk(walk.torque, channels, walk.q, weights=np.isin(JOINTS, SAGITTAL).astype(float))
+        sagittal = allocate_walk(walk.torque, channels, walk.q, weights=np.isin(JOINT_NAMES, SAGITTAL).astype(float))
         full = allocate_walk(walk.torque, channels, walk.q, weights=weights)
         assert max(sagittal.residual.max(), full.residual.max()) < 1e-9
         row.append((attained(sagittal, SAGITTAL)[0], *attained(full, walk.known_joints)))
@@ -63,6 +72,19 @@ for name, nerves in SETS.items():
             results[name] = (sagittal, full)
     cells = [" - ".join(f"{100 * r[k]:3.0f}" for r in row) + " %" for k in range(3)]
     print(f"{name:22s} {cells[0]:>24s} {cells[1]:>20s} {cells[2]:>16s}")
+
+# %% What it changes that joints give torque by themselves; paralysed legs may give less, or with contractures more
+alone = {}
+sagittal_only = np.isin(JOINT_NAMES, SAGITTAL).astype(float)
+for name, nerves in SETS.items():
+    cells = []
+    for factor in (0.0, 0.5, 1.0, 2.0):
+        wanted = measured.active(PassiveLegs(factor)).torque
+        found = allocate_walk(wanted, Nerves(both_sides(nerves)), walk.q, weights=sagittal_only)
+        cells.append(f"{factor:g}: {100 * attained(found, SAGITTAL)[0]:3.0f} %")
+        if factor == 0.0:
+            alone[name] = attained(found, SAGITTAL)[0]
+    print(f"{name:22s} all sagittal, passive torque of healthy legs times {', '.join(cells)}")
 
 # %% What is short, and why: the worst joint of every sample, counted
 for name, (sagittal, _) in results.items():
@@ -77,7 +99,7 @@ for name, (sagittal, _) in results.items():
         print(f"   {100 * count / len(walk.time):3.0f} % of samples: {reason}")
 
 # %% Against the rules of thumb: least squares without limits, then clip or rescale
-index = [JOINTS.index(j) for j in SAGITTAL]
+index = [JOINT_NAMES.index(j) for j in SAGITTAL]
 errors = {}
 for name, (sagittal, _) in results.items():
     rules = {"this": sagittal.achieved[:, index]}
@@ -104,8 +126,8 @@ sagittal, _ = results[chosen]
 figure, axes = plt.subplots(2, 3, figsize=(13, 7.2), constrained_layout=True)
 titles = ("right hip, flexion +", "right knee, flexion +", "right ankle, dorsiflexion +")
 for axis, joint, title in zip(axes[0], SAGITTAL[3:], titles, strict=True):
-    j = JOINTS.index(joint)
-    axis.plot(walk.time, walk.torque[:, j], color="0.25", lw=2.2, label="measured walking")
+    j = JOINT_NAMES.index(joint)
+    axis.plot(walk.time, walk.torque[:, j], color="0.25", lw=2.2, label="measured walking, less passive torque")
     axis.plot(
         walk.time,
         sagittal.achieved[:, j],
@@ -118,7 +140,7 @@ for axis, joint, title in zip(axes[0], SAGITTAL[3:], titles, strict=True):
     )
     axis.set(title=title, xlabel="time (s)", ylabel="torque (N m)")
     axis.margins(x=0)
-axes[0, 0].set_ylim(-115, 45)
+axes[0, 0].set_ylim(-135, 45)
 axes[0, 0].legend(fontsize=8, loc="lower left")
 names = sagittal.allocator.names
 right = [i for i, n in enumerate(names) if n.startswith("right_")]
@@ -135,7 +157,7 @@ wide = Attainable(Nerves(both_sides(SETS["every leg nerve"])), walk.q[60]).outli
 )
 axes[1, 1].fill(*wide.T, color="tab:blue", alpha=0.15, label="every leg nerve")
 axes[1, 1].fill(*outline.T, color="tab:orange", alpha=0.35, label="four a leg")
-knee, ankle = (walk.torque[:, JOINTS.index(j)] for j in ("right_knee_flexion", "right_ankle_dorsiflexion"))
+knee, ankle = (walk.torque[:, JOINT_NAMES.index(j)] for j in ("right_knee_flexion", "right_ankle_dorsiflexion"))
 axes[1, 1].plot(knee, ankle, color="0.25", lw=1.5, label="measured walking")
 axes[1, 1].set(
     title="attainable torque, knee and ankle", xlabel="knee flexion (N m)", ylabel="ankle dorsiflexion (N m)"
@@ -157,8 +179,11 @@ figure.savefig(out / "allocate_walking.png", dpi=110)
 
 # %% The number
 share = {name: attained(sagittal, SAGITTAL)[0] for name, (sagittal, _) in results.items()}
-print(f"Four nerves a leg make {100 * share[chosen]:.0f} % of the samples of walking (sagittal hip, knee and ankle).")
+print(
+    f"Four nerves a leg make {100 * alone[chosen]:.0f} % of the samples of walking (sagittal hip, knee and ankle) "
+    f"if joints give nothing by themselves, {100 * share[chosen]:.0f} % with the passive torque of healthy legs."
+)
 example = allocate(
-    dict(zip(JOINTS, walk.torque[60], strict=True)), Nerves(both_sides(SETS[chosen])), walk.q[60], weights=weights
+    dict(zip(JOINT_NAMES, walk.torque[60], strict=True)), Nerves(both_sides(SETS[chosen])), walk.q[60], weights=weights
 )
 print(example)

@@ -43,11 +43,16 @@ def allocate(
     walk: Annotated[
         Path | None, typer.Option(help="Instead of a torque: the folder of the measured walk; how much is attained.")
     ] = None,
+    passive: Annotated[
+        float,
+        typer.Option(help="With --walk: what joints give by themselves, 1 for healthy legs."),
+    ] = 0.0,
     nerves: Annotated[bool, typer.Option(help="List the nerves and what they turn, and end.")] = False,
 ) -> None:
     """Pulse widths for wanted joint torques, what is short, and why."""
-    from math import radians
+    from math import degrees, radians
 
+    from fes_pin.body.joints import known_joint, limits_of
     from fes_pin.stimulate.allocate import allocate as solve
     from fes_pin.stimulate.nerves import Nerves
     from fes_pin.stimulate.recruitment import LinearRecruitment
@@ -57,29 +62,36 @@ def allocate(
         typer.echo(str(channels))
         return
     if walk is not None:
-        typer.echo(walk_table(walk, channels))
+        typer.echo(walk_table(walk, channels, passive))
         return
     if not torque:
         raise InputError("no torque is wanted: give joint=N m, or --walk, or --nerves")
     posture = {name: radians(value) for name, value in pairs(angle or [], "--angle").items()}
+    for name, value in posture.items():
+        low, high = limits_of(known_joint(name))
+        if not low <= value <= high:
+            raise InputError(f"{name} must lie within {degrees(low):.0f} to {degrees(high):.0f} degrees")
     curve = LinearRecruitment(threshold_us, saturation_us)
     typer.echo(str(solve(pairs(torque, "a torque"), channels, posture, least=least, recruitment=curve)))
 
 
-def walk_table(folder: Path, nerves) -> str:
+def walk_table(folder: Path, nerves, passive: float = 0.0) -> str:
     """Per joint of the measured walk: peak torque, rms shortfall, share of samples within 10 % of the peak."""
     import numpy as np
 
+    from fes_pin.body.joints import JOINT_NAMES
+    from fes_pin.body.passive import PassiveLegs
     from fes_pin.stimulate.measured import read_walk
-    from fes_pin.stimulate.muscles import JOINTS
     from fes_pin.stimulate.walk import allocate_walk
 
-    walk = read_walk(folder)
+    if not 0.0 <= passive <= 10.0:
+        raise InputError(f"--passive must lie between 0 and 10, got {passive}")
+    walk = read_walk(folder).active(PassiveLegs(passive))
     result = allocate_walk(walk.torque, nerves, walk.q, weights=walk.known.astype(float))
     lines = [f"{len(walk.time)} samples, {nerves.n} channels, optimal to {result.residual.max():.0e}"]
     lines.append(f"{'joint':28s}{'peak':>9s}{'short, rms':>12s}{'within 10 %':>13s}")
     for j in np.flatnonzero(walk.known):
         peak, short = np.abs(walk.torque[:, j]).max(), result.shortfall[:, j]
         share = (np.abs(short) <= max(0.1 * peak, 1.0)).mean()
-        lines.append(f"{JOINTS[j]:28s}{peak:6.1f} Nm{np.sqrt((short**2).mean()):9.1f} Nm{100 * share:11.0f} %")
+        lines.append(f"{JOINT_NAMES[j]:28s}{peak:6.1f} Nm{np.sqrt((short**2).mean()):9.1f} Nm{100 * share:11.0f} %")
     return "\n".join(lines)

@@ -38,6 +38,9 @@ def test_nerves_are_listed():
         ("left_knee_flexion=much",),
         ("toe=1",),
         ("--walk", "nowhere"),
+        ("--walk", "nowhere", "--passive", "-1"),
+        ("left_knee_flexion=-40", "--angle", "left_knee_flexion=900"),
+        ("left_knee_flexion=-40", "--angle", "left_knee=10"),
         ("--nerve", "x", "toe=1"),
     ],
 )

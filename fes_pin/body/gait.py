@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fes_pin.body.joints import JOINT_NAMES, SIDES, mirrored
+from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, mirrored
 from fes_pin.data.errors import InputError
 
 TABLE = Path(__file__).with_name("gait_postures.csv")
-"""Degrees, right stance; made by scripts/generate_postures from the measured walk."""
-_MIRROR_SIGN = {"lumbar_bending": -1.0, "lumbar_rotation": -1.0}
+"""Degrees, right stance; made by scripts/generate/gait_postures.py from the measured walk."""
 
 
 @lru_cache(maxsize=1)
@@ -43,12 +42,12 @@ def posture_angles(name: str, stance: str) -> dict[str, float]:
     angles = _table()[name]
     if stance == "right":
         return dict(angles)
-    return {mirrored(joint): _MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
+    return {mirrored(joint): MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
 
 
 def mirror(angles: Mapping[str, float]) -> dict[str, float]:
     """A posture seen in a mirror: left and right change places."""
-    return {mirrored(joint): _MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
+    return {mirrored(joint): MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
 
 
 # Axes of OpenSim's ankle and subtalar joints of the right leg (gait2354, `subject01_model.json`), in our axes.
@@ -102,16 +101,13 @@ def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_fo
     Raises
     ------
     InputError
-        A coordinate is missing, or another stance.
+        A coordinate is missing or not finite, or another stance.
     """
     if stance not in SIDES:
         raise InputError(f"must be 'left' or 'right', got {stance!r}", column="stance")
 
     def measured(name: str) -> np.ndarray:
-        try:
-            return np.asarray(coordinates[f"q_{name}"], dtype=float)
-        except (KeyError, ValueError):
-            raise InputError("the coordinate is missing", column=f"q_{name}") from None
+        return _coordinate(coordinates, name)
 
     angles: dict[str, np.ndarray] = {}
     for side in SIDES:
@@ -134,6 +130,20 @@ def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_fo
     return np.stack([angles[name] for name in JOINT_NAMES], axis=1)
 
 
+def _coordinate(coordinates: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+    """A measured coordinate: (N,) finite numbers."""
+    column = f"q_{name}"
+    try:
+        values = np.asarray(coordinates[column], dtype=float)
+    except (KeyError, ValueError):
+        raise InputError("the coordinate is missing", column=column) from None
+    if values.ndim != 1 or not len(values):
+        raise InputError("must be a row of samples", column=column)
+    if not np.isfinite(values).all():
+        raise InputError(f"sample {int(np.argmin(np.isfinite(values)))} is not a finite number", column=column)
+    return values
+
+
 def pelvis_turns(coordinates: Mapping[str, np.ndarray]) -> np.ndarray:
     """Orientation of the measured pelvis in the world: (N, 3, 3).
 
@@ -145,14 +155,12 @@ def pelvis_turns(coordinates: Mapping[str, np.ndarray]) -> np.ndarray:
     Raises
     ------
     InputError
-        One of them is missing.
+        One of them is missing or not finite.
     """
     forward, left, up = np.eye(3)
     turns = []
     for name, axis in (("tilt", -left), ("list", forward), ("rotation", up)):
-        if f"q_pelvis_{name}" not in coordinates:
-            raise InputError("the coordinate is missing", column=f"q_pelvis_{name}")
-        turns.append(_turn(axis, np.asarray(coordinates[f"q_pelvis_{name}"], dtype=float)))
+        turns.append(_turn(axis, _coordinate(coordinates, f"pelvis_{name}")))
     return turns[0] @ turns[1] @ turns[2]
 
 

@@ -32,6 +32,9 @@ JOINT_NAMES: tuple[str, ...] = (
 )
 """The 19 joints in the order in which tables and arrays without names list them."""
 
+MIRROR_SIGN = {"lumbar_bending": -1.0, "lumbar_rotation": -1.0}
+"""Joints whose angle changes sign in a mirror; all others keep it and change sides."""
+
 SEGMENT_NAMES: tuple[str, ...] = (
     "trunk",
     "pelvis",

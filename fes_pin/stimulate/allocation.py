@@ -10,7 +10,7 @@ import numpy as np
 from fes_pin.stimulate.certificate import Certificate
 
 if TYPE_CHECKING:
-    from fes_pin.stimulate.allocate import Allocator
+    from fes_pin.stimulate.allocator import Allocator
 
 REPORTED_NM = 0.5
 """A shortfall is put in words from this size on, N m."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.allocate import by_name
 from fes_pin.stimulate.efforts import STEPS
-from fes_pin.stimulate.muscles import JOINTS
+from fes_pin.stimulate.named import by_name
 from fes_pin.stimulate.walk import allocate_walk
 
 INSIDE_NM = 1e-6
@@ -64,7 +64,7 @@ class Attainable:
         whole = np.atleast_2d(np.asarray(nerves.torque_matrix(q) if named else nerves, dtype=float))
         if whole.ndim != 2 or not np.isfinite(whole).all():
             raise InputError("the torque matrix must be joints x channels of finite numbers")
-        known = JOINTS if len(whole) == len(JOINTS) else tuple(f"joint_{j + 1}" for j in range(len(whole)))
+        known = JOINT_NAMES if len(whole) == len(JOINT_NAMES) else tuple(f"joint_{j + 1}" for j in range(len(whole)))
         self.joints = tuple(joints) if joints is not None else known
         unknown = [name for name in self.joints if name not in known]
         if unknown:
@@ -145,6 +145,6 @@ def gait_share(torques, nerves, q, joints: Sequence[str], tolerance_nm: float = 
     joints
         The joints that count.
     """
-    weights = by_name({name: 1.0 for name in joints}, JOINTS, "joints", 0.0)
+    weights = by_name({name: 1.0 for name in joints}, JOINT_NAMES, "joints", 0.0)
     walk = allocate_walk(torques, nerves, q, weights=weights, effort=1e-8)
     return float((np.abs(walk.shortfall[:, weights > 0.0]) <= tolerance_nm).all(1).mean())

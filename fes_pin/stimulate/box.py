@@ -47,8 +47,8 @@ def rebuild(n: int, H: Reals, P: Reals, status: Integers):
     return 0
 
 
-def add_rows(n: int, rows: int, a: Reals, A: Reals, out: Reals):
-    """out += the sum of a[j] times row j of A (rows x n), four rows at a time."""
+def add_rows(n: int, stride: int, rows: int, a: Reals, A: Reals, out: Reals):
+    """out += the sum of a[j] times row j of A (rows of n numbers, `stride` apart), four rows at a time."""
     fours = rows - rows % 4
     for block in range(fours // 4):
         j = 4 * block
@@ -56,13 +56,15 @@ def add_rows(n: int, rows: int, a: Reals, A: Reals, out: Reals):
         a1 = a[j + 1]
         a2 = a[j + 2]
         a3 = a[j + 3]
-        at = j * n
+        at = j * stride
         for k in range(n):
-            out[k] += a0 * A[at + k] + a1 * A[at + n + k] + a2 * A[at + 2 * n + k] + a3 * A[at + 3 * n + k]
+            out[k] += (
+                a0 * A[at + k] + a1 * A[at + stride + k] + a2 * A[at + 2 * stride + k] + a3 * A[at + 3 * stride + k]
+            )
     for j in range(fours, rows):
         a0 = a[j]
         for k in range(n):
-            out[k] += a0 * A[j * n + k]
+            out[k] += a0 * A[j * stride + k]
     return 0
 
 
@@ -70,7 +72,7 @@ def gradient(n: int, H: Reals, f: Reals, r: Reals, g: Reals):
     """g = H r + f, row by row of the symmetric H."""
     for k in range(n):
         g[k] = f[k]
-    add_rows(n, n, r, H, g)
+    add_rows(n, n, n, r, H, g)
     return 0
 
 
@@ -79,7 +81,7 @@ def respond(n: int, f: Reals, lower: Reals, upper: Reals, P: Reals, status: Inte
     for k in range(n):
         g[k] = 0.0
         r[k] = f[k] if status[k] == 0 else lower[k] if status[k] == 1 else upper[k]
-    add_rows(n, n, r, P, g)
+    add_rows(n, n, n, r, P, g)
     for k in range(n):
         if status[k] == 0:
             r[k] = -g[k]

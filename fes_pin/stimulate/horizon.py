@@ -8,19 +8,8 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.allocate import Allocator
-from fes_pin.stimulate.native import address
-from fes_pin.stimulate.polish import ROUNDS, polish
-from fes_pin.stimulate.splitting import compiled
-
-ITERATIONS = 2000
-"""Splitting iterations before the plan is given with the residual that it has."""
-TOLERANCE = 1e-4
-"""Residuals of the horizon's program at which iterations end: recruitment, and slope of the cost over it."""
-PENALTY, DAMPING = 0.1, 1e-6
-"""Step parameters of the splitting, rho and sigma."""
-REFRESH = 0.005
-"""Change of what fatigue leaves at which the program is made anew."""
+from fes_pin.stimulate.allocator import Allocator
+from fes_pin.stimulate.horizon_program import NO_ROOM, HorizonProgram, Solution
 
 
 @dataclass(frozen=True)
@@ -83,7 +72,7 @@ class Plan:
     gap
         No plan costs less than this one by more (of the cost divided by `scale`).
     iterations, rounds
-        Of the splitting; guesses that made its answer exact, 0 if none did.
+        Of the interior-point method; guesses at what is active until one was exact, 0 if none was.
     """
 
     recruitment: np.ndarray
@@ -105,8 +94,7 @@ class Horizon:
     Parameters
     ----------
     program
-        An `Allocator`: moment arms, weights, limits, curves, price of effort (the same for all channels), price of
-        change, rate (per pulse).
+        An `Allocator`: moment arms, weights, limits, curves, prices of effort and of change, rate (per pulse).
     step_s
         Time between pulses.
     time_constant_s
@@ -117,13 +105,11 @@ class Horizon:
         Length of the horizon.
     fatigue
         How strength falls with use; None: it does not.
-    rounds
-        Guesses at what is active, some 0.4 ms each for 30 channels, to make the plan exact; more succeed more often.
 
     Raises
     ------
     InputError
-        Times not positive, effort that differs between channels, least recruitments, cubes or lexicographic.
+        Times not positive, least recruitments, cubes or lexicographic.
     """
 
     program: Allocator
@@ -132,45 +118,31 @@ class Horizon:
     delay_steps: int = 0
     steps: int = 10
     fatigue: Fatigue | None = None
-    rounds: int = ROUNDS
     act: np.ndarray = field(init=False)
     left: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
         if not (self.step_s > 0.0 and self.time_constant_s > 0.0 and self.delay_steps >= 0 and self.steps >= 1):
             raise InputError("a horizon needs positive times, delay_steps >= 0 and steps >= 1")
-        if self.program.choosy or self.program.cubes or self.program.lexicographic:
-            raise InputError("a horizon takes effort squares and no least recruitment")
-        if np.ptp(self.program.prices) > 0.0:
-            raise InputError("a horizon takes one price of effort for all channels")
+        _check(self.program)
         n = self.program.n
         self.keep = float(np.exp(-self.step_s / self.time_constant_s))
         self.act, self.left, self.before = np.zeros(n), np.ones(n), np.zeros(n)
         self.queue = np.zeros((self.delay_steps, n))
-        self.x = np.zeros((self.steps, n))
-        self.z, self.y = (np.zeros((2 * self.steps - 1, n)) for _ in range(2))
         later = np.subtract.outer(np.arange(self.steps), np.arange(self.steps))
         self.response = np.where(later >= 0, (1.0 - self.keep) * self.keep ** np.maximum(later, 0), 0.0)
         self._assemble()
 
     def _assemble(self) -> None:
-        p, n, steps = self.program, self.program.n, self.steps
-        self.assembled_for = self.left.copy()
+        p, steps = self.program, self.steps
         self.matrix = p.matrix * self.left
+        strength = np.sqrt(p.weights / p.scale)[:, None] * self.matrix
+        self.exact = HorizonProgram(strength, p.prices, p.change, self.keep, steps, p.rate < 1.0)
         self.G = (self.matrix.T * p.weights) @ self.matrix / p.scale
         step = np.eye(steps) - np.eye(steps, k=-1)
-        self.S = self.response.T @ self.response
-        self.T = float(p.prices[0]) * np.eye(steps) + p.change * step.T @ step
-        values, vectors = np.linalg.eigh(self.G)
-        held = self.T + (DAMPING + PENALTY) * np.eye(steps) + PENALTY * step[1:].T @ step[1:]
-        inverses = np.linalg.inv(np.maximum(values, 0.0)[:, None, None] * self.S + held)
-        self.fixed = [
-            np.ascontiguousarray(a) for a in (self.S, self.T, self.G, vectors, vectors.T, np.moveaxis(inverses, 0, -1))
-        ]
-        self.whole = np.kron(self.G, self.S) + np.kron(np.eye(n), self.T)
-        self.work, self.out = np.empty(7 * steps * n), np.zeros(2)
+        self.S, self.T = self.response.T @ self.response, p.change * step.T @ step
 
-    def plan(self, torques, *, solver: str = "splitting") -> Plan:
+    def plan(self, torques, *, solver: str = "interior") -> Plan:
         """Stimulation for the torques ahead, from the present state.
 
         Parameters
@@ -178,7 +150,7 @@ class Horizon:
         torques
             (steps, joints) N m: wanted at the pulses `delay_steps` + 1 ... `delay_steps` + steps ahead.
         solver
-            `splitting`, then made exact where that succeeds; or any solver that qpsolvers knows (`osqp`, `daqp` ...).
+            `interior`, or any solver that qpsolvers knows (`osqp`, `daqp` ...).
 
         Raises
         ------
@@ -197,20 +169,12 @@ class Horizon:
         f = self.response.T @ (error @ self.matrix)
         f[0] -= p.change * self.before
         low, high = self.limits()
-        count, exact = 0, None
-        if solver == "splitting":
-            count = self.split(f, low, high)
-            exact = polish(self.whole, f, low, high, self.y, self.rounds)
-            if exact is not None:
-                self.x[:], self.y[:] = exact.u, exact.y
-        else:
-            self.ask(solver, f, low, high)
-        if exact is not None or solver != "splitting":
-            self.z[:] = np.vstack([self.x, np.diff(self.x, axis=0)])
-        u = self.feasible(low, high)
-        primal, dual, gap = self.proof(u, f, low, high)
+        found = self.exact.solve(f, low, high) if solver == "interior" else self.ask(solver, f, low, high)
+        u = self.feasible(found.u, low, high)
+        primal = float(np.abs(u - found.u).max())
+        dual, gap = self.proof(u, found.y, f, low, high)
         achieved = (free + self.response @ u) @ self.matrix.T
-        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, count, exact.rounds if exact else 0)
+        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, found.iterations, found.rounds)
 
     def limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Limits (2 steps - 1, n) of the steps, the first also by the rate, then of the changes."""
@@ -222,30 +186,16 @@ class Horizon:
         low[steps:], high[steps:] = -min(p.rate, 1.0), min(p.rate, 1.0)
         return low, high
 
-    def split(self, f, low, high) -> int:
-        """Iterate the splitting from where it is; the number of iterations."""
-        arrays = (*self.fixed, f, low, high)
-        return compiled()["split"](
-            self.program.n,
-            self.steps,
-            *(address(a) for a in arrays),
-            PENALTY,
-            DAMPING,
-            *(address(a) for a in (self.x, self.z, self.y, self.work, self.out)),
-            ITERATIONS,
-            TOLERANCE,
-        )
-
-    def ask(self, solver: str, f, low, high) -> None:
-        """Solve through qpsolvers; the answer and its multipliers go where the splitting's would."""
+    def ask(self, solver: str, f, low, high) -> Solution:
+        """Solve through qpsolvers."""
         import qpsolvers
         from scipy.sparse import csc_matrix
 
         if solver not in qpsolvers.available_solvers:
-            known = ", ".join(["splitting", *qpsolvers.available_solvers])
+            known = ", ".join(["interior", *qpsolvers.available_solvers])
             raise InputError(f"solver {solver!r} is not installed; there are {known}")
         n, steps = self.program.n, self.steps
-        H = np.kron(self.S, self.G) + np.kron(self.T, np.eye(n))
+        H = np.kron(self.S, self.G) + np.kron(self.T, np.eye(n)) + np.kron(np.eye(steps), np.diag(self.program.prices))
         change = (np.eye(steps * n) - np.eye(steps * n, k=-n))[n:]
         rows = np.vstack([change, -change])
         bounds = np.concatenate([high[steps:].ravel(), -low[steps:].ravel()])
@@ -256,28 +206,31 @@ class Horizon:
         found = qpsolvers.solve_problem(problem, solver=solver, **quiet)
         if found.x is None or found.z is None or found.z_box is None:
             raise InputError(f"solver {solver!r} found no answer")
-        self.x[:] = found.x.reshape(steps, n)
         up, down = found.z.reshape(2, steps - 1, n)
-        self.y[:] = np.vstack([found.z_box.reshape(steps, n), up - down])
+        return Solution(found.x.reshape(steps, n), np.vstack([found.z_box.reshape(steps, n), up - down]), 0, 0)
 
-    def feasible(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """The splitting's answer, moved into limits and rate step by step."""
-        u, rate = self.x.copy(), min(self.program.rate, 1.0)
+    def feasible(self, near: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """A solver's answer, moved into limits and rate step by step."""
+        u, rate = near.copy(), min(self.program.rate, 1.0)
         np.clip(u[0], low[0], high[0], out=u[0])
         for k in range(1, self.steps):
             np.clip(u[k], np.maximum(low[k], u[k - 1] - rate), np.minimum(high[k], u[k - 1] + rate), out=u[k])
         return u
 
-    def proof(self, u, f, low, high) -> tuple[float, float, float]:
-        """Primal and dual residual and a bound on the gap, from the plan and the splitting's multipliers."""
-        slope = self.S @ u @ self.G + self.T @ u + f
+    def proof(self, u, y, f, low, high) -> tuple[float, float]:
+        """Dual residual and a bound on the gap, from the plan and a solver's multipliers."""
+        slope = self.S @ u @ self.G + self.T @ u + u * self.program.prices + f
         rows = np.vstack([u, np.diff(u, axis=0)])
-        pull = self.y[: self.steps].copy()
-        pull[1:] += self.y[self.steps :]
-        pull[:-1] -= self.y[self.steps :]
+        pull = y[: self.steps].copy()
+        pull[1:] += y[self.steps :]
+        pull[:-1] -= y[self.steps :]
         unexplained = slope + pull
-        gap = np.maximum(self.y * (high - rows), self.y * (low - rows)).sum() + np.abs(unexplained).sum()
-        return float(np.abs(u - self.x).max()), float(np.abs(unexplained).max()), float(gap)
+        stuck = high[: self.steps] - low[: self.steps] <= NO_ROOM  # its multiplier is whatever its slope asks for
+        y = y.copy()
+        y[: self.steps][stuck] -= unexplained[stuck]
+        unexplained[stuck] = 0.0
+        gap = np.maximum(y * (high - rows), y * (low - rows)).sum() + np.abs(unexplained).sum()
+        return float(np.abs(unexplained).max()), float(gap)
 
     def act_when_pulses_act(self) -> np.ndarray:
         """Activation when the next pulse begins to act: after what is still under way."""
@@ -295,16 +248,31 @@ class Horizon:
             self.queue = np.vstack([self.queue[1:], command])
         self.act = self.keep * self.act + (1.0 - self.keep) * acting
         self.before = command
-        for array, steps in ((self.x, self.steps), (self.z, self.steps), (self.y, self.steps)):
-            array[: steps - 1] = array[1:steps].copy()
-            array[steps:-1] = array[steps + 1 :].copy()
         if self.fatigue is not None:
             self.left = self.fatigue.after(self.left, self.act, self.step_s)
-            if np.abs(self.left - self.assembled_for).max() > REFRESH:
-                self._assemble()
+            self._assemble()
         return plan
+
+    def carry_on(self, program: Allocator) -> None:
+        """Go on with another program (a dead channel, other limits): activation, strength, pulses under way stay.
+
+        Raises
+        ------
+        InputError
+            Other channels, or what a horizon cannot take.
+        """
+        if program.names != self.program.names:
+            raise InputError("a horizon can only be carried on with the same channels")
+        _check(program)
+        self.program = program
+        self._assemble()
 
     @property
     def torque(self) -> np.ndarray:
         """Torque that the muscles make now, (joints,) N m."""
         return (self.program.matrix * self.left) @ self.act
+
+
+def _check(program: Allocator) -> None:
+    if program.choosy or program.cubes or program.lexicographic:
+        raise InputError("a horizon takes effort squares or fatigue, and no least recruitment")

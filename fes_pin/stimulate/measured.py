@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import csv
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.passive import Passive
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.muscles import JOINTS
 
 REFERENCE = {
     "hip_flexion": ("hip_flexion", 1.0),
@@ -31,7 +32,7 @@ class MeasuredWalk:
     Attributes
     ----------
     time, q, torque
-        (samples,) s, (samples, 19) rad and N m in the order of `JOINTS`; what the reference does not know is 0.
+        (samples,) s, (samples, 19) rad and N m in the order of `JOINT_NAMES`; what the reference does not know is 0.
     known
         (19,) bool, joints whose torque the reference knows: not `ankle_rotation` (it has no such joint), nor
         `mtp_extension` (it puts the whole ground reaction on the hindfoot).
@@ -45,7 +46,21 @@ class MeasuredWalk:
     @property
     def known_joints(self) -> tuple[str, ...]:
         """Names of the joints whose torque is known."""
-        return tuple(name for name, known in zip(JOINTS, self.known, strict=True) if known)
+        return tuple(name for name, known in zip(JOINT_NAMES, self.known, strict=True) if known)
+
+    def active(self, passive: Passive) -> MeasuredWalk:
+        """The same walk with the torque that muscles must make: what inverse dynamics gives less the passive torque.
+
+        Parameters
+        ----------
+        passive
+            `PassiveLegs` or `ElasticJoints` of `fes_pin.body.passive`, damping included; joints whose torque is not
+            known stay at 0.
+        """
+        order = list(JOINT_NAMES)
+        rates = np.gradient(self.q, self.time, axis=0)
+        given = np.array([passive.torque(q, order) for q in self.q]) - rates @ passive.damping(order)
+        return replace(self, torque=np.where(self.known, self.torque - given, 0.0))
 
 
 def data_folder() -> Path:
@@ -93,8 +108,12 @@ def read_walk(folder: str | Path | None = None) -> MeasuredWalk:
             raise InputError("no such file", file=path)
     angles, torques = (columns(path) for path in paths)
     count = len(angles["time"])
-    q, torque, known = np.zeros((count, len(JOINTS))), np.zeros((count, len(JOINTS))), np.zeros(len(JOINTS), dtype=bool)
-    for i, joint in enumerate(JOINTS):
+    q, torque, known = (
+        np.zeros((count, len(JOINT_NAMES))),
+        np.zeros((count, len(JOINT_NAMES))),
+        np.zeros(len(JOINT_NAMES), dtype=bool),
+    )
+    for i, joint in enumerate(JOINT_NAMES):
         side, _, name = joint.partition("_")
         if side == "lumbar":
             coordinate, sign = joint, 1.0

@@ -9,23 +9,9 @@ from importlib.resources import files
 
 import numpy as np
 
+from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, angles_array
 from fes_pin.data.errors import InputError
 
-LEG = (
-    "hip_flexion",
-    "hip_adduction",
-    "hip_rotation",
-    "knee_flexion",
-    "ankle_dorsiflexion",
-    "ankle_inversion",
-    "ankle_rotation",
-    "mtp_extension",
-)
-LUMBAR = ("lumbar_extension", "lumbar_bending", "lumbar_rotation")
-JOINTS = tuple(f"{side}_{joint}" for side in ("left", "right") for joint in LEG) + LUMBAR
-"""The 19 joints in the order in which arrays of angles and torques list them."""
-
-MIRROR = {"lumbar_bending": -1.0, "lumbar_rotation": -1.0}
 BEYOND = np.radians(10.0)
 """Angles are held within the measured range widened by this much: the table is not extrapolated further."""
 FADE = np.radians(20.0)
@@ -45,8 +31,8 @@ def read_table(name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(text.splitlines()))
 
 
-def angles_of(q, joints: tuple[str, ...] = JOINTS) -> np.ndarray:
-    """Joint angles as an array in the order of `joints`.
+def angles_of(q) -> np.ndarray:
+    """Joint angles as an array in the order of `JOINT_NAMES`.
 
     Parameters
     ----------
@@ -58,21 +44,16 @@ def angles_of(q, joints: tuple[str, ...] = JOINTS) -> np.ndarray:
     InputError
         Unknown joint, wrong shape, or an angle that is not a number.
     """
-    if q is None:
-        return np.zeros(len(joints))
-    if hasattr(q, "keys"):
-        unknown = [name for name in q if name not in joints]
-        if unknown:
-            raise InputError(f"unknown joint {unknown[0]!r}; the joints are {', '.join(joints)}")
-        q = [q.get(name, 0.0) for name in joints]
+    if q is None or hasattr(q, "keys"):
+        return angles_array(q or {}, JOINT_NAMES)
     try:
         angles = np.asarray(q, dtype=float)
     except (TypeError, ValueError):
         raise InputError("joint angles must be numbers") from None
-    if angles.shape[-1:] != (len(joints),):
-        raise InputError(f"expected {len(joints)} joint angles, got an array of shape {angles.shape}")
+    if angles.shape[-1:] != (len(JOINT_NAMES),):
+        raise InputError(f"expected {len(JOINT_NAMES)} joint angles, got an array of shape {angles.shape}")
     if not np.isfinite(angles).all():
-        name = joints[int(np.argwhere(~np.isfinite(angles))[0][-1])]
+        name = JOINT_NAMES[int(np.argwhere(~np.isfinite(angles))[0][-1])]
         raise InputError(f"the angle of {name} is not a finite number")
     return angles
 
@@ -181,28 +162,28 @@ def standard_muscles() -> MuscleTable:
     for row in arm_rows:
         values = np.array([float(row[label.replace("_deg", "_mm")]) for label in labels]) / 1e3
         arms.setdefault(row["muscle"], {})[row["joint"]] = values
-    m, n, p = 2 * len(rows), len(JOINTS), len(labels)
+    m, n, p = 2 * len(rows), len(JOINT_NAMES), len(labels)
     constant, slope, rest = np.zeros((m, n)), np.zeros((m, n, n)), np.zeros((m, p, n))
     crossed = np.zeros((m, n))
-    for s, side in enumerate(("left", "right")):
+    for s, side in enumerate(SIDES):
         for k, row in enumerate(rows):
             i = s * len(rows) + k
-            names = [j if j in LUMBAR else f"{side}_{j}" for j in arms[row["muscle"]]]
-            sign = np.array([MIRROR.get(j, 1.0) if side == "left" else 1.0 for j in names])
-            where = [JOINTS.index(j) for j in names]
+            names = [j if j in JOINT_NAMES else f"{side}_{j}" for j in arms[row["muscle"]]]
+            sign = np.array([MIRROR_SIGN.get(j, 1.0) if side == "left" else 1.0 for j in names])
+            where = [JOINT_NAMES.index(j) for j in names]
             values = sign * np.array(list(arms[row["muscle"]].values())).T
             angles = np.array([measured.get(j, np.zeros(p)) for j in arms[row["muscle"]]]).T
             constant[i, where], slope[i][np.ix_(where, where)] = fit_length(angles, values)
             rest[i][:, where] = values - constant[i, where] - angles @ slope[i][np.ix_(where, where)]
             crossed[i, where] = 1.0
-    spread = np.array([measured.get(j.split("_", 1)[1], np.zeros(p)) for j in JOINTS])
+    spread = np.array([measured.get(j.split("_", 1)[1], np.zeros(p)) for j in JOINT_NAMES])
     column = {
         key: np.tile([float(row[key]) for row in rows], 2)
         for key in ("strength_N", "fibre_mm", "tendon_mm", "neutral_length_mm", "pennation_deg")
     }
     return MuscleTable(
-        names=tuple(f"{side}_{row['muscle']}" for side in ("left", "right") for row in rows),
-        nerves=tuple(f"{side}_{row['nerve']}" for side in ("left", "right") for row in rows),
+        names=tuple(f"{side}_{row['muscle']}" for side in SIDES for row in rows),
+        nerves=tuple(f"{side}_{row['nerve']}" for side in SIDES for row in rows),
         strength=column["strength_N"],
         fibre=column["fibre_mm"] / 1e3,
         tendon=column["tendon_mm"] / 1e3,

@@ -7,15 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.muscles import JOINTS, MuscleTable, angles_of, standard_muscles
+from fes_pin.stimulate.muscles import MuscleTable, standard_muscles
 
 STRENGTH_FACTOR = 1.8
 """Strengths are known to this factor: how far another accepted model (Rajagopal 2016) lies from this table."""
 SUBJECT_MASS, SUBJECT_HEIGHT = 72.6, 1.80
 """The adult whose legs the table describes, kg and m."""
-
-__all__ = ["JOINTS", "Nerves", "angles_of"]
 
 
 @dataclass(frozen=True)
@@ -147,7 +146,7 @@ class Nerves:
         return force
 
     def torque_matrix(self, q=None, v=None) -> np.ndarray:
-        """Joint torque per channel at full recruitment: (..., 19, n), N m; joints in the order of `JOINTS`.
+        """Joint torque per channel at full recruitment: (..., 19, n), N m; joints in the order of `JOINT_NAMES`.
 
         Moment arms at the posture times strength, summed over the muscles of a nerve.
 
@@ -179,6 +178,8 @@ class Nerves:
         matrix = self.torque_matrix()
         for name, column in zip(self.names, matrix.T, strict=True):
             order = np.argsort(-np.abs(column))[:3]
-            parts = [f"{JOINTS[i]} {column[i]:+.0f} N m" for i in order if abs(column[i]) >= 1.0]
+            parts = [f"{JOINT_NAMES[i]} {column[i]:+.0f} N m" for i in order if abs(column[i]) >= 1.0]
             lines.append(f"  {name:28s} {', '.join(parts)}")
+        if np.abs(matrix[16:]).max(initial=0.0) > 0.0:
+            lines.append("Levers at the trunk are round figures, constant over posture: a sign and a size (SOURCE.md).")
         return "\n".join(lines)

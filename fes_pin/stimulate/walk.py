@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.allocate import Allocator
 from fes_pin.stimulate.allocation import Allocation
+from fes_pin.stimulate.allocator import Allocator
 from fes_pin.stimulate.box import solve_sequence
 from fes_pin.stimulate.certificate import residuals
 

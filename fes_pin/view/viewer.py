@@ -83,11 +83,9 @@ class Scene:
         self.roots = list(roots)
         return self
 
-    def commands(self) -> list[bytes]:
-        """meshcat's drawing commands, packed."""
-        import umsgpack  # noqa: PLC0415
-
-        _import_meshcat()
+    def commands(self) -> list:
+        """meshcat's drawing commands."""
+        import_meshcat()
         from meshcat.animation import Animation  # noqa: PLC0415
         from meshcat.commands import SetAnimation, SetObject, SetProperty, SetTransform  # noqa: PLC0415
         from meshcat.geometry import Box, MeshLambertMaterial, Sphere  # noqa: PLC0415
@@ -131,12 +129,16 @@ class Scene:
         out += [SetTransform(_moved(c), Place(("meshcat", "ball", str(k)))) for k, (c, _, _) in enumerate(self.balls)]
         if len(self.frames) > 1:
             out.append(SetAnimation(animation, play=True, repetitions=1_000_000))
-        return [umsgpack.packb(command.lower()) for command in out]
+        return out
 
     def html(self) -> str:
         """The page."""
-        script = (Path(_import_meshcat().__file__).parent / "viewer/dist/main.min.js").read_text()
-        packed = ",\n".join(f'"{base64.b64encode(command).decode()}"' for command in self.commands())
+        import umsgpack  # noqa: PLC0415
+
+        script = (Path(import_meshcat().__file__).parent / "viewer/dist/main.min.js").read_text()
+        packed = ",\n".join(
+            f'"{base64.b64encode(umsgpack.packb(command.lower())).decode()}"' for command in self.commands()
+        )
         return _PAGE.format(script=script, commands=packed, caption=html.escape(self.caption))
 
     def write(self, path: str | Path) -> Path:
@@ -265,8 +267,8 @@ def _moved(translation: Sequence[float] | np.ndarray) -> np.ndarray:
     return matrix
 
 
-def _import_meshcat():
-    """meshcat, without the warning that its import of an old pyzmq module raises (its server is not used here)."""
+def import_meshcat():
+    """meshcat, without the warning that its import of an old pyzmq module raises."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         import meshcat  # noqa: PLC0415

@@ -1,8 +1,11 @@
-"""Pages of the viewer, in a real headless Chromium."""
+"""The viewer, pages and live, in a real headless Chromium."""
 
 import os
 import shutil
+import signal
 import subprocess
+import sys
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from fes_pin.body.linearize import linearize
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate.nerves import Nerves
 from fes_pin.view.influence import influence_table, plot_influence
+from fes_pin.view.live import LiveViewer
 from fes_pin.view.viewer import Scene, show_influence, show_mode, show_walk
 
 
@@ -33,12 +37,17 @@ def chromium():
 def screenshot(chromium, tmp_path):
     from matplotlib import image
 
-    def take(page, at=""):
+    def take(page, at="", milliseconds=2000):
+        address = page if isinstance(page, str) else page.as_uri()
         out = tmp_path / f"shot{len(list(tmp_path.glob('*.png')))}.png"
         command = [
             *(chromium, "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
-            *("--window-size=500,600", "--virtual-time-budget=2000", f"--user-data-dir={tmp_path / 'profile'}"),
-            *(f"--screenshot={out}", f"{page.as_uri()}{at}"),
+            *(
+                "--window-size=500,600",
+                f"--virtual-time-budget={milliseconds}",
+                f"--user-data-dir={tmp_path / 'profile'}",
+            ),
+            *(f"--screenshot={out}", f"{address}{at}"),
         ]
         subprocess.run(command, check=True, capture_output=True, timeout=90)
         return image.imread(out)[:, :, :3]
@@ -49,6 +58,10 @@ def screenshot(chromium, tmp_path):
 def skin(picture):
     """Pixels of the body's bare parts: orange-pink, neither floor nor sky."""
     return (picture[..., 0] > 0.55) & (picture[..., 0] - picture[..., 2] > 0.12)
+
+
+def red(p):
+    return ((p[..., 0] > 0.5) & (p[..., 1] < 0.25) & (p[..., 2] < 0.25)).sum()
 
 
 def changed(one, other):
@@ -66,15 +79,47 @@ def test_a_mode_shows_a_body_that_moves(body, screenshot, tmp_path):
     assert abs(left - right) > 5.0  # the whole body sways
 
 
+def test_a_live_viewer_shows_one_scene_after_the_other_and_moves(body, screenshot):
+    linear = linearize(body, "mid_stance")
+    with LiveViewer() as viewer:
+        viewer.show(Scene(body).pose({"right_ankle_dorsiflexion": 0.3}))
+        forward = screenshot(viewer.url)
+        viewer.show(Scene(body).pose({"right_ankle_dorsiflexion": -0.3}))
+        back = screenshot(viewer.url)
+        assert skin(forward).sum() > 500
+        left, right = (np.flatnonzero(skin(p).any(axis=0)).mean() for p in (forward, back))
+        assert abs(left - right) > 20.0
+        viewer.show(show_influence(linear, Nerves(), "right_femoral"))
+        assert red(screenshot(viewer.url)) > 100
+        viewer.show(show_mode(linear, linear.modes()[8]))
+        moving = [screenshot(viewer.url, milliseconds=t) for t in (1500, 2000, 2500, 3000)]
+        assert red(moving[0]) < 100  # the scene before is gone
+        assert max(changed(moving[0], p) for p in moving[1:]) > 0.005
+    with pytest.raises(OSError):
+        urlopen(viewer.url, timeout=2)
+
+
+def test_the_command_serves_until_it_is_interrupted():
+    command = [sys.executable, "-c", "from fes_pin.cli import main; main()", "body", "view", "--live", "--mode", "9"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        lines = [process.stdout.readline(), process.stdout.readline()]
+        assert "to double" in lines[0]
+        url = lines[1].split()[0]
+        assert b"meshcat" in urlopen(url, timeout=10).read()
+        process.send_signal(signal.SIGINT)
+        rest, errors = process.communicate(timeout=20)
+        assert process.returncode == 0 and rest.strip() == "ended" and errors == ""
+    finally:
+        process.kill()
+        process.wait()
+
+
 def test_a_nerve_paints_the_joints_that_it_turns(body, screenshot, tmp_path):
     linear = linearize(body, "mid_stance")
     plain = screenshot(Scene(body).pose("mid_stance").write(tmp_path / "plain.html"))
     scene = show_influence(linear, Nerves(), "right_femoral")
     painted = screenshot(scene.write(tmp_path / "nerve.html"))
-
-    def red(p):
-        return ((p[..., 0] > 0.5) & (p[..., 1] < 0.25) & (p[..., 2] < 0.25)).sum()
-
     assert red(painted) > 100 > red(plain)
     assert "right_knee_flexion -" in scene.caption
     assert "left" not in scene.caption
@@ -88,11 +133,9 @@ def test_a_page_needs_no_network(body, tmp_path):
 
 
 def test_walking_has_a_frame_a_posture(body):
-    import umsgpack
-
     frames = np.zeros((5, 19))
     frames[:, body.joint_names.index("left_knee_flexion")] = np.linspace(0.0, 1.0, 5)
-    last = umsgpack.unpackb(show_walk(body, frames, fps=10).commands()[-1])
+    last = show_walk(body, frames, fps=10).commands()[-1].lower()
     assert last["type"] == "set_animation"
     assert {len(track["keys"]) for part in last["animations"] for track in part["clip"]["tracks"]} == {5}
     with pytest.raises(InputError, match="frames"):

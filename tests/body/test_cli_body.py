@@ -56,6 +56,33 @@ def test_view_plays_the_measured_walk(walk, tmp_path):
     assert run("view", str(tmp_path / "w.html"), "--walk", str(walk / "coords_mtpfree.csv")).exit_code == 0
 
 
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda lines: lines[:2], "two or more samples"),
+        (lambda lines: [*lines[:3], lines[3].replace(lines[3].split(",")[7], "nan"), *lines[4:9]], "finite"),
+        (lambda lines: [*lines[:3], lines[3].replace(lines[3].split(",")[7], "abc"), *lines[4:9]], "finite"),
+        (lambda lines: [lines[0], *lines[9:3:-1]], "times that rise"),
+        (lambda lines: [lines[0].replace("q_hip_flexion_r", "q_hip_r"), *lines[1:9]], "q_hip_flexion_r"),
+        (lambda lines: [lines[0].replace("time", "when"), *lines[1:9]], "time_s"),
+    ],
+)
+def test_a_spoilt_walk_is_one_line_and_no_page(walk, tmp_path, spoil, says):
+    lines = (walk / "coords_mtpfree.csv").read_text().splitlines()
+    (tmp_path / "walk.csv").write_text("\n".join(spoil(lines)) + "\n")
+    page = tmp_path / "page.html"
+    result = run("view", str(page), "--walk", str(tmp_path / "walk.csv"))
+    assert result.exit_code == 2 and says in result.output and "walk.csv" in result.output
+    assert len(result.output.strip().splitlines()) == 1 and not page.exists()
+
+
+def test_a_map_that_cannot_be_written_is_one_line(tmp_path):
+    for path in (tmp_path / "none" / "map.png", tmp_path / "map.unknown"):
+        result = run("nerves", "right_femoral", "--map", str(path))
+        assert result.exit_code == 2 and "cannot be written" in result.output.splitlines()[-1]
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -66,6 +93,7 @@ def test_view_plays_the_measured_walk(walk, tmp_path):
         (("modes", "--brace", "plaster"), "cannot brace 'plaster'"),
         (("modes", "--urdf", "none.urdf"), "none.urdf"),
         (("nerves", "right_vagus"), "unknown nerve"),
+        (("view",), "--live"),
         (("view", "a.html", "--mode", "99"), "--mode"),
         (("view", "a.html", "--mode", "1", "--nerve", "right_tibial"), "choose one"),
         (("view", "a.html", "--walk", "none.csv"), "none.csv"),

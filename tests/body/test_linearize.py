@@ -6,11 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fes_pin.body.anthropometry import Subject, skeleton_of_subject
 from fes_pin.body.build import GRAVITY, Body
 from fes_pin.body.gait import posture_names
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.linearize import ground_normal, linearize, linearize_batch, linearize_chunks, model_on_slope
 from fes_pin.body.passive import ElasticJoints, PassiveLegs
+from fes_pin.body.skeleton import Segment, Skeleton
 from fes_pin.data.errors import InputError
 
 slopes = st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
@@ -37,10 +39,27 @@ def potential(model, q):
     return pin.computePotentialEnergy(model, data)
 
 
-@settings(max_examples=15, deadline=None)
+def some_body(seed):
+    """A subject of either sex and stance, or ten segments that no table knows: heavier, lighter, off their axis."""
+    rng = np.random.default_rng(seed)
+    stance = ("left", "right")[seed % 2]
+    subject = Subject(rng.uniform(25, 200), rng.uniform(1.2, 2.2), ("male", "female")[seed // 2 % 2])
+    if seed % 3:
+        return Body.from_subject(subject.mass_kg, subject.height_m, subject.sex, stance)
+    whole = skeleton_of_subject(subject)
+    segments = {}
+    for name, segment in whole.segments.items():
+        turn = pin.exp3(rng.normal(size=3) * 0.3)
+        mass = segment.mass * rng.uniform(0.5, 2.0)
+        inertia = turn @ segment.inertia @ turn.T * rng.uniform(0.5, 2.0)
+        segments[name] = Segment(mass, segment.com + rng.normal(size=3) * 0.02, 0.5 * (inertia + inertia.T))
+    return Body.from_segments(Skeleton(segments, whole.centres, whole.points, whole.height), stance)
+
+
+@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**6), slopes)
 def test_a_b_c_are_what_the_paper_says(seed, slope):
-    body = Body.from_subject(mass_kg=60.0 + seed % 40, height_m=1.7, sex="female", stance=("left", "right")[seed % 2])
+    body = some_body(seed)
     q = some_posture(body, seed)
     linear = linearize(body, q, slope)
     model = model_on_slope(body, slope)
@@ -56,6 +75,45 @@ def test_a_b_c_are_what_the_paper_says(seed, slope):
     assert np.abs(linear.C + gravity(q)).max() < 1e-12 * np.abs(linear.C).max()
     slope_of_energy = derivative(lambda x: np.array([potential(model, x)]), q)[0]
     assert np.abs(linear.C + slope_of_energy).max() < 1e-7 * np.abs(linear.C).max()
+    one = np.eye(19)
+    alone = [kinetic(model, q, e) for e in one]
+    pairs = [[kinetic(model, q, one[i] + one[j]) - alone[i] - alone[j] for j in range(19)] for i in range(19)]
+    assert np.abs(linear.A - np.array(pairs)).max() < 1e-12 * np.abs(linear.A).max()
+
+
+def kinetic(model, q, v):
+    return pin.computeKineticEnergy(model, model.createData(), q, v)
+
+
+def some_passive(rng):
+    legs = PassiveLegs(rng.uniform(0.3, 2.0), {"left_hip_flexion": rng.uniform(0, 3)})
+    joints = rng.choice(JOINT_NAMES, 6, replace=False).tolist()
+    stiffness, damping, rest = (dict(zip(joints, rng.uniform(0, s, 6).tolist(), strict=True)) for s in (80, 5, 1))
+    return (None, legs, ElasticJoints(stiffness, damping, rest))[int(rng.integers(3))]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), slopes)
+def test_around_a_moving_posture_with_passive_joints(seed, slope):
+    """B, C, E against differences of the whole torque: inverse dynamics less what passive joints give."""
+    rng, body = np.random.default_rng(seed), some_body(seed)
+    q, v, a, passive = some_posture(body, seed), rng.normal(size=19), 3.0 * rng.normal(size=19), some_passive(rng)
+    linear = linearize(body, q, slope, rates=v, accelerations=a, passive=passive)
+    model = model_on_slope(body, slope)
+    data = model.createData()
+    names = body.joint_names
+
+    def needed(q, v):
+        tau = pin.rnea(model, data, q, v, a).copy()
+        return tau if passive is None else tau - passive.torque(q, names) + passive.damping(names) @ v
+
+    by_angle, by_rate = derivative(lambda x: needed(x, v), q), derivative(lambda x: needed(q, x), v)
+    if isinstance(passive, PassiveLegs):  # measured moments have no potential: their stiffness is its symmetric part
+        skew = derivative(lambda x: passive.torque(x, names), q)
+        by_angle += 0.5 * (skew - skew.T)
+    assert np.abs(linear.B + by_angle).max() < 1e-7 * np.abs(by_angle).max()
+    assert np.abs(linear.E - by_rate).max() < 1e-7 * np.abs(by_rate).max()
+    assert np.abs(linear.C + needed(q, v)).max() < 1e-12 * np.abs(linear.C).max()
 
 
 def test_kinetic_energy_is_half_v_a_v(body):

@@ -158,7 +158,7 @@ def test_energy_and_momenta_of_simbodys_motion_with_our_segments(measured_body, 
     with open(walk / "reference/bodies_mtpfree.csv") as file:
         rows = list(csv.DictReader(file))
     whole = np.genfromtxt(walk / "reference/wholebody_mtpfree.csv", delimiter=",", names=True)
-    energy, momentum = 0.0, 0.0
+    energy, momentum, moment, centre = 0.0, 0.0, 0.0, 0.0
     for ours, theirs in carrier.items():
         track = [r for r in rows if r["body"] == theirs]
         get = lambda *keys: np.array([[float(r[k]) for k in keys] for r in track])  # noqa: B023, E731
@@ -172,9 +172,16 @@ def test_energy_and_momenta_of_simbodys_motion_with_our_segments(measured_body, 
         spin = np.einsum("nij,jk,nlk,nl->ni", turn, segment.inertia, turn, omega)
         energy = energy + 0.5 * segment.mass * np.sum(speed**2, axis=1) + 0.5 * np.sum(omega * spin, axis=1)
         momentum = momentum + segment.mass * speed
-    assert np.abs(energy - whole["KE"]).max() < 0.002 * whole["KE"].mean()
+        place = get("cx", "cy", "cz") @ TO_WORLD.T + turn @ apart
+        moment = moment + segment.mass * np.cross(place, speed) + spin
+        centre = centre + segment.mass / skeleton.mass * place
+    assert np.abs(energy - whole["KE"]).max() < 0.001 * whole["KE"].mean()
     reference = np.array([whole["p_x"], whole["p_y"], whole["p_z"]]).T @ TO_WORLD.T
-    assert np.abs(momentum - reference).max() < 0.01 * np.sqrt(np.mean(np.sum(reference**2, axis=1)))
+    assert np.abs(momentum - reference).max() < 0.001 * np.sqrt(np.mean(np.sum(reference**2, axis=1)))
+    about_centre = moment - np.cross(centre, momentum)
+    reference = np.array([whole["Lcom_x"], whole["Lcom_y"], whole["Lcom_z"]]).T @ TO_WORLD.T
+    size = np.sqrt(np.mean(np.sum(reference**2, axis=1)))
+    assert np.abs(about_centre - reference).max() < 0.001 * size
 
 
 def knee_slide(walk):

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate import certificate
 from fes_pin.stimulate.allocate import Allocator, allocate
 from fes_pin.stimulate.certificate import Certifier, residuals, slopes
-from fes_pin.stimulate.muscles import JOINTS
 from fes_pin.stimulate.nerves import Nerves
 from fes_pin.stimulate.recruitment import LinearRecruitment, SigmoidRecruitment
 
@@ -47,6 +47,62 @@ def test_two_thousand_random_problems_are_optimal_and_within_threshold_and_satur
         within_limits(a, curve)
         np.testing.assert_allclose(a.achieved, matrix @ a.recruitment, atol=1e-9)
     assert "optimal to" in str(a)
+
+
+def test_two_thousand_random_problems_cost_what_a_reference_solver_finds():
+    """DAQP on the program written out from its definition, without any code of the allocator."""
+    import daqp
+
+    rng = np.random.default_rng(11)
+    for _ in range(2000):
+        matrix, torque, options = random_problem(rng)
+        a = Allocator(matrix, **options)(torque)
+        n, weights = matrix.shape[1], options["weights"]
+        alive = np.where(options["upper"] > 0.0, matrix, 0.0)
+        squares = alive.T @ (weights[:, None] * alive)
+        scale = squares.diagonal().max() or 1.0
+        H, f = squares / scale + options["effort"] * np.eye(n), -(torque * weights) @ alive / scale
+        none = np.zeros((0, n))
+        x, _, flag, _ = daqp.solve(H, f, none, options["upper"], options["lower"], np.zeros(n, dtype=np.int32))
+        assert flag == 1
+        allowed = np.clip(x, options["lower"], options["upper"])  # DAQP keeps limits to 1e-6
+        ours, theirs, least = (0.5 * v @ H @ v + f @ v for v in (a.recruitment, allowed, x))
+        assert least - 1e-6 * (1.0 + np.abs(f).sum()) <= ours <= theirs + 1e-12
+
+
+def test_channels_that_die_in_the_middle_of_random_runs():
+    """Rate limit and price of change carry on from what was in force; the dead are off at once and stay off."""
+    rng, curve = np.random.default_rng(12), LinearRecruitment()
+    for _ in range(150):
+        matrix, _, options = random_problem(rng)
+        options.update(rate=rng.choice([0.05, 0.3, np.inf]), change=rng.choice([0.0, 1e-2]))
+        before, program = np.zeros(matrix.shape[1]), Allocator(matrix, **options)
+        dead: list[str] = []
+        for k in range(12):
+            if k == 6:
+                dead = [n for n in program.names if rng.random() < 0.4]
+                program = Allocator(matrix, dead=dead, **options)
+            a = program(rng.normal(size=len(matrix)) * 60, before)
+            off = np.isin(program.names, dead)
+            assert (a.recruitment[off] == 0.0).all() and (a.pulse_width_us[off] == 0.0).all()
+            moved = np.abs(a.recruitment - np.clip(before, program.lower, program.upper))
+            assert (moved <= options["rate"] + 1e-12).all()
+            assert a.certificate.is_optimal(1e-11)
+            within_limits(a, curve)
+            before = a.recruitment
+
+
+def test_a_refused_torque_leaves_the_run_as_it_was():
+    torque, again = {"left_knee_flexion": -60.0}, Allocator(LEFT, rate=0.05)
+    program = Allocator(LEFT, rate=0.05)
+    for _ in range(3):
+        program(torque)
+        again(torque)
+        with pytest.raises(InputError, match="finite"):
+            program({"left_knee_flexion": float("nan")})
+        with pytest.raises(InputError, match="solver"):
+            program(torque, solver="abacus")
+    np.testing.assert_array_equal(program(torque).recruitment, again(torque).recruitment)
 
 
 @pytest.mark.parametrize("solver", ["daqp", "osqp"])
@@ -120,7 +176,7 @@ def test_sequence_equals_single_allocations_and_certifies_itself():
 def test_words_name_the_saturated_nerve():
     a = allocate({"left_ankle_dorsiflexion": -400.0}, Nerves(["left_tibial", "right_femoral"]))
     assert a.reasons[0].startswith("left ankle dorsiflexion") and a.reasons[0].endswith("left tibial saturated")
-    short = -400.0 - a.achieved[JOINTS.index("left_ankle_dorsiflexion")]
+    short = -400.0 - a.achieved[JOINT_NAMES.index("left_ankle_dorsiflexion")]
     assert f"{abs(short):.1f} N m short" in a.reasons[0]
     assert a.active == {"left_tibial": "saturated", "right_femoral": "off"}
     assert a.multipliers["left_tibial"] > 0.0
@@ -213,7 +269,7 @@ def test_lexicographic_reaches_the_least_error_then_the_least_effort():
 def test_fatigue_moves_the_load_to_fresh_channels():
     names = ["left_hamstrings", "left_biceps_short_head"]
     torque = {"left_knee_flexion": 8.0}
-    weights = {j: float(j == "left_knee_flexion") for j in JOINTS}
+    weights = {j: float(j == "left_knee_flexion") for j in JOINT_NAMES}
     tired = Nerves(names).tired(left_hamstrings=0.3)
     plain = allocate(torque, tired, weights=weights)
     spared = allocate(torque, tired, weights=weights, effort_kind="fatigue")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, lsq_linear
 
+from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate.attainable import Attainable, gait_share
-from fes_pin.stimulate.muscles import JOINTS
 from fes_pin.stimulate.nerves import Nerves
 
 
@@ -89,11 +89,11 @@ def test_more_nerves_attain_no_less_of_a_gait():
     joints = ["left_knee_flexion", "left_ankle_dorsiflexion"]
     q = rng.uniform(-0.2, 0.4, (80, 19))
     torque = np.zeros((80, 19))
-    torque[:, [JOINTS.index(j) for j in joints]] = rng.normal(size=(80, 2)) * 30
+    torque[:, [JOINT_NAMES.index(j) for j in joints]] = rng.normal(size=(80, 2)) * 30
     shares = [gait_share(torque, Nerves(names), q, joints) for names in (few, many)]
     assert 0.0 < shares[0] < shares[1] <= 1.0
     by_hand = [
-        Attainable(Nerves(many), q[k], joints).nearest(torque[k, [JOINTS.index(j) for j in joints]]).distance < 0.5
+        Attainable(Nerves(many), q[k], joints).nearest(torque[k, [JOINT_NAMES.index(j) for j in joints]]).distance < 0.5
         for k in range(80)
     ]
     assert shares[1] == pytest.approx(np.mean(by_hand), abs=0.05)

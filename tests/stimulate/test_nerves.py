@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.muscles import JOINTS, MIRROR, standard_muscles
+from fes_pin.stimulate.muscles import standard_muscles
 from fes_pin.stimulate.nerves import Nerves
 
 SHARED = Path(os.environ.get("FES_PIN_DATA", Path(__file__).parents[2].parent / "shared"))
@@ -30,14 +31,14 @@ SIGNS = {
 
 def random_angles(count, seed=0):
     table = standard_muscles()
-    return np.random.default_rng(seed).uniform(table.lower, table.upper, (count, len(JOINTS)))
+    return np.random.default_rng(seed).uniform(table.lower, table.upper, (count, len(JOINT_NAMES)))
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("nerve", SIGNS)
 def test_every_nerve_turns_its_joints_the_anatomical_way(nerve, side):
     nerves = Nerves([f"{side}_{nerve}"])
-    torque = dict(zip(JOINTS, nerves.torque_matrix()[:, 0], strict=True))
+    torque = dict(zip(JOINT_NAMES, nerves.torque_matrix()[:, 0], strict=True))
     for joint, sign in SIGNS[nerve].items():
         assert sign * torque[f"{side}_{joint}"] > 1.0
     other = "right" if side == "left" else "left"
@@ -50,14 +51,14 @@ def test_left_is_the_mirror_of_right():
     left = Nerves([n for n in Nerves().names if n.startswith("left_")]).torque_matrix(q)
     right = Nerves([n for n in Nerves().names if n.startswith("right_")]).torque_matrix(mirrored)
     np.testing.assert_allclose(left[:, :8], right[:, 8:16], atol=1e-12)
-    signs = [MIRROR.get(joint, 1.0) for joint in JOINTS[16:]]
+    signs = [MIRROR_SIGN.get(joint, 1.0) for joint in JOINT_NAMES[16:]]
     np.testing.assert_allclose(left[:, 16:], np.array(signs)[:, None] * right[:, 16:], atol=1e-12)
 
 
 def test_right_erector_bends_right_and_right_external_oblique_turns_left():
     torque = Nerves(["right_ercspn", "right_extobl"]).torque_matrix()
-    assert torque[JOINTS.index("lumbar_extension"), 0] > 0 and torque[JOINTS.index("lumbar_bending"), 0] > 0
-    assert torque[JOINTS.index("lumbar_rotation"), 1] > 0 and torque[JOINTS.index("lumbar_extension"), 1] < 0
+    assert torque[JOINT_NAMES.index("lumbar_extension"), 0] > 0 and torque[JOINT_NAMES.index("lumbar_bending"), 0] > 0
+    assert torque[JOINT_NAMES.index("lumbar_rotation"), 1] > 0 and torque[JOINT_NAMES.index("lumbar_extension"), 1] < 0
 
 
 def test_smooth_moment_arms_are_the_gradient_of_one_length():
@@ -78,12 +79,14 @@ def test_batch_equals_single_and_mapping_equals_array():
     nerves, q = Nerves(), random_angles(7)
     batch = nerves.torque_matrix(q)
     for k in range(7):
-        np.testing.assert_allclose(batch[k], nerves.torque_matrix(dict(zip(JOINTS, q[k], strict=True))), atol=1e-12)
+        np.testing.assert_allclose(
+            batch[k], nerves.torque_matrix(dict(zip(JOINT_NAMES, q[k], strict=True))), atol=1e-12
+        )
 
 
 def test_force_velocity_is_one_at_rest_less_when_shortening_more_when_lengthening():
     nerves = Nerves(["right_vas_lat"])
-    j = JOINTS.index("right_knee_flexion")
+    j = JOINT_NAMES.index("right_knee_flexion")
     still, extend, flex = (nerves.torque_matrix(None, {"right_knee_flexion": v})[j, 0] for v in (0.0, -3.0, 3.0))
     assert still == pytest.approx(nerves.torque_matrix()[j, 0])
     assert abs(extend) < abs(still) < abs(flex) <= 1.4 * abs(still)
@@ -104,6 +107,11 @@ def test_fatigue_strength_and_size_scale_the_columns():
     np.testing.assert_allclose(Nerves.of_subject(72.6 * 2, 0.9, names).torque_matrix(), fresh)
     low, high = Nerves(names).torque_band()
     assert (np.abs(low) <= np.abs(fresh)).all() and (np.abs(fresh) <= np.abs(high)).all()
+
+
+def test_a_list_of_nerves_says_how_rough_the_trunk_is():
+    assert "round figures" in str(Nerves(["left_erector_spinae"]))
+    assert "round figures" not in str(Nerves(["left_femoral"]))
 
 
 def test_a_nerve_is_the_sum_of_its_muscles():
@@ -147,11 +155,11 @@ def test_measured_postures_are_met_to_the_rounding_of_the_table():
         rows = [r for r in csv.DictReader(file) if r["nerve_group"] != "trunk"]
     for label, angles in postures.items():
         q, keys = {}, {}
-        for joint in JOINTS[8:16]:
+        for joint in JOINT_NAMES[8:16]:
             name, sign = rename.get(joint.removeprefix("right_"), (joint.removeprefix("right_"), 1))
             q[joint], keys[joint] = sign * angles.get(f"{name}_r", 0.0), (f"r_{name}_r_m", sign)
         arms = standard_muscles().moment_arms(q)
         for row in (r for r in rows if r["posture"] == label):
             column = arms[:, standard_muscles().names.index(f"right_{row['muscle'].removesuffix('_r')}")]
             for joint, (key, sign) in keys.items():
-                assert column[JOINTS.index(joint)] == pytest.approx(sign * float(row.get(key, 0.0)), abs=1.2e-4)
+                assert column[JOINT_NAMES.index(joint)] == pytest.approx(sign * float(row.get(key, 0.0)), abs=1.2e-4)

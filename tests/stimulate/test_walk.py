@@ -1,12 +1,18 @@
 """Allocation along a motion, the rules of thumb beside it, and the measured walk."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.passive import ElasticJoints, PassiveLegs
 from fes_pin.data.errors import InputError
 from fes_pin.stimulate.allocate import Allocator
 from fes_pin.stimulate.measured import data_folder, read_walk
-from fes_pin.stimulate.muscles import JOINTS
 from fes_pin.stimulate.nerves import Nerves
 from fes_pin.stimulate.walk import allocate_walk, clipped, direction_error, rescaled
 
@@ -94,11 +100,11 @@ def test_measured_walking_is_attained_by_the_nerves_of_the_leg_and_not_by_four()
         pytest.skip("the measured walk is not here")
     walk = read_walk()
     assert len(walk.time) == 157 and walk.known.sum() == 15
-    knee, ankle = (JOINTS.index(f"right_{j}") for j in ("knee_flexion", "ankle_dorsiflexion"))
+    knee, ankle = (JOINT_NAMES.index(f"right_{j}") for j in ("knee_flexion", "ankle_dorsiflexion"))
     assert walk.q[:, knee].max() == pytest.approx(1.2, abs=0.1)  # a knee flexes some 65 degrees in swing
     assert -150 < walk.torque[:, ankle].min() < -100  # push-off
-    sagittal = [j for j in JOINTS if j.endswith(("hip_flexion", "knee_flexion", "ankle_dorsiflexion"))]
-    weights = np.isin(JOINTS, sagittal).astype(float)
+    sagittal = [j for j in JOINT_NAMES if j.endswith(("hip_flexion", "knee_flexion", "ankle_dorsiflexion"))]
+    weights = np.isin(JOINT_NAMES, sagittal).astype(float)
     legs = [n for n in Nerves().names if not n.endswith(("erector_spinae", "abdominals"))]
     four = [n for n in legs if n.split("_", 1)[1] in ("femoral", "hamstrings", "tibial", "deep_peroneal")]
     missed = []
@@ -107,3 +113,46 @@ def test_measured_walking_is_attained_by_the_nerves_of_the_leg_and_not_by_four()
         assert result.residual.max() < 1e-9
         missed.append(np.sqrt((result.shortfall[:, weights > 0] ** 2).sum(1).mean()))
     assert missed[0] < 1.0 and 10.0 < missed[1] < 25.0
+
+
+@pytest.mark.shared
+def test_active_torque_is_inverse_dynamics_less_springs_and_dampers():
+    try:
+        walk = read_walk()
+    except InputError:
+        pytest.skip("the measured walk is not here")
+    springs = ElasticJoints({"left_knee_flexion": 7.0}, {"left_knee_flexion": 0.5}, {"left_knee_flexion": 0.2})
+    j, unknown = JOINT_NAMES.index("left_knee_flexion"), JOINT_NAMES.index("left_mtp_extension")
+    active = walk.active(springs)
+    rate = np.gradient(walk.q[:, j], walk.time)
+    np.testing.assert_allclose(active.torque[:, j], walk.torque[:, j] + 7.0 * (walk.q[:, j] - 0.2) + 0.5 * rate)
+    others = [i for i in range(19) if i != j]
+    np.testing.assert_array_equal(active.torque[:, others], walk.torque[:, others])
+    stiff = walk.active(ElasticJoints({"left_mtp_extension": 5.0}))
+    assert not stiff.torque[:, unknown].any()  # what is not known stays so
+    legs = walk.active(PassiveLegs())
+    ankle = JOINT_NAMES.index("right_ankle_dorsiflexion")
+    helped = (walk.torque - legs.torque)[:, ankle]
+    assert -30.0 < helped.min() < -10.0 and helped.max() < 1.0  # a stretched calf pushes off by itself
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    ("story", "says"),
+    [("allocate_walking", "% with the passive torque of healthy legs"), ("allocate_ankle", "rms torque error")],
+)
+def test_story(story, says, tmp_path):
+    try:
+        data_folder()
+    except InputError:
+        pytest.skip("the measured walk is not here")
+    root = Path(__file__).parents[2]
+    (tmp_path / "analysis").mkdir()
+    copy = tmp_path / "analysis" / f"{story}.py"
+    copy.write_text((root / f"analysis/{story}.py").read_text())  # it draws beside itself
+    environment = {**os.environ, "PYTHONPATH": str(root)}
+    command = [sys.executable, str(copy)]
+    result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    assert result.returncode == 0, result.stderr
+    assert says in result.stdout
+    assert (tmp_path / f"out/{story}.png").stat().st_size > 10_000
