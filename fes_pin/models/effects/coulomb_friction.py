@@ -19,12 +19,12 @@ UNLOADED = 1e-3
 class CoulombFriction(Effect):
     """Dry friction at the joint, with or without more of it at rest (Stribeck) or under load.
 
-        torque - T x / (1 + x^8)^(1/8),   T = torque_nm |bearing_load|^load_exponent (1 + stiction exp(-(v / stribeck_speed)^2))
+        torque - T x / (1 + x^8)^(1/8),   T = torque_nm |load|^load_exponent (1 + stiction exp(-(v / stribeck_speed)^2))
         x = (torque + k v) / (T + k creep_speed),   k = STIFFEST J / h,   h the integration step
 
     It is T sign(v) in motion, and what holds the joint at rest: k v brings it there within a step. Under a torque below
     T the joint still creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of
-    small steps x = v / creep_speed. `bearing_load`: see the rig.
+    small steps x = v / creep_speed. `load` is the bearing's: see the rig.
     Rolling contacts lose by the elastic hysteresis of their Hertzian spots, as the load to the power 4/3.
 
     Tell-tale: the joint comes to rest at other angles from above than from below; free swings shrink by equal steps.

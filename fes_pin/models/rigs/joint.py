@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.data.trial import Trial
-from fes_pin.models.maths import cos, sin
+from fes_pin.models.maths import cos, sin, sqrt, where
 from fes_pin.models.parameters import parameter
 from fes_pin.models.rigs.base import Rig, first_rate
 from fes_pin.models.stage import Signals
@@ -57,13 +56,10 @@ class Joint(Rig):
         return ("effort",) if "effort" in trial.columns else ()
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
-        return (*self.needed, "swings", "weight")
+        return self.needed
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
-        known = {name: float(self.constants[name]) for name in self.needed}
-        weight = math.hypot(known["gravity_cos"], known["gravity_sin"])
-        swings = known["revolute"] > 0.0 and weight > WEIGHTLESS * known["inertia"]
-        return {**known, "swings": float(swings), "weight": weight if swings else 1.0}
+        return {name: float(self.constants[name]) for name in self.constant_names(trial.kind)}
 
     def initial_unknowns(self, trial: Trial) -> dict[str, float]:
         position, rate = first_rate(trial.time, trial["position"]) if "position" in trial.columns else (0.0, 0.0)
@@ -98,7 +94,9 @@ class Joint(Rig):
         tilted = s.through("gravity_angle", c.revolute * s.q)
         gravity = self.gravity_scale * (c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted))
         pull = self.gravity_scale * (c.gravity_sin * cos(tilted) - c.gravity_cos * sin(tilted)) + s.inertia * s.v * s.v
-        s.bearing_load = 1.0 + c.swings * (pull / c.weight - 1.0)
+        weight = sqrt(c.gravity_cos * c.gravity_cos + c.gravity_sin * c.gravity_sin)
+        swings = where(weight > WEIGHTLESS * c.inertia, c.revolute, 0.0)
+        s.bearing_load = 1.0 + swings * (pull / where(swings > 0.0, weight, 1.0) - 1.0)
         effort = s.through("effort", getattr(s.u, "effort", 0.0))
         s.torque = s.through("friction", s.through("torque", effort - gravity - self.damping * s.v))
         s.driving = s.through("driving", s.torque / s.inertia)
