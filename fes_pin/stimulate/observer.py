@@ -65,7 +65,7 @@ class JointObserver:
         self,
         dynamics: AnkleDynamics,
         angle_std_rad: float = 2e-3,
-        torque_wander: float = 0.02,
+        torque_wander: float = 0.01,
         share_wander: float = 0.02,
         share_std: float = 0.3,
     ) -> None:
