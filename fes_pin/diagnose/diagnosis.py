@@ -11,7 +11,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.experiment import NextExperiment, next_experiment
-from fes_pin.diagnose.held_out import Errors, Gain, HeldOut, cross_validate, errors_of, gain, separate
+from fes_pin.diagnose.held_out import Errors, Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.library import best_by_effect
 from fes_pin.diagnose.open_set import Remainder, remainder
 from fes_pin.diagnose.search import PARAMETER_PRICE, Search, Searched
@@ -26,6 +26,8 @@ ABSORBED_BELOW = 0.04
 """Share of its norm that an effect's sensitivity must keep beside the nominal parameters to be testable."""
 SEPARABLE = 2.71
 """Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: 1.645 squared (DESIGN 6.5)."""
+REFUSED_LEVEL = 1e-6
+"""Level of a cause at which something is there even if held-out trials refuse the name."""
 CONTENDERS = 4
 """Sets that each fold chooses among anew."""
 
@@ -50,6 +52,16 @@ class Cause:
     p_value: float
     gain_fit: float
     gain_held_out: Gain
+    evidence: Evidence | None = None
+
+    def helps(self, complete: bool) -> bool:
+        """True if trials that took no part speak for it.
+
+        Where the model leaves only noise the interval is that of their likelihood, and their open-loop errors must fall
+        too; else it is that of the errors.
+        """
+        known = self.evidence if complete else None
+        return self.gain_held_out.percent > 0.0 and (known.low if known else self.gain_held_out.low) > 0.0
 
 
 @dataclass(frozen=True)
@@ -168,11 +180,14 @@ def thinned(trial: Trial) -> Trial:
 def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Trial], seed: int) -> Diagnosis:
     left = remainder(searched.best, seed)
     causes, held = _causes(searched, left, test, seed)
-    while weak := [c for c in causes if c.gain_held_out.low <= 0.0]:
+    refused: list[Cause] = []
+    while weak := [c for c in causes if not c.helps(searched.complete)]:
         weakest = min(weak, key=lambda c: c.gain_held_out.low)
+        refused.append(weakest)
         searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
         left = remainder(searched.best, seed)
         causes, held = _causes(searched, left, test, seed)
+    left = _with_refused(left, refused)
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     nominal, best = searched.nominal, searched.best
     verdict = "causes_found" if causes else ("unexplained" if left.unexplained else "adequate")
@@ -182,7 +197,7 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         verdict=verdict,
         causes=tuple(causes),
         remainder=left,
-        absorbed=_absorbed(searched),
+        absorbed=_absorbed(searched, search.library.silent()),
         nominal=nominal,
         extended=best,
         nominal_error=(_error(nominal, searched.floor), held.nominal.error_percent() if held else None),
@@ -193,6 +208,15 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         held_out_by="the study's held-out trials" if test else "cross-validation over trials",
         wall_s=0.0,
     )
+
+
+def _with_refused(left: Remainder, refused: Sequence[Cause]) -> Remainder:
+    """A remainder also where a cause was certain, but trials that took no part did not bear out its form."""
+    certain = [c for c in refused if c.p_value < REFUSED_LEVEL]
+    if left.unexplained or not certain:
+        return left
+    surest = min(certain, key=lambda c: c.p_value)
+    return replace(left, unexplained=True, p_value=surest.p_value, where=surest.stage)
 
 
 def _error(fitted: Fit, floor: NoiseModel) -> float:
@@ -219,7 +243,7 @@ def _causes(
     out = []
     for one in best.model.effects:
         name = one.name
-        measured = held or HeldOut(inside_nominal, inside_best, inside)
+        measured = held or HeldOut(inside_nominal, inside_best, inside, {})
         out.append(
             Cause(
                 name=name,
@@ -229,6 +253,7 @@ def _causes(
                 p_value=searched.p_values[name],
                 gain_fit=gain(inside_nominal, inside[name], inside_best, seed).percent,
                 gain_held_out=gain(measured.nominal, measured.without[name], measured.extended, seed),
+                evidence=measured.evidence.get(name),
             )
         )
     return out, held
@@ -264,12 +289,12 @@ def _equivalents(searched: Searched, name: str, left: Remainder) -> tuple[str, .
     return tuple(sorted(set(out)))
 
 
-def _absorbed(searched: Searched) -> tuple[str, ...]:
+def _absorbed(searched: Searched, silent: Sequence[str]) -> tuple[str, ...]:
+    """Causes that these data could not show: taken up by the nominal parameters, or without effect in any trial."""
     found = {e.name for e in searched.best.model.effects}
     by_effect = best_by_effect(searched.scored)
-    return tuple(
-        sorted(n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < ABSORBED_BELOW)
-    )
+    taken = {n for n, many in by_effect.items() if n not in found and max(s.kept for s in many) < ABSORBED_BELOW}
+    return tuple(sorted(taken | set(silent)))
 
 
 def _ranking(searched: Searched) -> dict[str, tuple[Ranked, ...]]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.workers import in_parallel
-from fes_pin.identify.fit import Fit, fit_problem
-from fes_pin.identify.noise import Noise, NoiseModel
+from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem
+from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
@@ -99,12 +99,43 @@ def folds_of(trials: Sequence[Trial], count: int = FOLDS) -> list[list[int]]:
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """What a cause adds to the likelihood of trials that took no part.
+
+    The residual without it is the residual with it plus a difference Delta of predictions, all whitened:
+    |r + Delta|^2 - |r|^2 = |Delta|^2 + 2 r'Delta, which scatters by 2 |Delta| where r is noise.
+
+    Attributes
+    ----------
+    added
+        Twice the log-likelihood.
+    squares
+        |Delta|^2.
+    """
+
+    added: float
+    squares: float
+
+    @property
+    def low(self) -> float:
+        """Lower end of the 95 % interval."""
+        return self.added - 2.0 * CONFIDENCE_95 * math.sqrt(self.squares)
+
+    def __add__(self, other: Evidence) -> Evidence:
+        return Evidence(self.added + other.added, self.squares + other.squares)
+
+
+@dataclass(frozen=True)
 class HeldOut:
-    """Errors on held-out trials of the nominal model, the chosen extension, and it without each of its causes."""
+    """On held-out trials: errors of the nominal model, the chosen extension, and it without each of its causes.
+
+    `evidence` is of each cause beside the others, in the extension as it was chosen on all trials.
+    """
 
     nominal: Errors
     extended: Errors
     without: dict[str, Errors]
+    evidence: dict[str, Evidence]
 
 
 def cross_validate(
@@ -119,17 +150,17 @@ def cross_validate(
     """
     folds = [f for f in folds_of(nominal.trials) if len(f) < len(nominal.trials)]
     results = in_parallel(lambda f: _fold(f, nominal, best, without, contenders, floor), folds)
-    keys = list(without)
     return HeldOut(
-        _joined([r[0] for r in results]),
-        _joined([r[1] for r in results]),
-        {k: _joined([r[2][k] for r in results]) for k in keys},
+        _joined([r.nominal for r in results]),
+        _joined([r.extended for r in results]),
+        {n: _joined([r.without[n] for r in results]) for n in without},
+        {n: sum((r.evidence[n] for r in results), Evidence(0.0, 0.0)) for n in without},
     )
 
 
 def _fold(
     held: list[int], nominal: Fit, best: Fit, without: dict[str, Fit], contenders: Sequence[Fit], floor: NoiseModel
-) -> tuple[Errors, Errors, dict[str, Errors]]:
+) -> HeldOut:
     train = [i for i in range(len(nominal.trials)) if i not in held]
     test = [nominal.trials[i] for i in held]
 
@@ -137,38 +168,33 @@ def _fold(
         problem = Problem(fit.model, [fit.trials[i] for i in train], fit.noise)
         return fit_problem(problem, fit.values, [fit.unknowns[i] for i in train])
 
-    chosen = min((fitted(c) for c in (best, *contenders)), key=lambda f: f.sse + 3.84 * len(f.free))
-    rest = {n: errors_of(fitted(f).model, test, floor) for n, f in without.items()}
-    return errors_of(fitted(nominal).model, test, floor), errors_of(chosen.model, test, floor), rest
+    whole, rest = fitted(best), {n: fitted(f) for n, f in without.items()}
+    chosen = min((whole, *(fitted(c) for c in contenders)), key=lambda f: f.sse + 3.84 * len(f.free))
+    return replace(separate(fitted(nominal), whole, rest, test, floor), extended=errors_of(chosen.model, test, floor))
 
 
 def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Trial], floor: NoiseModel) -> HeldOut:
     """Errors on trials that the study itself holds out."""
+    left = _whitened(best, test)
     return HeldOut(
         errors_of(nominal.model, test, floor),
         errors_of(best.model, test, floor),
         {n: errors_of(f.model, test, floor) for n, f in without.items()},
+        {n: _evidence(_whitened(f, test), left) for n, f in without.items()},
     )
+
+
+def _whitened(fitted: Fit, test: Sequence[Trial]) -> np.ndarray:
+    """Whitened residuals on trials, each with its own unknowns estimated from it, end to end."""
+    problem = Problem(fitted.model, test, fitted.noise, ())
+    own = fit_problem(problem, fitted.values, problem.simulator.start(fitted.values))
+    return np.concatenate([p.residual for p in own.parts])
+
+
+def _evidence(without: np.ndarray, extended: np.ndarray) -> Evidence:
+    difference = without - extended
+    return Evidence(float(without @ without - extended @ extended), float(difference @ difference))
 
 
 def _joined(errors: Sequence[Errors]) -> Errors:
     return Errors(*(np.concatenate([getattr(e, name) for e in errors]) for name in ("squares", "spread", "counts")))
-
-
-def predictive_error(fitted: Fit) -> float:
-    """Logarithm of the mean squared error on trials left out in turn, averaged over trials.
-
-    Fits are for least open-loop error, and each trial's own unknowns are estimated from it; the logarithm keeps one
-    large motion from deciding alone.
-    """
-    white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in fitted.noise.items()}
-    logarithms = []
-    for held in folds_of(fitted.trials):
-        train = [i for i in range(len(fitted.trials)) if i not in held]
-        problem = Problem(fitted.model, [fitted.trials[i] for i in train], white)
-        again = fit_problem(problem, fitted.values, [fitted.unknowns[i] for i in train])
-        for i in held:
-            alone = Problem(again.model, [fitted.trials[i]], white, ())
-            own = fit_problem(alone, again.values, [fitted.unknowns[i]])
-            logarithms.append(math.log(max(own.sse / max(own.samples, 1), 1e-12)))
-    return float(np.mean(logarithms))

@@ -19,6 +19,8 @@ from fes_pin.models.stage import Effect
 
 TINY = 0.02
 """Share of an amplitude's scale at which a one-sided effect is linearized: next to its null, on its own side."""
+RIDGE = 1e-8
+"""Added to the scaled Gram matrix of two probes, which may be the same."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Library:
 
     def __init__(self, model: Model, trials: Sequence[Trial]) -> None:
         self.effects = effects_for(model.rig.name)
-        self.trials = tuple(trials)
+        self.model, self.trials = Model(model.rig), tuple(trials)
         self.measured = measured_columns(model, trials)
         self._problems: dict[str, Problem] = {}
 
@@ -70,6 +72,10 @@ class Library:
         nominal = Model(fitted.model.rig)
         wanted = [e for e in self.effects if e.name not in exclude and self._acts(e, nominal)]
         return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
+
+    def silent(self) -> tuple[str, ...]:
+        """Names of the effects that act in none of the trials: of a joint, where all are isometric."""
+        return tuple(e.name for e in self.effects if not self._acts(e, self.model))
 
     def _acts(self, effect: type[Effect], nominal: Model) -> bool:
         rig = nominal.rig
@@ -154,7 +160,8 @@ class Projection:
             block = slice(at, at + probe.columns.shape[1])
             at = block.stop
             blocks.append(block)
-            out.append(_score(probe, gram[block, block], along[block], float(before[block].sum())))
+            slim = replace(probe, columns=probe.columns[:0])
+            out.append(_score(slim, gram[block, block], along[block], float(before[block].sum())))
         return Scores(out, gram, along, blocks)
 
 
@@ -165,7 +172,7 @@ class Scores:
     Attributes
     ----------
     scored
-        One for each probe.
+        One for each probe, whose columns are dropped.
     gram
         Shape (k, k): inner products of what the fit leaves of all columns.
     along
@@ -221,32 +228,54 @@ def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
 
 def best_pairs(scores: Scores, count: int) -> list[tuple[Scored, Scored]]:
     """Pairs of effects whose linearizations together promise most, best first, each pair of names once."""
-    found: dict[tuple[str, str], tuple[float, Scored, Scored]] = {}
-    for i, first in enumerate(scores.scored):
-        for j in range(i):
-            second = scores.scored[j]
-            if first.probe.name == second.probe.name or not (first.kept > 0 and second.kept > 0):
-                continue
-            gain, a, b = _pair(scores, i, j)
-            key = (second.probe.name, first.probe.name)
-            if key not in found or gain > found[key][0]:
-                found[key] = (gain, replace(first, amplitudes=a), replace(second, amplitudes=b))
-    ordered = sorted(found.items(), key=lambda item: (-item[1][0], item[0]))[:count]
-    return [(one, other) for _, (_, one, other) in ordered]
+    found: dict[tuple[str, str], tuple[Scored, Scored]] = {}
+    first, second, promise = _pair_promises(scores)
+    for k in np.argsort(-promise, kind="stable"):
+        i, j = int(first[k]), int(second[k])
+        one, other = scores.scored[i], scores.scored[j]
+        key = (other.probe.name, one.probe.name)
+        if key in found or one.probe.name == other.probe.name or not (one.kept > 0 and other.kept > 0):
+            continue
+        inside = _inside(scores, i, j)
+        if inside is not None:
+            found[key] = (replace(one, amplitudes=inside[0]), replace(other, amplitudes=inside[1]))
+            if len(found) == count:
+                break
+    return list(found.values())
 
 
-def _pair(scores: Scores, i: int, j: int) -> tuple[float, dict[str, float], dict[str, float]]:
-    """Joint promise of two probes within their bounds, and the amplitudes that go with it."""
+def _pair_promises(scores: Scores) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Every pair of probes and what both promise together, bounds aside; each of shape (pairs,).
+
+    Blocks are filled up to one size with rows of the identity, which promise nothing.
+    """
+    size, rows = max(b.stop - b.start for b in scores.blocks), len(scores.along)
+    gram = np.eye(rows + 2 * size)
+    gram[:rows, :rows] = scores.gram
+    along = np.concatenate([scores.along, np.zeros(2 * size)])
+    spare = [np.arange(rows + k * size, rows + (k + 1) * size) for k in range(2)]
+    where = [np.stack([np.r_[b, fill][:size] for b in scores.blocks]) for fill in spare]
+    first, second = np.tril_indices(len(scores.blocks), -1)
+    at = np.concatenate([where[0][first], where[1][second]], axis=1)
+    inner, toward = gram[at[:, :, None], at[:, None, :]], along[at]
+    scale = 1.0 / np.sqrt(np.maximum(np.einsum("kii->ki", inner), 1e-300))
+    scaled = inner * scale[:, :, None] * scale[:, None, :] + RIDGE * np.eye(2 * size)
+    x = scale * np.linalg.solve(scaled, (toward * scale)[:, :, None])[:, :, 0]
+    return first, second, 2.0 * np.einsum("ki,ki->k", toward, x) - np.einsum("ki,kij,kj->k", x, inner, x)
+
+
+def _inside(scores: Scores, i: int, j: int) -> tuple[dict[str, float], dict[str, float]] | None:
+    """Amplitudes at which two probes together explain most; None if they lie outside their bounds."""
     rows = np.r_[scores.blocks[i], scores.blocks[j]]
     gram, along = scores.gram[np.ix_(rows, rows)], scores.along[rows]
     keys = [(k, n) for k in (i, j) for n in scores.scored[k].probe.effect.amplitudes()]
     info = [scores.scored[k].probe.effect.parameters()[n] for k, n in keys]
     scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    scaled = gram * np.outer(scale, scale) + 1e-8 * np.eye(len(rows))
+    scaled = gram * np.outer(scale, scale) + RIDGE * np.eye(len(rows))
     x = scale * np.linalg.solve(scaled, along * scale)
     nulls = np.array([f.null or 0.0 for f in info])
     if any(not f.lower <= v + z <= f.upper for f, v, z in zip(info, x, nulls, strict=True)):
-        return 0.0, {}, {}
+        return None
     values = {key: float(v + z) for key, v, z in zip(keys, x, nulls, strict=True)}
-    first, second = ({n: v for (k, n), v in values.items() if k == which} for which in (i, j))
-    return float(2.0 * along @ x - x @ gram @ x), first, second
+    one, other = ({n: v for (k, n), v in values.items() if k == which} for which in (i, j))
+    return one, other

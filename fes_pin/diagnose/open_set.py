@@ -1,23 +1,35 @@
-"""What no cause in the library explains: lack of fit on smooth features of the motion, and where it is."""
+"""What no cause in the library explains, and where it is.
+
+Four tests share one level: lack of fit on smooth features of the motion; bursts at times of their own; spectral lines;
+torque that repeats with the angle over short distances. The last three see what the first is blind to, and what an
+autoregressive noise model takes for noise.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.signal
 import scipy.stats
 
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.bursts import burst_p_value
+from fes_pin.diagnose.detents import detent_p_value
+from fes_pin.diagnose.innovations import channels, under_own_noise
 from fes_pin.diagnose.library import Projection
+from fes_pin.diagnose.lines import LONGEST_NOISE, line_p_value
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
 
-REMAINDER_LEVEL = 0.01
-"""Level of the test of the remainder; see `search.CLAIM_LEVEL`."""
+REMAINDER_LEVEL = 0.02
+"""Level of all tests of the remainder together; see `search.CLAIM_LEVEL`."""
+SHARES = {"smooth": 1 / 2, "burst": 1 / 6, "line": 1 / 6, "detent": 1 / 6}
+"""Of the level, for each test."""
+SMOOTH_LEVEL = REMAINDER_LEVEL * SHARES["smooth"]
 STRONG_LEVEL = 1e-12
 """Level at which a remainder counts although it differs from trial to trial: a spasm, not noise."""
 SIGN_DRAWS = 400
@@ -134,6 +146,34 @@ def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
 
 
 def remainder(fitted: Fit, seed: int = 0) -> Remainder:
+    """Test whether a fit leaves anything but noise.
+
+    The p-value is that of the most significant of the four tests, over its share of the level.
+    """
+    smooth = smooth_remainder(fitted, seed)
+    found = [(smooth.p_value / SHARES["smooth"], smooth.where), *_others(fitted)]
+    p_value, where = min(found, key=lambda f: f[0])
+    if smooth.unexplained:
+        return replace(smooth, p_value=min(1.0, p_value, smooth.p_value))
+    unexplained = p_value < REMAINDER_LEVEL
+    return Remainder(unexplained, min(1.0, p_value), where if unexplained else None, smooth.excess)
+
+
+def _others(fitted: Fit) -> list[tuple[float, str]]:
+    """p-values of bursts, lines and detents over their shares of the level, and what each depends on."""
+    own = under_own_noise(fitted)
+    groups = channels(own)
+    bursts = min(burst_p_value([e.values for e in pieces], noise, pieces[0].dt) for noise, pieces in groups)
+    line, where = min(line_p_value(pieces) for _, pieces in channels(under_own_noise(fitted, LONGEST_NOISE)))
+    detents = detent_p_value(own, Projection(own.parts))
+    return [
+        (len(groups) * bursts / SHARES["burst"], "time"),
+        (len(groups) * line / SHARES["line"], where),
+        (detents / SHARES["detent"], "angle"),
+    ]
+
+
+def smooth_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     """Test whether smooth features explain anything that a fit leaves.
 
     The chi-square of the features is divided by the inflation that it shows when each trial's features change sign at
@@ -152,14 +192,14 @@ def remainder(fitted: Fit, seed: int = 0) -> Remainder:
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
     plain = float(scipy.stats.chi2.sf(statistic, rank))
     p_value = float(scipy.stats.chi2.sf(statistic / _inflation(shares, rank, seed), rank))
-    unexplained = p_value < REMAINDER_LEVEL or plain < STRONG_LEVEL
+    unexplained = p_value < SMOOTH_LEVEL or plain < STRONG_LEVEL
     scores: dict[str, float] = {}
     for name, z in zip(names, columns.T @ projection.residual, strict=True):
         scores[name] = max(scores.get(name, 0.0), float(z**2))
     where = max(scores, key=lambda n: scores[n]) if unexplained else None
     inflation = _inflation(shares, rank, seed)
     excess = max(0.0, statistic / inflation - float(scipy.stats.chi2.ppf(0.975, rank)))
-    shown = plain if unexplained and p_value >= REMAINDER_LEVEL else p_value
+    shown = plain if unexplained and p_value >= SMOOTH_LEVEL else p_value
     return Remainder(bool(unexplained), shown, where, excess)
 
 

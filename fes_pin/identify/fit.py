@@ -12,7 +12,7 @@ import scipy.stats
 from threadpoolctl import ThreadpoolController
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
+from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, NormalEquations, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
 
@@ -147,7 +147,7 @@ class _Search:
             if np.isfinite(sse) and sse <= self.sse:
                 gained = self.sse - sse
                 self.x, self.unknowns, self.parts, self.sse = new_x, locals_, parts, sse
-                self.damping = max(self.damping * 0.2, 1e-9)
+                self.damping = max(self.damping * _relief(gained / promised), 1e-9)
                 return gained < TOLERANCE
             self.damping = max(self.damping * 10.0, 1e-4)
         return True
@@ -266,8 +266,8 @@ def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
     return out
 
 
-def noise_of(fitted: Fit) -> dict[str, Noise]:
-    """The noise that a fit's residuals show, by output column."""
+def noise_of(fitted: Fit, longest: int = ORDERS[-1]) -> dict[str, Noise]:
+    """The noise that a fit's residuals show, by output column, with autoregressions up to the order `longest`."""
     problem = Problem(fitted.model, fitted.trials, fitted.noise, free=())
     step = noise_step([t.dt for t in fitted.trials])
     columns: dict[str, list[np.ndarray]] = {}
@@ -277,9 +277,14 @@ def noise_of(fitted: Fit) -> dict[str, Noise]:
             columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
             squares.setdefault(name, []).append(float(np.mean(residual**2)))
     return {
-        name: estimate_noise(pieces, len(fitted.free), math.sqrt(float(np.mean(squares[name]))), step)
+        name: estimate_noise(pieces, len(fitted.free), math.sqrt(float(np.mean(squares[name]))), step, longest)
         for name, pieces in columns.items()
     }
+
+
+def _relief(kept: float) -> float:
+    """Factor on the damping after a step that kept this share of its promise (Nielsen, IMM-REP-1999-05, Copenhagen)."""
+    return float(np.clip(1.0 - (2.0 * kept - 1.0) ** 3, 0.2, 2.0))
 
 
 def _damped(hessian: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:

@@ -67,7 +67,11 @@ class Noise:
 
 
 def estimate_noise(
-    residuals: Sequence[np.ndarray], used: int = 0, std: float | None = None, step_s: float = 0.0
+    residuals: Sequence[np.ndarray],
+    used: int = 0,
+    std: float | None = None,
+    step_s: float = 0.0,
+    longest: int = ORDERS[-1],
 ) -> Noise:
     """Fit autoregressive noise to the residuals of one channel, by least squares.
 
@@ -81,10 +85,12 @@ def estimate_noise(
         Standard deviation of single samples, where the residuals are averages.
     step_s
         Time step of the residuals, if they are averages.
+    longest
+        Highest order that is tried.
     """
     total = sum(len(r) for r in residuals)
     shortest = min(len(r) for r in residuals)
-    orders = [p for p in ORDERS if p <= shortest // 10]
+    orders = [p for p in ORDERS if p <= min(longest, shortest // 10)]
     order_limit = orders[-1]
     lagged = [_lags(r, order_limit) for r in residuals if len(r) > 2 * order_limit + 2]
     gram = np.sum([m.T @ m for m in lagged], axis=0)

@@ -14,7 +14,7 @@ def predict(model: Model, trial: Trial) -> Trial:
     """What the model predicts for a trial: its time and the predicted output columns.
 
     A joint's initial state is the first sample of `position` and `velocity`, or the conditions `position0` and
-    `velocity0`; nothing else of the outputs is used.
+    `velocity0`; a velocity that is missing is estimated from the first 0.2 s. Nothing else of the outputs is used.
 
     Raises
     ------

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from diagnose.hidden import diagnosed, slide, study_of
+from diagnose.hidden import diagnosed, shortened, slide, study_of
 
 from fes_pin.data.errors import InputError
 from fes_pin.diagnose.diagnosis import diagnose
@@ -50,3 +50,10 @@ def test_a_study_that_holds_out_everything():
     study = study_of("muscle")
     with pytest.raises(InputError, match="at least one trial to fit"):
         diagnose(replace(study, trials=tuple(replace(t, role="held_out") for t in study.trials)))
+
+
+def test_isometric_trials_alone_do_not_test_the_joint():
+    diagnosis = diagnose(shortened(study_of("ankle", seed=22), {"isometric"}))
+    check_adequate(diagnosis)
+    assert {"coulomb_friction", "load_error", "frame_vibration", "force_length"} <= set(diagnosis.absorbed)
+    assert "threshold_drift" not in diagnosis.absorbed

@@ -87,6 +87,10 @@ class Rig:
         """Start values of the unknowns of a trial, from its first samples."""
         return {}
 
+    def unmeasured(self, trial: Trial) -> tuple[str, ...]:
+        """Names of the unknowns that a trial's first sample does not tell."""
+        return ()
+
     def guess(self, trial: Trial) -> float:
         """Where the search for the static equilibrium starts."""
         return 0.0

@@ -65,6 +65,10 @@ class Joint(Rig):
             "initial_velocity": float(conditions.get("velocity0", rate)),
         }
 
+    def unmeasured(self, trial: Trial) -> tuple[str, ...]:
+        told = "velocity" in trial.columns or "velocity0" in trial.conditions
+        return () if told or "position" not in trial.columns else ("initial_velocity",)
+
     def set_rest(self, s: Signals, z: Any) -> None:
         s.x.q, s.x.v, s.m.rest = s.initial.initial_position, s.initial.initial_velocity, s.initial.initial_position
         s.q = s.sensed = s.x.q

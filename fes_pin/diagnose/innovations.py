@@ -1,0 +1,53 @@
+"""A fit's innovations channel by channel, under the noise that its residuals show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit, noise_of
+from fes_pin.identify.noise import ORDERS, Noise, thinning
+from fes_pin.identify.problem import Problem
+
+
+@dataclass(frozen=True)
+class Innovations:
+    """One channel of one trial.
+
+    Attributes
+    ----------
+    values
+        Shape (n,), of unit variance.
+    dt
+        Their time step, s.
+    """
+
+    trial: Trial
+    values: np.ndarray
+    dt: float
+
+
+def under_own_noise(fitted: Fit, longest: int = ORDERS[-1]) -> Fit:
+    """The same model, linearized where it is under the noise that its residuals show; `longest` as in `noise_of`."""
+    noise = noise_of(fitted, longest)
+    parts = Problem(fitted.model, fitted.trials, noise, fitted.free).linearize(fitted.values, fitted.unknowns)
+    return replace(fitted, noise=noise, parts=tuple(parts))
+
+
+def channels(fitted: Fit) -> list[tuple[Noise, list[Innovations]]]:
+    """Innovations by channel and time step, with the noise that whitened them."""
+    found: dict[tuple[str, float], list[Innovations]] = {}
+    for trial, part in zip(fitted.trials, fitted.parts, strict=True):
+        at = 0
+        for name in fitted.model.rig.outputs(trial.kind):
+            if name not in trial.columns or name not in fitted.noise:
+                continue
+            noise = fitted.noise[name]
+            count = thinning(trial.dt, noise.step_s)
+            size = max(len(trial) // count - len(noise.ar), 0)
+            step = round(trial.dt * count, 9)
+            found.setdefault((name, step), []).append(Innovations(trial, part.residual[at : at + size], step))
+            at += size
+    return [(fitted.noise[name], pieces) for (name, _), pieces in found.items()]

@@ -1,0 +1,232 @@
+"""Sets of causes fitted jointly with the nominal model, under one noise model."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.library import Library, Projection, Scored, Scores
+from fes_pin.diagnose.noise_floor import rich_noise, whiteless
+from fes_pin.diagnose.workers import in_parallel
+from fes_pin.identify.fit import CONFIDENCE_95, MAX_ITERATIONS, Fit, fit_problem, noise_of
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.problem import Problem
+from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
+
+STARTS = 2
+"""Shapes that a joint fit starts from."""
+LOOK = 15
+"""Iterations of a first look. Most fits end in fewer; the others go on only while they are among the best."""
+GLANCE = 5
+"""Iterations after which the best start of a refinement is chosen, which alone goes on."""
+PURSUED = 6
+"""Best sets of a size that go on until they converge."""
+PARAMETER_PRICE = 3.84
+"""Twice the log-likelihood that one more parameter must earn: chi-square with one degree of freedom at 95 %."""
+
+Names = tuple[str, ...]
+
+
+class JointFits:
+    """Fits of sets of causes to one set of trials, by the names of the causes.
+
+    Attributes
+    ----------
+    noise
+        What all `fits` were made under.
+    fits
+        By names in alphabetical order; `()` is the nominal model.
+    """
+
+    def __init__(self, model: Model, trials: Sequence[Trial]) -> None:
+        self.model, self.trials = Model(model.rig), tuple(trials)
+        self.library = Library(self.model, trials)
+        self.noise: NoiseModel = {}
+        self.fits: dict[Names, Fit] = {}
+        self._problems: dict[tuple, Problem] = {}
+        self._looks: dict[Names, int] = {}
+        self._scores: dict[int, tuple[Fit, Scores]] = {}
+        self._refinements: dict[int, tuple[Fit, Fit | None]] = {}
+
+    def problem(self, model: Model) -> Problem:
+        """The problem of a model's structure, under the present noise."""
+        key = (model.structure(), model.fitted_parameters(), _choices(model))
+        if key not in self._problems:
+            self._problems[key] = Problem(model, self.trials, self.noise)
+        self._problems[key].noise = self.noise
+        return self._problems[key]
+
+    def fit_from(self, starts: Iterable[Model], unknowns: list[dict[str, float]] | None, iterations: int = LOOK) -> Fit:
+        """The best of several fits of one structure, each of so many iterations at most."""
+        fitted = [fit_problem(self.problem(s), s.parameters(), unknowns, iterations) for s in starts]
+        return min(fitted, key=lambda f: f.sse)
+
+    def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:
+        """Fit a base with one more effect, from its most promising shapes.
+
+        Amplitudes start at their linear estimate; where that falls over (a stiffness below zero), at their nulls.
+        """
+        starts = [base.model + _with_amplitudes(s.probe.effect, s.amplitudes) for s in scored[:STARTS]]
+        fitted = self.fit_from(starts, base.unknowns)
+        if np.isfinite(fitted.sse):
+            return fitted
+        return self.fit_from([base.model + one.probe.effect for one in scored[:STARTS]], base.unknowns)
+
+    def extend_with_both(self, base: Fit, pair: tuple[Scored, Scored]) -> Fit:
+        """Fit a base with two more effects at once."""
+        model = base.model
+        for one in pair:
+            model = model + _with_amplitudes(one.probe.effect, one.amplitudes)
+        return self.fit_from([model], base.unknowns)
+
+    def add(self, made: dict[Names, Callable[[], Fit]]) -> None:
+        """Fit sets side by side, and pursue the best of their size."""
+        fitted = in_parallel(lambda make: make(), made.values())
+        self.fits.update(zip(made, fitted, strict=True))
+        self._looks.update(dict.fromkeys(made, 1))
+        for size in sorted({len(n) for n in made}):
+            self._pursue(size)
+
+    def _pursue(self, size: int) -> None:
+        """Go on with fits that have not converged, as long as they are among the best of their size."""
+        while slow := [n for n in self.ranked(size)[:PURSUED] if self._unfinished(n)]:
+            self.fits.update(zip(slow, in_parallel(lambda n: self._go_on(self.fits[n], LOOK), slow), strict=True))
+            for names in slow:
+                self._looks[names] += 1
+
+    def _unfinished(self, names: Names) -> bool:
+        one = self.fits[names]
+        return not one.converged and bool(np.isfinite(one.sse)) and self._looks.get(names, 9) * LOOK < MAX_ITERATIONS
+
+    def _go_on(self, fitted: Fit, iterations: int) -> Fit:
+        return self.fit_from([fitted.model], fitted.unknowns, iterations)
+
+    def scores(self, base: Fit) -> Scores:
+        """Promise of every effect that a fit does not have."""
+        if id(base) not in self._scores:
+            probes = self.library.probes(base, self.noise, exclude=names_of(base))
+            self._scores[id(base)] = (base, Projection(base.parts).score(probes))
+        return self._scores[id(base)][1]
+
+    def set_noise(self, noise: NoiseModel) -> None:
+        """Fit under this noise from now on."""
+        self.noise = noise
+        self._scores.clear()
+        self._refinements.clear()
+
+    def first_noise(self, base: Fit) -> None:
+        """The noise of the nominal model, beside everything that the library could explain: only to rank causes."""
+        white = whiteless(noise_of(base))
+        probes = self.library.probes(base, white, exclude=())
+        self.set_noise(rich_noise(base, white, [p.columns for p in probes]))
+
+    def refit(self, names: Iterable[Names], noise_from: Names) -> None:
+        """Fit sets of causes again under the noise that one of them leaves, and forget all others."""
+        kept, old = [n for n in dict.fromkeys(names) if n in self.fits], self.fits
+        self.set_noise(noise_of(old[noise_from]))
+        self.fits = {}
+        self.add({n: lambda n=n: self._go_on(old[n], LOOK) for n in kept})  # type: ignore[misc]
+        self.finish(noise_from)
+
+    def finish(self, names: Names) -> None:
+        """Let one fit converge, whatever its rank."""
+        if not self.fits[names].converged:
+            self.fits[names] = self._go_on(self.fits[names], MAX_ITERATIONS)
+
+    def base(self, rest: Names, names: Names) -> Fit:
+        """The fit of a subset of a set, from the set's own values if there is none yet."""
+        if rest not in self.fits:
+            whole = self.fits[names]
+            model = whole.model
+            for n in set(names) - set(rest):
+                model = model - n
+            self.fits[rest] = self.fit_from([model], whole.unknowns, MAX_ITERATIONS)
+        self.finish(rest)
+        return self.fits[rest]
+
+    def refinement(self, names: Names) -> Fit | None:
+        """The best fit of a set with the form of one of its effects refined; None if no form is, or none is told.
+
+        What a refinement adds must be told from nothing: a form that the data do not determine explains nothing.
+        """
+        base = self.fits[names]
+        if id(base) not in self._refinements:
+            self._refinements[id(base)] = (base, self._refinement(base))
+        return self._refinements[id(base)][1]
+
+    def _refinement(self, base: Fit) -> Fit | None:
+        starts = [s for name in names_of(base) for s in _refined(base.model, name)]
+        fitted = in_parallel(lambda s: self.fit_from([s], base.unknowns, GLANCE), starts)
+        if not fitted:
+            return None
+        best = min(fitted, key=lambda f: f.sse)
+        best = best if best.converged else self._go_on(best, MAX_ITERATIONS)
+        return best if _is_told(best) else None
+
+    def price(self, names: Names) -> float:
+        """Twice the negative log-likelihood, with what its parameters must earn."""
+        return self.fits[names].sse + PARAMETER_PRICE * len(self.fits[names].free)
+
+    def ranked(self, size: int) -> list[Names]:
+        """Sets of a size, cheapest first."""
+        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (self.price(n), n))
+
+
+def names_of(fitted: Fit) -> Names:
+    """The causes in a fit."""
+    return tuple(sorted(e.name for e in fitted.model.effects))
+
+
+def subsets(names: Names) -> list[Names]:
+    """The sets with one cause less."""
+    return [tuple(m for m in names if m != n) for n in names]
+
+
+def _choices(model: Model) -> tuple[float, ...]:
+    """Values of discrete choices, which compiled problems share but fits must not mix."""
+    info = model.parameter_info()
+    return tuple(v for n, v in model.parameters().items() if not info[n].fitted)
+
+
+def _refined(model: Model, name: str) -> list[Model]:
+    """Starts with the refinements of one effect switched on."""
+    (effect,) = (e for e in model.effects if e.name == name)
+    info = {n: effect.parameters()[n] for n in effect.refinements()}
+    if not info or effect.refined():
+        return []
+    choices = itertools.product(*(i.grid for i in info.values()))
+    return [model.with_parameters({f"{name}.{n}": v for n, v in zip(info, values, strict=True)}) for values in choices]
+
+
+def _is_told(fitted: Fit) -> bool:
+    """True if the data tell every parameter that has a null from it, in all effects whose form is refined."""
+    for one in fitted.model.effects:
+        if not one.refined():
+            continue
+        for n, info in one.parameters().items():
+            name = f"{one.name}.{n}"
+            if name not in fitted.free:
+                continue
+            std, away = fitted.std(name), getattr(one, n) - info.null if info.null is not None else np.inf
+            if not np.isfinite(std) or abs(away) < CONFIDENCE_95 * std:
+                return False
+    return True
+
+
+def _with_amplitudes(effect: Effect, amplitudes: dict[str, float]) -> Effect:
+    """The effect at a linear estimate of its amplitudes, or a step from its null where that says nothing."""
+    info = effect.parameters()
+    values = {}
+    for name, value in amplitudes.items():
+        null, one = info[name].null, info[name]
+        assert null is not None
+        step = 0.2 * one.scale if one.upper > null else -0.2 * one.scale
+        far = 20.0 * one.scale
+        values[name] = (
+            null + step if abs(value - null) < 1e-6 * one.scale else float(np.clip(value, null - far, null + far))
+        )
+    return type(effect)(**{**{n: getattr(effect, n) for n in info}, **values})

@@ -1,0 +1,128 @@
+"""The remainder: what is outside the library is seen and located, and noise of every family is not."""
+
+import math
+
+import numpy as np
+import oracle.rigs
+import pytest
+import scipy.signal
+from diagnose.hidden import study_of
+from identify.rigs import trials_of
+
+from fes_pin.diagnose.bursts import burst_p_value
+from fes_pin.diagnose.innovations import channels, under_own_noise
+from fes_pin.diagnose.open_set import REMAINDER_LEVEL, SHARES, remainder
+from fes_pin.identify.fit import fit
+from fes_pin.identify.noise import Noise
+from fes_pin.models.nominal import nominal_model
+from fes_pin.models.predict import predict
+
+DT = 0.005
+WHITE = Noise(1.0, (), 1.0)
+TREMBLING = Noise(1.0, (1.6, -0.64), 5.0)
+"""An autoregression with both poles at 0.8."""
+
+
+def left_in(study):
+    return remainder(fit(nominal_model(study), study.trials))
+
+
+def forces(rng, bend=lambda t, force: force, colour=0.0):
+    """Trials of a muscle with a change of its force and autoregressive noise, and the fit of its nominal model."""
+    model, trials = trials_of("muscle", rng, count=6, n=1000)
+    made = []
+    for trial in trials:
+        force = bend(trial.time, predict(model, trial)["force_n"])
+        noise = scipy.signal.lfilter([math.sqrt(1.0 - colour**2)], [1.0, -colour], rng.standard_normal(1000))
+        made.append(trial.with_columns(force_n=force + 0.2 * noise))
+    return fit(model, made)
+
+
+@pytest.mark.parametrize("noise", ["white", "ar1", "process"])
+@pytest.mark.parametrize("rig", ["ankle", "joint"])
+def test_nothing_is_left_of_noise(rig, noise):
+    left = left_in(study_of(rig, noise=noise, seed=40, n_motion=3, duration_s=4.0))
+    assert not left.unexplained and left.where is None
+    assert REMAINDER_LEVEL <= left.p_value <= 1.0
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.6, 0.9])
+def test_nothing_is_left_of_a_muscles_noise(colour):
+    """At a level of 2 %, 2 of 6 have a probability of 6e-3."""
+    rng = np.random.default_rng(41)
+    assert sum(remainder(forces(rng, colour=colour)).unexplained for _ in range(6)) <= 1
+
+
+def test_the_level_is_shared_out():
+    assert sum(SHARES.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("noise", [WHITE, TREMBLING], ids=["white", "coloured"])
+def test_bursts_keep_their_level(noise):
+    """At 5 %, more than 9 of 80 have a probability of 0.008."""
+    rng = np.random.default_rng(42)
+    p_values = [burst_p_value(list(rng.standard_normal((5, 600))), noise, DT) for _ in range(80)]
+    assert sum(p < 0.05 for p in p_values) <= 9
+    assert all(0.0 < p <= 1.0 for p in p_values)
+
+
+def test_single_bad_samples_are_no_bursts():
+    rng = np.random.default_rng(43)
+    e = rng.standard_normal((6, 1000))
+    e[rng.random(e.shape) < 0.01] *= 10.0
+    assert burst_p_value(list(e), WHITE, DT) > 1e-3
+
+
+@pytest.mark.parametrize("noise", [WHITE, TREMBLING], ids=["white", "coloured"])
+def test_humps_at_random_times_are_bursts(noise):
+    """Three in each trial, each 7 standard deviations of its own amplitude."""
+    rng = np.random.default_rng(44)
+    hump = np.sin(np.pi * (np.arange(60) + 0.5) / 60) ** 2
+    shape = np.convolve(hump, np.r_[1.0, -np.array(noise.ar)])
+    e = rng.standard_normal((6, 1000))
+    for trial in e:
+        for at in rng.integers(0, 1000 - len(shape), 3):
+            trial[at : at + len(shape)] += 7.0 * shape / np.linalg.norm(shape)
+    assert burst_p_value(list(e), noise, DT) < 1e-4
+
+
+@pytest.mark.parametrize("hz", [12.5, 40.0])
+def test_ripple_of_the_force_goes_with_the_stimulus(hz):
+    """0.06 N on a noise of 0.2 N: d = 15."""
+    rng = np.random.default_rng(45)
+    left = remainder(forces(rng, lambda t, f: f + 0.06 * f / np.abs(f).mean() * np.sin(2.0 * math.pi * hz * t)))
+    assert left.unexplained and left.where == "stimulus", left
+
+
+def test_a_line_of_any_phase_is_a_matter_of_time():
+    rng = np.random.default_rng(46)
+    left = remainder(forces(rng, lambda t, f: f + 0.08 * np.sin(2.0 * math.pi * 31.0 * t + rng.uniform(0.0, 7.0))))
+    assert left.unexplained and left.where == "time", left
+
+
+def test_a_sensor_that_slips_is_seen():
+    rng = np.random.default_rng(47)
+    left = remainder(forces(rng, lambda t, f: f + 0.5 * (t - t[0] > rng.uniform(1.0, 4.0))))
+    assert left.unexplained, left
+
+
+@pytest.mark.parametrize("rig", ["ankle", "joint"])
+def test_detents_are_seen_in_the_angle(rig, monkeypatch):
+    """A joint that prefers every tenth of its range."""
+    usual = oracle.rigs.joint_torque
+
+    def torque(x, q, v, t, causes):
+        return usual(x, q, v, t, causes) - 0.03 * math.sin(2.0 * math.pi * q / 0.15)
+
+    monkeypatch.setattr(oracle.rigs, "joint_torque", torque)
+    left = left_in(study_of(rig, seed=48))
+    assert left.unexplained, left
+
+
+def test_innovations_are_what_the_fit_was_whitened_to():
+    study = study_of("ankle", seed=49)
+    own = under_own_noise(fit(nominal_model(study), study.trials))
+    pieces = [e.values for _, group in channels(own) for e in group]
+    assert {len(group) for _, group in channels(own)} == {4, 2}
+    assert sum(len(e) for e in pieces) == sum(len(p.residual) for p in own.parts)
+    assert np.concatenate(pieces).std() == pytest.approx(1.0, abs=0.03)
