@@ -107,11 +107,11 @@ The difference, traced. (1) On the twins E <= 10 % has no upper end. With k1 : k
 lighter foot; behind a muscle with a lag of 50 ms its inertia hardly shows. (2) The choice of what the paper does not
 print (stimulus, F_ANT, excursion), or a shorter lag, does not explain it: on {rigs} such rigs per trial, without a
 frame, E at table 2's ends rises by at most {greatest["3-23"]:.2f} and {greatest["4-24"]:.2f} %, where 4.65 and 5.83 %
-are needed. (3) The two tables do not fit one another, either: for 3-23 no ellipsoid has these ends and this best point (its
-least E would be negative); table 1 lies in a corner of table 2's box, with k1 / k2 = 0.425 where both ends have 0.38.
-(4) With one ratio moved at a time, k1 and k2 end near table 2's minima (for 4-24 near its maxima, too), k3 far outside.
-So table 2 does not hold the extremes of E <= 10 % as eq. (1) has them on any rig tried here; its search must have held
-something that the paper does not name, or ended early. Which of the two, the paper does not say."""
+are needed. (3) The two tables do not fit one another, either: for 3-23 no ellipsoid has these ends and this best point
+(its least E would be negative); table 1 lies in a corner of table 2's box, with k1 / k2 = 0.425 where both ends have
+0.38. (4) With one ratio moved at a time, k1 and k2 end near table 2's minima (for 4-24 near its maxima, too), k3 far
+outside. So table 2 does not hold the extremes of E <= 10 % as eq. (1) has them on any rig tried here; its search must
+have held something that the paper does not name, or ended early. Which of the two, the paper does not say."""
 )
 
 # %% What cannot be told, said by the tool

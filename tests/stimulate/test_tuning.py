@@ -102,6 +102,23 @@ def test_gain_margin_is_where_the_loop_becomes_unstable():
     )
 
 
+def delayed(loop, pulses):
+    """The same loop with dead time between nerve and muscle, as more states."""
+    n = len(loop.a)
+    a = np.zeros((n + pulses, n + pulses))
+    a[:n, :n], a[:n, n] = loop.a, loop.b
+    a[n:-1, n + 1 :] = np.eye(pulses - 1)
+    return replace(loop, a=a, b=np.eye(n + pulses)[-1])
+
+
+def test_delay_margin_is_where_the_loop_becomes_unstable():
+    dynamics = dynamics_of(TWIN)
+    observer = JointObserver(dynamics)
+    loop = loop_at(dynamics, observer, tune(dynamics, observer), 1.8)
+    pulses = margins(loop).delay_s / PULSE_S
+    assert delayed(loop, math.floor(pulses)).radius() < 1.0 < delayed(loop, math.ceil(pulses)).radius()
+
+
 def test_a_frame_takes_the_margins_that_eq_1_promises():
     """The paper's fit of eq. (1) alone, on the rig it was fitted to: why a torque that wanders fast must not be."""
     problem = RatioProblem(ankle_of(paper_twin("3-23")), [paper_trial("3-23", frame=True)])
