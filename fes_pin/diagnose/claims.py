@@ -75,10 +75,20 @@ class Claims:
 
     def better(self, names: Names, best: Names) -> bool:
         """True if a larger set earns its place beside the best smaller one."""
-        larger, smaller, none = (self.sets.fits[n] for n in (names, best, ()))
-        if smaller.sse - larger.sse < FORM_SHARE * (none.sse - larger.sse):
+        if self.share(names, best) < FORM_SHARE:
             return False
-        return self.p_value(larger, smaller) < CLAIM_LEVEL
+        return self.p_value(self.sets.fits[names], self.sets.fits[best]) < CLAIM_LEVEL
+
+    def share(self, names: Names, best: Names) -> float:
+        """Share of what a larger set explains that a smaller one does not, of the likelihood or of the plain errors.
+
+        An error of form leaves little of either; but under slow noise a fast cause has nearly all the likelihood, and
+        beside a slow cause nearly none of the errors.
+        """
+        larger, smaller, none = (self.sets.fits[n] for n in (names, best, ()))
+        explained = [none.sse - larger.sse, none.plain - larger.plain]
+        added = [smaller.sse - larger.sse, smaller.plain - larger.plain]
+        return max((a / e for a, e in zip(added, explained, strict=True) if e > 0.0), default=0.0)
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
         """Family-wise p-value of what a larger model adds.
@@ -92,7 +102,7 @@ class Claims:
         return self._p_values[key][2]
 
     def _p_value(self, larger: Fit, smaller: Fit) -> float:
-        degrees = max(len(larger.free) - len(smaller.free), 1)
+        degrees = max(larger.degrees - smaller.degrees, 1)
         p_value = self.family.p_value(smaller.sse - larger.sse, degrees)
         coherent = self.family.adjusted(coherence_p_value(smaller, larger, degrees))
         if coherent < p_value or p_value >= CLAIM_LEVEL:
@@ -102,7 +112,7 @@ class Claims:
 
     def demanded(self, refined: Fit, base: Fit) -> bool:
         """True if the data demand a refinement of an effect's form."""
-        degrees = max(len(refined.free) - len(base.free), 1)
+        degrees = max(refined.degrees - base.degrees, 1)
         return bool(scipy.stats.chi2.sf(base.sse - refined.sse, degrees) < REFINE_LEVEL)
 
 

@@ -8,17 +8,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.spikes import without_spikes
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.experiment import NextExperiment, next_experiment
 from fes_pin.diagnose.held_out import Errors, Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.library import best_by_effect
 from fes_pin.diagnose.open_set import Remainder, remainder
-from fes_pin.diagnose.search import PARAMETER_PRICE, Search, Searched
+from fes_pin.diagnose.search import Search, Searched
 from fes_pin.diagnose.workers import one_thread_each
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
-from fes_pin.models.effects import effect
+from fes_pin.identify.own import amplitude
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 
@@ -88,6 +89,8 @@ class Diagnosis:
         Causes that these data could not show.
     ranking
         For each cause, its rivals by shortfall in twice the log-likelihood.
+    left_out
+        Samples taken for spikes, by trial and column; in `study` they hold what their neighbours say.
     """
 
     study: Study
@@ -103,6 +106,7 @@ class Diagnosis:
     next_experiment: NextExperiment | None
     ranking: dict[str, tuple[Ranked, ...]]
     held_out_by: str
+    left_out: dict[str, dict[str, tuple[int, ...]]]
     wall_s: float = field(compare=False)
 
     @property
@@ -143,6 +147,7 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
     """
     began = time.perf_counter()
     tell = progress or (lambda _share, _words: None)
+    study, left_out = despiked_study(study)
     train, test = split(study)
     with one_thread_each():
         recorded = [t for t in study.trials if t.role != "held_out"]
@@ -151,7 +156,22 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
         tell(0.88, "held-out gain")
         diagnosis = _judge(study, search, searched, test, seed)
     tell(1.0, "done")
-    return replace(diagnosis, wall_s=time.perf_counter() - began)
+    return replace(diagnosis, left_out=left_out, wall_s=time.perf_counter() - began)
+
+
+def despiked_study(study: Study) -> tuple[Study, dict[str, dict[str, tuple[int, ...]]]]:
+    """A study without the spikes of its measured columns, and which samples they were, by trial and column.
+
+    A sample that its neighbours replace is no evidence of its own: intervals are too narrow by half the share of such
+    samples, half a percent where one in a hundred is a spike.
+    """
+    rig, trials, found = nominal_model(study).rig, [], {}
+    for trial in study.trials:
+        clean, spikes = without_spikes(trial, rig.outputs(trial.kind))
+        trials.append(clean)
+        if spikes:
+            found[trial.name] = spikes
+    return (replace(study, trials=tuple(trials)) if found else study), found
 
 
 def split(study: Study) -> tuple[list[Trial], list[Trial]]:
@@ -206,6 +226,7 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         next_experiment=_experiment(searched, causes, study),
         ranking=_ranking(searched),
         held_out_by="the study's held-out trials" if test else "cross-validation over trials",
+        left_out={},
         wall_s=0.0,
     )
 
@@ -263,7 +284,9 @@ def _estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
     info, values, out = fitted.model.parameter_info(), fitted.values, {}
     (one,) = (e for e in fitted.model.effects if e.name == name)
     refined = one.refined()
-    for n in effect(name).parameters():
+    if one.each_trial:
+        out["amplitude"] = ParameterEstimate(*amplitude(fitted, one), one.parameters()[one.unknowns()[0]].unit)
+    for n in one.common():
         key = f"{name}.{n}"
         if info[key].optional and not refined:
             continue
@@ -283,8 +306,7 @@ def _equivalents(searched: Searched, name: str, left: Remainder) -> tuple[str, .
     out = []
     for rival in searched.rivals[name]:
         (instead,) = {e.name for e in rival.model.effects} - others
-        price = PARAMETER_PRICE * (len(rival.free) - len(best.free))
-        if rival.sse + price - best.sse < margin:
+        if rival.price - best.price < margin:
             out.append(instead)
     return tuple(sorted(set(out)))
 

@@ -62,11 +62,13 @@ def next_experiment(best: Fit, rival: Fit, pair: tuple[str, str], study: Study) 
 
 def separation(best: Fit, rival: Fit, trial: Trial) -> float:
     """Squared distance between what two fits predict of a trial, after the rival is adapted."""
-    (one,) = Problem(best.model, [trial], best.noise, ()).simulator.run(best.values)
+    size = {n: v for n, v in best.unknowns[0].items() if n in best.model.own_unknowns()}
+    start = {**best.model.initial_unknowns(trial), **size}
+    (one,) = Problem(best.model, [trial], best.noise, ()).simulator.run(best.values, [start])
     names = best.model.rig.outputs(trial.kind)
     measured = trial.with_columns(**{n: one.readings[:, k] for k, n in enumerate(names)})
     parts = Problem(rival.model, [measured], best.noise, rival.free).linearize(
-        rival.values, [rival.model.rig.initial_unknowns(measured)]
+        rival.values, [rival.model.initial_unknowns(measured)]
     )
     known, new = normal_equations(rival.parts), normal_equations(parts)
     hessian = known.hessian + new.hessian

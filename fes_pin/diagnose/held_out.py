@@ -12,9 +12,9 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem
 from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.own import predictions
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
-from fes_pin.models.simulate import Simulator
 
 FOLDS = 5
 RESAMPLES = 2000
@@ -53,17 +53,19 @@ class Errors:
 
 
 def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
-    """Open-loop errors of a model that starts each trial as a prediction does."""
-    simulated = Simulator(model, trials).run(model.parameters())
+    """Open-loop errors of a model that starts each trial as a prediction does.
+
+    What is each trial's own is estimated from other parts of it than those that it is judged on; see `identify.own`.
+    """
     squares, spread, counts = [], [], []
     pieces = 1 if len(trials) >= 5 else 10
-    for trial, one in zip(trials, simulated, strict=True):
+    for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
         total, around = np.zeros(len(trial)), np.zeros(len(trial))
         channels = 0
         for k, name in enumerate(model.rig.outputs(trial.kind)):
             if name in trial.columns and name in noise:
                 variance = noise[name].std ** 2
-                total += (trial[name] - one.readings[:, k]) ** 2 / variance
+                total += (trial[name] - readings[:, k]) ** 2 / variance
                 around += (trial[name] - trial[name].mean()) ** 2 / variance
                 channels += 1
         for a, b in zip(np.array_split(total, pieces), np.array_split(around, pieces), strict=True):
@@ -169,7 +171,7 @@ def _fold(
         return fit_problem(problem, fit.values, [fit.unknowns[i] for i in train])
 
     whole, rest = fitted(best), {n: fitted(f) for n, f in without.items()}
-    chosen = min((whole, *(fitted(c) for c in contenders)), key=lambda f: f.sse + 3.84 * len(f.free))
+    chosen = min((whole, *(fitted(c) for c in contenders)), key=lambda f: f.price)
     return replace(separate(fitted(nominal), whole, rest, test, floor), extended=errors_of(chosen.model, test, floor))
 
 
@@ -187,8 +189,22 @@ def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Tr
 def _whitened(fitted: Fit, test: Sequence[Trial]) -> np.ndarray:
     """Whitened residuals on trials, each with its own unknowns estimated from it, end to end."""
     problem = Problem(fitted.model, test, fitted.noise, ())
-    own = fit_problem(problem, fitted.values, problem.simulator.start(fitted.values))
-    return np.concatenate([p.residual for p in own.parts])
+    return foretold(fit_problem(problem, fitted.values, problem.simulator.start(fitted.values)))
+
+
+def foretold(own: Fit) -> np.ndarray:
+    """Whitened residuals of trials from their estimated initial states, end to end.
+
+    What effects have of each trial's own is estimated from other parts of it than those that it foretells.
+    """
+    if not own.model.own_unknowns():
+        return np.concatenate([p.residual for p in own.parts])
+    out = []
+    for trial, readings in zip(own.trials, predictions(own.model, own.trials, own.noise, own.unknowns), strict=True):
+        for k, name in enumerate(own.model.rig.outputs(trial.kind)):
+            if name in trial.columns and name in own.noise:
+                out.append(own.noise[name].whiten(trial[name] - readings[:, k], trial.dt))
+    return np.concatenate(out)
 
 
 def _evidence(without: np.ndarray, extended: np.ndarray) -> Evidence:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -25,8 +27,6 @@ GLANCE = 5
 """Iterations after which the best start of a refinement is chosen, which alone goes on."""
 PURSUED = 6
 """Best sets of a size that go on until they converge."""
-PARAMETER_PRICE = 3.84
-"""Twice the log-likelihood that one more parameter must earn: chi-square with one degree of freedom at 95 %."""
 
 Names = tuple[str, ...]
 
@@ -63,7 +63,7 @@ class JointFits:
     def fit_from(self, starts: Iterable[Model], unknowns: list[dict[str, float]] | None, iterations: int = LOOK) -> Fit:
         """The best of several fits of one structure, each of so many iterations at most."""
         fitted = [fit_problem(self.problem(s), s.parameters(), unknowns, iterations) for s in starts]
-        return min(fitted, key=lambda f: f.sse)
+        return min(fitted, key=lambda f: f.price)
 
     def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:
         """Fit a base with one more effect, from its most promising shapes.
@@ -122,7 +122,8 @@ class JointFits:
         """The noise of the nominal model, beside everything that the library could explain: only to rank causes."""
         white = whiteless(noise_of(base))
         probes = self.library.probes(base, white, exclude=())
-        self.set_noise(rich_noise(base, white, [p.columns for p in probes]))
+        varying = {p.name: [q.columns for q in probes if q.name == p.name] for p in probes if p.effect.varies}
+        self.set_noise(rich_noise(base, white, [p.columns for p in probes], list(varying.values())))
 
     def refit(self, names: Iterable[Names], noise_from: Names) -> None:
         """Fit sets of causes again under the noise that one of them leaves, and forget all others."""
@@ -167,13 +168,9 @@ class JointFits:
         best = best if best.converged else self._go_on(best, MAX_ITERATIONS)
         return best if _is_told(best) else None
 
-    def price(self, names: Names) -> float:
-        """Twice the negative log-likelihood, with what its parameters must earn."""
-        return self.fits[names].sse + PARAMETER_PRICE * len(self.fits[names].free)
-
     def ranked(self, size: int) -> list[Names]:
         """Sets of a size, cheapest first."""
-        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (self.price(n), n))
+        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (self.fits[n].price, n))
 
 
 def names_of(fitted: Fit) -> Names:
@@ -220,7 +217,7 @@ def _is_told(fitted: Fit) -> bool:
 def _with_amplitudes(effect: Effect, amplitudes: dict[str, float]) -> Effect:
     """The effect at a linear estimate of its amplitudes, or a step from its null where that says nothing."""
     info = effect.parameters()
-    values = {}
+    values: dict[str, Any] = {}
     for name, value in amplitudes.items():
         null, one = info[name].null, info[name]
         assert null is not None
@@ -229,4 +226,4 @@ def _with_amplitudes(effect: Effect, amplitudes: dict[str, float]) -> Effect:
         values[name] = (
             null + step if abs(value - null) < 1e-6 * one.scale else float(np.clip(value, null - far, null + far))
         )
-    return type(effect)(**{**{n: getattr(effect, n) for n in info}, **values})
+    return replace(effect, **values)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.workers import in_parallel
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.problem import Linearized, Problem, measured_columns
 from fes_pin.models.effects import effects_for
@@ -57,9 +58,9 @@ class Library:
         """The effect at its null with every combination of its shapes."""
         grids = effect.grids(self.measured)
         shapes = effect.shapes()
-        start = {n: _near_null(effect, n) for n in effect.amplitudes()}
+        start: dict[str, Any] = {n: _near_null(effect, n) for n in effect.amplitudes()}
         return [
-            effect(**start, **dict(zip(shapes, values, strict=True)))
+            effect(**{**start, **dict(zip(shapes, values, strict=True))})
             for values in itertools.product(*(grids[n] for n in shapes))
         ]
 
@@ -108,7 +109,8 @@ class Scored:
     Attributes
     ----------
     gain
-        Drop in the sum of squares that the linearized effect promises.
+        Drop in the sum of squares that the linearized effect promises; where its amplitudes are each trial's own, less
+        the price of each that it has beyond those of a common effect.
     amplitudes
         The linear estimate of its amplitudes.
     kept
@@ -126,13 +128,14 @@ class Projection:
 
     def __init__(self, parts: Sequence[Linearized]) -> None:
         self.residual = np.concatenate([p.residual for p in parts])
-        self._bases, self._slices = [], []
+        self._bases, self._slices, self._trials = [], [], []
         at = 0
         for part in parts:
             rows = slice(at, at + len(part.residual))
             at = rows.stop
-            if part.local.shape[1]:
-                self._bases.append(np.linalg.qr(_scaled(part.local))[0])
+            self._trials.append(rows)
+            if (felt := part.local.any(axis=0)).any():
+                self._bases.append(np.linalg.qr(_scaled(part.local[:, felt]))[0])
                 self._slices.append(rows)
         jacobian = np.concatenate([p.jacobian for p in parts])
         self._basis = _basis(self._without_locals(jacobian))
@@ -146,14 +149,20 @@ class Projection:
 
     def __call__(self, columns: np.ndarray) -> np.ndarray:
         """Columns of shape (m, k) without the part that the fit could take up."""
-        out = self._without_locals(columns)
-        return out - self._basis @ (self._basis.T @ out)
+        return self._without_shared(self._without_locals(columns))
+
+    def _without_shared(self, columns: np.ndarray) -> np.ndarray:
+        return columns - self._basis @ (self._basis.T @ columns)
 
     def score(self, probes: Sequence[Probe]) -> Scores:
-        """The promises of probes, and the Gram matrix of what is left of them."""
+        """The promises of probes, and the Gram matrix of what is left of them.
+
+        Those that can be other in each trial are scored both ways.
+        """
         stacked = np.concatenate([p.columns for p in probes], axis=1)
         stacked = np.where(np.isfinite(stacked), stacked, 0.0)
-        left = self(stacked)
+        partly = self._without_locals(stacked)
+        left = self._without_shared(partly)
         before, gram, along = np.einsum("mi,mi->i", stacked, stacked), left.T @ left, left.T @ self.residual
         out, blocks, at = [], [], 0
         for probe in probes:
@@ -162,7 +171,37 @@ class Projection:
             blocks.append(block)
             slim = replace(probe, columns=probe.columns[:0])
             out.append(_score(slim, gram[block, block], along[block], float(before[block].sum())))
+        if len(self._trials) > 1:
+            out += [
+                self._own(p, stacked[:, b], partly[:, b]) for p, b in zip(probes, blocks, strict=True) if _varies(p)
+            ]
         return Scores(out, gram, along, blocks)
+
+    def _own(self, probe: Probe, columns: np.ndarray, partly: np.ndarray) -> Scored:
+        """A probe with amplitudes of each trial's own: its columns, cut into trials, side by side.
+
+        With c_i the columns of trial i beside its own unknowns and B the basis of what all trials share, the Gram
+        matrix of what is left is diag(c_i' c_i) - (c_i' B_i) (c_j' B_j)'.
+        """
+        count = columns.shape[1]
+        gram = np.zeros((count * len(self._trials),) * 2)
+        for k, rows in enumerate(self._trials):
+            own = slice(count * k, count * (k + 1))
+            gram[own, own] = partly[rows].T @ partly[rows]
+        shared = np.concatenate([partly[rows].T @ self._basis[rows] for rows in self._trials])
+        gram -= shared @ shared.T
+        along = np.concatenate([partly[rows].T @ self.residual[rows] for rows in self._trials])
+        before, after = float(np.sum(columns**2)), float(np.trace(gram))
+        effect = type(probe.effect).of_each_trial(**{n: getattr(probe.effect, n) for n in probe.effect.shapes()})
+        probe = Probe(effect, probe.columns[:0])
+        felt = np.diag(gram) > 1e-12 * np.diag(gram).max(initial=1e-300)
+        if not after > 1e-18 * max(before, 1e-300) or not felt.any():
+            return Scored(probe, 0.0, {}, 0.0)
+        gram, along = gram[np.ix_(felt, felt)], along[felt]
+        scale = 1.0 / np.sqrt(np.diag(gram))
+        x = np.linalg.lstsq(gram * np.outer(scale, scale), along * scale, rcond=1e-10)[0]
+        gain = float((along * scale) @ x) - PARAMETER_PRICE * max(len(along) - count, 0)
+        return Scored(probe, gain, {}, float(np.sqrt(after / before)))
 
 
 @dataclass(frozen=True)
@@ -172,7 +211,7 @@ class Scores:
     Attributes
     ----------
     scored
-        One for each probe, whose columns are dropped.
+        One for each probe, whose columns are dropped, and after those one for each that can be other in each trial.
     gram
         Shape (k, k): inner products of what the fit leaves of all columns.
     along
@@ -200,6 +239,10 @@ def _score(probe: Probe, gram: np.ndarray, along: np.ndarray, before: float) -> 
     gain = float(2.0 * along @ amplitudes - amplitudes @ gram @ amplitudes)
     values = dict(zip(names, (float(a) for a in amplitudes + nulls), strict=True))
     return Scored(probe, gain, values, float(np.sqrt(after / before)))
+
+
+def _varies(probe: Probe) -> bool:
+    return probe.effect.varies
 
 
 def _scaled(columns: np.ndarray) -> np.ndarray:

@@ -6,12 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.identify.noise import Noise, estimate_noise, thinning
 from fes_pin.identify.problem import Problem
 
 
-def rich_noise(fitted: Fit, white: dict[str, Noise], columns: Sequence[np.ndarray]) -> dict[str, Noise]:
+def rich_noise(
+    fitted: Fit,
+    white: dict[str, Noise],
+    columns: Sequence[np.ndarray],
+    varying: Sequence[Sequence[np.ndarray]] = (),
+) -> dict[str, Noise]:
     """Autoregressive noise of the residuals without any part that the columns could explain.
 
     Parameters
@@ -22,6 +27,9 @@ def rich_noise(fitted: Fit, white: dict[str, Noise], columns: Sequence[np.ndarra
         White noise by output column, which the columns are scaled with.
     columns
         Sensitivities scaled with `white`, shape (m, k) each, all trials end to end.
+    varying
+        For each effect that can be other in each trial, such columns for each of its shapes. The best shape, if it is
+        worth its degrees of freedom, is taken out trial by trial.
     """
     problem = Problem(fitted.model, fitted.trials, white, fitted.free)
     parts = problem.linearize(fitted.values, fitted.unknowns)
@@ -29,6 +37,8 @@ def rich_noise(fitted: Fit, white: dict[str, Noise], columns: Sequence[np.ndarra
     explain = [np.concatenate([p.jacobian for p in parts]), *columns, _local_columns(parts)]
     basis = _span(np.concatenate([c for c in explain if c.shape[1]], axis=1))
     left = residual - basis @ (basis.T @ residual)
+    for shapes in varying:
+        left = left - _of_each_trial(left, shapes, [len(p.residual) for p in parts])
     at = 0
     channels: dict[str, list[np.ndarray]] = {}
     for trial in fitted.trials:
@@ -40,6 +50,24 @@ def rich_noise(fitted: Fit, white: dict[str, Noise], columns: Sequence[np.ndarra
                 channels.setdefault(name, []).append(piece)
     share = {n: basis.shape[1] * sum(map(len, v)) // max(len(left), 1) for n, v in channels.items()}
     return {n: estimate_noise(v, share[n], white[n].std, white[n].step_s) for n, v in channels.items()}
+
+
+def _of_each_trial(left: np.ndarray, shapes: Sequence[np.ndarray], counts: Sequence[int]) -> np.ndarray:
+    """What the best of several shapes explains with amplitudes of each trial's own; zero if that is too little."""
+    best, most = np.zeros_like(left), 0.0
+    ends = np.cumsum(counts)
+    for columns in shapes:
+        explained, rank = np.zeros_like(left), 0
+        for end, count in zip(ends, counts, strict=True):
+            rows = slice(end - count, end)
+            if columns[rows].any():
+                basis = _span(columns[rows])
+                explained[rows] = basis @ (basis.T @ left[rows])
+                rank += basis.shape[1]
+        worth = float(explained @ explained) - PARAMETER_PRICE * rank
+        if worth > most:
+            best, most = explained, worth
+    return best
 
 
 def whiteless(noise: dict[str, Noise]) -> dict[str, Noise]:

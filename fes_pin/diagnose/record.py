@@ -42,6 +42,7 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "ceiling_percent": shown(diagnosis.ceiling_percent),
         "next_experiment": _experiment(diagnosis),
+        **_left_out(diagnosis),
         "wall_s": round(diagnosis.wall_s, 2),
     }
 
@@ -71,6 +72,12 @@ def _cause(cause: Cause) -> dict[str, Any]:
             "ci95": [shown(held.low), shown(held.high)],
         },
     }
+
+
+def _left_out(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Samples left out as spikes by trial and column; no key where there are none."""
+    found = {t: {n: len(k) for n, k in columns.items()} for t, columns in diagnosis.left_out.items()}
+    return {"left_out_samples": found} if found else {}
 
 
 def _parameters(fitted: Fit) -> dict[str, Any]:

@@ -10,8 +10,8 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.diagnosis import Diagnosis
 from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.own import predictions
 from fes_pin.models.model import Model
-from fes_pin.models.simulate import Simulator
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Replay:
 def replay(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     """Every trial of the study as both models of a diagnosis predict it, in the order of the study."""
     trials, noise = diagnosis.study.trials, diagnosis.extended.noise
-    nominal = _predicted(diagnosis.nominal.model, trials)
-    extended = _predicted(diagnosis.model, trials)
+    nominal = _predicted(diagnosis.nominal.model, trials, noise)
+    extended = _predicted(diagnosis.model, trials, noise)
     made = []
     for trial, before, after in zip(trials, nominal, extended, strict=True):
         outputs = tuple(n for n in diagnosis.model.rig.outputs(trial.kind) if n in trial)
@@ -49,11 +49,11 @@ def replay(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     return tuple(made)
 
 
-def _predicted(model: Model, trials: Sequence[Trial]) -> list[Trial]:
+def _predicted(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> list[Trial]:
     out = []
-    for trial, one in zip(trials, Simulator(model, trials).run(model.parameters()), strict=True):
+    for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
         names = model.rig.outputs(trial.kind)
-        out.append(trial.with_columns(**{n: one.readings[:, k] for k, n in enumerate(names)}))
+        out.append(trial.with_columns(**{n: readings[:, k] for k, n in enumerate(names)}))
     return out
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.claims import Claims
-from fes_pin.diagnose.joint_fits import PARAMETER_PRICE, JointFits, Names, subsets
+from fes_pin.diagnose.joint_fits import JointFits, Names, subsets
 from fes_pin.diagnose.library import Scored, best_by_effect, best_pairs
 from fes_pin.diagnose.significance import Family
 from fes_pin.diagnose.unfinished import choose_by_prediction, fit_for_prediction
@@ -234,4 +234,4 @@ class Search:
         return [k for k in self.sets.fits if len(k) == len(names) and rest <= set(k) and name not in k]
 
 
-__all__ = ["PARAMETER_PRICE", "Search", "Searched"]
+__all__ = ["Search", "Searched"]

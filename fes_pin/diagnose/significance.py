@@ -21,13 +21,15 @@ class Family:
     """All (effect, shape) scores of a library under the hypothesis that nothing is missing.
 
     The scores are jointly Gaussian; one simulation of them gives the distribution of the smallest p-value, and with it
-    the number of independent tests that the family amounts to.
+    the number of independent tests that the family amounts to. Effects with amplitudes of each trial's own count as one
+    test more for each of their shapes, which is the most that they can be.
     """
 
     def __init__(self, scores: Scores, seed: int) -> None:
         norms = np.sqrt(np.maximum(np.diag(scores.gram), 0.0))
         scale = 1.0 / np.where(norms > 0, norms, 1.0)
         self.tests = _effective_tests(scores.gram * np.outer(scale, scale), scores.blocks, seed)
+        self.tests += sum(s.probe.effect.each_trial for s in scores.scored)
 
     def p_value(self, gain: float, degrees: int) -> float:
         """Family-wise p-value of a drop in twice the negative log-likelihood."""
@@ -49,7 +51,7 @@ def coherence_p_value(smaller: Fit, larger: Fit, degrees: int) -> float:
     units = [
         (float(x @ x), float(x @ r))
         for few, many in zip(smaller.parts, larger.parts, strict=True)
-        for x, r in _pieces(few.residual - many.residual, many.residual, len(larger.parts))
+        for x, r in _pieces(few.residual - many.residual, many.residual, len(larger.parts), degrees)
     ]
     felt = [(size, along) for size, along in units if size > 1e-4 * max(u[0] for u in units)]
     free = len(felt) - degrees
@@ -59,9 +61,9 @@ def coherence_p_value(smaller: Fit, larger: Fit, degrees: int) -> float:
     return float(scipy.stats.f.sf(gain / (degrees * max(phi, 1e-12)), degrees, free))
 
 
-def _pieces(added: np.ndarray, left: np.ndarray, trials: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """A trial as one unit of evidence, or in pieces where there are few trials."""
-    count = max(1, -(-MIN_UNITS // trials))
+def _pieces(added: np.ndarray, left: np.ndarray, trials: int, degrees: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """A trial as one unit of evidence, or in pieces where there are few trials for the degrees of freedom."""
+    count = max(1, -(-max(MIN_UNITS, 2 * degrees) // trials))
     return zip(np.array_split(added, count), np.array_split(left, count), strict=True)
 
 

@@ -11,6 +11,12 @@ HEADLINES = {
     "unexplained": "the model misses something, and nothing in the library explains it.",
 }
 
+EACH_TRIAL = (
+    "size and phase are each trial's own; in a held-out trial its other parts tell them, and a prediction from inputs "
+    "alone leaves the effect out"
+)
+"""What is said of effects whose amplitudes are each trial's own."""
+
 
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict in one sentence."""
@@ -55,11 +61,26 @@ def footnotes(diagnosis: Diagnosis) -> list[str]:
     lines.append(
         f"{'something is' if left.unexplained else 'nothing'} left unexplained (p = {left.p_value:.2g}{where})"
     )
+    if diagnosis.left_out:
+        lines.append(f"left out as spikes: {left_out_text(diagnosis)}")
+    own = [e.name for e in diagnosis.model.effects if e.each_trial]
+    if own:
+        lines.append(f"{', '.join(own)}: {EACH_TRIAL}")
     if diagnosis.absorbed:
         lines.append(f"not testable here: {', '.join(diagnosis.absorbed)}")
     if diagnosis.next_experiment:
         lines.append(f"next experiment: {diagnosis.next_experiment.why}")
     return lines
+
+
+def left_out_text(diagnosis: Diagnosis) -> str:
+    """How many samples of which trial were taken for spikes."""
+    lengths = {t.name: len(t) for t in diagnosis.study.trials}
+    return ", ".join(
+        f"{len(k)} of {lengths[t]} samples of {n} in {t}"
+        for t, columns in diagnosis.left_out.items()
+        for n, k in columns.items()
+    )
 
 
 def verdict_text(diagnosis: Diagnosis) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.claims import FORM_SHARE
-from fes_pin.diagnose.held_out import folds_of
+from fes_pin.diagnose.held_out import folds_of, foretold
 from fes_pin.diagnose.joint_fits import LOOK, JointFits, Names
 from fes_pin.diagnose.noise_floor import whiteless
 from fes_pin.diagnose.workers import in_parallel
@@ -31,8 +31,8 @@ def choose_by_prediction(sets: JointFits, names: Names, pool: Sequence[Names]) -
         return names
     near = dict(zip(pool, in_parallel(lambda n: open_loop(sets.fits[n]), pool), strict=True))
     errors: dict[Names, float] = {}
-    for one in sorted(near, key=lambda n: (_mean_logarithm([near[n]]), n)):
-        if errors and _mean_logarithm([near[one]]) > min(errors.values()) + FORM_SHARE:
+    for one in sorted(near, key=lambda n: (_mean_logarithm(_residuals(near[n])), n)):
+        if errors and _mean_logarithm(_residuals(near[one])) > min(errors.values()) + FORM_SHARE:
             break
         errors[one] = predictive_error(near[one])
     for one in sorted(errors, key=lambda n: (errors[n], n))[:REFINED]:
@@ -62,19 +62,23 @@ def predictive_error(near: Fit) -> float:
         Fit for least open-loop error to all trials.
     """
 
-    def left_out(held: list[int]) -> list[Fit]:
+    def left_out(held: list[int]) -> list[np.ndarray]:
         train = [i for i in range(len(near.trials)) if i not in held]
         problem = Problem(near.model, [near.trials[i] for i in train], near.noise)
         again = fit_problem(problem, near.values, [near.unknowns[i] for i in train], 2 * LOOK)
         alone = [Problem(again.model, [near.trials[i]], near.noise, ()) for i in held]
-        return [fit_problem(p, again.values, [near.unknowns[i]]) for p, i in zip(alone, held, strict=True)]
+        return [foretold(fit_problem(p, again.values, [near.unknowns[i]])) for p, i in zip(alone, held, strict=True)]
 
     return _mean_logarithm([one for fold in in_parallel(left_out, folds_of(near.trials)) for one in fold])
 
 
-def _mean_logarithm(fits: Sequence[Fit]) -> float:
-    """Of the mean squared whitened residual, over all trials of all fits."""
-    means = [float(p.residual @ p.residual) / max(len(p.residual), 1) for f in fits for p in f.parts]
+def _residuals(fitted: Fit) -> list[np.ndarray]:
+    return [p.residual for p in fitted.parts]
+
+
+def _mean_logarithm(residuals: Sequence[np.ndarray]) -> float:
+    """Of the mean squared whitened residual, over trials."""
+    means = [float(r @ r) / max(len(r), 1) for r in residuals]
     return float(np.mean([math.log(max(m, 1e-12)) if math.isfinite(m) else math.inf for m in means]))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import scipy.stats
@@ -20,6 +20,8 @@ TOLERANCE = 0.01
 """A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
 MAX_ITERATIONS = 60
 CONFIDENCE_95 = float(scipy.stats.norm.ppf(0.975))
+PARAMETER_PRICE = 3.84
+"""Twice the log-likelihood that one more parameter must earn: chi-square with one degree of freedom at 95 %."""
 UNIDENTIFIED = 1e-10
 """Eigenvalue of the scaled information matrix, relative to the largest, below which a direction is not identified."""
 
@@ -101,7 +103,27 @@ class Fit:
     @property
     def reduced(self) -> float:
         """Sum of squares over degrees of freedom: 1 where the noise model is right and the model adequate."""
-        return self.sse / max(self.samples - len(self.free), 1)
+        return self.sse / max(self.samples - self.degrees, 1)
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of freedom of parameters and effects: what is free, and in each trial the effects' unknowns it feels.
+
+        Initial states are not counted: all models of a rig have the same.
+        """
+        own = len(self.model.own_unknowns())
+        return len(self.free) + sum(int(p.local[:, -own:].any(axis=0).sum()) for p in self.parts if own)
+
+    @cached_property
+    def plain(self) -> float:
+        """Sum of squared residuals over the variance of a single sample, not whitened."""
+        white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in self.noise.items()}
+        return whitened_sse(Problem(self.model, self.trials, white, ()).linearize(self.values, self.unknowns))
+
+    @property
+    def price(self) -> float:
+        """Twice the negative log-likelihood, with what its degrees of freedom must earn."""
+        return self.sse + PARAMETER_PRICE * self.degrees
 
 
 class _Search:
@@ -113,7 +135,7 @@ class _Search:
         self.upper = np.array([problem.limits[n][1] for n in self.names])
         self.fixed = dict(start)
         self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
-        self.unknowns = unknowns if unknowns is not None else problem.start_unknowns()
+        self.unknowns = problem.start_unknowns() if unknowns is None else problem.completed(unknowns)
         self.damping = 1e-4
         self.parts = self._linearize(self.x, self.unknowns)
         self.sse = whitened_sse(self.parts)
@@ -277,7 +299,7 @@ def noise_of(fitted: Fit, longest: int = ORDERS[-1]) -> dict[str, Noise]:
             columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
             squares.setdefault(name, []).append(float(np.mean(residual**2)))
     return {
-        name: estimate_noise(pieces, len(fitted.free), math.sqrt(float(np.mean(squares[name]))), step, longest)
+        name: estimate_noise(pieces, fitted.degrees, math.sqrt(float(np.mean(squares[name]))), step, longest)
         for name, pieces in columns.items()
     }
 

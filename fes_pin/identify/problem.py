@@ -60,12 +60,18 @@ class Problem:
         self.model, self.trials, self.noise = model, tuple(trials), noise
         self.free = model.fitted_parameters() if free is None else free
         self.limits = limits_of(model, self.trials)
-        self.unknown_names = model.rig.unknowns(self.trials[0].kind) if self.trials else ()
+        initial = dict.fromkeys(n for t in self.trials for n in model.rig.unknowns(t.kind))
+        self.unknown_names = (*initial, *model.own_unknowns()) if self.trials else ()
         self.simulator = Simulator(model, self.trials, (*self.free, *self.unknown_names))
 
     def start_unknowns(self) -> Unknowns:
         """The unknowns of each trial as its first samples suggest."""
-        return [dict(self.model.rig.initial_unknowns(t)) for t in self.trials]
+        return [self.model.initial_unknowns(t) for t in self.trials]
+
+    def completed(self, unknowns: Unknowns) -> Unknowns:
+        """Unknowns of another model on these trials with what this one has besides, without what it has not."""
+        both = zip(self.start_unknowns(), unknowns, strict=True)
+        return [{n: known.get(n, value) for n, value in start.items()} for start, known in both]
 
     def residuals(self, values: Mapping[str, float], unknowns: Unknowns) -> list[dict[str, np.ndarray]]:
         """Measured minus simulated, for each trial by output column; not whitened."""
@@ -108,6 +114,8 @@ def limits_of(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, f
     for effect in model.effects:
         for n, (low, high) in effect.limits(measured).items():
             name = f"{effect.name}.{n}"
+            if name not in limits:  # each trial's own
+                continue
             limits[name] = (max(limits[name][0], low), min(limits[name][1], high))
     return limits
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import Parameter
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, Stage
@@ -34,18 +35,32 @@ class Model:
         return Model(self.rig, tuple(e for e in self.effects if e.name != name))
 
     def parameters(self) -> dict[str, float]:
-        """Every parameter's value, by name."""
+        """The value of every parameter that all trials share, by name."""
         values = {n: float(getattr(self.rig, n)) for n in self.rig.parameters()}
         for effect in self.effects:
-            values.update({f"{effect.name}.{n}": float(getattr(effect, n)) for n in effect.parameters()})
+            values.update({f"{effect.name}.{n}": float(getattr(effect, n)) for n in effect.common()})
         return values
 
     def parameter_info(self) -> dict[str, Parameter]:
         """Every parameter's unit, null, bounds and scale, by name."""
         info = dict(self.rig.parameters())
         for effect in self.effects:
-            info.update({f"{effect.name}.{n}": i for n, i in effect.parameters().items()})
+            own = effect.parameters()
+            info.update({f"{effect.name}.{n}": own[n] for n in effect.common()})
         return info
+
+    def own_unknowns(self) -> tuple[str, ...]:
+        """Names of what each trial must estimate for itself because an effect says so."""
+        return tuple(f"{e.name}.{n}" for e in self.effects for n in e.unknowns())
+
+    def unknowns(self, kind: str) -> tuple[str, ...]:
+        """Names of what each trial of a kind must estimate for itself: its initial state, and what effects say."""
+        return (*self.rig.unknowns(kind), *self.own_unknowns())
+
+    def initial_unknowns(self, trial: Trial) -> dict[str, float]:
+        """Unknowns of a trial as its first samples suggest; those of effects at what is known before: their nulls."""
+        own = {f"{e.name}.{n}": float(getattr(e, n)) for e in self.effects for n in e.unknowns()}
+        return {**self.rig.initial_unknowns(trial), **own}
 
     def fitted_parameters(self) -> tuple[str, ...]:
         """What a fit moves: the rig's fitted parameters, and of the effects' all but choices and unused forms."""
@@ -71,7 +86,7 @@ class Model:
         effects = []
         for effect in self.effects:
             prefix = f"{effect.name}."
-            own = {n.removeprefix(prefix): float(v) for n, v in values.items() if n.startswith(prefix)}
+            own: dict[str, Any] = {n.removeprefix(prefix): float(v) for n, v in values.items() if n.startswith(prefix)}
             effects.append(dataclasses.replace(effect, **own))
         return Model(rig, tuple(effects))
 
@@ -82,7 +97,7 @@ class Model:
 
     def structure(self) -> tuple[str, ...]:
         """What compiled code depends on: the rig and the effects, not their values."""
-        return (self.rig.name, *(e.name for e in self.effects))
+        return (self.rig.name, *(f"{e.name} of each trial" if e.each_trial else e.name for e in self.effects))
 
     def __str__(self) -> str:
         info = self.parameter_info()

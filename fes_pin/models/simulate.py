@@ -89,7 +89,7 @@ class Simulator:
         values
             Every parameter of the model, by name.
         unknowns
-            For each trial its own unknowns, if the rig has any; by default as its first samples say: see `start`.
+            For each trial its own unknowns, if the model has any; by default as its first samples say: see `start`.
         """
         if unknowns is None:
             unknowns = self.start(values)
@@ -104,10 +104,11 @@ class Simulator:
         """Each trial's unknowns as its first samples say.
 
         What was measured at the first sample is taken from it; a rate that was not is the one with which the model
-        follows the first 0.2 s best, position and rate fitted together.
+        follows the first 0.2 s best, position and rate fitted together. What effects have of each trial's own is at its
+        null.
         """
         rig = self.model.rig
-        out = [rig.initial_unknowns(t) for t in self.trials]
+        out = [self.model.initial_unknowns(t) for t in self.trials]
         todo = [i for i, t in enumerate(self.trials) if rig.unmeasured(t)]
         if todo:
             found = _first_motion(self.model, [self.trials[i] for i in todo], values, [out[i] for i in todo])
@@ -153,7 +154,7 @@ class _Block:
         rig, model = model.rig, model.acting(first.kind, model.rig.input_columns(first))
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
         self.inputs = rig.input_columns(first)
-        available = set(model.parameters()) | set(rig.unknowns(first.kind))
+        available = set(model.parameters()) | set(model.unknowns(first.kind))
         self.columns = columns
         self.program: Program = program(model, first.kind, self.inputs, tuple(c for c in columns if c in available))
         self.layout = self.program.layout

@@ -48,6 +48,11 @@ class Effect:
         True if it can only take energy from the joint.
     max_step_s
         Longest integration step that resolves it, s.
+    varies
+        True if its amplitudes can be other in each trial: those of what does not begin with the trial.
+    each_trial
+        Its amplitudes are unknowns of each trial, estimated from that trial alone; the fields keep what a trial that
+        was not measured is predicted with: their nulls. All other parameters stay common to all trials.
     """
 
     name: ClassVar[str]
@@ -58,6 +63,9 @@ class Effect:
     memories: ClassVar[tuple[str, ...]] = ()
     dissipative: ClassVar[bool] = False
     max_step_s: ClassVar[float] = math.inf
+    varies: ClassVar[bool] = False
+
+    each_trial: bool = dataclasses.field(default=False, kw_only=True)
 
     def apply(self, value: Any, s: Any) -> Any:
         """The signal with the effect, from the signal without it."""
@@ -101,10 +109,23 @@ class Effect:
             i.optional and i.null is not None and getattr(self, n) != i.null for n, i in self.parameters().items()
         )
 
+    def unknowns(self) -> tuple[str, ...]:
+        """The parameters that each trial has a value of its own of."""
+        return self.amplitudes() if self.each_trial else ()
+
+    def common(self) -> tuple[str, ...]:
+        """The parameters that all trials share."""
+        return tuple(n for n in self.parameters() if n not in self.unknowns())
+
     def fitted_parameters(self) -> tuple[str, ...]:
-        """What a fit moves: all but discrete choices, and but refinements that are switched off."""
-        refined = self.refined()
-        return tuple(n for n, i in self.parameters().items() if i.fitted and (refined or not i.optional))
+        """What a fit moves in all trials alike: all but discrete choices, and but refinements that are switched off."""
+        refined, info = self.refined(), self.parameters()
+        return tuple(n for n in self.common() if info[n].fitted and (refined or not info[n].optional))
+
+    @classmethod
+    def of_each_trial(cls, **shapes: Any) -> Effect:
+        """The effect with amplitudes that are each trial's own."""
+        return dataclasses.replace(cls.absent(), each_trial=True, **shapes)
 
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
@@ -124,7 +145,8 @@ class Effect:
     @classmethod
     def absent(cls) -> Effect:
         """The effect at its null."""
-        return cls(**{n: i.null for n, i in cls.parameters().items() if i.null is not None})
+        nulls: dict[str, Any] = {n: i.null for n, i in cls.parameters().items() if i.null is not None}
+        return cls(**nulls)
 
 
 class Signals(SimpleNamespace):

@@ -14,8 +14,11 @@ from fes_pin.data.toml import Document, read_toml
 from fes_pin.models.effects import effect
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import RIGS
+from fes_pin.models.stage import Effect
 
 FORMAT = 1
+EACH_TRIAL = "each_trial"
+"""Key of an effect whose amplitudes are each trial's own."""
 
 
 def model_toml(model: Model) -> str:
@@ -27,7 +30,7 @@ def model_toml(model: Model) -> str:
         "fitted": list(rig.fitted_parameters()),
         "constants": {n: float(v) for n, v in rig.constants.items()},
         "nominal": {n: float(getattr(rig, n)) for n in rig.parameters()},
-        "effects": {e.name: {n: float(getattr(e, n)) for n in e.parameters()} for e in model.effects},
+        "effects": {e.name: _effect_table(e) for e in model.effects},
     }
     return tomli_w.dumps(tables)
 
@@ -63,9 +66,7 @@ def load_model(path: str | Path) -> Model:
     listed = document.table("effects")
     for name in listed:
         try:
-            one = effect(name)
-            added = one(**_numbers(document, f"effects.{name}", set(one.parameters()), listed))
-            model = model + added
+            model = model + _effect(document, name, listed)
         except KeyError as error:
             raise document.error(f"effects.{name}", str(error.args[0])) from None
         except InputError:
@@ -73,6 +74,19 @@ def load_model(path: str | Path) -> Model:
         except ValueError as error:
             raise document.error(f"effects.{name}", str(error)) from None
     return model
+
+
+def _effect_table(one: Effect) -> dict[str, Any]:
+    own = {EACH_TRIAL: True} if one.each_trial else {}
+    return {**own, **{n: float(getattr(one, n)) for n in one.parameters()}}
+
+
+def _effect(document: Document, name: str, listed: dict[str, Any]) -> Effect:
+    kind, key = effect(name), f"effects.{name}"
+    each_trial = document.table(key, listed).pop(EACH_TRIAL, False)
+    if not isinstance(each_trial, bool) or (each_trial and not kind.varies):
+        raise document.error(f"{key}.{EACH_TRIAL}", f"expected {'true or false' if kind.varies else 'none'}")
+    return kind(**_numbers(document, key, set(kind.parameters()), listed), each_trial=each_trial)
 
 
 def _numbers(

@@ -9,7 +9,7 @@ from fes_pin.data.files import write_text
 from fes_pin.diagnose.diagnosis import Diagnosis
 from fes_pin.diagnose.record import NEXT_FILE
 from fes_pin.diagnose.replay import replay
-from fes_pin.diagnose.text import headline
+from fes_pin.diagnose.text import headline, left_out_text
 from fes_pin.models.describe import sentence
 from fes_pin.models.effects import effect
 from fes_pin.view.page import (
@@ -84,6 +84,9 @@ def _facts(diagnosis: Diagnosis) -> Markup:
             by = diagnosis.held_out_by if k else "nominal → extended" if diagnosis.causes else "nominal"
             rows.append((f"error E, {where}", shown, by))
     rows.append(("noise floor of E", percent(diagnosis.ceiling_percent), "no model can be better"))
+    if diagnosis.left_out:
+        count = sum(len(k) for columns in diagnosis.left_out.values() for k in columns.values())
+        rows.append(("left out as spikes", f"{count} samples", left_out_text(diagnosis)))
     state = "something" if left.unexplained else "nothing"
     rows.append(("left unexplained", state, probability(left.p_value)))
     cells = [element("div", element("dt", t), element("dd", v, element("small", note))) for t, v, note in rows]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from fes_pin.diagnose.diagnosis import Cause, Diagnosis
-from fes_pin.identify.fit import Fit
+from fes_pin.diagnose.text import EACH_TRIAL
+from fes_pin.identify.fit import CONFIDENCE_95, Fit
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.models.effects import effect
 from fes_pin.view.page import Content, Markup, element, figure, probability, rounded, table, unit_text
@@ -76,7 +77,7 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
             element("p", sentence(kind)),
             element("pre", equation(kind)),
             _estimates(diagnosis.extended, cause),
-            element("p", gain, " ", told),
+            element("p", gain, " ", told, *_own_note(diagnosis, cause)),
             element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}", class_="soft"),
             _rivals(diagnosis, cause),
         ),
@@ -84,10 +85,21 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
     )
 
 
+def _own_note(diagnosis: Diagnosis, cause: Cause) -> list[str]:
+    """What is to be said where the amplitudes are each trial's own."""
+    own = any(e.each_trial for e in diagnosis.model.effects if e.name == cause.name)
+    return [f" {EACH_TRIAL[0].upper()}{EACH_TRIAL[1:]}."] if own else []
+
+
 def _estimates(fitted: Fit, cause: Cause) -> Markup:
     rows: list[list[Content]] = []
     for name, one in cause.parameters.items():
-        shown, interval = value_and_interval(fitted, f"{cause.name}.{name}", one.value)
+        key = f"{cause.name}.{name}"
+        if key in fitted.values:
+            shown, interval = value_and_interval(fitted, key, one.value)
+        else:  # a mean over trials
+            low, high = one.value - CONFIDENCE_95 * one.std, one.value + CONFIDENCE_95 * one.std
+            shown, interval = rounded(one.value, one.std), f"[{rounded(low, one.std)}, {rounded(high, one.std)}]"
         rows.append([element("code", name), shown, unit_text(one.unit), interval])
     return table(("parameter", "value", "unit", "95 % interval"), rows, (1, 3))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from confusion_matrix.generator import Made
 from fes_pin.diagnose.diagnosis import Diagnosis, diagnose
-from fes_pin.models.simulate import simulate
+from fes_pin.identify.own import predictions
 
 
 def judge(made: Made) -> dict[str, Any]:
@@ -62,8 +62,8 @@ def _share(made: Made, diagnosis: Diagnosis) -> float | None:
     for fitted in (diagnosis.nominal, diagnosis.extended):
         total = 0.0
         for trial in made.fresh:
-            simulated = simulate(fitted.model, trial)
+            (readings,) = predictions(fitted.model, [trial], fitted.noise)
             column = "force_n" if trial.kind == "isometric" else fitted.model.rig.output(trial.kind)
-            total += float(np.sum(trial.residual(simulated, column) ** 2))
+            total += float(np.sum((trial[column] - readings[:, 0]) ** 2))
         errors.append(total)
     return round(1.0 - errors[1] / errors[0], 4) if errors[0] > 0 and math.isfinite(errors[1]) else None

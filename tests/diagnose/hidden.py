@@ -19,7 +19,7 @@ SHORT = {"n_motion": 4, "n_isometric": 2, "duration_s": 5.0}
 def study_of(rig, names=(), noise="white", seed=0, **how):
     """A short study that hides causes of typical size."""
     more = {"n_isometric": 5} if rig == "muscle" else {}
-    causes = {n: dict(TYPICAL[n]) for n in names}
+    causes = names if callable(names) else {n: dict(TYPICAL[n]) for n in names}
     return make_study(np.random.default_rng(seed), rig, causes, noise, **(SHORT | more | how))
 
 

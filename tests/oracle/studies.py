@@ -71,7 +71,7 @@ def make_study(
         numpy's Generator: draws the rig, the stimuli and the noise.
     rig
         "ankle", "joint" or "muscle".
-    causes : dict of str to dict
+    causes : dict of str to dict, or a function of a trial's number that gives one
         Parameters by canonical name, see `oracle.simulate`; `TYPICAL` has some.
     noise
         "white", "ar1" (first-order autoregressive sensor noise) or "process" (white, and a random torque).
@@ -97,7 +97,8 @@ def make_study(
     for number, kind in enumerate(kinds):
         bare = _inputs(rng, rig, kind, number, duration_s, driven)
         disturbance = rng.normal(0.0, PROCESS_TORQUE_NM, len(bare)) if noise == "process" and kind == "motion" else None
-        columns = simulate(constants, nominal, causes, bare, disturbance)
+        hidden = causes(number) if callable(causes) else causes
+        columns = simulate(constants, nominal, hidden, bare, disturbance)
         noisy = {n: y + _noise(rng, len(bare), n, "ar1" if noise == "ar1" else "white") for n, y in columns.items()}
         if rig == "joint":
             del noisy["velocity"]

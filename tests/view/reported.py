@@ -102,6 +102,7 @@ def diagnosed(
         next_experiment=plan,
         ranking={n: tuple(Ranked(tuple({*names} - {n} | {r}), 0.5 + k) for k, r in enumerate(rivals)) for n in names},
         held_out_by="cross-validation over trials",
+        left_out={},
         wall_s=1.0,
     )
 

@@ -66,9 +66,10 @@ class _Symbols:
     def signals(self, states: dict[str, Any], memories: dict[str, Any]) -> Signals:
         """Signals and effects with symbols in place of numbers."""
         layout, p = self.layout, self.p
-        effects = [
-            dataclasses.replace(e, **{n: p[f"{e.name}.{n}"] for n in e.parameters()}) for e in self.model.effects
-        ]
+        effects = []
+        for e in self.model.effects:
+            own: dict[str, Any] = {n: p[f"{e.name}.{n}"] for n in e.parameters()}
+            effects.append(dataclasses.replace(e, **own))
         s = Signals(
             effects,
             kind=layout.kind,
@@ -76,7 +77,7 @@ class _Symbols:
             m=SimpleNamespace(**{n: v for n, v in memories.items() if "." not in n}),
             u=SimpleNamespace(**self.u),
             c=SimpleNamespace(**self.c),
-            initial=SimpleNamespace(**{n: p[n] for n in layout.unknowns}),
+            initial=SimpleNamespace(**{n: p[n] for n in layout.unknowns if "." not in n}),
             time=self.t - self.c["t0"],
             step=self.c["step"],
             pace=1.0,

@@ -58,7 +58,7 @@ def make_layout(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple
         kind=kind,
         inputs=inputs,
         parameters=tuple(model.parameters()),
-        unknowns=rig.unknowns(kind),
+        unknowns=model.unknowns(kind),
         constants=(*rig.constant_names(kind), *TIMING),
         outputs=rig.outputs(kind),
         columns=columns,

@@ -20,7 +20,8 @@ class MainsHum(Effect):
         y + in_phase sin(2 pi f t) + quadrature cos(2 pi f t)
 
     Tell-tale: a steady ripple at 50 or 60 Hz (or where sampling folds it to) that is there at rest as well.
-    Source: capacitive pick-up from the mains; the frequency is 50 or 60 Hz by country.
+    Source: capacitive pick-up from the mains; the frequency is 50 or 60 Hz by country. Trials cut from one recording
+    may share the phase; others begin at any phase, and both amplitudes are each trial's own.
     """
 
     in_phase: float = parameter(0.001, unit="rad", null=0.0, lower=-100.0, upper=100.0, scale=0.001)
@@ -28,6 +29,7 @@ class MainsHum(Effect):
     frequency_hz: float = parameter(50.0, unit="Hz", grid=(50.0, 60.0), fitted=False)
 
     name, stage, signal, rigs = "mains_hum", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
+    varies = True
 
     def apply(self, value: Any, s: Any) -> Any:
         phase = TURN * self.frequency_hz * s.time

@@ -21,7 +21,7 @@ class PeriodicTorque(Effect):
 
     Tell-tale: the rest angle sways in time with nothing that was commanded.
     Source: a Fourier component at the breathing rate: at rest 12 to 20 a minute in people, 10 to 35 in dogs, and up
-    to 0.8 Hz; the phase is that of the trial's first sample.
+    to 0.8 Hz; the phase is that of the trial's first sample. A trial that does not begin with a breath has its own.
     """
 
     in_phase: float = parameter(0.01, unit="N m", null=0.0, lower=-100.0, upper=100.0, scale=0.005)
@@ -36,6 +36,7 @@ class PeriodicTorque(Effect):
     )
 
     name, stage, signal, rigs = "periodic_torque", Stage.RIG, "torque", ("ankle", "joint")
+    varies = True
 
     def apply(self, value: Any, s: Any) -> Any:
         phase = TURN * self.frequency_hz * s.time

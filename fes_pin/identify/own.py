@@ -1,0 +1,119 @@
+"""What is each trial's own: predictions and sizes of effects whose amplitudes have a value of their own in every trial.
+
+Nothing is known of such an amplitude before its trial is measured. A prediction from inputs alone leaves the effect
+out. Where there is a measurement, the trial is cut into `SEGMENTS` pieces; the amplitudes that predict the odd pieces
+are estimated from the even ones and the other way round, so that no sample takes part in its own prediction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.noise import Noise, NoiseModel
+from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations
+from fes_pin.models.model import Model
+from fes_pin.models.simulate import Simulated, Simulator
+from fes_pin.models.stage import Effect
+
+SEGMENTS = 4
+"""Pieces of a trial: two would ask a slow oscillation to be foretold over half a trial, many would be as slow noise."""
+STEPS = 3
+"""Gauss-Newton steps: the amplitudes are linear but for what the joint's own nonlinearity makes of them."""
+
+
+def predictions(
+    model: Model, trials: Sequence[Trial], noise: NoiseModel, initial: Unknowns | None = None
+) -> list[np.ndarray]:
+    """Readings that a model predicts of measured trials, shape (n, outputs) each; see the module.
+
+    Parameters
+    ----------
+    noise
+        By output column: what weighs the channels.
+    initial
+        Initial states of the trials; by default as predictions start.
+    """
+    simulator, values = Simulator(model, trials), model.parameters()
+    start = simulator.start(values)
+    if initial is not None:
+        start = [{**one, **{n: i[n] for n in i if "." not in n}} for one, i in zip(start, initial, strict=True)]
+    if not model.own_unknowns():
+        return [s.readings for s in simulator.run(values, start)]
+    halves = [_halves(len(t)) for t in trials]
+    even, odd = (
+        simulator.run(values, _estimated(model, trials, noise, start, [half[k] for half in halves])) for k in (1, 0)
+    )
+    return [_merged(a, b, first) for a, b, (first, _) in zip(even, odd, halves, strict=True)]
+
+
+def _merged(here: Simulated, there: Simulated, first: np.ndarray) -> np.ndarray:
+    return np.where(first[:, None], here.readings, there.readings)
+
+
+def _halves(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The odd pieces of a trial and the even ones, as masks of shape (n,)."""
+    first = (np.arange(count) * SEGMENTS // count) % 2 == 0
+    return first, ~first
+
+
+def _estimated(
+    model: Model, trials: Sequence[Trial], noise: NoiseModel, start: Unknowns, seen: Sequence[np.ndarray]
+) -> Unknowns:
+    """The start with the effects' unknowns as the samples that are seen say, by least squares beside the initial state.
+
+    Sinusoids are estimated as well by ordinary least squares as with the right weights (Grenander 1954).
+    """
+    white = {n: Noise(max(m.std, 1e-12)) for n, m in noise.items()}
+    problem = Problem(model, trials, white, ())
+    names, now = problem.unknown_names, start
+    for _ in range(STEPS):
+        moved = []
+        for part, rows, one in zip(problem.linearize(model.parameters(), now), seen, now, strict=True):
+            chosen = np.resize(rows, len(part.residual))  # channel after channel
+            moved.append(_moved(part, chosen, names, one))
+        now = moved
+    own = set(model.own_unknowns())
+    return [{n: (new[n] if n in own else old[n]) for n in old} for old, new in zip(start, now, strict=True)]
+
+
+def _moved(part: Linearized, rows: np.ndarray, names: Sequence[str], now: dict[str, float]) -> dict[str, float]:
+    columns = part.local[rows]
+    norms = np.linalg.norm(columns, axis=0)
+    scale = np.where(norms > 0, norms, 1.0)
+    step = np.linalg.lstsq(columns / scale, part.residual[rows], rcond=1e-6)[0] / scale
+    return {**now, **{n: now[n] + float(d) for n, d in zip(names, step, strict=True)}}
+
+
+def amplitude(fitted: Fit, effect: Effect) -> tuple[float, float]:
+    """Size of an effect whose amplitudes are each trial's own: the root mean square of their length, and its deviation.
+
+    The mean is over the trials of the kind that comes first among those that feel the effect, as a motion and a force
+    have no unit in common; what the uncertainty of the single values adds to their squares is taken off.
+    """
+    names = (*fitted.model.rig.unknowns(fitted.trials[0].kind), *fitted.model.own_unknowns())
+    own = np.array([names.index(f"{effect.name}.{n}") for n in effect.unknowns()])
+    slopes = [slope for _, slope in normal_equations(fitted.parts).eliminated]
+    squares, spread, kind = [], [], None
+    for trial, part, unknowns, slope in zip(fitted.trials, fitted.parts, fitted.unknowns, slopes, strict=True):
+        felt = np.flatnonzero(part.local.any(axis=0))
+        if not np.isin(own, felt).all() or (kind or trial.kind) != trial.kind:
+            continue
+        kind = trial.kind
+        value = np.array([unknowns[names[k]] for k in own])
+        variance = np.linalg.inv(part.local[:, felt].T @ part.local[:, felt])
+        mine = np.searchsorted(felt, own)
+        free = np.isfinite(np.diag(fitted.covariance))
+        shared = slope[np.ix_(own, free)] @ fitted.covariance[np.ix_(free, free)] @ slope[np.ix_(own, free)].T
+        covariance = variance[np.ix_(mine, mine)] + shared
+        squares.append(float(value @ value - np.trace(covariance)))
+        spread.append(float(value @ covariance @ value))
+    if not squares:
+        return 0.0, math.inf
+    size = math.sqrt(max(float(np.mean(squares)), 0.0))
+    deviation = math.sqrt(sum(spread)) / len(spread)
+    return size, deviation / size if size > 0 else math.inf
