@@ -201,7 +201,7 @@ def _refined(model: Model, effect: Effect) -> list[list[Model]]:
 
 
 def _is_told(fitted: Fit) -> bool:
-    """True if the data tell every parameter that has a null from it, in all effects whose form is refined."""
+    """True if the data tell every parameter that has a null from it, within its bounds, in all refined effects."""
     for one in fitted.model.effects:
         if not one.refined():
             continue
@@ -209,6 +209,8 @@ def _is_told(fitted: Fit) -> bool:
             name = f"{one.name}.{n}"
             if name not in fitted.free:
                 continue
+            if name in fitted.at_bound:
+                return False
             std, away = fitted.std(name), getattr(one, n) - info.null if info.null is not None else np.inf
             if not np.isfinite(std) or abs(away) < CONFIDENCE_95 * std:
                 return False
