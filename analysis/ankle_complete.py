@@ -12,7 +12,9 @@ import numpy as np
 from fes_pin.data.paper import PRINTED, STEPWISE, paper_study, paper_twin
 from fes_pin.data.twin import RunningTwin, staircase
 from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.identify.fit import fit
 from fes_pin.identify.ratios import RatioProblem, ankle_of, error_percent, least_error
+from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 
 OUT = Path(__file__).parents[1] / "out"
@@ -80,3 +82,29 @@ for name, (_, _, _, e_before, e_after, diagnosis) in answers.items():
         f"{name}: cause named: {causes}; E {e_before:.2f} -> {e_after:.3f} % (paper {PRINTED[name].error_percent} %); "
         f"k2 = l / J moves from {PRINTED[name].ratios['k2']:.0f} to {0.08 / j:.1f} 1/(kg m)"
     )
+
+# %% Prediction of trials that took no part, in the measures that others report
+print(
+    "\nheld-out trials, open loop: RMSE, NRMSE (of the range), fit 1 - |error| / |deviation from the mean|; with and\n"
+    "without the frame, in both cases fitted to the other trials"
+)
+for name, (*_, diagnosis) in answers.items():
+    study = paper_study(name, frame=True)
+    alone = fit(nominal_model(study), [t for t in study.trials if t.role == "fit"]).model
+    for label, model in (("eq. (1)", alone), ("extended", diagnosis.model)):
+        rows = []
+        for trial in (t for t in study.trials if t.role == "held_out"):
+            angle = trial["angle_rad"]
+            error = angle - simulate(model, trial)["angle_rad"]
+            rms = np.sqrt(np.mean(error**2))
+            rows.append((np.degrees(rms), 100 * rms / np.ptp(angle), 100 * (1 - rms / angle.std())))
+        print("  {} {:9s} {:.2f} degrees, {:.1f} %, fit {:.1f} %".format(name, label, *np.mean(rows, axis=0)))
+print(
+    """
+Beside what others report of people's ankles under stimulation: RMSE 2.78 +- 0.33 degrees, NRMSE 23.7 +- 1.8 %, tenfold
+cross-validation of a neural Hammerstein model (Zhou and others, IEEE Access 7, 2019, doi 10.1109/ACCESS.2019.2943453),
+and cross-validated fits of 73 to 76 %, whose source was not found again. Ours is better on twins, down to the noise of
+their potentiometer, because what moves them is in the library. That is no comparison of methods: those trials have what
+no one put in. It says that a cause in the library is found and that nothing of the misfit is then left; it says nothing
+about a measured ankle, and none was at hand."""
+)

@@ -286,7 +286,7 @@ def _estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
         out["amplitude"] = ParameterEstimate(*amplitude(fitted, one), one.parameters()[one.unknowns()[0]].unit)
     for n in one.common():
         key = f"{name}.{n}"
-        if info[key].optional and not refined:
+        if info[key].optional and n not in refined:
             continue
         std = fitted.std(key) if key in fitted.free else 0.0
         out[n] = ParameterEstimate(values[key], std, info[key].unit)

@@ -160,13 +160,12 @@ class JointFits:
         return self._refinements[id(base)][1]
 
     def _refinement(self, base: Fit) -> Fit | None:
-        starts = [s for name in names_of(base) for s in _refined(base.model, name)]
-        fitted = in_parallel(lambda s: self.fit_from([s], base.unknowns, GLANCE), starts)
-        if not fitted:
-            return None
-        best = min(fitted, key=lambda f: f.sse)
-        best = best if best.converged else self._go_on(best, MAX_ITERATIONS)
-        return best if _is_told(best) else None
+        refinements = [starts for effect in base.model.effects for starts in _refined(base.model, effect)]
+        looks = in_parallel(lambda s: self.fit_from([s], base.unknowns, GLANCE), [s for r in refinements for s in r])
+        at = np.cumsum([0, *map(len, refinements)])
+        best = [min(looks[a:b], key=lambda f: f.sse) for a, b in itertools.pairwise(at)]
+        fitted = in_parallel(lambda f: f if f.converged else self._go_on(f, MAX_ITERATIONS), best)
+        return min(filter(_is_told, fitted), key=lambda f: f.price, default=None)
 
     def ranked(self, size: int) -> list[Names]:
         """Sets of a size, cheapest first."""
@@ -189,18 +188,20 @@ def _choices(model: Model) -> tuple[float, ...]:
     return tuple(v for n, v in model.parameters().items() if not info[n].fitted)
 
 
-def _refined(model: Model, name: str) -> list[Model]:
-    """Starts with the refinements of one effect switched on."""
-    (effect,) = (e for e in model.effects if e.name == name)
-    info = {n: effect.parameters()[n] for n in effect.refinements()}
-    if not info or effect.refined():
+def _refined(model: Model, effect: Effect) -> list[list[Model]]:
+    """Starts with one refinement of an effect switched on, for each refinement; none if one is on already."""
+    if effect.refined():
         return []
-    choices = itertools.product(*(i.grid for i in info.values()))
-    return [model.with_parameters({f"{name}.{n}": v for n, v in zip(info, values, strict=True)}) for values in choices]
+    out, info = [], effect.parameters()
+    for names in effect.refinements():
+        paths = [f"{effect.name}.{n}" for n in names]
+        choices = itertools.product(*(info[n].grid for n in names))
+        out.append([model.with_parameters(dict(zip(paths, values, strict=True))) for values in choices])
+    return out
 
 
 def _is_told(fitted: Fit) -> bool:
-    """True if the data tell every parameter that has a null from it, in all effects whose form is refined."""
+    """True if the data tell every parameter that has a null from it, within its bounds, in all refined effects."""
     for one in fitted.model.effects:
         if not one.refined():
             continue
@@ -208,6 +209,8 @@ def _is_told(fitted: Fit) -> bool:
             name = f"{one.name}.{n}"
             if name not in fitted.free:
                 continue
+            if name in fitted.at_bound:
+                return False
             std, away = fitted.std(name), getattr(one, n) - info.null if info.null is not None else np.inf
             if not np.isfinite(std) or abs(away) < CONFIDENCE_95 * std:
                 return False

@@ -154,7 +154,7 @@ class _Path:
             j = s @ self.free
             hessian, gradient = j.T @ j, j.T @ r
             move = -np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), gradient)
-            if scale * float(-gradient @ move) < 1e-9 * self.level:
+            if scale * float(-gradient @ move) < 1e-9 * min(self.level, 100.0):
                 break
             size = float(np.max(np.abs(move)))
             trial = x + self.free @ (move * min(1.0, 0.5 / size))
@@ -257,6 +257,28 @@ def error_domain(
             free = np.zeros((3, 0)) if cut else np.delete(np.eye(3), k, axis=1)
             found[name] = follow(problem, optimum, sign * axis, level_percent, free)
     return ErrorDomain(problem, level_percent, optimum, *ends)
+
+
+def error_holding(problem: RatioProblem, optimum: Optimum, name: str, value: float) -> float:
+    """E in percent with one ratio held at a value and the other two made best for it."""
+    k = RATIOS.index(name)
+    ahead = math.log(value) - optimum.x[k]
+    path = _Path(problem, optimum, math.copysign(1.0, ahead) * np.eye(3)[k], math.inf, np.delete(np.eye(3), k, axis=1))
+    x, error = optimum.x, optimum.error_percent
+    for distance in np.linspace(0.0, abs(ahead), math.ceil(abs(ahead) / STEP) + 1)[1:]:
+        x, error = path._least(float(distance), x)
+    return error
+
+
+def ellipsoid_floor(low: float, best: float, high: float, error_percent: float, level_percent: float = 10.0) -> float:
+    """The least E, percent, of a parabola in log-ratio that meets the level at both ends and E at the best point.
+
+    An ellipsoidal domain has such a parabola for each ratio's profile, and the profile is at most E at the best point:
+    where this is below 0, ends and best point are not those of one ellipsoid.
+    """
+    ends = np.log([low, high])
+    place = (math.log(best) - ends.mean()) / (0.5 * np.ptp(ends))
+    return float((error_percent - level_percent * place**2) / (1.0 - place**2))
 
 
 def profile_intervals(problem: RatioProblem, optimum: Optimum, noise_std: float) -> ErrorDomain:

@@ -70,8 +70,6 @@ class GainFilter:
 
     Attributes
     ----------
-    x, p
-        Mean (3,) and covariance (3, 3) of (F, alpha, beta).
     nis
         Normalised innovation squared of the last sample; one degree of freedom.
     """
@@ -89,9 +87,21 @@ class GainFilter:
         self.dt, self.recruitment, self.noise_std, self.wander = dt, recruitment, noise_std, wander
         alpha = math.exp(-dt / START_TIME_CONSTANT_S)
         beta = (1.0 - alpha) * 0.5 * greatest_gain * recruitment.force_scale_n
-        self.x = np.array([0.0, alpha, beta])
-        self.p = np.diag([noise_std**2, START_ALPHA_STD**2, beta**2])
+        self._x = (0.0, alpha, beta)
+        # upper triangle by rows
+        self._p = (noise_std**2, 0.0, 0.0, START_ALPHA_STD**2, 0.0, beta**2)
         self.nis = math.nan
+
+    @property
+    def x(self) -> np.ndarray:
+        """Mean of (F, alpha, beta), shape (3,)."""
+        return np.array(self._x)
+
+    @property
+    def p(self) -> np.ndarray:
+        """Covariance of (F, alpha, beta), shape (3, 3)."""
+        ff, fa, fb, aa, ab, bb = self._p
+        return np.array([[ff, fa, fb], [fa, aa, ab], [fb, ab, bb]])
 
     def step(self, force_n: float, pulse_width_us: float) -> None:
         """Take in one measured force (NaN: none), and the pulse width that is held from now on."""
@@ -100,30 +110,31 @@ class GainFilter:
         self._predict(self.recruitment(pulse_width_us))
 
     def _correct(self, force_n: float) -> None:
-        innovation = force_n - self.x[0]
-        size = self.p[0, 0] + self.noise_std**2
-        self.nis = float(innovation * innovation / size)
-        gain = self.p[:, 0] / size
-        self.x = self.x + gain * innovation
-        keep = np.eye(3) - np.outer(gain, [1.0, 0.0, 0.0])
-        self.p = keep @ self.p @ keep.T + self.noise_std**2 * np.outer(gain, gain)
-        self.corrected = self.x.copy(), self.p.copy()
+        (force, alpha, beta), (ff, fa, fb, aa, ab, bb) = self._x, self._p
+        innovation, noise = force_n - force, self.noise_std**2
+        size = ff + noise
+        self.nis = innovation * innovation / size
+        gain, left = innovation / size, noise / size
+        self._x = (force + gain * ff, alpha + gain * fa, beta + gain * fb)
+        self._p = (left * ff, left * fa, left * fb, aa - fa * fa / size, ab - fa * fb / size, bb - fb * fb / size)
 
     def _predict(self, r: float) -> None:
-        force, alpha, beta = self.x
-        p, moves = self.p, np.array([[alpha, force, r], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-        self.x = np.array([alpha * force + p[0, 1] + beta * r, alpha, beta])
-        self.p = moves @ p @ moves.T
-        self.p[0, 0] += p[0, 0] * p[1, 1] + p[0, 1] ** 2
-        self.p[2, 2] += (self.wander * beta) ** 2 * self.dt
+        (force, alpha, beta), (ff, fa, fb, aa, ab, bb) = self._x, self._p
+        self._x = (alpha * force + fa + beta * r, alpha, beta)
+        # a row of the transition: alpha, force, r; and what the product of two Gaussians adds
+        to_f = alpha * ff + force * fa + r * fb
+        to_a = alpha * fa + force * aa + r * ab
+        to_b = alpha * fb + force * ab + r * bb
+        own = alpha * to_f + force * to_a + r * to_b + ff * aa + fa * fa
+        self._p = (own, to_a, to_b, aa, ab, bb + (self.wander * beta) ** 2 * self.dt)
 
     def gain_and_time_constant(self) -> tuple[float, float]:
         """K and tau in s, from the means."""
-        return _physical(self.x[1], self.x[2], self.dt, self.recruitment.force_scale_n)
+        return _physical(self._x[1], self._x[2], self.dt, self.recruitment.force_scale_n)
 
     def stds(self) -> tuple[float, float]:
         """Standard deviations of K and of tau in s, to first order."""
-        slope = _slope(self.x[1], self.x[2], self.dt, self.recruitment.force_scale_n)
+        slope = _slope(self._x[1], self._x[2], self.dt, self.recruitment.force_scale_n)
         covariance = slope @ self.p[1:, 1:] @ slope.T
         return float(np.sqrt(covariance[0, 0])), float(np.sqrt(covariance[1, 1]))
 

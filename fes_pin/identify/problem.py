@@ -14,6 +14,8 @@ from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
 
 Unknowns = list[dict[str, float]]
+SINGULAR = 1e-12
+"""Share of an unknown's own information added to it: two that the trial cannot tell apart do not stop a fit."""
 
 
 @dataclass(frozen=True)
@@ -156,16 +158,23 @@ def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> Norma
         g, h = j.T @ r, j.T @ j
         if local.shape[1]:
             own = local.T @ local
-            own[np.diag_indices_from(own)] *= 1.0 + damping
-            own[np.diag_indices_from(own)] += 1e-300
-            constant = np.linalg.solve(own, local.T @ r)
-            slope = np.linalg.solve(own, local.T @ j)
+            if not np.isfinite(own).all():
+                return NormalEquations(math.inf, np.zeros(size), np.zeros((size, size)), 0.0, ())
+            solved = _solved(own, np.column_stack([local.T @ r, local.T @ j]), damping)
+            constant, slope = solved[:, 0], solved[:, 1:]
             g, h = g - j.T @ (local @ constant), h - j.T @ (local @ slope)
             eliminated.append((constant, slope))
             local_gain += float(r @ (local @ constant))
         gradient += g
         hessian += h
     return NormalEquations(sse, gradient, hessian, local_gain, tuple(eliminated))
+
+
+def _solved(own: np.ndarray, right: np.ndarray, damping: float) -> np.ndarray:
+    """Solution of a trial's own system, damped and scaled; an unknown that is not felt stays where it is."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-150))
+    scaled = own * np.outer(scale, scale) + (damping + SINGULAR) * np.eye(len(own))
+    return scale[:, None] * np.linalg.solve(scaled, scale[:, None] * right)
 
 
 def whitened_sse(parts: Sequence[Linearized]) -> float:

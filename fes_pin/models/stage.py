@@ -99,15 +99,20 @@ class Effect:
         return tuple(n for n, info in cls.parameters().items() if info.null is None and not info.optional)
 
     @classmethod
-    def refinements(cls) -> tuple[str, ...]:
-        """The optional parameters, which refine the effect's form."""
-        return tuple(n for n, info in cls.parameters().items() if info.optional)
+    def refinements(cls) -> tuple[tuple[str, ...], ...]:
+        """The refinements of the effect's form: for each an optional parameter with a null, and its shapes after it."""
+        out: list[tuple[str, ...]] = []
+        for name, info in cls.parameters().items():
+            if info.optional and info.null is not None:
+                out.append((name,))
+            elif info.optional:
+                out[-1] = (*out[-1], name)
+        return tuple(out)
 
-    def refined(self) -> bool:
-        """True if a refinement of the form is switched on."""
-        return any(
-            i.optional and i.null is not None and getattr(self, n) != i.null for n, i in self.parameters().items()
-        )
+    def refined(self) -> tuple[str, ...]:
+        """The parameters of the refinements that are switched on."""
+        info = self.parameters()
+        return tuple(n for names in self.refinements() if getattr(self, names[0]) != info[names[0]].null for n in names)
 
     def unknowns(self) -> tuple[str, ...]:
         """The parameters that each trial has a value of its own of."""
@@ -120,7 +125,7 @@ class Effect:
     def fitted_parameters(self) -> tuple[str, ...]:
         """What a fit moves in all trials alike: all but discrete choices, and but refinements that are switched off."""
         refined, info = self.refined(), self.parameters()
-        return tuple(n for n in self.common() if info[n].fitted and (refined or not info[n].optional))
+        return tuple(n for n in self.common() if info[n].fitted and (n in refined or not info[n].optional))
 
     @classmethod
     def of_each_trial(cls, **shapes: Any) -> Effect:

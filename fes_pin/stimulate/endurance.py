@@ -17,7 +17,7 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.models.effects.fatigue import FLOOR, Fatigue
 from fes_pin.models.model import Model
-from fes_pin.stimulate.observer import PULSE_S, AnkleDynamics
+from fes_pin.stimulate.dynamics import PULSE_S, AnkleDynamics
 
 RESERVE = 0.1
 """Share of the force left that a schedule keeps for the feedback."""

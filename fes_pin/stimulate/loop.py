@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from fes_pin.stimulate.control import LOOKAHEAD, PositionController
-from fes_pin.stimulate.observer import PULSE_S
+from fes_pin.stimulate.dynamics import PULSE_S
 
 
 class Joint(Protocol):

@@ -6,6 +6,7 @@ import math
 from typing import Any, Protocol
 
 from fes_pin.data.errors import InputError
+from fes_pin.stimulate.recruitment import LinearRecruitment
 
 
 class Curve(Protocol):
@@ -52,6 +53,8 @@ class PulseWidth:
         if not (self.half == 0.0 or 0.0 < self.half < self.threshold):
             raise InputError(f"expected a half width from 0 to below the threshold of {self.threshold:g} us")
         self.followed = 0.0
+        # one straight line needs no arrays
+        self._straight = type(curve) is LinearRecruitment
 
     def __call__(self, recruitment: float) -> tuple[float, float]:
         """The pulse width in us for a recruitment, and the recruitment that it makes.
@@ -59,11 +62,11 @@ class PulseWidth:
         A recruitment that is not a number counts as 0.
         """
         wanted = min(max(recruitment, 0.0), 1.0) if math.isfinite(recruitment) else 0.0
-        target = float(self.curve.pulse_width_us(wanted))
+        target = self._width(wanted)
         if self.half == 0.0:
             width = self._allowed(target)
             # the curve's own inverse: exact but for what the limits took
-            return width, wanted if width == target else float(self.curve.recruitment(width))
+            return width, wanted if width == target else self._recruited(width)
         if wanted == 0.0:
             width = 0.0
         else:
@@ -84,4 +87,15 @@ class PulseWidth:
         return min(max(self.followed, width - self.half), width + self.half)
 
     def _made(self, width: float) -> float:
-        return float(self.curve.recruitment(self._follows(width)))
+        return self._recruited(self._follows(width))
+
+    def _width(self, recruitment: float) -> float:
+        if not self._straight:
+            return float(self.curve.pulse_width_us(recruitment))
+        width = self.threshold + recruitment * (self.saturation - self.threshold)
+        return 0.0 if recruitment <= 0.0 else min(width, self.saturation)
+
+    def _recruited(self, width: float) -> float:
+        if not self._straight:
+            return float(self.curve.recruitment(width))
+        return min(max((width - self.threshold) / (self.saturation - self.threshold), 0.0), 1.0)

@@ -46,6 +46,24 @@ def test_within_two_percent_after_five_seconds(seed):
     assert gain == pytest.approx(0.65, rel=0.02) and tau == pytest.approx(0.05, rel=0.02)
 
 
+def test_the_filter_does_the_sums_of_a_kalman_filter():
+    """Against matrices: the correction in Joseph's form, the prediction with the product's exact moments."""
+    trial, noise = isometric(11, seconds=2.0), FORCE_NOISE_N
+    tracker = GainFilter(trial.dt, Recruitment.of(CONSTANTS), noise, wander=0.05)
+    x, p = tracker.x, tracker.p
+    for force, width in zip(trial["force_n"], trial["pulse_width_us"], strict=True):
+        tracker.step(float(force), float(width))
+        gain = p[:, 0] / (p[0, 0] + noise**2)
+        keep = np.eye(3) - np.outer(gain, [1.0, 0.0, 0.0])
+        x, p = x + gain * (force - x[0]), keep @ p @ keep.T + noise**2 * np.outer(gain, gain)
+        moves = np.array([[x[1], x[0], tracker.recruitment(width)], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        product = p[0, 0] * p[1, 1] + p[0, 1] ** 2
+        x = np.array([x[1] * x[0] + p[0, 1] + tracker.recruitment(width) * x[2], x[1], x[2]])
+        p = moves @ p @ moves.T + np.diag([product, 0.0, (0.05 * x[2]) ** 2 * trial.dt])
+        np.testing.assert_allclose(tracker.x, x, rtol=1e-9)
+        np.testing.assert_allclose(tracker.p, p, rtol=1e-6, atol=1e-12)
+
+
 def test_nees_lies_in_its_band(runs):
     squares, _ = runs
     assert squares.shape == (RUNS, len(CHECKS))

@@ -9,8 +9,9 @@ import scipy.optimize
 from fes_pin.data.errors import InputError
 from fes_pin.data.paper import ANGLE_NOISE_RAD, PRINTED, paper_study, paper_trial, paper_twin
 from fes_pin.data.twin import AnkleTwin, record, staircase
+from fes_pin.diagnose.diagnosis import diagnose
 from fes_pin.identify.antagonist import carried_covariance, fit_antagonist, with_antagonist
-from fes_pin.identify.error_region import error_domain, follow, profile_intervals
+from fes_pin.identify.error_region import ellipsoid_floor, error_domain, error_holding, follow, profile_intervals
 from fes_pin.identify.identifiability import identifiability
 from fes_pin.identify.ratios import RATIOS, RatioProblem, ankle_of, error_percent, least_error
 from fes_pin.models.effects import FrameVibration
@@ -102,6 +103,40 @@ def test_domain_has_no_upper_end_because_light_feet_fit_as_well(framed):
     assert "no end" in str(domain) and "correlation 0.99" in str(domain)
 
 
+def test_error_with_one_ratio_held_is_that_of_an_independent_optimiser(framed):
+    problem, optimum = framed
+    held = np.log(60.0)
+    found = scipy.optimize.minimize(
+        lambda y: problem.error(np.r_[y[0], held, y[1]])[0],
+        optimum.x[[0, 2]] + held - optimum.x[1],
+        jac=lambda y: problem.error(np.r_[y[0], held, y[1]])[1][[0, 2]],
+    )
+    assert error_holding(problem, optimum, "k2", 60.0) == pytest.approx(found.fun, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", PRINTED)
+@pytest.mark.parametrize("change", [{}, {"f1_per_rad": 6.6, "f0_n": 0.9}, {"time_constant_s": 0.02}], ids=str)
+def test_table_2_is_narrower_than_the_extremes_can_be(name, change):
+    """Its ends, the other ratios free, raise E by less than a third of what 10 % needs: no stimulus or F_ANT does."""
+    twin, printed = replace(paper_twin(name), **change), PRINTED[name]
+    bursts = [(0.2, 0.0), *[(0.125, 1000.0), (0.125, 0.0)] * 5, (0.4, 0.0)]
+    problem = RatioProblem(ankle_of(twin), [record(twin, staircase(bursts), name)])
+    optimum = least_error(problem, starts=1)
+    rises = [error_holding(problem, optimum, n, end) for n in RATIOS for end in printed.domain[n]]
+    assert max(rises) < (10.0 - printed.error_percent) / 3.0
+
+
+def test_tables_1_and_2_of_3_23_are_not_of_one_ellipsoid():
+    def floors(name):
+        printed = PRINTED[name]
+        return [
+            ellipsoid_floor(lo, printed.ratios[n], hi, printed.error_percent) for n, (lo, hi) in printed.domain.items()
+        ]
+
+    assert min(floors("3-23")) < 0.0 < min(floors("4-24"))
+    assert ellipsoid_floor(np.exp(-1.0), np.exp(0.5), np.exp(1.0), 2.0 + 8.0 / 4.0) == pytest.approx(2.0)
+
+
 def test_profile_intervals_cover_the_truth_and_are_as_wide_as_the_scatter():
     truth, inside, runs, found, halves = PRINTED["3-23"].ratios, 0, 20, [], []
     for seed in range(runs):
@@ -179,3 +214,20 @@ def test_the_tool_says_what_cannot_be_told():
     assert both.determines({"moment_arm_m": 1, "inertia_kgm2": -1}) and both.determines({"time_constant_s": 1})
     with pytest.raises(KeyError, match="no constant lever"):
         both.determines({"lever": 1.0})
+
+
+def test_trial_3_23_on_its_frame_is_the_papers_and_the_frame_is_named():
+    """The paper's own case: its E at the optimum, the frame found, and E at the noise floor with it."""
+    study = paper_study("3-23", frame=True)
+    optimum = least_error(problem_of("3-23", frame=True))
+    assert optimum.error_percent == pytest.approx(PRINTED["3-23"].error_percent, abs=0.05)
+    diagnosis = diagnose(study)
+    assert [c.name for c in diagnosis.causes] == ["frame_vibration"]
+    trial, hidden = study.trials[0], paper_twin("3-23", frame=True)
+    after = error_percent([trial["angle_rad"]], [simulate(diagnosis.model, trial)["angle_rad"]])
+    spread = trial["angle_rad"] - trial["angle_rad"].mean()
+    floor = 100.0 * ANGLE_NOISE_RAD**2 * len(spread) / (spread @ spread)
+    assert after == pytest.approx(floor, rel=0.25)  # the noise's own variance is known to 8 %
+    found = diagnosis.model.parameters()
+    assert found["frame_vibration.frequency_hz"] == pytest.approx(hidden.frame_hz, rel=0.03)
+    assert found["inertia_kgm2"] == pytest.approx(hidden.inertia_kgm2, rel=0.03)

@@ -115,6 +115,7 @@ class Ankle(Rig):
         c, q, v = s.c, s.q, s.v
         s.load = s.through("load", c.load_kg)
         s.inertia = self.inertia_kgm2
+        s.bearing_load = 1.0  # muscle and cable press on the joint by forces that the rig does not tell
         force = s.through("net_force", s.force)
         antagonist = where(q > c.theta_r_rad, c.f0_n * (exp(c.f1_per_rad * ramp(q - c.theta_r_rad)) - 1.0), 0.0)
         tilted = s.through("gravity_angle", q)

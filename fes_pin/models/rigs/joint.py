@@ -6,10 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.data.trial import Trial
-from fes_pin.models.maths import cos, sin
+from fes_pin.models.maths import cos, sin, sqrt, where
 from fes_pin.models.parameters import parameter
 from fes_pin.models.rigs.base import Rig, first_rate
 from fes_pin.models.stage import Signals
+
+WEIGHTLESS = 1e-6
+"""Gravity's torque over inertia below which a joint counts as balanced, 1/s2: a period above an hour and a half."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,11 @@ class Joint(Rig):
     M, A and B are read off Pinocchio's CRBA and gravity of the URDF (`constants`: `inertia`, `gravity_cos`,
     `gravity_sin`, `revolute`); for a prismatic joint (`revolute` 0) gravity is the constant A. The effort is held
     between samples. Each trial has its own initial position and velocity.
+
+    The bearing of a revolute joint carries the pull along the arm, in units of the URDF's weight at rest W (that of the
+    simple pendulum with the same A, B and M; 1 for a prismatic joint, and where the joint feels no gravity):
+
+        bearing_load = (gravity_scale d/dq (A cos(q) + B sin(q)) + inertia_scale M v^2) / W,   W^2 = A^2 + B^2
     """
 
     inertia_scale: float = parameter(1.0, lower=1e-3, upper=1e3, scale=0.1)
@@ -85,6 +93,10 @@ class Joint(Rig):
         s.inertia = self.inertia_scale * c.inertia
         tilted = s.through("gravity_angle", c.revolute * s.q)
         gravity = self.gravity_scale * (c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted))
+        pull = self.gravity_scale * (c.gravity_sin * cos(tilted) - c.gravity_cos * sin(tilted)) + s.inertia * s.v * s.v
+        weight = sqrt(c.gravity_cos * c.gravity_cos + c.gravity_sin * c.gravity_sin)
+        swings = where(weight > WEIGHTLESS * c.inertia, c.revolute, 0.0)
+        s.bearing_load = 1.0 + swings * (pull / where(swings > 0.0, weight, 1.0) - 1.0)
         effort = s.through("effort", getattr(s.u, "effort", 0.0))
         s.torque = s.through("friction", s.through("torque", effort - gravity - self.damping * s.v))
         s.driving = s.through("driving", s.torque / s.inertia)

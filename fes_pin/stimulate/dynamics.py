@@ -1,0 +1,235 @@
+"""Eq. (1) of one ankle as plain numbers, for use pulse by pulse.
+
+    J theta'' = (a F_M - l (F_ANT - M g)) sin(theta) + m g l cos(theta) - xi theta' + torque
+
+Source: Dombre, Fournier and Coiffet, section II-1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from numbers import Real
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.models.effects import FrameVibration
+from fes_pin.models.model import Model
+from fes_pin.models.rigs.ankle import Ankle
+from fes_pin.models.rigs.base import GRAVITY
+from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
+
+PULSE_S = 1.0 / 45.0
+"""Time between pulses, s; Dombre, Fournier and Coiffet, section II-3-1."""
+RESOLVED = 0.7
+"""Longest integration step, in units of the joint's fastest radian: Runge-Kutta's fourth order then errs by 1e-3."""
+LONGEST_STRETCH = 3.0
+"""Angle in rad beyond theta_r from which F_ANT grows no more, so that no state overflows."""
+
+
+def number(value: object) -> float:
+    """A reading as a float; NaN for what is no number, or too large for one."""
+    if type(value) is float:
+        return value
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    try:
+        return float(value) if isinstance(value, Real) else math.nan
+    except OverflowError:
+        return math.nan
+
+
+def _frame_of(model: Model) -> dict[str, float]:
+    frame = next((e for e in model.effects if isinstance(e, FrameVibration)), None)
+    if frame is None:
+        return {}
+    return {
+        "frame_coupling": float(frame.coupling),
+        "frame_hz": float(frame.frequency_hz),
+        "frame_damping": float(frame.damping_ratio),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class AnkleDynamics:
+    """Eq. (1) as plain numbers: the ankle that a controller believes in, with one load.
+
+    Attributes
+    ----------
+    pull_nm
+        a K F_ref: torque of full activation at sin(theta) = 1, N m.
+    frame_coupling, frame_hz, frame_damping
+        Of the effect `frame_vibration`; a coupling of 0 is a rigid frame. Gains are chosen with it; nothing else here
+        moves with it.
+    """
+
+    inertia: float
+    damping: float
+    time_constant: float
+    pull_nm: float
+    lever: float
+    f0: float
+    f1: float
+    theta_r: float
+    load_n: float
+    gravity_cos: float
+    gravity_sin: float
+    frame_coupling: float = 0.0
+    frame_hz: float = 0.0
+    frame_damping: float = 0.0
+
+    @classmethod
+    def of(cls, model: Model, load_kg: float) -> AnkleDynamics:
+        """From an ankle's model; of its effects the frame is used.
+
+        Raises
+        ------
+        InputError
+            For another rig, or a load that is none.
+        """
+        if not isinstance(model.rig, Ankle):
+            raise InputError(f"position control needs the rig ankle, found {model.rig.name}")
+        if not (math.isfinite(load_kg) and load_kg >= 0.0):
+            raise InputError(f"expected a load of at least 0 kg, found {load_kg:g}")
+        rig, c = model.rig, {n: float(v) for n, v in model.rig.constants.items()}
+        a, b = gravity_coefficients(point_foot(c["foot_mass_kg"], c["com_distance_m"]))
+        return cls(
+            rig.inertia_kgm2,
+            rig.damping_nms,
+            rig.time_constant_s,
+            c["moment_arm_m"] * rig.gain * c["force_scale_n"],
+            c["com_distance_m"],
+            c["f0_n"],
+            c["f1_per_rad"],
+            c["theta_r_rad"],
+            load_kg * GRAVITY,
+            a,
+            b,
+            **_frame_of(model),
+        )
+
+    @property
+    def pieces(self) -> int:
+        """Integration steps per pulse that resolve damping and stiffness up to where full activation holds."""
+        return max(2, math.ceil(PULSE_S * self._fastest() / RESOLVED))
+
+    def _fastest(self) -> float:
+        stiff = max(-self.passive(self.rest_angle(share))[1] / self.inertia for share in (0.0, 1.0))
+        return max(self.damping / self.inertia, math.sqrt(max(stiff, 0.0)))
+
+    def passive(self, q: float) -> tuple[float, float]:
+        """Torque of antagonist, load and weight at an angle, N m, and its slope, N m/rad."""
+        stretch = min(q - self.theta_r, LONGEST_STRETCH)
+        grown = self.f0 * math.exp(self.f1 * stretch) if stretch > 0.0 else self.f0
+        pull, slope = grown - self.f0 - self.load_n, self.f1 * grown if stretch > 0.0 else 0.0
+        s, c = math.sin(q), math.cos(q)
+        torque = -self.lever * pull * s - self.gravity_cos * c - self.gravity_sin * s
+        return torque, -self.lever * (slope * s + pull * c) + self.gravity_cos * s - self.gravity_sin * c
+
+    def rest_angle(self, activation: float = 0.0) -> float:
+        """Angle in rad that a steady activation of the believed muscle holds; by bisection."""
+        low, high = 0.3, 2.8
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            rising = self.passive(middle)[0] + self.pull_nm * activation * math.sin(middle) > 0.0
+            low, high = (middle, high) if rising else (low, middle)
+        return 0.5 * (low + high)
+
+    def activation_for(self, q: float, v: float = 0.0, acceleration: float = 0.0, torque: float = 0.0) -> float:
+        """Activation (times gain share) that moves the joint so against an unknown `torque`; unbounded."""
+        needed = self.inertia * acceleration + self.damping * v - self.passive(q)[0] - torque
+        return needed / (self.pull_nm * max(math.sin(q), 0.05))
+
+    def linear(self, q: float, activation: float, share: float) -> np.ndarray:
+        """Derivative of the rates of (activation, angle, rate, torque, share), shape (5, 5)."""
+        s, j = math.sin(q), self.inertia
+        stiff = (self.pull_nm * share * activation * math.cos(q) + self.passive(q)[1]) / j
+        pull = self.pull_nm * s / j
+        f = np.zeros((5, 5))
+        f[0, 0], f[1, 2] = -1.0 / self.time_constant, 1.0
+        f[2] = pull * share, stiff, -self.damping / j, 1.0 / j, pull * activation
+        return f
+
+
+class PulseToPulse:
+    """What a pulse does to an ankle's state, in plain numbers.
+
+    Parameters
+    ----------
+    dynamics
+        The ankle.
+    pieces
+        Integration steps per pulse; by default as many as the ankle's fastest motion needs.
+    """
+
+    def __init__(self, dynamics: AnkleDynamics, pieces: int | None = None) -> None:
+        self.dynamics = dynamics
+        self.pieces = dynamics.pieces if pieces is None else pieces
+        self.step_s = PULSE_S / self.pieces
+        self.fade = math.exp(-self.step_s / dynamics.time_constant)
+        self.half_fade = math.exp(-0.5 * self.step_s / dynamics.time_constant)
+        # the variation's own pieces are finer, by halving: a quarter of those of the motion, in powers of two
+        self.halvings = max(2, math.ceil(math.log2(4 * self.pieces)))
+
+    def moved(
+        self, act: float, q: float, v: float, torque: float, share: float, recruitment: float
+    ) -> tuple[float, float, float]:
+        """Activation, angle and rate a pulse later: the classical Runge-Kutta method, activation exact."""
+        d, h = self.dynamics, self.step_s
+        f0, f1, start, lever, load = d.f0, d.f1, d.theta_r, d.lever, d.load_n
+        a, b, inverse, damping, pull = d.gravity_cos, d.gravity_sin, 1.0 / d.inertia, d.damping, d.pull_nm * share
+        sin, cos, exp = math.sin, math.cos, math.exp
+
+        def rise(angle: float, rate: float, active: float) -> float:
+            stretch = angle - start
+            grown = f0 * (exp(f1 * min(stretch, LONGEST_STRETCH)) - 1.0) if stretch > 0.0 else 0.0
+            held = pull * active - lever * (grown - load) - b
+            return (held * sin(angle) - a * cos(angle) + torque - damping * rate) * inverse
+
+        half = 0.5 * h
+        for _ in range(self.pieces):
+            rest = act - recruitment
+            middle, end = recruitment + rest * self.half_fade, recruitment + rest * self.fade
+            k1 = rise(q, v, act)
+            v2 = v + half * k1
+            k2 = rise(q + half * v, v2, middle)
+            v3 = v + half * k2
+            k3 = rise(q + half * v2, v3, middle)
+            v4 = v + h * k3
+            k4 = rise(q + h * v3, v4, end)
+            q += h / 6.0 * (v + 2.0 * (v2 + v3) + v4)
+            v += h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+            act = end
+        return act, q, v
+
+    def transition(self, q: float, activation: float, share: float) -> tuple[list[float], list[float]]:
+        """Rows of angle and rate of the state's transition over a pulse, linear about a state; five numbers each.
+
+        exp(f t) by its series to the third power and by squaring; to 1e-4.
+        """
+        d = self.dynamics
+        inverse, s = 1.0 / d.inertia, math.sin(q)
+        k = (d.pull_nm * share * activation * math.cos(q) + d.passive(q)[1]) * inverse
+        c, g, w = -d.damping * inverse, d.pull_nm * s * inverse, -1.0 / d.time_constant
+        h = PULSE_S / (1 << self.halvings)
+        h2, h3 = 0.5 * h * h, h * h * h / 6.0
+        # exp([[0, 1], [k, c]] h), and what it makes of 1 in activation and of a steady 1 of acceleration
+        m21, m22 = k * c, k + c * c
+        e11, e12 = 1.0 + h2 * k + h3 * m21, h + h2 * c + h3 * m22
+        e21, e22 = h * k + h2 * m21 + h3 * k * m22, 1.0 + h * c + h2 * m22 + h3 * (m21 + c * m22)
+        a1, a2 = g * (h2 + h3 * (c + w)), g * (h + h2 * (c + w) + h3 * (m22 + w * c + w * w))
+        u1, u2 = h2 + h3 * c, h + h2 * c + h3 * m22
+        fade = 1.0 + h * w + h2 * w * w + h3 * w * w * w
+        for _ in range(self.halvings):
+            a1, a2 = e11 * a1 + e12 * a2 + a1 * fade, e21 * a1 + e22 * a2 + a2 * fade
+            u1, u2 = e11 * u1 + e12 * u2 + u1, e21 * u1 + e22 * u2 + u2
+            e11, e12, e21, e22 = (
+                e11 * e11 + e12 * e21,
+                e12 * (e11 + e22),
+                e21 * (e11 + e22),
+                e21 * e12 + e22 * e22,
+            )
+            fade *= fade
+        tired = g * activation
+        return [share * a1, e11, e12, u1 * inverse, tired * u1], [share * a2, e21, e22, u2 * inverse, tired * u2]
