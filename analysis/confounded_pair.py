@@ -119,9 +119,7 @@ def state(diagnosis, true):
 
 stories = {}
 for pair in PAIRS:
-    print(
-        f"\n{pair[0]} or {pair[1]}\n  {'true cause':26s}{'first':>9s}  trials: twice the log-likelihood by which it leads"
-    )
+    print(f"\n{pair[0]} or {pair[1]}\n  {'true cause':26s}{'first':>9s}  trials: its lead in twice the log-likelihood")
     for seed in range(STUDIES):
         true, other = pair if seed % 2 == 0 else pair[::-1]
         ankle = TrueAnkle(true, seed)
