@@ -84,6 +84,8 @@ class Search:
             if size > 1 and not self._extend_beam(size):
                 break
             first = self._swap(self.sets.ranked(size)[0])
+            if size == 1:
+                first = self._refine_best()
             if size == 2 and not self.claims.complete(first):
                 self._extend_beam(size, every=True)
                 first = self._swap(self.sets.ranked(size)[0])
@@ -181,6 +183,12 @@ class Search:
         refined = self.sets.refinement(names)
         if refined is not None and self.claims.demanded(refined, self.sets.fits[names]):
             self.sets.fits[names] = refined
+
+    def _refine_best(self) -> Names:
+        """The best single cause, once each of the best has the form that the data demand."""
+        for names in self.sets.ranked(1)[:BEAM]:
+            self._refine(names)
+        return self.sets.ranked(1)[0]
 
     def _swap(self, names: Names) -> Names:
         """Replace single causes as long as that helps."""

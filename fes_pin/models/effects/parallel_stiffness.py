@@ -16,14 +16,17 @@ from fes_pin.models.stage import Effect, Stage
 class ParallelStiffness(Effect):
     """An extra spring across the joint.
 
-        torque - stiffness (q - rest_angle)
+        torque - stiffness x (1 + hardening x^2),   x = q - rest_angle
 
     Tell-tale: the joint is held too softly, at all speeds and activations alike, around some angle of its own.
-    Source: Winters, in Multiple Muscle Systems, Springer 1990: passive joint elasticity.
+    Source: Winters, in Multiple Muscle Systems, Springer 1990: passive joint elasticity; it stiffens with the angle.
     """
 
     stiffness_nm_per_rad: float = parameter(0.05, unit="N m/rad", null=0.0, lower=-1.0, upper=1000.0, scale=0.05)
     rest_angle_rad: float = parameter(1.6, unit="rad", lower=-20.0, upper=20.0, scale=0.1)
+    hardening_per_rad2: float = parameter(
+        0.0, unit="1/rad2", null=0.0, lower=0.0, upper=100.0, scale=1.0, optional=True, grid=(1.0,)
+    )
 
     name, stage, signal, rigs = "parallel_stiffness", Stage.JOINT, "torque", ("ankle", "joint")
 
@@ -47,4 +50,5 @@ class ParallelStiffness(Effect):
         return {"rest_angle_rad": (low - 0.5 * (high - low), high + 0.5 * (high - low))}
 
     def apply(self, value: Any, s: Any) -> Any:
-        return value - self.stiffness_nm_per_rad * (s.q - self.rest_angle_rad)
+        x = s.q - self.rest_angle_rad
+        return value - self.stiffness_nm_per_rad * x * (1.0 + self.hardening_per_rad2 * x * x)

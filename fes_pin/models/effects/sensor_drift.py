@@ -13,15 +13,18 @@ from fes_pin.models.stage import Effect, Stage
 class SensorDrift(Effect):
     """A ramp in time added to the measured output of a trial.
 
-        y + rate t,   t from the first sample of the trial
+        y + rate t / (1 + settling t),   t from the first sample of the trial
 
     Tell-tale: readings at equal states move apart steadily within a trial, whatever happens.
     Source: the warming of a bridge or of its amplifier.
     """
 
     rate_per_s: float = parameter(0.001, unit="rad/s", null=0.0, lower=-100.0, upper=100.0, scale=0.0005)
+    settling_per_s: float = parameter(
+        0.0, unit="1/s", null=0.0, lower=0.0, upper=10.0, scale=0.1, optional=True, grid=(0.2,)
+    )
 
     name, stage, signal, rigs = "sensor_drift", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
 
     def apply(self, value: Any, s: Any) -> Any:
-        return value + self.rate_per_s * s.time
+        return value + self.rate_per_s * s.time / (1.0 + self.settling_per_s * s.time)

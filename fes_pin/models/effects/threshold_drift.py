@@ -13,7 +13,7 @@ from fes_pin.models.stage import Effect, Stage
 class ThresholdDrift(Effect):
     """The threshold moves with time within a trial, stimulated or not.
 
-        w_eff = w - rate t,   t from the first sample of the trial
+        w_eff = w - rate t / (1 + settling t),   t from the first sample of the trial
 
     Tell-tale: equal stimuli are answered ever more weakly (or strongly) within a trial, the more so near the
     threshold, and rest does not help.
@@ -22,8 +22,11 @@ class ThresholdDrift(Effect):
     """
 
     rate_us_per_s: float = parameter(2.0, unit="us/s", null=0.0, lower=-100.0, upper=100.0, scale=2.0)
+    settling_per_s: float = parameter(
+        0.0, unit="1/s", null=0.0, lower=0.0, upper=10.0, scale=0.1, optional=True, grid=(0.2,)
+    )
 
     name, stage, signal, rigs = "threshold_drift", Stage.NERVE, "pulse_width", ("ankle", "muscle")
 
     def apply(self, value: Any, s: Any) -> Any:
-        return value - self.rate_us_per_s * s.time
+        return value - self.rate_us_per_s * s.time / (1.0 + self.settling_per_s * s.time)
