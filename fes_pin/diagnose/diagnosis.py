@@ -53,14 +53,16 @@ class Cause:
     gain_held_out: Gain
     evidence: Evidence | None = None
 
-    def helps(self, complete: bool) -> bool:
+    def helps(self, complete: bool, alone: bool) -> bool:
         """True if trials that took no part speak for it.
 
-        Where the model leaves only noise the interval is that of their likelihood, and their open-loop errors must fall
-        too; else it is that of the errors.
+        By their likelihood where the model leaves only noise, by their open-loop errors where it does not; where other
+        causes stand beside it by both, for several flexible forms together come near to anything.
         """
         known = self.evidence if complete else None
-        return self.gain_held_out.percent > 0.0 and (known.low if known else self.gain_held_out.low) > 0.0
+        likely = known is None or known.low > 0.0
+        useful = self.gain_held_out.percent if known and alone else self.gain_held_out.low
+        return likely and useful > 0.0
 
 
 @dataclass(frozen=True)
@@ -199,7 +201,7 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
     left = remainder(searched.best, seed)
     causes, held = _causes(searched, left, test, seed)
     refused: list[Cause] = []
-    while weak := [c for c in causes if not c.helps(searched.complete)]:
+    while weak := [c for c in causes if not c.helps(searched.complete, len(causes) == 1)]:
         weakest = min(weak, key=lambda c: c.gain_held_out.low)
         refused.append(weakest)
         searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))

@@ -45,12 +45,14 @@ def cause(p_value=1e-3, evidence=None, percent=50.0, low=10.0, stage="joint"):
 
 def test_held_out_trials_speak_by_likelihood_only_where_noise_is_all_that_is_left():
     sure, unsure = Evidence(100.0, 100.0), Evidence(10.0, 100.0)
-    assert cause(evidence=sure, low=-5.0).helps(complete=True)
-    assert not cause(evidence=unsure, low=5.0).helps(complete=True)
-    assert not cause(evidence=sure, low=-5.0).helps(complete=False)
-    assert cause(evidence=unsure, low=5.0).helps(complete=False)
-    assert not cause(evidence=sure, percent=-1.0, low=-5.0).helps(complete=True)
-    assert cause(low=5.0).helps(complete=True) and not cause(low=-5.0).helps(complete=True)
+    assert cause(evidence=sure, low=-5.0).helps(complete=True, alone=True)
+    assert not cause(evidence=sure, low=-5.0).helps(complete=True, alone=False)
+    assert cause(evidence=sure, low=5.0).helps(complete=True, alone=False)
+    assert not cause(evidence=unsure, low=5.0).helps(complete=True, alone=True)
+    assert not cause(evidence=sure, low=-5.0).helps(complete=False, alone=True)
+    assert cause(evidence=unsure, low=5.0).helps(complete=False, alone=False)
+    assert not cause(evidence=sure, percent=-1.0, low=-5.0).helps(complete=True, alone=True)
+    assert cause(low=5.0).helps(complete=True, alone=True) and not cause(low=-5.0).helps(complete=True, alone=True)
 
 
 def test_a_refused_certainty_is_a_remainder():
