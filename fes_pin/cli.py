@@ -36,13 +36,16 @@ def diagnose(
     from fes_pin.data.files import write_files  # noqa: PLC0415
     from fes_pin.data.study import read_study  # noqa: PLC0415
     from fes_pin.diagnose.diagnosis import diagnose as find  # noqa: PLC0415
-    from fes_pin.diagnose.record import diagnosis_files  # noqa: PLC0415
+    from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files  # noqa: PLC0415
     from fes_pin.view.report import report_html  # noqa: PLC0415
 
     measured = read_study(study)
     with _progress() as tell:
         diagnosis = find(measured, seed=seed, progress=tell)
-    write_files(out, {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)})
+    files = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
+    write_files(out, files)
+    if NEXT_FILE not in files:  # what an earlier diagnosis proposed is not this one's
+        (out / NEXT_FILE).unlink(missing_ok=True)
     _print_verdict(diagnosis)
     typer.echo(f"report: {out / 'report.html'}")
 

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from fes_pin import cli
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import read_trial
 from fes_pin.diagnose.diagnosis import diagnose
-from fes_pin.diagnose.record import diagnosis_files, diagnosis_record
+from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files, diagnosis_record
 from fes_pin.models.effects import EFFECTS
 from fes_pin.models.simulate import simulate
 from fes_pin.models.store import load_model, save_model
@@ -183,6 +184,14 @@ def test_a_failed_write_leaves_the_old_answer(made, diagnosis, monkeypatch, caps
     line = fails(monkeypatch, capsys, "diagnose", made / "study", "--out", out)
     assert "No space left" in line
     assert {p.name: p.read_text() for p in out.iterdir()} == old
+
+
+def test_what_an_earlier_diagnosis_proposed_does_not_stay(made, diagnosis, monkeypatch, tmp_path):
+    (tmp_path / NEXT_FILE).write_text("of another study")
+    decided = replace(diagnosis, next_experiment=None)
+    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose", lambda *_, **__: decided)
+    run(monkeypatch, "diagnose", made / "study", "--out", tmp_path)
+    assert (tmp_path / "diagnosis.json").exists() and not (tmp_path / NEXT_FILE).exists()
 
 
 def test_a_killed_report_leaves_no_folder(made, diagnosis, monkeypatch, tmp_path):

@@ -11,10 +11,10 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.library import Library, Projection, Scored, Scores
-from fes_pin.diagnose.noise_floor import rich_noise, whiteless
+from fes_pin.diagnose.noise_floor import rich_noise
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import CONFIDENCE_95, MAX_ITERATIONS, Fit, fit_problem, noise_of
-from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -120,7 +120,7 @@ class JointFits:
 
     def first_noise(self, base: Fit) -> None:
         """The noise of the nominal model, beside everything that the library could explain: only to rank causes."""
-        white = whiteless(noise_of(base))
+        white = as_white(noise_of(base))
         probes = self.library.probes(base, white, exclude=())
         varying = {p.name: [q.columns for q in probes if q.name == p.name] for p in probes if p.effect.varies}
         self.set_noise(rich_noise(base, white, [p.columns for p in probes], list(varying.values())))

@@ -70,11 +70,6 @@ def _of_each_trial(left: np.ndarray, shapes: Sequence[np.ndarray], counts: Seque
     return best
 
 
-def whiteless(noise: dict[str, Noise]) -> dict[str, Noise]:
-    """The same noise, taken for white."""
-    return {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in noise.items()}
-
-
 def _local_columns(parts: Sequence) -> np.ndarray:
     """Each trial's unknowns as columns of their own, shape (m, all unknowns)."""
     rows, width = sum(len(p.residual) for p in parts), sum(p.local.shape[1] for p in parts)

@@ -11,9 +11,9 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.claims import FORM_SHARE
 from fes_pin.diagnose.held_out import folds_of, foretold
 from fes_pin.diagnose.joint_fits import LOOK, JointFits, Names
-from fes_pin.diagnose.noise_floor import whiteless
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import Fit, fit_problem, noise_of
+from fes_pin.identify.noise import as_white
 from fes_pin.identify.problem import Problem
 
 REFINED = 3
@@ -46,7 +46,7 @@ def choose_by_prediction(sets: JointFits, names: Names, pool: Sequence[Names]) -
 
 def open_loop(fitted: Fit) -> Fit:
     """The same model fitted for least open-loop error: its residuals are misfit, and not to be whitened."""
-    problem = Problem(fitted.model, fitted.trials, whiteless(dict(fitted.noise)))
+    problem = Problem(fitted.model, fitted.trials, as_white(fitted.noise))
     return fit_problem(problem, fitted.values, fitted.unknowns, 2 * LOOK)
 
 
@@ -88,5 +88,5 @@ def fit_for_prediction(fits: Sequence[Fit], recorded: Sequence[Trial]) -> list[F
     Each trial's initial state is estimated, though a prediction takes its first sample: the noise of a first sample
     would go into the parameters.
     """
-    noise = whiteless(noise_of(fits[0]))
+    noise = as_white(noise_of(fits[0]))
     return in_parallel(lambda f: fit_problem(Problem(f.model, recorded, noise), f.values), fits)

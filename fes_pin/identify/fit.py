@@ -12,7 +12,7 @@ import scipy.stats
 from threadpoolctl import ThreadpoolController
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, estimate_noise, noise_step, thin, thinning
+from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, NormalEquations, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
 
@@ -117,8 +117,9 @@ class Fit:
     @cached_property
     def plain(self) -> float:
         """Sum of squared residuals over the variance of a single sample, not whitened."""
-        white = {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in self.noise.items()}
-        return whitened_sse(Problem(self.model, self.trials, white, ()).linearize(self.values, self.unknowns))
+        return whitened_sse(
+            Problem(self.model, self.trials, as_white(self.noise), ()).linearize(self.values, self.unknowns)
+        )
 
     @property
     def price(self) -> float:

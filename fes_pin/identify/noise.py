@@ -19,7 +19,8 @@ COEFFICIENT_PRICE = 4.0
 
 WHITE_SHARE = 0.003
 """Share of the residual's variance that is taken for white on top of it. It keeps a filter from becoming a resonator
-that swallows what a model gets wrong: the range of its spectrum stays within about 300. Slow noise weighs as before."""
+that swallows whatever a model gets wrong; slow noise weighs as before. It is no bound on the range of the spectrum: a
+sinusoid still leaves a deep notch."""
 
 
 @dataclass(frozen=True)
@@ -154,3 +155,8 @@ def _ridge(gram: np.ndarray, p: int) -> np.ndarray:
 
 NoiseModel = Mapping[str, Noise]
 """Noise by output column."""
+
+
+def as_white(noise: NoiseModel) -> dict[str, Noise]:
+    """The same noise, each sample as uncertain as before, taken for white."""
+    return {n: Noise(max(m.std, 1e-12), (), m.std, m.step_s) for n, m in noise.items()}
