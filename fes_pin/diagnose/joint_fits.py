@@ -194,6 +194,8 @@ def _refined(model: Model, effect: Effect) -> list[list[Model]]:
         return []
     out, info = [], effect.parameters()
     for names in effect.refinements():
+        if model.rig.name not in (info[names[0]].rigs or effect.rigs):
+            continue
         paths = [f"{effect.name}.{n}" for n in names]
         choices = itertools.product(*(info[n].grid for n in names))
         out.append([model.with_parameters(dict(zip(paths, values, strict=True))) for values in choices])

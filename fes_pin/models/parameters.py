@@ -31,6 +31,8 @@ class Parameter:
         False for a discrete choice, which a search enumerates and never moves.
     optional
         True for a refinement of the form: it stays at its null (or default) until data demand it.
+    rigs
+        The rigs on which a refinement is tried; empty for all of its effect's.
     """
 
     unit: str = ""
@@ -41,6 +43,7 @@ class Parameter:
     grid: tuple[float, ...] = ()
     fitted: bool = True
     optional: bool = False
+    rigs: tuple[str, ...] = ()
 
 
 def parameter(
@@ -54,9 +57,10 @@ def parameter(
     grid: tuple[float, ...] = (),
     fitted: bool = True,
     optional: bool = False,
+    rigs: tuple[str, ...] = (),
 ) -> Any:
     """A dataclass field that is a parameter; see `Parameter`."""
-    info = Parameter(unit, null, lower, upper, scale, grid, fitted, optional)
+    info = Parameter(unit, null, lower, upper, scale, grid, fitted, optional, rigs)
     return dataclasses.field(default=default, metadata={_KEY: info})
 
 

@@ -179,17 +179,19 @@ class Signals(SimpleNamespace):
 def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, Any]:
     """First-order low pass of `target` that is exact at time constant 0 and never stiff.
 
-    With e = (T^8 + h^8)^(1/8), h the integration step: x' = (target - x) / e, out = target - T x'.
+    With e = (T^8 + (h/2)^8)^(1/8), h the integration step: x' = (target - x) / e, out = target - T x'.
     The transfer function (1 + (e - T) s) / (1 + e s) has the low pass's delay T. It differs from the low pass where T
-    is below two steps, and then only above 1/h: e - T is h at T = 0, h/1000 at T = 2 h.
+    is below a step, and then only above 2/h: e - T is h/2 at T = 0, h/4000 at T = h. Runge-Kutta steps of order four
+    are stable down to e = 0.36 h.
 
     Returns
     -------
     out, rate
         The lagged signal and the time derivative of `state`.
     """
-    ratio = time_constant / step
+    shortest = 0.5 * step
+    ratio = time_constant / shortest
     fourth = ratio * ratio * ratio * ratio
-    e = step * sqrt(sqrt(sqrt(1.0 + fourth * fourth)))
+    e = shortest * sqrt(sqrt(sqrt(1.0 + fourth * fourth)))
     rate = (target - state) / e
     return target - time_constant * rate, rate

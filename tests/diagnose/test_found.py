@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from diagnose.hidden import diagnosed, named, slide
+from diagnose.hidden import diagnosed, named, slide, study_of
 from oracle import TYPICAL
 
 from fes_pin.diagnose.diagnosis import diagnose
@@ -61,6 +61,17 @@ def test_intervals_hold_the_truth():
 def test_friction_of_a_slide(driven):
     diagnosis = diagnose(slide(0, {"coulomb_friction": {"torque_nm": 0.15}}, driven))
     assert [s for s in named(diagnosis) if "coulomb_friction" in s], str(diagnosis)
+
+
+def test_a_reading_that_is_shifted_in_time():
+    """A clock that is late is a form of `sensor_lag`: nothing is left of it, where a low pass would leave a trace."""
+    study = study_of("joint", lambda _: {"sensor_lag": {"form": "shift", "lag_s": 0.025}}, seed=9)
+    diagnosis = diagnose(study)
+    assert named(diagnosis) == [{"sensor_lag"}], str(diagnosis)
+    found = diagnosis.causes[0].parameters
+    assert found["shift"].value == 1.0
+    assert found["lag_s"].value == pytest.approx(0.025, abs=5.0 * found["lag_s"].std)
+    assert not diagnosis.remainder.unexplained
 
 
 def test_both_of_two_causes():

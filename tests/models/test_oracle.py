@@ -1,5 +1,7 @@
 """The engine against slow re-implementations that share nothing with it, for every effect on every rig."""
 
+import dataclasses
+
 import numpy as np
 import oracle
 import pytest
@@ -96,6 +98,18 @@ def test_every_effect_means_what_the_oracle_means(one, rig, kind):
 def test_the_nominal_model_is_exact_at_1_khz(rig, kind):
     error, _ = worst(Model(RIGS[rig]), {}, rig, trials(rig, kind, dt=1e-3, duration=2.0))
     assert error <= 1e-6
+
+
+@pytest.mark.parametrize("second_s", [0.001, 0.002, 0.004])
+def test_a_short_lag_is_told_from_a_delay(second_s):
+    """What the engine's steps do to a lag shorter than they are is small beside what makes it a lag and no delay."""
+    some, causes = trials("muscle", "isometric"), {"second_order_activation": {"second_s": second_s}}
+    wanted = [oracle.simulate(MUSCLE, nominal("muscle"), causes, t)["force_n"] for t in some]
+    made = [dataclasses.replace(t, columns={**t.columns, "force_n": y}) for t, y in zip(some, wanted, strict=True)]
+    as_lag = fit(Model(RIGS["muscle"]) + effect("second_order_activation")(second_s=second_s), made)
+    as_delay = fit(Model(RIGS["muscle"]) + effect("electromechanical_delay")(delay_s=second_s), made)
+    assert as_lag.noise["force_n"].std < 0.5 * as_delay.noise["force_n"].std
+    assert as_lag.values["second_order_activation.second_s"] == pytest.approx(second_s, rel=0.02)
 
 
 def test_friction_converges_to_its_law():

@@ -25,6 +25,7 @@ class SecondOrderActivation(Effect):
 
     name, stage, signal, rigs = "second_order_activation", Stage.MUSCLE, "activation", ("ankle", "muscle")
     states = ("lagged",)
+    max_step_s = 1.25e-3
 
     def apply(self, value: Any, s: Any) -> Any:
         return lag(value, s.own.lagged, self.second_s, s.step)[0]

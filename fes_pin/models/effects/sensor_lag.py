@@ -1,4 +1,4 @@
-"""A first-order low pass between the output and its reading."""
+"""A low pass, or a time shift, between the output and its reading."""
 
 from __future__ import annotations
 
@@ -12,24 +12,35 @@ from fes_pin.models.stage import Effect, Stage, lag
 
 @dataclass(frozen=True)
 class SensorLag(Effect):
-    """A first-order low pass between the output and its reading.
+    """A low pass, or a time shift, between the output and its reading.
 
-        lag z' = y - z,   z replaces y
+        b z' = y - z,   y replaced by z + shift (z - y),   b = lag / (1 + shift)
+
+    The reading is late by `lag_s`. It is a first-order low pass at shift 0, and at shift 1 the all-pass
+    (1 - b s) / (1 + b s): a pure delay to second order in s. Where nothing but the stimulus drives the rig a shift of
+    the reading's clock is an electromechanical delay in all that it does, and has that name.
 
     Tell-tale: every motion is read late, in proportion to its speed, stimulated or not.
-    Source: an anti-aliasing filter, or clocks that differ: both are a delay to first order.
+    Source: an anti-aliasing filter, or clocks that differ. All-pass: Pade's approximant of a delay, of order (1, 1).
     """
 
     lag_s: float = parameter(0.005, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.005, grid=(0.005, 0.02))
+    shift: float = parameter(
+        0.0, null=0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, optional=True, grid=(1.0,), rigs=("joint",)
+    )
 
     name, stage, signal, rigs = "sensor_lag", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
     states = ("filtered",)
+    max_step_s = 1.25e-3
 
     def apply(self, value: Any, s: Any) -> Any:
-        return value + (lag(s.sensed, s.own.filtered, self.lag_s, s.step)[0] - s.sensed)
+        return value + (1.0 + self.shift) * (self._lagged(s)[0] - s.sensed)
 
     def rate(self, s: Any) -> Mapping[str, Any]:
-        return {"filtered": lag(s.sensed, s.own.filtered, self.lag_s, s.step)[1]}
+        return {"filtered": self._lagged(s)[1]}
 
     def rest(self, s: Any) -> Mapping[str, Any]:
         return {"filtered": s.sensed}
+
+    def _lagged(self, s: Any) -> tuple[Any, Any]:
+        return lag(s.sensed, s.own.filtered, self.lag_s / (1.0 + self.shift), s.step)
