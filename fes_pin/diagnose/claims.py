@@ -8,7 +8,8 @@ from fes_pin.diagnose.joint_fits import JointFits, Names
 from fes_pin.diagnose.library import Scores
 from fes_pin.diagnose.open_set import smooth_remainder
 from fes_pin.diagnose.significance import Family, coherence_p_value
-from fes_pin.identify.fit import Fit, fit_problem, noise_of, rough_noise
+from fes_pin.diagnose.workers import in_parallel
+from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 
@@ -107,7 +108,7 @@ class Claims:
         coherent = self.family.adjusted(coherence_p_value(smaller, larger, degrees))
         if coherent < p_value or p_value >= CLAIM_LEVEL:
             return p_value
-        few, many = _again(smaller, smaller), _again(larger, smaller)
+        few, many = in_parallel(lambda one: _again(one, smaller), (smaller, larger))
         return max(p_value, min(coherent, self.family.p_value(few.sse - many.sse, degrees)))
 
     def demanded(self, refined: Fit, base: Fit) -> bool:
@@ -124,5 +125,4 @@ def slow_misfit(fitted: Fit) -> bool:
 
 def _again(fitted: Fit, noise_from: Fit) -> Fit:
     """The same model fitted under the noise that another leaves."""
-    problem = Problem(fitted.model, fitted.trials, noise_of(noise_from))
-    return fit_problem(problem, fitted.values, fitted.unknowns)
+    return go_on(Problem(fitted.model, fitted.trials, noise_of(noise_from)), fitted)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.workers import in_parallel
-from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem
+from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem, go_on
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.own import predictions
 from fes_pin.identify.problem import Problem
@@ -167,8 +167,7 @@ def _fold(
     test = [nominal.trials[i] for i in held]
 
     def fitted(fit: Fit) -> Fit:
-        problem = Problem(fit.model, [fit.trials[i] for i in train], fit.noise)
-        return fit_problem(problem, fit.values, [fit.unknowns[i] for i in train])
+        return go_on(Problem(fit.model, [fit.trials[i] for i in train], fit.noise), fit)
 
     whole, rest = fitted(best), {n: fitted(f) for n, f in without.items()}
     chosen = min((whole, *(fitted(c) for c in contenders)), key=lambda f: f.price)

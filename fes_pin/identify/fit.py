@@ -130,7 +130,13 @@ class Fit:
 class _Search:
     """The state of one Levenberg-Marquardt search."""
 
-    def __init__(self, problem: Problem, start: Mapping[str, float], unknowns: Unknowns | None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        start: Mapping[str, float],
+        unknowns: Unknowns | None,
+        parts: Sequence[Linearized] | None = None,
+    ) -> None:
         self.problem, self.names = problem, problem.free
         self.lower = np.array([problem.limits[n][0] for n in self.names])
         self.upper = np.array([problem.limits[n][1] for n in self.names])
@@ -138,7 +144,8 @@ class _Search:
         self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
         self.unknowns = problem.start_unknowns() if unknowns is None else problem.completed(unknowns)
         self.damping = 1e-4
-        self.parts = self._linearize(self.x, self.unknowns)
+        known = parts is not None and all(start[n] == v for n, v in zip(self.names, self.x, strict=True))
+        self.parts = list(parts) if parts and known else self._linearize(self.x, self.unknowns)
         self.sse = whitened_sse(self.parts)
 
     def _linearize(self, x: np.ndarray, unknowns: Unknowns) -> list[Linearized]:
@@ -213,8 +220,22 @@ def fit_problem(
     Fit
         Also if it did not converge: then `converged` is False.
     """
-    search = _Search(problem, start, unknowns)
-    done = False
+    return _run(_Search(problem, start, unknowns), max_iterations)
+
+
+def go_on(problem: Problem, fitted: Fit, max_iterations: int = MAX_ITERATIONS) -> Fit:
+    """Fit a problem from where a fit of the same model, to the same trials and perhaps more, has ended.
+
+    Under the same noise what that fit has linearized at its end is where this one begins.
+    """
+    at = {id(t): i for i, t in enumerate(fitted.trials)}
+    rows = [at[id(t)] for t in problem.trials]
+    known = [fitted.parts[i] for i in rows] if problem.noise == fitted.noise and problem.free == fitted.free else None
+    return _run(_Search(problem, fitted.values, [fitted.unknowns[i] for i in rows], known), max_iterations)
+
+
+def _run(search: _Search, max_iterations: int) -> Fit:
+    problem, done = search.problem, False
     for _ in range(max_iterations):
         done = search.step()
         if done:
