@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
@@ -61,10 +62,16 @@ class Noise:
             Shape (n / thinning - p, ...): the first p samples only start the filter.
         """
         values = thin(values, thinning(dt, self.step_s))
-        taps = np.r_[-np.array(self.ar[::-1]), 1.0] / self.innovation_std
+        columns = values.reshape(len(values), math.prod(values.shape[1:]))
         with np.errstate(invalid="ignore"):  # a simulation that did not stay finite
-            out = _correlated(values.reshape(len(values), math.prod(values.shape[1:])), taps)
+            out = _correlated(columns, self._stretch)
         return out.reshape(len(out), *values.shape[1:])
+
+    @cached_property
+    def _stretch(self) -> np.ndarray:
+        """What whitens `BLOCK` samples from these and the p before, shape (BLOCK, p + BLOCK)."""
+        taps = [*(-a / self.innovation_std for a in reversed(self.ar)), 1.0 / self.innovation_std]
+        return np.array([[0.0] * k + taps + [0.0] * (BLOCK - 1 - k) for k in range(BLOCK)])
 
 
 def estimate_noise(
@@ -155,17 +162,17 @@ def _ridge(gram: np.ndarray, p: int) -> np.ndarray:
     return WHITE_SHARE * gram[0, 0] * np.eye(p)
 
 
-def _correlated(values: np.ndarray, taps: np.ndarray) -> np.ndarray:
-    """Row t is sum_k taps_k values_(t+k), shape (n - taps + 1, columns): stretches of BLOCK rows times one matrix."""
-    p, count, columns = len(taps) - 1, max(len(values) - len(taps) + 1, 0), values.shape[1]
-    blocks = count // BLOCK
-    matrix = scipy.linalg.toeplitz(np.r_[taps[0], np.zeros(BLOCK - 1)], np.r_[taps, np.zeros(BLOCK - 1)])
+def _correlated(values: np.ndarray, stretch: np.ndarray) -> np.ndarray:
+    """A filter run over the columns of `values`, shape (n, columns), by one product for each stretch of rows."""
+    block, reach = stretch.shape
+    p, columns, (row, column) = reach - block, values.shape[1], values.strides
+    count = max(len(values) - p, 0)
+    full = count // block * block
     out = np.empty((count, columns))
-    step = values.strides[0]
-    stretches = as_strided(values, (blocks, BLOCK + p, columns), (BLOCK * step, *values.strides), writeable=False)
-    np.matmul(matrix, stretches, out=out[: blocks * BLOCK].reshape(blocks, BLOCK, columns))
-    if rest := count - blocks * BLOCK:
-        np.matmul(matrix[:rest, : rest + p], values[blocks * BLOCK :], out=out[blocks * BLOCK :])
+    windows = as_strided(values, (full // block, reach, columns), (block * row, row, column), writeable=False)
+    np.matmul(stretch, windows, out=out[:full].reshape(full // block, block, columns))
+    if rest := count - full:
+        np.matmul(stretch[:rest, : rest + p], values[full:], out=out[full:])
     return out
 
 
