@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import scipy.stats
-
 from fes_pin.diagnose.joint_fits import JointFits, Names
 from fes_pin.diagnose.library import Scores
 from fes_pin.diagnose.open_set import smooth_remainder
 from fes_pin.diagnose.significance import Family, coherence_p_value
 from fes_pin.diagnose.workers import in_parallel
+from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
@@ -114,7 +113,7 @@ class Claims:
     def demanded(self, refined: Fit, base: Fit) -> bool:
         """True if the data demand a refinement of an effect's form."""
         degrees = max(refined.degrees - base.degrees, 1)
-        return bool(scipy.stats.chi2.sf(base.sse - refined.sse, degrees) < REFINE_LEVEL)
+        return bool(chi2_tail(base.sse - refined.sse, degrees) < REFINE_LEVEL)
 
 
 def slow_misfit(fitted: Fit) -> bool:

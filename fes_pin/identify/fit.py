@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 
 import numpy as np
-import scipy.stats
 from threadpoolctl import ThreadpoolController
 
 from fes_pin.data.trial import Trial
+from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, NormalEquations, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
@@ -19,7 +19,7 @@ from fes_pin.models.model import Model
 TOLERANCE = 0.01
 """A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
 MAX_ITERATIONS = 60
-CONFIDENCE_95 = float(scipy.stats.norm.ppf(0.975))
+CONFIDENCE_95 = normal_quantile(0.975)
 PARAMETER_PRICE = 3.84
 """Twice the log-likelihood that one more parameter must earn: chi-square with one degree of freedom at 95 %."""
 UNIDENTIFIED = 1e-10
