@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.signal
-import scipy.stats
 
+from fes_pin.identify.distributions import pearson3_tail
 from fes_pin.identify.noise import Noise
 
 HUMPS_S = (0.06, 0.12, 0.25, 0.5, 1.0)
@@ -65,14 +64,14 @@ def _one(innovations: Sequence[np.ndarray], g: np.ndarray) -> float | None:
     long = [np.clip(e, -CLIP, CLIP) for e in innovations if len(e) >= 2 * len(g)]
     if not long:
         return None
-    z = np.concatenate([scipy.signal.fftconvolve(e, g[::-1], "valid") for e in long])
+    z = np.concatenate([np.convolve(e, g[::-1], "valid") for e in long])
     statistic = float(np.sum((z / np.sqrt(np.mean(z**2))) ** 4 - 3.0))
-    power = scipy.signal.fftconvolve(g, g[::-1], "full") ** 2
+    power = np.convolve(g, g[::-1], "full") ** 2
     variance = 24.0 * len(z) * float(power @ power)
-    third = 1728.0 * len(z) * float(power @ scipy.signal.fftconvolve(power, power, "same"))
+    third = 1728.0 * len(z) * float(power @ np.convolve(power, power, "same"))
     return _tail(statistic / np.sqrt(variance), third / variance**1.5)
 
 
 def _tail(z: float, skewness: float) -> float:
     """Upper tail of a gamma distribution of mean 0, variance 1 and this skewness (Pearson type III)."""
-    return float(scipy.stats.pearson3.sf(z, skewness))
+    return pearson3_tail(z, skewness)

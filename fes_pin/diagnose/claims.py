@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import scipy.stats
-
 from fes_pin.diagnose.joint_fits import JointFits, Names
 from fes_pin.diagnose.library import Scores
 from fes_pin.diagnose.open_set import smooth_remainder
 from fes_pin.diagnose.significance import Family, coherence_p_value
-from fes_pin.identify.fit import Fit, fit_problem, noise_of, rough_noise
+from fes_pin.diagnose.workers import in_parallel
+from fes_pin.identify.distributions import chi2_tail
+from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 
@@ -107,13 +107,13 @@ class Claims:
         coherent = self.family.adjusted(coherence_p_value(smaller, larger, degrees))
         if coherent < p_value or p_value >= CLAIM_LEVEL:
             return p_value
-        few, many = _again(smaller, smaller), _again(larger, smaller)
+        few, many = in_parallel(lambda one: _again(one, smaller), (smaller, larger))
         return max(p_value, min(coherent, self.family.p_value(few.sse - many.sse, degrees)))
 
     def demanded(self, refined: Fit, base: Fit) -> bool:
         """True if the data demand a refinement of an effect's form."""
         degrees = max(refined.degrees - base.degrees, 1)
-        return bool(scipy.stats.chi2.sf(base.sse - refined.sse, degrees) < REFINE_LEVEL)
+        return bool(chi2_tail(base.sse - refined.sse, degrees) < REFINE_LEVEL)
 
 
 def slow_misfit(fitted: Fit) -> bool:
@@ -124,5 +124,4 @@ def slow_misfit(fitted: Fit) -> bool:
 
 def _again(fitted: Fit, noise_from: Fit) -> Fit:
     """The same model fitted under the noise that another leaves."""
-    problem = Problem(fitted.model, fitted.trials, noise_of(noise_from))
-    return fit_problem(problem, fitted.values, fitted.unknowns)
+    return go_on(Problem(fitted.model, fitted.trials, noise_of(noise_from)), fitted)

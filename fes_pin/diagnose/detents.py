@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-import scipy.stats
 
 from fes_pin.diagnose.library import Projection
+from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.problem import Problem
 from fes_pin.models.maths import cos, sin
@@ -84,9 +84,9 @@ def detent_p_value(fitted: Fit, projection: Projection) -> float:
         parts = problem.linearize({**values, f"{Ripple.name}.wave": wave * unit}, fitted.unknowns)
         columns = projection(np.concatenate([p.jacobian for p in parts]))
         scores += [_two(columns[:, 2 * j : 2 * j + 2], projection.residual) for j in range(AT_ONCE)]
-    half = float(scipy.stats.chi2.median(2))
+    half = float(chi2_quantile(0.5, 2))
     inflation = max(1.0, float(np.median(scores)) / half)
-    return min(1.0, len(scores) * float(scipy.stats.chi2.sf(max(scores) / inflation, 2)))
+    return min(1.0, len(scores) * float(chi2_tail(max(scores) / inflation, 2)))
 
 
 def _range(fitted: Fit, moving: list[bool]) -> tuple[float, float]:

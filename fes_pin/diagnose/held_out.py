@@ -10,7 +10,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.workers import in_parallel
-from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem
+from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem, go_on
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.own import predictions
 from fes_pin.identify.problem import Problem
@@ -151,7 +151,12 @@ def cross_validate(
         Fits of all sets of causes that came near on the whole; each fold chooses anew among them and `best`.
     """
     folds = [f for f in folds_of(nominal.trials) if len(f) < len(nominal.trials)]
-    results = in_parallel(lambda f: _fold(f, nominal, best, without, contenders, floor), folds)
+    many = [nominal, best, *without.values(), *contenders]
+    again = iter(in_parallel(lambda pair: _left_out(*pair), [(held, one) for held in folds for one in many]))
+    results = in_parallel(
+        lambda pair: _fold(*pair, nominal.trials, list(without), floor),
+        [(held, [next(again) for _ in many]) for held in folds],
+    )
     return HeldOut(
         _joined([r.nominal for r in results]),
         _joined([r.extended for r in results]),
@@ -160,19 +165,21 @@ def cross_validate(
     )
 
 
+def _left_out(held: Sequence[int], fitted: Fit) -> Fit:
+    """A fit again, without the trials that are held out."""
+    train = [t for i, t in enumerate(fitted.trials) if i not in held]
+    return go_on(Problem(fitted.model, train, fitted.noise), fitted)
+
+
 def _fold(
-    held: list[int], nominal: Fit, best: Fit, without: dict[str, Fit], contenders: Sequence[Fit], floor: NoiseModel
+    held: Sequence[int], fits: Sequence[Fit], trials: Sequence[Trial], names: Sequence[str], floor: NoiseModel
 ) -> HeldOut:
-    train = [i for i in range(len(nominal.trials)) if i not in held]
-    test = [nominal.trials[i] for i in held]
-
-    def fitted(fit: Fit) -> Fit:
-        problem = Problem(fit.model, [fit.trials[i] for i in train], fit.noise)
-        return fit_problem(problem, fit.values, [fit.unknowns[i] for i in train])
-
-    whole, rest = fitted(best), {n: fitted(f) for n, f in without.items()}
-    chosen = min((whole, *(fitted(c) for c in contenders)), key=lambda f: f.price)
-    return replace(separate(fitted(nominal), whole, rest, test, floor), extended=errors_of(chosen.model, test, floor))
+    """What fits of the nominal model, the best, it without each of `names` and the contenders say of held trials."""
+    nominal, best, *rest = fits
+    without, contenders = dict(zip(names, rest, strict=False)), rest[len(names) :]
+    test = [trials[i] for i in held]
+    chosen = min((best, *contenders), key=lambda f: f.price)
+    return replace(separate(nominal, best, without, test, floor), extended=errors_of(chosen.model, test, floor))
 
 
 def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Trial], floor: NoiseModel) -> HeldOut:

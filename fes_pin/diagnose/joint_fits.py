@@ -13,7 +13,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.library import Library, Projection, Scored, Scores
 from fes_pin.diagnose.noise_floor import rich_noise
 from fes_pin.diagnose.workers import in_parallel
-from fes_pin.identify.fit import CONFIDENCE_95, MAX_ITERATIONS, Fit, fit_problem, noise_of
+from fes_pin.identify.fit import CONFIDENCE_95, MAX_ITERATIONS, Fit, fit_problem, go_on, noise_of
 from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
@@ -103,7 +103,7 @@ class JointFits:
         return not one.converged and bool(np.isfinite(one.sse)) and self._looks.get(names, 9) * LOOK < MAX_ITERATIONS
 
     def _go_on(self, fitted: Fit, iterations: int) -> Fit:
-        return self.fit_from([fitted.model], fitted.unknowns, iterations)
+        return go_on(self.problem(fitted.model), fitted, iterations)
 
     def scores(self, base: Fit) -> Scores:
         """Promise of every effect that a fit does not have."""

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.fft
 import scipy.ndimage
-import scipy.signal
-import scipy.stats
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.innovations import Innovations
-from fes_pin.identify.noise import thin
+from fes_pin.identify.distributions import chi2_quantile, f_tail
+from fes_pin.identify.noise import low_pass, thin
 
 LOWEST_HZ = 2.0
 """Slower oscillations are the smooth features' and the library's."""
@@ -57,7 +56,7 @@ def _amplitude(one: Innovations, where: str) -> np.ndarray | None:
     if drive is None:
         return None
     pole = float(np.exp(-one.trial.dt / ACTIVATION_S))
-    act = thin(scipy.signal.lfilter([1.0 - pole], [1.0, -pole], drive), max(1, round(one.dt / one.trial.dt)))
+    act = thin(low_pass(drive, pole), max(1, round(one.dt / one.trial.dt)))
     return act[len(act) - len(one.values) :]
 
 
@@ -85,15 +84,13 @@ def _lines(rows: Sequence[tuple[Innovations, np.ndarray | None]]) -> tuple[float
     if inside.sum() < NEIGHBOURS:
         return ()
     degrees = 2 * len(used)
-    median = scipy.stats.chi2.median(degrees)
+    median = chi2_quantile(0.5, degrees)
     level = np.maximum(scipy.ndimage.median_filter(apart, NEIGHBOURS, mode="reflect") / median, 1e-12)[inside]
     one_phase = float(np.max(np.abs(together[inside]) ** 2 / power / level))
     any_phase = float(np.max(apart[inside] / level)) / degrees
     known = MEDIAN_EFFICIENCY * degrees * 0.25 * NEIGHBOURS * _fullness([g for _, g in used])
     count = int(inside.sum())
-    return tuple(
-        min(1.0, count * float(scipy.stats.f.sf(x, k, known))) for x, k in ((one_phase, 2), (any_phase, degrees))
-    )
+    return tuple(min(1.0, count * f_tail(x, k, known)) for x, k in ((one_phase, 2), (any_phase, degrees)))
 
 
 def _fullness(amplitudes: Sequence[np.ndarray]) -> float:

@@ -20,10 +20,9 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-import scipy.signal
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import thin
+from fes_pin.identify.noise import low_pass, thin
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Signals
@@ -106,7 +105,7 @@ def activation(rig: Rig, trial: Trial) -> dict[str, np.ndarray]:
     s = _signals(rig, trial, {n: trial[n] for n in rig.input_columns(trial)})
     recruited = np.asarray(rig.sample(s)["r"], dtype=float) * np.ones(len(trial))
     pole = math.exp(-trial.dt / float(getattr(rig, "time_constant_s")))  # noqa: B009
-    return {"activation": scipy.signal.lfilter([0.0, 1.0 - pole], [1.0, -pole], recruited)}
+    return {"activation": low_pass(np.r_[0.0, recruited[:-1]], pole)}
 
 
 def nominal_torque(

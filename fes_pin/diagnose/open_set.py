@@ -11,8 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.signal
-import scipy.stats
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.bursts import burst_p_value
@@ -20,8 +18,9 @@ from fes_pin.diagnose.detents import detent_p_value
 from fes_pin.diagnose.innovations import channels, under_own_noise
 from fes_pin.diagnose.library import Projection
 from fes_pin.diagnose.lines import LONGEST_NOISE, line_p_value
+from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.noise import NoiseModel, low_pass
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
 
@@ -141,8 +140,7 @@ def _of_trial(trial: Trial, reading: np.ndarray, output: str) -> dict[str, np.nd
 
 
 def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
-    pole = float(np.exp(-dt / time_constant))
-    return scipy.signal.lfilter([1.0 - pole], [1.0, -pole], x)
+    return low_pass(x, float(np.exp(-dt / time_constant)))
 
 
 def remainder(fitted: Fit, seed: int = 0) -> Remainder:
@@ -190,15 +188,15 @@ def smooth_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     basis = (columns @ vectors[:, kept]) / np.sqrt(values[kept])
     shares = _trial_shares(basis, projection.residual, fitted)
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
-    plain = float(scipy.stats.chi2.sf(statistic, rank))
-    p_value = float(scipy.stats.chi2.sf(statistic / _inflation(shares, rank, seed), rank))
+    plain = float(chi2_tail(statistic, rank))
+    p_value = float(chi2_tail(statistic / _inflation(shares, rank, seed), rank))
     unexplained = p_value < SMOOTH_LEVEL or plain < STRONG_LEVEL
     scores: dict[str, float] = {}
     for name, z in zip(names, columns.T @ projection.residual, strict=True):
         scores[name] = max(scores.get(name, 0.0), float(z**2))
     where = max(scores, key=lambda n: scores[n]) if unexplained else None
     inflation = _inflation(shares, rank, seed)
-    excess = max(0.0, statistic / inflation - float(scipy.stats.chi2.ppf(0.975, rank)))
+    excess = max(0.0, statistic / inflation - float(chi2_quantile(0.975, rank)))
     shown = plain if unexplained and p_value >= SMOOTH_LEVEL else p_value
     return Remainder(bool(unexplained), shown, where, excess)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-import scipy.stats
 
 from fes_pin.diagnose.library import Scores
+from fes_pin.identify.distributions import chi2_tail, f_tail
 from fes_pin.identify.fit import Fit
 
 DRAWS = 4000
@@ -33,7 +33,7 @@ class Family:
 
     def p_value(self, gain: float, degrees: int) -> float:
         """Family-wise p-value of a drop in twice the negative log-likelihood."""
-        single = float(scipy.stats.chi2.sf(max(gain, 0.0), degrees))
+        single = float(chi2_tail(max(gain, 0.0), degrees))
         return self.adjusted(single)
 
     def adjusted(self, single: float) -> float:
@@ -58,7 +58,7 @@ def coherence_p_value(smaller: Fit, larger: Fit, degrees: int) -> float:
     if free < 1 or gain <= 0:
         return 1.0
     phi = sum(along**2 / size for size, along in felt) / free
-    return float(scipy.stats.f.sf(gain / (degrees * max(phi, 1e-12)), degrees, free))
+    return f_tail(gain / (degrees * max(phi, 1e-12)), degrees, free)
 
 
 def _pieces(added: np.ndarray, left: np.ndarray, trials: int, degrees: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -82,5 +82,5 @@ def _effective_tests(gram: np.ndarray, blocks: Sequence[slice], seed: int) -> fl
             largest[rank] = np.maximum(largest.get(rank, 0.0), statistic)
     if not largest:
         return 1.0
-    smallest = np.min([scipy.stats.chi2.sf(s, k) for k, s in largest.items()], axis=0)
+    smallest = np.min([chi2_tail(s, k) for k, s in largest.items()], axis=0)
     return max(1.0, float(np.log(0.95) / np.log1p(-np.quantile(smallest, 0.05))))

@@ -12,7 +12,7 @@ from fes_pin.diagnose.claims import FORM_SHARE
 from fes_pin.diagnose.held_out import folds_of, foretold
 from fes_pin.diagnose.joint_fits import LOOK, JointFits, Names
 from fes_pin.diagnose.workers import in_parallel
-from fes_pin.identify.fit import Fit, fit_problem, noise_of
+from fes_pin.identify.fit import Fit, fit_problem, go_on, noise_of
 from fes_pin.identify.noise import as_white
 from fes_pin.identify.problem import Problem
 
@@ -47,7 +47,7 @@ def choose_by_prediction(sets: JointFits, names: Names, pool: Sequence[Names]) -
 def open_loop(fitted: Fit) -> Fit:
     """The same model fitted for least open-loop error: its residuals are misfit, and not to be whitened."""
     problem = Problem(fitted.model, fitted.trials, as_white(fitted.noise))
-    return fit_problem(problem, fitted.values, fitted.unknowns, 2 * LOOK)
+    return go_on(problem, fitted, 2 * LOOK)
 
 
 def predictive_error(near: Fit) -> float:
@@ -64,8 +64,7 @@ def predictive_error(near: Fit) -> float:
 
     def left_out(held: list[int]) -> list[np.ndarray]:
         train = [i for i in range(len(near.trials)) if i not in held]
-        problem = Problem(near.model, [near.trials[i] for i in train], near.noise)
-        again = fit_problem(problem, near.values, [near.unknowns[i] for i in train], 2 * LOOK)
+        again = go_on(Problem(near.model, [near.trials[i] for i in train], near.noise), near, 2 * LOOK)
         alone = [Problem(again.model, [near.trials[i]], near.noise, ()) for i in held]
         return [foretold(fit_problem(p, again.values, [near.unknowns[i]])) for p, i in zip(alone, held, strict=True)]
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 
 import numpy as np
-import scipy.stats
 from threadpoolctl import ThreadpoolController
 
 from fes_pin.data.trial import Trial
+from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, NormalEquations, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
@@ -19,7 +19,7 @@ from fes_pin.models.model import Model
 TOLERANCE = 0.01
 """A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
 MAX_ITERATIONS = 60
-CONFIDENCE_95 = float(scipy.stats.norm.ppf(0.975))
+CONFIDENCE_95 = normal_quantile(0.975)
 PARAMETER_PRICE = 3.84
 """Twice the log-likelihood that one more parameter must earn: chi-square with one degree of freedom at 95 %."""
 UNIDENTIFIED = 1e-10
@@ -130,7 +130,13 @@ class Fit:
 class _Search:
     """The state of one Levenberg-Marquardt search."""
 
-    def __init__(self, problem: Problem, start: Mapping[str, float], unknowns: Unknowns | None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        start: Mapping[str, float],
+        unknowns: Unknowns | None,
+        parts: Sequence[Linearized] | None = None,
+    ) -> None:
         self.problem, self.names = problem, problem.free
         self.lower = np.array([problem.limits[n][0] for n in self.names])
         self.upper = np.array([problem.limits[n][1] for n in self.names])
@@ -138,7 +144,8 @@ class _Search:
         self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
         self.unknowns = problem.start_unknowns() if unknowns is None else problem.completed(unknowns)
         self.damping = 1e-4
-        self.parts = self._linearize(self.x, self.unknowns)
+        known = parts is not None and all(start[n] == v for n, v in zip(self.names, self.x, strict=True))
+        self.parts = list(parts) if parts and known else self._linearize(self.x, self.unknowns)
         self.sse = whitened_sse(self.parts)
 
     def _linearize(self, x: np.ndarray, unknowns: Unknowns) -> list[Linearized]:
@@ -213,8 +220,22 @@ def fit_problem(
     Fit
         Also if it did not converge: then `converged` is False.
     """
-    search = _Search(problem, start, unknowns)
-    done = False
+    return _run(_Search(problem, start, unknowns), max_iterations)
+
+
+def go_on(problem: Problem, fitted: Fit, max_iterations: int = MAX_ITERATIONS) -> Fit:
+    """Fit a problem from where a fit of the same model, to the same trials and perhaps more, has ended.
+
+    Under the same noise what that fit has linearized at its end is where this one begins.
+    """
+    at = {id(t): i for i, t in enumerate(fitted.trials)}
+    rows = [at[id(t)] for t in problem.trials]
+    known = [fitted.parts[i] for i in rows] if problem.noise == fitted.noise and problem.free == fitted.free else None
+    return _run(_Search(problem, fitted.values, [fitted.unknowns[i] for i in rows], known), max_iterations)
+
+
+def _run(search: _Search, max_iterations: int) -> Fit:
+    problem, done = search.problem, False
     for _ in range(max_iterations):
         done = search.step()
         if done:

@@ -7,7 +7,7 @@ import pytest
 import scipy.signal
 import scipy.stats
 
-from fes_pin.identify.noise import ORDERS, WHITE_SHARE, Noise, estimate_noise, noise_step, thin, thinning
+from fes_pin.identify.noise import ORDERS, WHITE_SHARE, Noise, estimate_noise, low_pass, noise_step, thin, thinning
 
 TRUE = {0: (), 1: (0.6,), 2: (1.2, -0.5), 3: (0.5, -0.3, 0.4)}
 
@@ -88,7 +88,7 @@ def test_whitening_is_the_same_for_residuals_and_columns():
     together = noise.whiten(columns, 1e-2)
     assert together.shape == (48, 3)
     for k in range(3):
-        assert np.array_equal(together[:, k], noise.whiten(columns[:, k], 1e-2))
+        np.testing.assert_allclose(together[:, k], noise.whiten(columns[:, k], 1e-2), rtol=1e-12, atol=1e-14)
         by_hand = (columns[2:, k] - 0.4 * columns[1:-1, k] - 0.2 * columns[:-2, k]) / 0.5
         assert np.allclose(together[:, k], by_hand, rtol=1e-12)
 
@@ -118,3 +118,17 @@ def test_white_noise_stays_white_and_smaller_when_averaged():
     assert noise.innovation_std == pytest.approx(0.5, rel=0.1)
     assert noise.std == 1.0
     assert len(noise.whiten(fast, 1e-3)) == 2000 - len(noise.ar)
+
+
+@pytest.mark.parametrize("length", [5, 20, 33, 200])
+@pytest.mark.parametrize("order", [0, 1, 4])
+def test_whitening_is_the_filter_of_the_coefficients(length, order):
+    rng = np.random.default_rng(length)
+    values, ar = rng.standard_normal((length, 3)), tuple(rng.uniform(-0.3, 0.3, order))
+    plain = scipy.signal.lfilter([1.0, *(-a for a in ar)], [0.1], values, axis=0)[order:]
+    np.testing.assert_allclose(Noise(0.1, ar).whiten(values[:, ::-1], 0.01), plain[:, ::-1], rtol=1e-11, atol=1e-11)
+
+
+def test_a_low_pass_is_the_recursion():
+    values = np.random.default_rng(0).standard_normal(100)
+    np.testing.assert_allclose(low_pass(values, 0.9), scipy.signal.lfilter([0.1], [1.0, -0.9], values), rtol=1e-12)

@@ -8,6 +8,8 @@ from llvmlite import ir
 from fes_pin.models.compile.lanes import CONTRACT, VECTOR, LaneFunctions, select_lanes, splat
 
 POINTER = ir.PointerType(VECTOR)
+ROUNDED = (*CONTRACT, "arcp")
+"""Beside fused products: what is divided by the same number several times may be multiplied by its inverse."""
 _BINARY = {ca.OP_ADD: "fadd", ca.OP_SUB: "fsub", ca.OP_MUL: "fmul", ca.OP_DIV: "fdiv"}
 _COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 _LANE_FUNCTIONS = {
@@ -78,7 +80,7 @@ class Lowering:
     def _operation(self, b: ir.IRBuilder, op: int, a: list[ir.Value]) -> ir.Value:
         one, zero = splat(1.0), splat(0.0)
         if op in _BINARY:
-            return getattr(b, _BINARY[op])(a[0], a[1], flags=CONTRACT)
+            return getattr(b, _BINARY[op])(a[0], a[1], flags=ROUNDED)
         if op in _COMPARE:
             compare = b.fcmp_unordered if op == ca.OP_NE else b.fcmp_ordered
             return _number(b, compare(_COMPARE[op], a[0], a[1]))
