@@ -34,8 +34,8 @@ SHARES = {"smooth": 1 / 2, "burst": 1 / 10, "line": 1 / 10, "detent": 1 / 10, "r
 """Of the level, for each test."""
 SMOOTH_LEVEL = REMAINDER_LEVEL * SHARES["smooth"]
 SHORT_NOISE = 2
-"""Order of the noise that bursts, repeated and uneven deviations are looked for under: these tests hold for noise of any
-spectrum, and a longer autoregression learns slow deviations as noise."""
+"""Order of the noise that bursts, repeated and uneven deviations are looked for under: these tests hold for noise of
+any spectrum, and a longer autoregression learns slow deviations as noise."""
 STRONG_LEVEL = 1e-12
 """Level at which a remainder counts although it differs from trial to trial: a spasm, not noise."""
 SIGN_DRAWS = 400
