@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.fft
+import scipy.special
 
 from fes_pin.identify.distributions import pearson3_tail
 from fes_pin.identify.noise import Noise
@@ -15,8 +17,6 @@ TORQUES_S = (0.05, 0.15, 0.4)
 """Lengths of a passing cause of noise, s: where the noise model has learned how the joint swings after a push."""
 STEPS_S = (0.25, 1.0)
 """Lengths over which a lasting deviation is compared with what was before, s."""
-CLIP = 4.0
-"""Innovations beyond this, in standard deviations, count as this: a single bad sample is no burst."""
 
 
 def burst_p_value(innovations: Sequence[np.ndarray], noise: Noise, dt: float) -> float:
@@ -25,22 +25,34 @@ def burst_p_value(innovations: Sequence[np.ndarray], noise: Noise, dt: float) ->
     A hump or step of a given length in the reading leaves its whitened shape g in the innovations e; a push that the
     reading answers as it answers the noise leaves g as it is. With
     z_t = sum_s g_s e_(t+s) / |g|, Gaussian noise has excess kurtosis 0 in z, whatever its spectrum; deviations at times
-    of their own raise it, even those that the noise model has taken for slow noise. The statistic sum_t H4(z_t), H4 the
-    fourth Hermite polynomial, has under the null the variance 24 n sum_s rho_s^4 and the third cumulant
-    1728 n sum_st (rho_s rho_t rho_(s-t))^2, with rho the autocorrelation of g; see
-    `_tail`. The smallest p-value of all shapes is corrected for their number.
+    of their own raise it. The statistic sum_t H4(z_t), H4 the fourth Hermite polynomial, has under the null the
+    variance 24 n sum_s rho_s^4 and the third cumulant 1728 n sum_st (rho_s rho_t rho_(s-t))^2, with rho the
+    autocorrelation of z as it is: the innovations need not be white, and a low order of the noise leaves it less room
+    to learn the bursts. Its tail is that of a gamma distribution of these moments. The smallest p-value of all shapes
+    is corrected for their number.
+
+    The innovations are taken by rank (van der Waerden's normal scores): independent ones of any distribution, as heavy
+    in its tails as may be, then are Gaussian, and a few bad samples are no burst.
 
     Parameters
     ----------
     innovations
-        One array for each trial, of unit variance.
+        One array for each trial.
     noise
         What whitened them.
     dt
         Their time step, s.
     """
-    found = [p for g in _templates(noise, dt) if (p := _one(innovations, g)) is not None]
+    scores = normal_scores(innovations)
+    found = [p for g in _templates(noise, dt) if (p := _one(scores, g)) is not None]
     return min([1.0, *(len(found) * p for p in found)])
+
+
+def normal_scores(values: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Quantiles of the normal distribution by the rank of each value among all."""
+    together = np.concatenate(values)
+    scores = scipy.special.ndtri((_ranks(together) - 0.5) / len(together))
+    return np.split(scores, np.cumsum([len(v) for v in values])[:-1])
 
 
 def _templates(noise: Noise, dt: float) -> list[np.ndarray]:
@@ -59,19 +71,37 @@ def _hump(length: float, dt: float) -> np.ndarray:
     return np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2
 
 
-def _one(innovations: Sequence[np.ndarray], g: np.ndarray) -> float | None:
+def _one(scores: Sequence[np.ndarray], g: np.ndarray) -> float | None:
     """p-value of one shape; None where no trial is long enough for it."""
-    long = [np.clip(e, -CLIP, CLIP) for e in innovations if len(e) >= 2 * len(g)]
-    if not long:
+    z = [np.convolve(e, g[::-1], "valid") for e in scores if len(e) >= 2 * len(g)]
+    if not z:
         return None
-    z = np.concatenate([np.convolve(e, g[::-1], "valid") for e in long])
-    statistic = float(np.sum((z / np.sqrt(np.mean(z**2))) ** 4 - 3.0))
-    power = np.convolve(g, g[::-1], "full") ** 2
-    variance = 24.0 * len(z) * float(power @ power)
-    third = 1728.0 * len(z) * float(power @ np.convolve(power, power, "same"))
-    return _tail(statistic / np.sqrt(variance), third / variance**1.5)
+    count, level = sum(map(len, z)), float(np.mean(np.concatenate(z) ** 2))
+    statistic = sum(float(np.sum((one**2 / level) ** 2 - 3.0)) for one in z)
+    power = autocorrelation(z) ** 2
+    variance = 24.0 * count * float(power @ power)
+    third = 1728.0 * count * float(power @ convolved(power, power))
+    return pearson3_tail(statistic / np.sqrt(variance), third / variance**1.5)
 
 
-def _tail(z: float, skewness: float) -> float:
-    """Upper tail of a gamma distribution of mean 0, variance 1 and this skewness (Pearson type III)."""
-    return pearson3_tail(z, skewness)
+def autocorrelation(z: Sequence[np.ndarray]) -> np.ndarray:
+    """Of a channel of mean 0, shape (2 k + 1,), up to a quarter of its shortest trial either way."""
+    most = min(map(len, z)) // 4
+    size = scipy.fft.next_fast_len(max(map(len, z)) + most, real=True)
+    power = np.sum([np.abs(np.fft.rfft(one, size)) ** 2 for one in z], axis=0)
+    half = np.fft.irfft(power, size)[: most + 1]
+    return np.r_[half[:0:-1], half] / half[0]
+
+
+def convolved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The middle of a convolution by Fourier transforms, as long as `a`; shapes (n,) and (2 k + 1,)."""
+    count = len(a) + len(b) - 1
+    size = scipy.fft.next_fast_len(count, real=True)
+    whole = np.fft.irfft(np.fft.rfft(a, size) * np.fft.rfft(b, size), size)
+    return whole[len(b) // 2 :][: len(a)]
+
+
+def _ranks(values: np.ndarray) -> np.ndarray:
+    """From 1 on; equal values share the mean of theirs."""
+    _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
+    return (np.cumsum(counts) - 0.5 * (counts - 1))[which]

@@ -8,8 +8,11 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, noise_of
-from fes_pin.identify.noise import ORDERS, Noise, thinning
+from fes_pin.identify.noise import ORDERS, Noise, low_pass, thin, thinning
 from fes_pin.identify.problem import Problem
+
+ACTIVATION_S = 0.05
+"""Time constant from stimulus to force, s: Dombre, Fournier and Coiffet's ankle, as PAPER_NOTES has it."""
 
 
 @dataclass(frozen=True)
@@ -51,3 +54,12 @@ def channels(fitted: Fit) -> list[tuple[Noise, list[Innovations]]]:
             found.setdefault((name, step), []).append(Innovations(trial, part.residual[at : at + size], step))
             at += size
     return [(fitted.noise[name], pieces) for (name, _), pieces in found.items()]
+
+
+def driven(one: Innovations) -> np.ndarray:
+    """Roughly how active the muscle (or the motor, with its sign) is, shape (n,); zero without a stimulus."""
+    trial, count = one.trial, max(1, round(one.dt / one.trial.dt))
+    drive = next((trial[n] for n in ("pulse_width_us", "stim", "effort") if n in trial.columns), np.zeros(len(trial)))
+    pole = float(np.exp(-trial.dt / ACTIVATION_S))
+    act = thin(low_pass(drive / max(float(np.abs(drive).max()), 1e-300), pole), count)
+    return act[len(act) - len(one.values) :]

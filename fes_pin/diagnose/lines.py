@@ -8,10 +8,8 @@ import numpy as np
 import scipy.fft
 import scipy.ndimage
 
-from fes_pin.data.trial import Trial
-from fes_pin.diagnose.innovations import Innovations
+from fes_pin.diagnose.innovations import Innovations, driven
 from fes_pin.identify.distributions import chi2_quantile, f_tail
-from fes_pin.identify.noise import low_pass, thin
 
 LOWEST_HZ = 2.0
 """Slower oscillations are the smooth features' and the library's."""
@@ -27,8 +25,6 @@ MEDIAN_EFFICIENCY = 0.64
 """Of a median against a mean as a measure of level: 2 / pi."""
 CLIP = 4.0
 """Innovations beyond this, in standard deviations, count as this."""
-ACTIVATION_S = 0.05
-"""Time constant from stimulus to force, s: Dombre, Fournier and Coiffet's ankle, as PAPER_NOTES has it."""
 
 
 def line_p_value(pieces: Sequence[Innovations]) -> tuple[float, str]:
@@ -52,19 +48,8 @@ def line_p_value(pieces: Sequence[Innovations]) -> tuple[float, str]:
 def _amplitude(one: Innovations, where: str) -> np.ndarray | None:
     if where == "time":
         return np.ones(len(one.values))
-    drive = _drive(one.trial)
-    if drive is None:
-        return None
-    pole = float(np.exp(-one.trial.dt / ACTIVATION_S))
-    act = thin(low_pass(drive, pole), max(1, round(one.dt / one.trial.dt)))
-    return act[len(act) - len(one.values) :]
-
-
-def _drive(trial: Trial) -> np.ndarray | None:
-    for name in ("pulse_width_us", "stim", "effort"):
-        if name in trial.columns and np.ptp(trial[name]) > 0:
-            return trial[name] / np.abs(trial[name]).max()
-    return None
+    act = driven(one)
+    return act if np.ptp(act) > 0 else None
 
 
 def _lines(rows: Sequence[tuple[Innovations, np.ndarray | None]]) -> tuple[float, ...]:

@@ -1,8 +1,9 @@
 """What no cause in the library explains, and where it is.
 
-Four tests share one level: lack of fit on smooth features of the motion; bursts at times of their own; spectral lines;
-torque that repeats with the angle over short distances. The last three see what the first is blind to, and what an
-autoregressive noise model takes for noise.
+Six tests share one level: lack of fit on smooth features of the motion; bursts at times of their own; spectral lines;
+torque that repeats with the angle over short distances; deviations that come again at the same time of every trial;
+deviations that grow with the stimulus. The last five see what the first is blind to, and what an autoregressive noise
+model takes for noise.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.bursts import burst_p_value
 from fes_pin.diagnose.detents import detent_p_value
-from fes_pin.diagnose.innovations import channels, under_own_noise
+from fes_pin.diagnose.innovations import channels, driven, under_own_noise
 from fes_pin.diagnose.library import Projection
 from fes_pin.diagnose.lines import LONGEST_NOISE, line_p_value
+from fes_pin.diagnose.repeated import repeated_p_value
+from fes_pin.diagnose.uneven import uneven_p_value
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel, low_pass
@@ -26,9 +29,12 @@ from fes_pin.models.simulate import Simulator
 
 REMAINDER_LEVEL = 0.02
 """Level of all tests of the remainder together; see `search.CLAIM_LEVEL`."""
-SHARES = {"smooth": 1 / 2, "burst": 1 / 6, "line": 1 / 6, "detent": 1 / 6}
+SHARES = {"smooth": 1 / 2, "burst": 1 / 10, "line": 1 / 10, "detent": 1 / 10, "repeated": 1 / 10, "uneven": 1 / 10}
 """Of the level, for each test."""
 SMOOTH_LEVEL = REMAINDER_LEVEL * SHARES["smooth"]
+SHORT_NOISE = 2
+"""Order of the noise that bursts, repeated and uneven deviations are looked for under: these tests hold for noise of
+any spectrum, and a longer autoregression learns slow deviations as noise."""
 STRONG_LEVEL = 1e-12
 """Level at which a remainder counts although it differs from trial to trial: a spasm, not noise."""
 SIGN_DRAWS = 400
@@ -146,7 +152,7 @@ def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
 def remainder(fitted: Fit, seed: int = 0) -> Remainder:
     """Test whether a fit leaves anything but noise.
 
-    The p-value is that of the most significant of the four tests, over its share of the level.
+    The p-value is that of the most significant of the six tests, over its share of the level.
     """
     smooth = smooth_remainder(fitted, seed)
     found = [(smooth.p_value / SHARES["smooth"], smooth.where), *_others(fitted)]
@@ -158,16 +164,24 @@ def remainder(fitted: Fit, seed: int = 0) -> Remainder:
 
 
 def _others(fitted: Fit) -> list[tuple[float, str]]:
-    """p-values of bursts, lines and detents over their shares of the level, and what each depends on."""
+    """p-values of all but the smooth features over their shares of the level, and what each depends on."""
     own = under_own_noise(fitted)
-    groups = channels(own)
-    bursts = min(burst_p_value([e.values for e in pieces], noise, pieces[0].dt) for noise, pieces in groups)
+    short = channels(under_own_noise(fitted, SHORT_NOISE))
+    count = len(short)
+    bursts = min(burst_p_value([e.values for e in pieces], noise, pieces[0].dt) for noise, pieces in short)
     line, where = min(line_p_value(pieces) for _, pieces in channels(under_own_noise(fitted, LONGEST_NOISE)))
     detents = detent_p_value(own, Projection(own.parts))
+    repeated = min(repeated_p_value([e.values for e in pieces], pieces[0].dt) for _, pieces in short)
+    uneven = min(
+        uneven_p_value([e.values for e in pieces], [np.abs(driven(e)) for e in pieces], pieces[0].dt)
+        for _, pieces in short
+    )
     return [
-        (len(groups) * bursts / SHARES["burst"], "time"),
-        (len(groups) * line / SHARES["line"], where),
+        (count * bursts / SHARES["burst"], "time"),
+        (count * line / SHARES["line"], where),
         (detents / SHARES["detent"], "angle"),
+        (count * repeated / SHARES["repeated"], "time"),
+        (count * uneven / SHARES["uneven"], "stimulus"),
     ]
 
 

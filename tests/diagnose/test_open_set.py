@@ -12,6 +12,8 @@ from identify.rigs import trials_of
 from fes_pin.diagnose.bursts import burst_p_value
 from fes_pin.diagnose.innovations import channels, under_own_noise
 from fes_pin.diagnose.open_set import REMAINDER_LEVEL, SHARES, remainder
+from fes_pin.diagnose.repeated import repeated_p_value
+from fes_pin.diagnose.uneven import uneven_p_value
 from fes_pin.identify.fit import fit
 from fes_pin.identify.noise import Noise
 from fes_pin.models.nominal import nominal_model
@@ -64,6 +66,45 @@ def test_bursts_keep_their_level(noise):
     p_values = [burst_p_value(list(rng.standard_normal((5, 600))), noise, DT) for _ in range(80)]
     assert sum(p < 0.05 for p in p_values) <= 9
     assert all(0.0 < p <= 1.0 for p in p_values)
+
+
+COLOURED = [(1.0,), (1.0, -0.8), (1.0, -1.6, 0.64)]
+"""Denominators of noise that is white, that is slow, and that is slower; a short noise model leaves the like."""
+
+
+@pytest.mark.parametrize("poles", COLOURED, ids=["white", "slow", "slower"])
+def test_tests_that_need_no_white_noise_keep_their_level(poles):
+    """At 5 %, more than 9 of 80 have a probability of 0.008."""
+    rng = np.random.default_rng(50)
+    driver = [np.abs(np.sin(np.arange(600) / (40.0 + 10.0 * k))) for k in range(5)]
+    p_values = []
+    for _ in range(80):
+        e = scipy.signal.lfilter([1.0], poles, rng.standard_normal((5, 700)))[:, 100:]
+        p_values.append((burst_p_value(list(e), WHITE, DT), repeated_p_value(e, DT), uneven_p_value(e, driver, DT)))
+    assert (np.sum(np.array(p_values) < 0.05, axis=0) <= 9).all()
+
+
+def test_heavy_tails_are_no_bursts():
+    """Student's t of 4 degrees: at 5 %, more than 6 of 40 have a probability of 0.003."""
+    rng = np.random.default_rng(51)
+    assert sum(burst_p_value(list(rng.standard_t(4, (5, 600))), WHITE, DT) < 0.05 for _ in range(40)) <= 6
+
+
+def test_what_comes_again_in_every_trial_is_told_by_how_trials_differ():
+    """A rising tone of a fifth of the noise, d = 10, in noise that a model of order 2 has not whitened."""
+    rng = np.random.default_rng(52)
+    t = np.arange(1000) * DT
+    e = scipy.signal.lfilter([1.0], [1.0, -0.5, 0.2], rng.standard_normal((5, 1000)))
+    tone = 0.2 * np.sin(2.0 * math.pi * (0.7 + 0.25 * t) * t)
+    assert repeated_p_value(e, DT) > 1e-3 > repeated_p_value(e + tone, DT)
+    assert repeated_p_value(e[:2] + tone, DT) == 1.0, "two trials do not tell how trials differ"
+
+
+def test_a_strength_that_wanders_is_larger_while_the_muscle_is_active():
+    """Of each trial's own phase, so that no feature is coherent."""
+    rng = np.random.default_rng(53)
+    left = remainder(forces(rng, lambda t, f: f * (1.0 + 0.03 * np.sin(2.5 * t + rng.uniform(0.0, 7.0))), colour=0.6))
+    assert left.unexplained, left
 
 
 def test_single_bad_samples_are_no_bursts():
