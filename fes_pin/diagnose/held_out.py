@@ -18,6 +18,10 @@ from fes_pin.models.model import Model
 
 FOLDS = 5
 RESAMPLES = 2000
+RUNAWAY = 10.0
+"""A prediction that leaves the trials counts as this many times their largest reading: where it goes says nothing."""
+FAR = 1e6
+"""The same for whitened residuals, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +63,14 @@ def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Error
     """
     squares, spread, counts = [], [], []
     pieces = 1 if len(trials) >= 5 else 10
+    most = {n: RUNAWAY * max((float(np.abs(t[n]).max()) for t in trials if n in t.columns), default=0.0) for n in noise}
     for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
         total, around = np.zeros(len(trial)), np.zeros(len(trial))
         channels = 0
         for k, name in enumerate(model.rig.outputs(trial.kind)):
             if name in trial.columns and name in noise:
                 variance = noise[name].std ** 2
-                total += (trial[name] - readings[:, k]) ** 2 / variance
+                total += _within(trial[name] - readings[:, k], most[name]) ** 2 / variance
                 around += (trial[name] - trial[name].mean()) ** 2 / variance
                 channels += 1
         for a, b in zip(np.array_split(total, pieces), np.array_split(around, pieces), strict=True):
@@ -214,7 +219,12 @@ def foretold(own: Fit) -> np.ndarray:
     return np.concatenate(out)
 
 
+def _within(errors: np.ndarray, most: float) -> np.ndarray:
+    return np.clip(np.nan_to_num(errors, nan=most, posinf=most, neginf=-most), -most, most)
+
+
 def _evidence(without: np.ndarray, extended: np.ndarray) -> Evidence:
+    without, extended = _within(without, FAR), _within(extended, FAR)
     difference = without - extended
     return Evidence(float(without @ without - extended @ extended), float(difference @ difference))
 

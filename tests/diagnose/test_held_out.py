@@ -1,0 +1,36 @@
+"""Errors on trials that took no part."""
+
+from dataclasses import replace
+
+import numpy as np
+from diagnose.hidden import study_of
+
+from fes_pin.diagnose.held_out import RUNAWAY, errors_of, separate
+from fes_pin.identify.fit import fit
+from fes_pin.models.effects import effect
+from fes_pin.models.nominal import nominal_model
+
+
+def test_a_prediction_that_runs_away_counts_as_a_large_error():
+    """A spring that pushes: the joint leaves the floating-point numbers, and the errors stay numbers."""
+    study = study_of("joint", driven=False)
+    base = fit(nominal_model(study), study.trials)
+    falling = effect("parallel_stiffness")(stiffness_nm_per_rad=-500.0, rest_angle_rad=0.0)
+    errors = errors_of(base.model + falling, study.trials, base.noise)
+    most = RUNAWAY * max(np.abs(t["position"]).max() for t in study.trials)
+    assert np.isfinite(errors.squares).all()
+    assert errors.squares.max() > errors_of(base.model, study.trials, base.noise).squares.max()
+    assert (errors.squares <= (1.0 + 1e-9) * errors.counts * (most / base.noise["position"].std) ** 2).all()
+
+
+def test_evidence_against_a_model_that_runs_away_is_a_number():
+    study = study_of("joint", driven=False)
+    base = fit(nominal_model(study), study.trials)
+    falling = base.model + effect("parallel_stiffness")(stiffness_nm_per_rad=-500.0, rest_angle_rad=0.0)
+    fallen = replace(base, model=falling)
+    with_it, without_it = (
+        separate(base, one, {"cause": other}, study.trials, base.noise)
+        for one, other in ((base, fallen), (fallen, base))
+    )
+    assert 1e6 < with_it.evidence["cause"].low < np.inf
+    assert -np.inf < without_it.evidence["cause"].low < -1e6
