@@ -1,4 +1,4 @@
-"""Fits: Levenberg-Marquardt with exact sensitivities, bounds, and each trial's own unknowns."""
+"""Fits of models to trials: parameters with their covariance, and each trial's own unknowns."""
 
 from __future__ import annotations
 
@@ -11,19 +11,16 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from fes_pin.data.trial import Trial
+from fes_pin.identify.descent import UNIDENTIFIED, Descent
 from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
-from fes_pin.identify.problem import Linearized, NormalEquations, Problem, Unknowns, normal_equations, whitened_sse
+from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
 
-TOLERANCE = 0.01
-"""A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
 MAX_ITERATIONS = 60
 CONFIDENCE_95 = normal_quantile(0.975)
 PARAMETER_PRICE = 3.84
 """Twice the log-likelihood that one more parameter must earn: chi-square with one degree of freedom at 95 %."""
-UNIDENTIFIED = 1e-10
-"""Eigenvalue of the scaled information matrix, relative to the largest, below which a direction is not identified."""
 
 
 @dataclass(frozen=True)
@@ -127,86 +124,6 @@ class Fit:
         return self.sse + PARAMETER_PRICE * self.degrees
 
 
-class _Search:
-    """The state of one Levenberg-Marquardt search."""
-
-    def __init__(
-        self,
-        problem: Problem,
-        start: Mapping[str, float],
-        unknowns: Unknowns | None,
-        parts: Sequence[Linearized] | None = None,
-    ) -> None:
-        self.problem, self.names = problem, problem.free
-        self.lower = np.array([problem.limits[n][0] for n in self.names])
-        self.upper = np.array([problem.limits[n][1] for n in self.names])
-        self.fixed = dict(start)
-        self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
-        self.unknowns = problem.start_unknowns() if unknowns is None else problem.completed(unknowns)
-        self.damping = 1e-4
-        known = parts is not None and all(start[n] == v for n, v in zip(self.names, self.x, strict=True))
-        self.parts = list(parts) if parts and known else self._linearize(self.x, self.unknowns)
-        self.sse = whitened_sse(self.parts)
-
-    def _linearize(self, x: np.ndarray, unknowns: Unknowns) -> list[Linearized]:
-        with np.errstate(all="ignore"):
-            return self.problem.linearize(self.values(x), unknowns)
-
-    def values(self, x: np.ndarray) -> dict[str, float]:
-        return {**self.fixed, **dict(zip(self.names, (float(v) for v in x), strict=True))}
-
-    def free_now(self, gradient: np.ndarray) -> np.ndarray:
-        """Parameters that are not held by a bound."""
-        held = ((self.x <= self.lower) & (gradient < 0)) | ((self.x >= self.upper) & (gradient > 0))
-        return ~held
-
-    def step(self) -> bool:
-        """Go down once; True when there is nothing left to gain."""
-        for _ in range(12):
-            system = normal_equations(self.parts, self.damping)
-            if not np.isfinite(system.sse):
-                return True
-            move = self._bounded_move(system)
-            new_x = self.x + move
-            promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
-            locals_ = self._moved(system.local_steps(move))
-            if promised < TOLERANCE:
-                return True
-            parts = self._linearize(new_x, locals_)
-            sse = whitened_sse(parts)
-            if np.isfinite(sse) and sse <= self.sse:
-                gained = self.sse - sse
-                self.x, self.unknowns, self.parts, self.sse = new_x, locals_, parts, sse
-                self.damping = max(self.damping * _relief(gained / promised), 1e-9)
-                return gained < TOLERANCE
-            self.damping = max(self.damping * 10.0, 1e-4)
-        return True
-
-    def _bounded_move(self, system: NormalEquations) -> np.ndarray:
-        """Marquardt's step inside the bounds: what would leave them stops there, and the others step anew."""
-        free, move = self.free_now(system.gradient), np.zeros(len(self.x))
-        for _ in range(len(self.x)):
-            held = ~free
-            gradient = system.gradient - system.hessian[:, held] @ move[held]
-            move[free] = _damped(system.hessian[np.ix_(free, free)], gradient[free], self.damping)
-            inside = np.clip(self.x + move, self.lower, self.upper)
-            out = free & (inside != self.x + move)
-            if not out.any():
-                break
-            move[out] = (inside - self.x)[out]
-            free &= ~out
-        return np.clip(self.x + move, self.lower, self.upper) - self.x
-
-    def _moved(self, steps: list[np.ndarray]) -> Unknowns:
-        if not steps:
-            return self.unknowns
-        names = self.problem.unknown_names
-        return [
-            {n: u[n] + float(d) for n, d in zip(names, step, strict=True)}
-            for u, step in zip(self.unknowns, steps, strict=True)
-        ]
-
-
 def fit_problem(
     problem: Problem,
     start: Mapping[str, float],
@@ -220,7 +137,7 @@ def fit_problem(
     Fit
         Also if it did not converge: then `converged` is False.
     """
-    return _run(_Search(problem, start, unknowns), max_iterations)
+    return _run(Descent(problem, start, unknowns), max_iterations)
 
 
 def go_on(problem: Problem, fitted: Fit, max_iterations: int = MAX_ITERATIONS) -> Fit:
@@ -231,10 +148,10 @@ def go_on(problem: Problem, fitted: Fit, max_iterations: int = MAX_ITERATIONS) -
     at = {id(t): i for i, t in enumerate(fitted.trials)}
     rows = [at[id(t)] for t in problem.trials]
     known = [fitted.parts[i] for i in rows] if problem.noise == fitted.noise and problem.free == fitted.free else None
-    return _run(_Search(problem, fitted.values, [fitted.unknowns[i] for i in rows], known), max_iterations)
+    return _run(Descent(problem, fitted.values, [fitted.unknowns[i] for i in rows], known), max_iterations)
 
 
-def _run(search: _Search, max_iterations: int) -> Fit:
+def _run(search: Descent, max_iterations: int) -> Fit:
     problem, done = search.problem, False
     for _ in range(max_iterations):
         done = search.step()
@@ -324,22 +241,6 @@ def noise_of(fitted: Fit, longest: int = ORDERS[-1]) -> dict[str, Noise]:
         name: estimate_noise(pieces, fitted.degrees, math.sqrt(float(np.mean(squares[name]))), step, longest)
         for name, pieces in columns.items()
     }
-
-
-def _relief(kept: float) -> float:
-    """Factor on the damping after a step that kept this share of its promise (Nielsen, IMM-REP-1999-05, Copenhagen)."""
-    return float(np.clip(1.0 - (2.0 * kept - 1.0) ** 3, 0.2, 2.0))
-
-
-def _damped(hessian: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:
-    """Marquardt's step in parameters scaled by the information that the data have of them."""
-    if not len(gradient):
-        return gradient
-    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-    scaled = hessian / np.outer(scale, scale) + damping * np.eye(len(scale))
-    values, vectors = np.linalg.eigh(scaled)
-    inverse = np.where(values > UNIDENTIFIED, 1.0 / np.maximum(values, UNIDENTIFIED), 0.0)
-    return (vectors @ (inverse * (vectors.T @ (gradient / scale)))) / scale
 
 
 def _covariance(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:

@@ -10,7 +10,8 @@ from identify.rigs import SIZE, WHITE, by_scipy, measured, off, trials_of
 from models.cases import JOINT, RIGS, trial
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import TOLERANCE, fit, fit_problem
+from fes_pin.identify.descent import TOLERANCE
+from fes_pin.identify.fit import fit, fit_problem
 from fes_pin.identify.noise import Noise, thinning
 from fes_pin.identify.problem import Problem, normal_equations
 from fes_pin.models.effects import effect

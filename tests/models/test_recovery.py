@@ -7,7 +7,8 @@ import oracle
 import pytest
 from models.cases import EFFECTS_OF_RIGS, KINDS, RIGS, name_of, trial
 
-from fes_pin.identify.fit import TOLERANCE, fit_problem
+from fes_pin.identify.descent import TOLERANCE
+from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
