@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,10 +11,11 @@ from fes_pin.data.spikes import without_spikes
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.experiment import SEPARABLE, NextExperiment, next_experiment
-from fes_pin.diagnose.held_out import Errors, Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
+from fes_pin.diagnose.held_out import Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.library import best_by_effect
 from fes_pin.diagnose.open_set import Remainder, remainder
 from fes_pin.diagnose.search import Search, Searched
+from fes_pin.diagnose.unfinished import alike
 from fes_pin.diagnose.workers import one_thread_each
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
@@ -250,6 +250,8 @@ def _held_out(searched: Searched, test: Sequence[Trial]) -> HeldOut | None:
     if len(searched.nominal.trials) < 2:
         return None
     contenders = sorted((f for fits in searched.rivals.values() for f in fits), key=lambda f: f.sse)[:CONTENDERS]
+    if not searched.complete:
+        contenders = alike(contenders, searched.best.trials, searched.best.noise)
     return cross_validate(searched.nominal, searched.best, searched.without, contenders, searched.floor)
 
 
@@ -340,9 +342,4 @@ def _experiment(searched: Searched, causes: Sequence[Cause], study: Study) -> Ne
     return None
 
 
-def finite(value: float) -> float | None:
-    """A number as JSON can hold it."""
-    return value if math.isfinite(value) else None
-
-
-__all__ = ["Cause", "Diagnosis", "Errors", "ParameterEstimate", "Ranked", "diagnose", "finite", "split"]
+__all__ = ["Cause", "Diagnosis", "ParameterEstimate", "Ranked", "diagnose", "split"]

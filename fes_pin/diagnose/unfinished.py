@@ -13,7 +13,7 @@ from fes_pin.diagnose.held_out import folds_of, foretold
 from fes_pin.diagnose.joint_fits import LOOK, JointFits, Names
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import Fit, fit_problem, go_on, noise_of
-from fes_pin.identify.noise import as_white
+from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.problem import Problem
 
 REFINED = 3
@@ -87,5 +87,9 @@ def fit_for_prediction(fits: Sequence[Fit], recorded: Sequence[Trial]) -> list[F
     Each trial's initial state is estimated, though a prediction takes its first sample: the noise of a first sample
     would go into the parameters.
     """
-    noise = as_white(noise_of(fits[0]))
-    return in_parallel(lambda f: fit_problem(Problem(f.model, recorded, noise), f.values), fits)
+    return alike(fits, recorded, as_white(noise_of(fits[0])))
+
+
+def alike(fits: Sequence[Fit], trials: Sequence[Trial], noise: NoiseModel) -> list[Fit]:
+    """The same models fitted to the same trials under one noise, so that they can be compared."""
+    return in_parallel(lambda f: fit_problem(Problem(f.model, trials, noise), f.values), fits)
