@@ -1,0 +1,36 @@
+"""Causes that are the same in all that a rig can show: what no data can tell apart is said, not guessed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models.cases import RIGS, trial
+
+from fes_pin.models.effects import effect
+from fes_pin.models.model import Model
+from fes_pin.models.simulate import Simulator
+
+TWINS = [
+    ("muscle", "isometric", ("second_order_activation", {"second_s": 0.02}), ("sensor_lag", {"lag_s": 0.02})),
+    ("joint", "motion", ("base_tilt", {"tilt_rad": 0.03}), ("sensor_offset", {"offset": -0.03})),
+]
+"""A muscle held still is linear behind its recruitment: a lag before the sensor is a lag in the sensor. A joint under
+gravity that was turned with its base is the joint, read from another zero."""
+
+
+@pytest.mark.parametrize(("rig", "kind", "one", "other"), TWINS, ids=["lags", "tilt"])
+def test_twins_read_alike(rig, kind, one, other):
+    made = [trial(rig, kind, np.random.default_rng(k), 400, 5e-3) for k in range(2)]
+    for a, b, bare in zip(readings(rig, made, one), readings(rig, made, other), readings(rig, made), strict=True):
+        assert np.abs(a - bare).max() > 1e-3
+        np.testing.assert_allclose(a, b, atol=1e-7 * np.abs(a).max())
+
+
+def readings(rig, trials, *causes):
+    """From the same first reading of a joint, whatever its zero."""
+    model = Model(RIGS[rig])
+    for name, values in causes:
+        model = model + effect(name)(**values)
+    zero = sum(values.get("offset", 0.0) for _, values in causes)
+    begun = [replace(t, conditions={n: v - zero * (n == "position0") for n, v in t.conditions.items()}) for t in trials]
+    return [s.readings for s in Simulator(model, begun).run(model.parameters())]
