@@ -139,7 +139,7 @@ class Effect:
         Parameters
         ----------
         measured
-            Every measured column, all trials end to end, by name.
+            Every measured column, all trials end to end, by name; `time` since each trial began, s.
         """
         return {n: info.grid or (getattr(cls, n),) for n, info in cls.parameters().items()}
 

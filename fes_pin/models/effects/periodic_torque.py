@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from fes_pin.models.maths import cos, sin
 from fes_pin.models.parameters import parameter
@@ -11,6 +14,7 @@ from fes_pin.models.stage import Effect, Stage
 
 TURN = 6.283185307179586
 """2 pi, rad per turn."""
+FASTEST_HZ = 0.8
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class PeriodicTorque(Effect):
         0.4,
         unit="Hz",
         lower=0.05,
-        upper=0.8,
+        upper=FASTEST_HZ,
         scale=0.02,
         grid=(0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75),
     )
@@ -38,6 +42,22 @@ class PeriodicTorque(Effect):
     name, stage, signal, rigs = "periodic_torque", Stage.RIG, "torque", ("ankle", "joint")
     varies = True
 
+    @classmethod
+    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """The frequencies of which a trial holds a period."""
+        grids = super().grids(measured)
+        slowest = _slowest(measured)
+        return {**grids, "frequency_hz": tuple(f for f in grids["frequency_hz"] if f >= slowest) or (FASTEST_HZ,)}
+
+    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+        """What does not come again within a trial is not seen to be periodic: with a phase of each trial's own it would
+        stand for anything slow."""
+        return {"frequency_hz": (_slowest(measured), FASTEST_HZ)}
+
     def apply(self, value: Any, s: Any) -> Any:
         phase = TURN * self.frequency_hz * s.time
         return value + self.in_phase * sin(phase) + self.quadrature * cos(phase)
+
+
+def _slowest(measured: Mapping[str, np.ndarray]) -> float:
+    return min(1.0 / float(np.max(measured["time"])), FASTEST_HZ)
