@@ -68,9 +68,11 @@ class JointFits:
     def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:
         """Fit a base with one more effect, from its most promising shapes.
 
-        Amplitudes start at their linear estimate; where that falls over (a stiffness below zero), at their nulls.
+        Amplitudes start at their linear estimate, and where they have start values of their own (a lag, far from
+        linear) at those; where the estimate falls over (a stiffness below zero), at their nulls.
         """
         starts = [base.model + _with_amplitudes(s.probe.effect, s.amplitudes) for s in scored[:STARTS]]
+        starts += [base.model + one for one in _started(scored[0].probe.effect)]
         fitted = self.fit_from(starts, base.unknowns)
         if np.isfinite(fitted.sse):
             return fitted
@@ -217,6 +219,13 @@ def _is_told(fitted: Fit) -> bool:
             if not np.isfinite(std) or abs(away) < CONFIDENCE_95 * std:
                 return False
     return True
+
+
+def _started(effect: Effect) -> list[Effect]:
+    """The effect at the start values of its amplitude."""
+    info = effect.parameters()
+    starts: list[dict[str, Any]] = [{n: value} for n in effect.amplitudes() for value in info[n].grid]
+    return [replace(effect, **one) for one in starts]
 
 
 def _with_amplitudes(effect: Effect, amplitudes: dict[str, float]) -> Effect:

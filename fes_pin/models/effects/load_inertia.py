@@ -14,19 +14,20 @@ from fes_pin.models.stage import Effect, Stage
 class LoadInertia(Effect):
     """The load's own inertia, felt through its cable.
 
-        J + share M l^2 sin(theta)^2
+        J + share M l^2 (sin(theta)^2 + wheel cos(theta)^2)
 
     Tell-tale: heavier loads make the joint slower, not only displaced.
     Source: d'Alembert's principle for a load on a cable at lever l sin(theta), without its slack; share 1 is a
-    rigid cable.
+    rigid cable at wheel 0. At wheel 1 the lever is the same at all angles, as of a cable that runs on a wheel.
     """
 
     share: float = parameter(0.5, null=0.0, lower=0.0, upper=3.0, scale=0.1)
+    wheel: float = parameter(0.0, null=0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, optional=True, grid=(1.0,))
 
     name, stage, signal, rigs = "load_inertia", Stage.JOINT, "driving", ("ankle",)
 
     def apply(self, value: Any, s: Any) -> Any:
         moved = self.share * s.load * s.lever * s.lever
         sine, cosine = sin(s.q), cos(s.q)
-        torque = value * s.inertia - moved * sine * cosine * s.v * s.v
-        return torque / (s.inertia + moved * sine * sine)
+        torque = value * s.inertia - moved * (1.0 - self.wheel) * sine * cosine * s.v * s.v
+        return torque / (s.inertia + moved * (sine * sine + self.wheel * cosine * cosine))
