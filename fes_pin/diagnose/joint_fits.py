@@ -68,11 +68,9 @@ class JointFits:
     def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:
         """Fit a base with one more effect, from its most promising shapes.
 
-        Amplitudes start at their linear estimate, and where they have start values of their own (a lag, far from
-        linear) at those; where the estimate falls over (a stiffness below zero), at their nulls.
+        Amplitudes start at their linear estimate; where that falls over (a stiffness below zero), at their nulls.
         """
         starts = [base.model + _with_amplitudes(s.probe.effect, s.amplitudes) for s in scored[:STARTS]]
-        starts += [base.model + one for one in _started(scored[0].probe.effect)]
         fitted = self.fit_from(starts, base.unknowns)
         if np.isfinite(fitted.sse):
             return fitted
@@ -92,6 +90,17 @@ class JointFits:
         self._looks.update(dict.fromkeys(made, 1))
         for size in sorted({len(n) for n in made}):
             self._pursue(size)
+
+    def restart(self, names: Sequence[Names]) -> None:
+        """Fit sets from the believed nominal values, too: a strong cause has dragged the fit without it far away."""
+        found = in_parallel(lambda n: self.fit_from([self._believed(n)], None), names)
+        self.fits.update({n: f for n, f in zip(names, found, strict=True) if f.price < self.fits[n].price})
+
+    def _believed(self, names: Names) -> Model:
+        model = self.model
+        for one in self.fits[names].model.effects:
+            model = model + one
+        return model
 
     def _pursue(self, size: int) -> None:
         """Go on with fits that have not converged, as long as they are among the best of their size."""
@@ -219,13 +228,6 @@ def _is_told(fitted: Fit) -> bool:
             if not np.isfinite(std) or abs(away) < CONFIDENCE_95 * std:
                 return False
     return True
-
-
-def _started(effect: Effect) -> list[Effect]:
-    """The effect at the start values of its amplitude."""
-    info = effect.parameters()
-    starts: list[dict[str, Any]] = [{n: value} for n in effect.amplitudes() for value in info[n].grid]
-    return [replace(effect, **one) for one in starts]
 
 
 def _with_amplitudes(effect: Effect, amplitudes: dict[str, float]) -> Effect:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.claims import Claims
-from fes_pin.diagnose.joint_fits import JointFits, Names, subsets
+from fes_pin.diagnose.joint_fits import PURSUED, JointFits, Names, subsets
 from fes_pin.diagnose.library import Scored, best_by_effect, best_pairs
 from fes_pin.diagnose.significance import Family
 from fes_pin.diagnose.unfinished import choose_by_prediction, fit_for_prediction
@@ -147,6 +147,7 @@ class Search:
         self.progress(0.12, "every cause, fitted jointly")
         by_effect = best_by_effect(scores.scored)
         sets.add({(n,): lambda v=v: sets.extend(base, v) for n, v in by_effect.items()})  # type: ignore[misc]
+        sets.restart(sets.ranked(1)[:PURSUED])
 
     def _extend_beam(self, size: int, every: bool = False) -> bool:
         """Fit the most promising sets of a size, or every one; False if nothing at all is left to find."""

@@ -74,6 +74,14 @@ def test_a_reading_that_is_shifted_in_time():
     assert not diagnosis.remainder.unexplained
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_cause_that_has_dragged_the_nominal_fit_far_away(seed):
+    """A reading 80 ms late looks like three times the damping; from there its own fit ends in another hollow."""
+    diagnosis = diagnose(study_of("ankle", lambda _: {"sensor_lag": {"lag_s": 0.08}}, seed=seed))
+    assert named(diagnosis) == [{"sensor_lag"}], str(diagnosis)
+    assert not diagnosis.remainder.unexplained
+
+
 def test_both_of_two_causes():
     diagnosis = diagnosed("ankle", ("coulomb_friction", "electromechanical_delay"), "white", 0)
     sets = named(diagnosis)

@@ -21,7 +21,7 @@ class SecondOrderActivation(Effect):
     Source: Baratta and Solomonow, IEEE Trans. Biomed. Eng. 37 (1990): muscle as a second-order low pass.
     """
 
-    second_s: float = parameter(0.005, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.005, grid=(0.02, 0.15))
+    second_s: float = parameter(0.005, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.005)
 
     name, stage, signal, rigs = "second_order_activation", Stage.MUSCLE, "activation", ("ankle", "muscle")
     states = ("lagged",)

@@ -24,7 +24,7 @@ class SensorLag(Effect):
     Source: an anti-aliasing filter, or clocks that differ. All-pass: Pade's approximant of a delay, of order (1, 1).
     """
 
-    lag_s: float = parameter(0.005, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.005, grid=(0.02, 0.15))
+    lag_s: float = parameter(0.005, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.005)
     shift: float = parameter(
         0.0, null=0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, optional=True, grid=(1.0,), rigs=("joint",)
     )
