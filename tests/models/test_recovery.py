@@ -10,15 +10,16 @@ from models.cases import EFFECTS_OF_RIGS, KINDS, RIGS, name_of, trial
 from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.noise import Noise
-from fes_pin.identify.problem import Problem
+from fes_pin.identify.problem import Problem, measured_columns
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import simulate
 
 NOISE = {"angle_rad": Noise(2e-3), "position": Noise(2e-3), "force_n": Noise(0.2)}
 SHARE_OF_A_DEVIATION = 0.2
 WRONG = {"gain": 0.8, "time_constant_s": 1.4, "inertia_kgm2": 1.3, "damping_nms": 0.7, "inertia_scale": 0.95}
-SAMPLES = {"ankle": 1000, "joint": 500, "muscle": 3000}
-"""A joint from a start 5 % off is out of step with its data after some swings; a muscle tires over 10 s and more."""
+SAMPLES = {"ankle": 1000, "joint": 520, "muscle": 3000}
+"""A joint from a start 5 % off is out of step with its data after some swings, but holds a period of 0.4 Hz; a muscle
+tires over 10 s and more."""
 
 
 def typical(one, rig):
@@ -41,10 +42,9 @@ def measured(model, rig):
     return out
 
 
-def starts(one, trials):
+def starts(one, model, trials):
     """Start values of a search: every combination of the effect's own grid, amplitudes at their defaults."""
-    columns = {n: np.concatenate([t[n] for t in trials if n in t]) for n in trials[0].columns}
-    grids = {n: g for n, g in one.grids(columns).items() if n in one.shapes()}
+    grids = {n: g for n, g in one.grids(measured_columns(model, trials)).items() if n in one.shapes()}
     return [dict(zip(grids, values, strict=True)) for values in itertools.product(*grids.values())]
 
 
@@ -52,7 +52,7 @@ def best_fit(problem, one, trials):
     """A short fit from every start, a whole one from the four best, on until nothing moves."""
     nominal = {n: v * WRONG.get(n, 1.0) for n, v in problem.model.parameters().items() if "." not in n}
     tried = []
-    for start in starts(one, trials):
+    for start in starts(one, problem.model, trials):
         values = {**problem.model.parameters(), **nominal}
         values |= {f"{one.name}.{n}": v for n, v in {n: getattr(one, n) for n in one.amplitudes()}.items()}
         values |= {f"{one.name}.{n}": v for n, v in start.items()}
