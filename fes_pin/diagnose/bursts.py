@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.fft
-import scipy.special
 
+from fes_pin.diagnose.innovations import autocorrelation, convolved, normal_scores
 from fes_pin.identify.distributions import pearson3_tail
 from fes_pin.identify.noise import Noise
 
@@ -48,13 +47,6 @@ def burst_p_value(innovations: Sequence[np.ndarray], noise: Noise, dt: float) ->
     return min([1.0, *(len(found) * p for p in found)])
 
 
-def normal_scores(values: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Quantiles of the normal distribution by the rank of each value among all."""
-    together = np.concatenate(values)
-    scores = scipy.special.ndtri((_ranks(together) - 0.5) / len(together))
-    return np.split(scores, np.cumsum([len(v) for v in values])[:-1])
-
-
 def _templates(noise: Noise, dt: float) -> list[np.ndarray]:
     """What deviations leave in the innovations, each of norm 1."""
     ar = np.r_[1.0, -np.array(noise.ar)]
@@ -82,26 +74,3 @@ def _one(scores: Sequence[np.ndarray], g: np.ndarray) -> float | None:
     variance = 24.0 * count * float(power @ power)
     third = 1728.0 * count * float(power @ convolved(power, power))
     return pearson3_tail(statistic / np.sqrt(variance), third / variance**1.5)
-
-
-def autocorrelation(z: Sequence[np.ndarray]) -> np.ndarray:
-    """Of a channel of mean 0, shape (2 k + 1,), up to a quarter of its shortest trial either way."""
-    most = min(map(len, z)) // 4
-    size = scipy.fft.next_fast_len(max(map(len, z)) + most, real=True)
-    power = np.sum([np.abs(np.fft.rfft(one, size)) ** 2 for one in z], axis=0)
-    half = np.fft.irfft(power, size)[: most + 1]
-    return np.r_[half[:0:-1], half] / half[0]
-
-
-def convolved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The middle of a convolution by Fourier transforms, as long as `a`; shapes (n,) and (2 k + 1,)."""
-    count = len(a) + len(b) - 1
-    size = scipy.fft.next_fast_len(count, real=True)
-    whole = np.fft.irfft(np.fft.rfft(a, size) * np.fft.rfft(b, size), size)
-    return whole[len(b) // 2 :][: len(a)]
-
-
-def _ranks(values: np.ndarray) -> np.ndarray:
-    """From 1 on; equal values share the mean of theirs."""
-    _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
-    return (np.cumsum(counts) - 0.5 * (counts - 1))[which]

@@ -1,10 +1,13 @@
-"""A fit's innovations channel by channel, under the noise that its residuals show."""
+"""A fit's innovations channel by channel, under the noise that its residuals show, and what tests take of them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.fft
+import scipy.special
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, noise_of
@@ -12,7 +15,7 @@ from fes_pin.identify.noise import ORDERS, Noise, low_pass, thin, thinning
 from fes_pin.identify.problem import Problem
 
 ACTIVATION_S = 0.05
-"""Time constant from stimulus to force, s: Dombre, Fournier and Coiffet's ankle, as PAPER_NOTES has it."""
+"""Time constant from stimulus to force, s: Dombre, Fournier and Coiffet's ankle, section II of their paper."""
 
 
 @dataclass(frozen=True)
@@ -63,3 +66,33 @@ def driven(one: Innovations) -> np.ndarray:
     pole = float(np.exp(-trial.dt / ACTIVATION_S))
     act = thin(low_pass(drive / max(float(np.abs(drive).max()), 1e-300), pole), count)
     return act[len(act) - len(one.values) :]
+
+
+def normal_scores(values: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Quantiles of the normal distribution by the rank of each value among all."""
+    together = np.concatenate(values)
+    scores = scipy.special.ndtri((_ranks(together) - 0.5) / len(together))
+    return np.split(scores, np.cumsum([len(v) for v in values])[:-1])
+
+
+def autocorrelation(z: Sequence[np.ndarray]) -> np.ndarray:
+    """Of a channel of mean 0, shape (2 k + 1,), up to a quarter of its shortest trial either way."""
+    most = min(map(len, z)) // 4
+    size = scipy.fft.next_fast_len(max(map(len, z)) + most, real=True)
+    power = np.sum([np.abs(np.fft.rfft(one, size)) ** 2 for one in z], axis=0)
+    half = np.fft.irfft(power, size)[: most + 1]
+    return np.r_[half[:0:-1], half] / half[0]
+
+
+def convolved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The middle of a convolution by Fourier transforms, as long as `a`; shapes (n,) and (2 k + 1,)."""
+    count = len(a) + len(b) - 1
+    size = scipy.fft.next_fast_len(count, real=True)
+    whole = np.fft.irfft(np.fft.rfft(a, size) * np.fft.rfft(b, size), size)
+    return whole[len(b) // 2 :][: len(a)]
+
+
+def _ranks(values: np.ndarray) -> np.ndarray:
+    """From 1 on; equal values share the mean of theirs."""
+    _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
+    return (np.cumsum(counts) - 0.5 * (counts - 1))[which]

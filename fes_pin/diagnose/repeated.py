@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.diagnose.bursts import autocorrelation
+from fes_pin.diagnose.innovations import autocorrelation
 from fes_pin.identify.distributions import f_tail
 
 SCALES_S = (0.0, 0.03, 0.08, 0.2, 0.5)

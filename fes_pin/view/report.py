@@ -100,8 +100,8 @@ def _left(diagnosis: Diagnosis) -> list[Markup]:
         f"Something is left that the {'extended' if diagnosis.causes else 'nominal'} model does not explain "
         f"({probability(left.p_value)}).{where}"
         if left.unexplained
-        else "Nothing that depends smoothly on the motion, comes in bursts or waves, or repeats with the angle "
-        f"({probability(left.p_value)})."
+        else "Nothing that depends smoothly on the motion, comes in bursts or waves, repeats with the angle or from "
+        f"trial to trial, or grows with the stimulus ({probability(left.p_value)})."
     )
     out = [element("p", told)]
     if diagnosis.absorbed:

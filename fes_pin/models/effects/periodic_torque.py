@@ -15,6 +15,7 @@ from fes_pin.models.stage import Effect, Stage
 TURN = 6.283185307179586
 """2 pi, rad per turn."""
 FASTEST_HZ = 0.8
+"""The fastest breathing that is looked for; see the source below."""
 
 
 @dataclass(frozen=True)
