@@ -175,8 +175,8 @@ def _serve(scene) -> None:
 
     with LiveViewer() as viewer:
         viewer.show(scene)
-        typer.echo(f"{scene.caption}\n{viewer.url} (Ctrl-C ends it)")
-        try:
+        try:  # from the first sign that it can be interrupted
+            typer.echo(f"{scene.caption}\n{viewer.url} (Ctrl-C ends it)")
             viewer.wait()
         except KeyboardInterrupt:
             typer.echo("ended")
