@@ -1,9 +1,9 @@
 """What no cause in the library explains, and where it is.
 
-Six tests share one level: lack of fit on smooth features of the motion; bursts at times of their own; spectral lines;
+Eight tests share one level: lack of fit on smooth features of the motion; bursts at times of their own; spectral lines;
 torque that repeats with the angle over short distances; deviations that come again at the same time of every trial;
-deviations that grow with the stimulus. The last five see what the first is blind to, and what an autoregressive noise
-model takes for noise.
+deviations that grow with the stimulus; readings that slip once within a trial; readings that lag where the motion
+turns. All but the first see what it is blind to, and what an autoregressive noise model takes for noise.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from fes_pin.diagnose.detents import detent_p_value
 from fes_pin.diagnose.innovations import channels, driven, under_own_noise
 from fes_pin.diagnose.library import Projection
 from fes_pin.diagnose.lines import LONGEST_NOISE, line_p_value
+from fes_pin.diagnose.play import play_p_value
 from fes_pin.diagnose.repeated import repeated_p_value
+from fes_pin.diagnose.slips import slip_p_value
 from fes_pin.diagnose.uneven import uneven_p_value
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
@@ -29,7 +31,8 @@ from fes_pin.models.simulate import Simulator
 
 REMAINDER_LEVEL = 0.02
 """Level of all tests of the remainder together; see `search.CLAIM_LEVEL`."""
-SHARES = {"smooth": 1 / 2, "burst": 1 / 10, "line": 1 / 10, "detent": 1 / 10, "repeated": 1 / 10, "uneven": 1 / 10}
+OTHERS = ("burst", "line", "detent", "repeated", "uneven", "slip", "play")
+SHARES = {"smooth": 1 / 2, **dict.fromkeys(OTHERS, 1 / (2 * len(OTHERS)))}
 """Of the level, for each test."""
 SMOOTH_LEVEL = REMAINDER_LEVEL * SHARES["smooth"]
 SHORT_NOISE = 2
@@ -152,10 +155,10 @@ def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
 def remainder(fitted: Fit, seed: int = 0) -> Remainder:
     """Test whether a fit leaves anything but noise.
 
-    The p-value is that of the most significant of the six tests, over its share of the level.
+    The p-value is that of the most significant of the eight tests, over its share of the level.
     """
     smooth = smooth_remainder(fitted, seed)
-    found = [(smooth.p_value / SHARES["smooth"], smooth.where), *_others(fitted)]
+    found = [(smooth.p_value / SHARES["smooth"], smooth.where), *_others(fitted, seed)]
     p_value, where = min(found, key=lambda f: f[0])
     if smooth.unexplained:
         return replace(smooth, p_value=min(1.0, p_value, smooth.p_value))
@@ -163,14 +166,15 @@ def remainder(fitted: Fit, seed: int = 0) -> Remainder:
     return Remainder(unexplained, min(1.0, p_value), where if unexplained else None, smooth.excess)
 
 
-def _others(fitted: Fit) -> list[tuple[float, str]]:
+def _others(fitted: Fit, seed: int) -> list[tuple[float, str]]:
     """p-values of all but the smooth features over their shares of the level, and what each depends on."""
     own = under_own_noise(fitted)
+    beside = Projection(own.parts)
     short = channels(under_own_noise(fitted, SHORT_NOISE))
     count = len(short)
     bursts = min(burst_p_value([e.values for e in pieces], noise, pieces[0].dt) for noise, pieces in short)
     line, where = min(line_p_value(pieces) for _, pieces in channels(under_own_noise(fitted, LONGEST_NOISE)))
-    detents = detent_p_value(own, Projection(own.parts))
+    detents = detent_p_value(own, beside)
     repeated = min(repeated_p_value([e.values for e in pieces], pieces[0].dt) for _, pieces in short)
     uneven = min(
         uneven_p_value([e.values for e in pieces], [np.abs(driven(e)) for e in pieces], pieces[0].dt)
@@ -182,6 +186,8 @@ def _others(fitted: Fit) -> list[tuple[float, str]]:
         (detents / SHARES["detent"], "angle"),
         (count * repeated / SHARES["repeated"], "time"),
         (count * uneven / SHARES["uneven"], "stimulus"),
+        (slip_p_value(own, beside, seed) / SHARES["slip"], "time"),
+        (play_p_value(own, beside) / SHARES["play"], "rate"),
     ]
 
 
