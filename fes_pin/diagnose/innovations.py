@@ -58,9 +58,9 @@ class Stretch:
     dt: float
 
 
-def under_own_noise(fitted: Fit, longest: int = ORDERS[-1]) -> Fit:
-    """The same model, linearized where it is under the noise that its residuals show; `longest` as in `noise_of`."""
-    noise = noise_of(fitted, longest)
+def under_own_noise(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> Fit:
+    """The same model, linearized where it is under the noise that its residuals show, of orders as in `noise_of`."""
+    noise = noise_of(fitted, longest, least)
     parts = Problem(fitted.model, fitted.trials, noise, fitted.free).linearize(fitted.values, fitted.unknowns)
     return replace(fitted, noise=noise, parts=tuple(parts))
 

@@ -38,6 +38,10 @@ SMOOTH_LEVEL = REMAINDER_LEVEL * SHARES["smooth"]
 SHORT_NOISE = 2
 """Order of the noise that bursts, repeated and uneven deviations are looked for under: these tests hold for noise of
 any spectrum, and a longer autoregression learns slow deviations as noise."""
+FULL_NOISE = 24
+"""Order of the noise that slips and play are looked for under. It whitens a random torque down to the lowest
+frequencies, also where a criterion finds it too weak to be worth the coefficients, and reaches back too short a time,
+0.12 s, to learn a jump that lasts."""
 STRONG_LEVEL = 1e-12
 """Level at which a remainder counts although it differs from trial to trial: a spasm, not noise."""
 SIGN_DRAWS = 400
@@ -83,10 +87,9 @@ def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Featur
             if output not in trial.columns or output not in noise:
                 continue
             made = _of_trial(trial, one.readings[:, k], output)
-            whitened = {n: noise[output].whiten(v, trial.dt) for n, v in made.items()}
-            for n in whitened:
-                names[f"{output} {n}"] = n
-            blocks.append({f"{output} {n}": v for n, v in whitened.items()})
+            whitened = noise[output].whiten(np.stack(list(made.values()), axis=1), trial.dt)
+            names |= {f"{output} {n}": n for n in made}
+            blocks.append(dict(zip((f"{output} {n}" for n in made), whitened.T, strict=True)))
     keys = list(names)
     rows = []
     for block in blocks:
@@ -143,9 +146,11 @@ def _of_trial(trial: Trial, reading: np.ndarray, output: str) -> dict[str, np.nd
                 "history: act t": act * time,
                 "history: act slow": act * slow,
             }
-    through = {f"{n} filtered": _low_pass(_low_pass(x, 0.05, dt), 0.05, dt) for n, x in {**base, **driven}.items()}
+    plain = {**base, **driven}
+    lagged = _low_pass(_low_pass(np.stack(list(plain.values()), axis=1), 0.05, dt), 0.05, dt)
+    through = dict(zip((f"{n} filtered" for n in plain), lagged.T, strict=True))
     kind = "angle" if output != "force_n" else "force"
-    return {n.replace("angle:", f"{kind}:"): x for n, x in {**base, **driven, **through}.items()}
+    return {n.replace("angle:", f"{kind}:"): x for n, x in {**plain, **through}.items()}
 
 
 def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
@@ -169,12 +174,13 @@ def remainder(fitted: Fit, seed: int = 0) -> Remainder:
 def _others(fitted: Fit, seed: int) -> list[tuple[float, str]]:
     """p-values of all but the smooth features over their shares of the level, and what each depends on."""
     own = under_own_noise(fitted)
-    beside = Projection(own.parts)
+    full = under_own_noise(fitted, FULL_NOISE, FULL_NOISE)
+    beside = Projection(full.parts)
     short = channels(under_own_noise(fitted, SHORT_NOISE))
     count = len(short)
     bursts = min(burst_p_value([e.values for e in pieces], noise, pieces[0].dt) for noise, pieces in short)
     line, where = min(line_p_value(pieces) for _, pieces in channels(under_own_noise(fitted, LONGEST_NOISE)))
-    detents = detent_p_value(own, beside)
+    detents = detent_p_value(own, Projection(own.parts))
     repeated = min(repeated_p_value([e.values for e in pieces], pieces[0].dt) for _, pieces in short)
     uneven = min(
         uneven_p_value([e.values for e in pieces], [np.abs(driven(e)) for e in pieces], pieces[0].dt)
@@ -186,8 +192,8 @@ def _others(fitted: Fit, seed: int) -> list[tuple[float, str]]:
         (detents / SHARES["detent"], "angle"),
         (count * repeated / SHARES["repeated"], "time"),
         (count * uneven / SHARES["uneven"], "stimulus"),
-        (slip_p_value(own, beside, seed) / SHARES["slip"], "time"),
-        (play_p_value(own, beside) / SHARES["play"], "rate"),
+        (slip_p_value(full, beside, seed) / SHARES["slip"], "time"),
+        (play_p_value(full, beside) / SHARES["play"], "rate"),
     ]
 
 

@@ -16,7 +16,7 @@ from fes_pin.identify.noise import Noise
 TRIM = 0.15
 """Share of a trial at either end that no jump is looked for in: Andrews, Tests for parameter instability and structural
 change with unknown change point, Econometrica 61 (1993)."""
-DRAWS = 32
+DRAWS = 16
 """Simulated innovations of all trials; the scatter of their mean is allowed for."""
 FELT = 0.02
 """Share of a step's squared norm that must be left beside what the fit takes up."""
@@ -31,8 +31,8 @@ def slip_p_value(fitted: Fit, projection: Projection, seed: int = 0) -> float:
     innovations, projected in the same way, give its mean and the second and third cumulant of a trial's part; its tail
     is that of a gamma distribution of these moments, the scatter of the simulated mean included.
 
-    Slow noise hides slow deviations: the noise that the fit's residuals show has learned from the jumps, too. What it
-    can not imitate is that all frequencies of a jump meet in one instant.
+    The innovations have to be white down to the frequencies of a trial, and the noise must not have learned the jumps:
+    it is to be of one long order, whatever criterion chooses orders; see `open_set.FULL_NOISE`.
 
     Source: Basseville and Nikiforov, Detection of Abrupt Changes, Prentice Hall 1993, section 2.4.3.
     """
