@@ -15,9 +15,9 @@ from fes_pin.models.model import Model
 CLAIM_LEVEL = 0.01
 """Family-wise error of each round of claims; with the tests of the remainder (0.02) a diagnosis stays below 5 %, with
 room for noise that is not quite autoregressive."""
-FORM_SHARE = 0.03
+FORM_SHARE = 0.0625
 """A further cause must explain at least this share of what all causes do: a real cause differs from its equation, and
-an error of 17 % in its form leaves 3 % of its likelihood to whatever else comes near."""
+an error of a quarter in its form leaves a sixteenth of its likelihood to whatever else comes near."""
 HOPE_LEVEL = 0.1
 """A round of joint fits is left out only if neither a linear promise nor smooth features reach this level."""
 PROMISING = 25.0

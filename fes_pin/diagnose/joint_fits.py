@@ -92,15 +92,20 @@ class JointFits:
             self._pursue(size)
 
     def restart(self, names: Sequence[Names]) -> None:
-        """Fit sets from the believed nominal values, too: a strong cause has dragged the fit without it far away."""
-        found = in_parallel(lambda n: self.fit_from([self._believed(n)], None), names)
+        """Fit sets from afar, too: a strong cause has dragged the fit without it away from its nominal values."""
+        found = in_parallel(self._from_afar, names)
         self.fits.update({n: f for n, f in zip(names, found, strict=True) if f.price < self.fits[n].price})
 
-    def _believed(self, names: Names) -> Model:
+    def _from_afar(self, names: Names) -> Fit:
+        """Fit a set from the believed nominal values: first for least errors, then under the noise.
+
+        Slow noise leaves the fast parts of an answer to a fit, and those of a late one meet only where they are near.
+        """
         model = self.model
         for one in self.fits[names].model.effects:
             model = model + one
-        return model
+        near = fit_problem(Problem(model, self.trials, as_white(self.noise)), model.parameters(), None, LOOK)
+        return fit_problem(self.problem(model), near.values, near.unknowns, LOOK)
 
     def _pursue(self, size: int) -> None:
         """Go on with fits that have not converged, as long as they are among the best of their size."""

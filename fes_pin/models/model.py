@@ -69,6 +69,10 @@ class Model:
             names += [f"{effect.name}.{n}" for n in effect.fitted_parameters()]
         return tuple(names)
 
+    def unused_parameters(self) -> dict[str, float]:
+        """Values, by name, of the parameters that belong to forms of effects that are switched off."""
+        return {f"{e.name}.{n}": value for e in self.effects for n, value in e.unused().items()}
+
     def with_parameters(self, values: Mapping[str, float]) -> Model:
         """The same model with other values.
 
@@ -96,7 +100,7 @@ class Model:
         return Model(self.rig, tuple(e for e in self.effects if e.signal in signals))
 
     def structure(self) -> tuple[str, ...]:
-        """What compiled code depends on: the rig and the effects, not their values."""
+        """The rig and the effects, not their values."""
         return (self.rig.name, *(f"{e.name} of each trial" if e.each_trial else e.name for e in self.effects))
 
     def __str__(self) -> str:

@@ -67,6 +67,7 @@ class Simulator:
         self.max_step_s = max_step(model) if max_step_s is None else max_step_s
         self._delayed = is_delayed(model)
         self._blocks = [_Block(model, self.trials, lanes, columns, self.max_step_s) for lanes in self._groups()]
+        self._fixed = {n: value for block in self._blocks for n, value in block.layout.fixed}
 
     def _groups(self) -> Iterator[list[int]]:
         """Trials that can share a block: same kind, inputs and integration steps per sample, of similar length."""
@@ -90,7 +91,16 @@ class Simulator:
             Every parameter of the model, by name.
         unknowns
             For each trial its own unknowns, if the model has any; by default as its first samples say: see `start`.
+
+        Raises
+        ------
+        ValueError
+            For another value of a parameter that belongs to a form of an effect that is off in `model`: such forms are
+            left out of the equations, unless sensitivities to them are asked for.
         """
+        for name, value in self._fixed.items():
+            if values[name] != value:
+                raise ValueError(f"{name} is {value:g} in the model that this simulator is for, not {values[name]:g}")
         if unknowns is None:
             unknowns = self.start(values)
         delay = total_delay(self.model, values) if self._delayed else 0.0

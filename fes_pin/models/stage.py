@@ -114,6 +114,11 @@ class Effect:
         info = self.parameters()
         return tuple(n for names in self.refinements() if getattr(self, names[0]) != info[names[0]].null for n in names)
 
+    def unused(self) -> dict[str, float]:
+        """The parameters of the refinements that are switched off, with their values."""
+        refined = self.refined()
+        return {n: float(getattr(self, n)) for n, i in self.parameters().items() if i.optional and n not in refined}
+
     def unknowns(self) -> tuple[str, ...]:
         """The parameters that each trial has a value of its own of."""
         return self.amplitudes() if self.each_trial else ()
@@ -124,8 +129,8 @@ class Effect:
 
     def fitted_parameters(self) -> tuple[str, ...]:
         """What a fit moves in all trials alike: all but discrete choices, and but refinements that are switched off."""
-        refined, info = self.refined(), self.parameters()
-        return tuple(n for n in self.common() if info[n].fitted and (n in refined or not info[n].optional))
+        unused, info = self.unused(), self.parameters()
+        return tuple(n for n in self.common() if info[n].fitted and n not in unused)
 
     @classmethod
     def of_each_trial(cls, **shapes: Any) -> Effect:

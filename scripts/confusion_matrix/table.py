@@ -20,6 +20,8 @@ TWINS = {
     "joint": ({"base_tilt", "sensor_offset"},),
 }
 """Causes that are the same in all that a rig shows: no data tell them apart. Asserted in tests/models/test_twins.py."""
+LATE_CLOCK, DELAY, STIMULATED = "time_shift", "electromechanical_delay", ("ankle", "muscle")
+"""The form of `sensor_lag` that is a delay where nothing but the stimulus tells the time. Asserted there, too."""
 
 
 def wilson(hits: int, count: int) -> tuple[float, float]:
@@ -46,10 +48,22 @@ def exact(r: Record) -> bool:
     return r["sets"] == [list(r["causes"])]
 
 
+def twin(r: Record) -> set[str]:
+    """The hidden cause, and what is the same on this rig."""
+    (cause,) = r["causes"]
+    if r["form"] == LATE_CLOCK and r["rig"] in STIMULATED:
+        return {cause, DELAY}
+    return next((twins for twins in TWINS.get(r["rig"], ()) if cause in twins), {cause})
+
+
+def first_but_twins(r: Record) -> bool:
+    """The true cause, or what is the same on this rig, is in the first set."""
+    return bool(r["sets"]) and bool(twin(r) & set(r["sets"][0]))
+
+
 def exact_but_twins(r: Record) -> bool:
-    """One claim, the right one, alone or with what is the same on this rig."""
-    (cause,), same = r["causes"], TWINS.get(r["rig"], ())
-    return exact(r) or any(cause in twins and [set(s) for s in r["sets"]] == [twins] for twins in same)
+    """One claim, of nothing but the right cause and what is the same on this rig."""
+    return len(r["sets"]) == 1 and set(r["sets"][0]) <= twin(r)
 
 
 def both(r: Record) -> bool:
@@ -117,10 +131,11 @@ def _name_rows(good: list[Record]) -> list[str]:
 
     return [
         *rows("true cause in the first set", {15: "", 40: ">= 97 %", 150: ">= 99 %"}, first, None),
+        *rows("  the same, twins counted as one", {40: "", 150: ""}, first_but_twins, None),
         *rows("named exactly, the engine's form", {15: "", 40: ">= 90 %", 150: ">= 97 %"}, exact, True),
-        *rows("  the same, or with its twin", {40: "", 150: ""}, exact_but_twins, True),
+        *rows("  the same, twins counted as one", {40: "", 150: ""}, exact_but_twins, True),
         *rows("named exactly, another form", {15: "", 40: ">= 80 %", 150: ">= 90 %"}, exact, False),
-        *rows("  the same, or with its twin", {40: "", 150: ""}, exact_but_twins, False),
+        *rows("  the same, twins counted as one", {40: "", 150: ""}, exact_but_twins, False),
     ]
 
 

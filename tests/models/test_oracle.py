@@ -16,8 +16,8 @@ from fes_pin.models.simulate import Simulator
 
 CONSTANTS = {"ankle": ANKLE, "joint": JOINT, "muscle": MUSCLE}
 ANGLE_RAD, FORCE_N = 1e-5, 3e-4
-LOOSER = {"coulomb_friction": 30.0}
-"""A joint that comes to rest does so within a step: the engine errs in proportion to it, by at most 3e-4 rad."""
+LOOSER = {"coulomb_friction": 20.0}
+"""A joint that comes to rest does so within a step: the engine errs in proportion to it, by at most 2e-4 rad."""
 
 FORMS = {
     "recruitment_curvature": [

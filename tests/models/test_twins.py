@@ -26,6 +26,19 @@ def test_twins_read_alike(rig, kind, one, other):
         np.testing.assert_allclose(a, b, atol=1e-7 * np.abs(a).max())
 
 
+@pytest.mark.parametrize(("rig", "kind"), [("ankle", "motion"), ("ankle", "isometric"), ("muscle", "isometric")])
+def test_a_clock_that_is_late_is_a_delay(rig, kind):
+    """What begins at rest and is driven by a stimulus alone has no other clock than the stimulus."""
+    made, late, dt = [trial(rig, kind, np.random.default_rng(2), 400, 5e-3)], 5, 5e-3
+    (prompt,), (delayed,) = (
+        readings(rig, made),
+        readings(rig, made, ("electromechanical_delay", {"delay_s": late * dt})),
+    )
+    read_late = np.concatenate([np.repeat(prompt[:1], late, axis=0), prompt[:-late]])
+    assert np.abs(delayed - prompt).max() > 1e-3
+    np.testing.assert_allclose(delayed, read_late, atol=1e-7 * np.abs(prompt).max())
+
+
 def readings(rig, trials, *causes):
     """From the same first reading of a joint, whatever its zero."""
     model = Model(RIGS[rig])

@@ -125,8 +125,7 @@ def joint_torque(x, q, v, t, causes):
         if p.get("form") == "tanh":
             share = math.tanh(v / p["sharp"])
         else:
-            ratio = v / p.get("creep_speed", 0.004)
-            share = ratio / (1.0 + ratio**8) ** 0.125
+            share = max(-1.0, min(v / p.get("creep_speed", 0.004), 1.0))
         total -= p["torque_nm"] * more * share
     if "quadratic_damping" in causes:
         p = causes["quadratic_damping"]

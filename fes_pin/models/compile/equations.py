@@ -65,7 +65,7 @@ class _Symbols:
 
     def signals(self, states: dict[str, Any], memories: dict[str, Any]) -> Signals:
         """Signals and effects with symbols in place of numbers."""
-        layout, p = self.layout, self.p
+        layout, p = self.layout, {**self.p, **dict(self.layout.fixed)}
         effects = []
         for e in self.model.effects:
             own: dict[str, Any] = {n: p[f"{e.name}.{n}"] for n in e.parameters()}

@@ -30,6 +30,8 @@ class Layout:
     outputs: tuple[str, ...]
     columns: tuple[str, ...]
     """Parameters and unknowns with respect to which the program gives sensitivities."""
+    fixed: tuple[tuple[str, float], ...]
+    """Parameters of forms that are switched off, with the values that are compiled in: such forms cost nothing."""
 
     @property
     def values(self) -> tuple[str, ...]:
@@ -54,12 +56,14 @@ class Sizes:
 def make_layout(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...]) -> Layout:
     """The layout of a model's program for trials of a kind with these input columns."""
     rig = model.rig
+    fixed = {n: value for n, value in model.unused_parameters().items() if n not in columns}
     return Layout(
         kind=kind,
         inputs=inputs,
-        parameters=tuple(model.parameters()),
+        parameters=tuple(n for n in model.parameters() if n not in fixed),
         unknowns=model.unknowns(kind),
         constants=(*rig.constant_names(kind), *TIMING),
         outputs=rig.outputs(kind),
         columns=columns,
+        fixed=tuple(fixed.items()),
     )

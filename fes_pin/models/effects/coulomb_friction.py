@@ -11,6 +11,8 @@ from fes_pin.models.stage import Effect, Stage
 
 STIFFEST = 2.5
 """Largest rate of decay times step that it may show; RK4 is stable to 2.78: Hairer, Wanner, Solving ODEs II, IV.2."""
+CORNER = 0.01
+"""Width of its corners, as a share of the friction torque: the joint breaks away within 1 % of it."""
 UNLOADED = 1e-3
 """Load below which its sign no longer shows, in units of the weight at rest: it keeps derivatives finite."""
 
@@ -19,12 +21,14 @@ UNLOADED = 1e-3
 class CoulombFriction(Effect):
     """Dry friction at the joint, with or without more of it at rest (Stribeck) or under load.
 
-        torque - T x / (1 + x^8)^(1/8),   T = torque_nm |load|^load_exponent (1 + stiction exp(-(v / stribeck_speed)^2))
-        x = (torque + k v) / (T + k creep_speed),   k = STIFFEST J / h,   h the integration step
+        torque - T clip(x),   T = torque_nm |load|^load_exponent (1 + stiction exp(-(v / stribeck_speed)^2))
+        x = y / max(1, |y|)^2 + k v / S,   y = torque / S,   S = T + k creep_speed,   k = STIFFEST J / h
 
-    It is T sign(v) in motion, and what holds the joint at rest: k v brings it there within a step. Under a torque below
-    T the joint still creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of
-    small steps x = v / creep_speed. `load` is the bearing's: see the rig.
+    with clip(x) from -1 to 1 and h the integration step. It is T sign(v) in motion, and what holds the joint at rest:
+    there x is torque / S, and k v brings the joint there within a step. A torque beyond T only turns the motion: y
+    falls out of x then, and friction changes its sign where the velocity does. Under a torque below T the joint still
+    creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of small steps
+    x = v / creep_speed. `load` is the bearing's: see the rig.
     Rolling contacts lose by the elastic hysteresis of their Hertzian spots, as the load to the power 4/3.
 
     Tell-tale: the joint comes to rest at other angles from above than from below; free swings shrink by equal steps.
@@ -48,13 +52,19 @@ class CoulombFriction(Effect):
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
     dissipative = True
-    max_step_s = 6.25e-4
 
     def apply(self, value: Any, s: Any) -> Any:
         ratio = s.v / self.stribeck_speed
         loaded = exp(0.5 * self.load_exponent * log(s.bearing_load * s.bearing_load + UNLOADED * UNLOADED))
         most = self.torque_nm * loaded * (1.0 + self.stiction * exp(-ratio * ratio))
         stopping = STIFFEST * s.inertia / s.step
-        x = (value + stopping * s.v) / (most + stopping * self.creep_speed)
-        fourth = x * x * x * x
-        return value - most * x / sqrt(sqrt(sqrt(1.0 + fourth * fourth)))
+        scale = most + stopping * self.creep_speed
+        y = value / scale
+        beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
+        x = y / (beyond * beyond) + stopping * s.v / scale
+        return value - 0.5 * most * (_length(x + 1.0) - _length(x - 1.0))
+
+
+def _length(x: Any) -> Any:
+    """|x| with a rounded corner: sums and differences of two make max(1, |x|) and clip(x)."""
+    return sqrt(x * x + CORNER * CORNER)
