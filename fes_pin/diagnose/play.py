@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from fes_pin.diagnose.innovations import Stretch, stretches
@@ -25,10 +27,12 @@ def play_p_value(fitted: Fit, projection: Projection) -> float:
     The deviation that a play of half width w makes in the simulated reading y, p_t - y_t with
     p_t = min(max(p_(t-1), y_t - w), y_t + w), is whitened as the residual and freed of what the fit takes up. With c_i
     and r_i its part and the residual's in one piece of a trial, x_i = c_i' r_i, n_i = c_i' c_i and a = sum x / sum n,
-    the gain (sum x)^2 / sum n is compared with the spread between U pieces, sum (x_i - a n_i)^2 / n_i / (U - 1), by
-    Fisher's F of 1 and U - 1 degrees: noise that is not quite whitened, or another deviation, is in both.
+    the gain (sum x)^2 / sum n is compared with the spread between pieces, sum (x_i - a n_i)^2 / n_i / k, by Fisher's F
+    of 1 and k degrees: noise that is not quite whitened, or another deviation, is in both. With b_i the orthonormal
+    vectors that the fit takes up, cut to the piece, k = sum (1 - |b_i' c_i|^2 / n_i) - 1 is what the spread is of white
+    noise: fewer than pieces less one, for the fit has taken its part out of each.
 
-    Source of the operator: Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989, section 2.
+    Source of the operator: Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
     """
     simulated = Simulator(fitted.model, fitted.trials).run(fitted.values, fitted.unknowns)
     groups: dict[str, list[Stretch]] = {}
@@ -42,7 +46,7 @@ def play_p_value(fitted: Fit, projection: Projection) -> float:
             columns[one.rows] = one.noise.whiten(deviation, one.trial.dt)
         left = projection(columns)
         felt = np.linalg.norm(left, axis=0) > FELT * np.linalg.norm(columns, axis=0)
-        found += [_one(c, projection.residual, group) for c in left.T[felt]]
+        found += [_one(c, projection, group) for c in left.T[felt]]
     return min([1.0, *(len(found) * p for p in found)])
 
 
@@ -62,19 +66,26 @@ def _deviations(readings: list[np.ndarray]) -> list[np.ndarray]:
     return [out[: len(one), k] for k, one in enumerate(readings)]
 
 
-def _one(column: np.ndarray, residual: np.ndarray, group: list[Stretch]) -> float:
+def _one(column: np.ndarray, projection: Projection, group: list[Stretch]) -> float:
     """p-value of one width in one channel."""
-    count = -(-UNITS // len(group))
-    pieces = [
-        (float(c @ r), float(c @ c))
-        for one in group
-        for c, r in zip(np.array_split(column[one.rows], count), np.array_split(residual[one.rows], count), strict=True)
-    ]
-    x, n = np.array(pieces).T
+    units = []
+    for rows in _pieces(group):
+        c = column[rows]
+        taken = sum(float(np.sum((b.T @ c) ** 2)) for b in projection.taken(rows))
+        units.append((float(c @ projection.residual[rows]), float(c @ c), taken))
+    x, n, taken = np.array(units).T
     felt = n > 1e-4 * n.max()
-    x, n = x[felt], n[felt]
-    if len(x) < 2:
+    x, n, taken = x[felt], n[felt], taken[felt]
+    degrees = float(np.sum(1.0 - taken / n)) - 1.0
+    if degrees < 1.0:
         return 1.0
     amplitude = x.sum() / n.sum()
-    spread = float(np.sum((x - amplitude * n) ** 2 / n)) / (len(x) - 1)
-    return f_tail(float(amplitude * x.sum()) / max(spread, 1e-12), 1, len(x) - 1)
+    spread = float(np.sum((x - amplitude * n) ** 2 / n)) / degrees
+    return f_tail(float(amplitude * x.sum()) / max(spread, 1e-12), 1, degrees)
+
+
+def _pieces(group: list[Stretch]) -> list[slice]:
+    """Rows of each trial, cut into equal pieces."""
+    count = -(-UNITS // len(group))
+    edges = [np.linspace(s.rows.start, s.rows.stop, count + 1).round().astype(int) for s in group]
+    return [slice(a, b) for one in edges for a, b in itertools.pairwise(one.tolist())]

@@ -31,6 +31,8 @@ def slip_p_value(fitted: Fit, projection: Projection, seed: int = 0) -> float:
     innovations, projected in the same way, give its mean and the second and third cumulant of a trial's part; its tail
     is that of a gamma distribution of these moments, the scatter of the simulated mean included.
 
+    A deviation that is slow without a jump raises the statistic as well, if less.
+
     The innovations have to be white down to the frequencies of a trial, and the noise must not have learned the jumps:
     it is to be of one long order, whatever criterion chooses orders; see `open_set.FULL_NOISE`.
 
