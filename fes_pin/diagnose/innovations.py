@@ -14,6 +14,8 @@ from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.noise import ORDERS, Noise, low_pass, thin, thinning
 from fes_pin.identify.problem import Problem
 
+CLIP = 4.0
+"""Innovations beyond this, in standard deviations, count as this."""
 ACTIVATION_S = 0.05
 """Time constant from stimulus to force, s: Dombre, Fournier and Coiffet's ankle, section II of their paper."""
 
@@ -35,27 +37,55 @@ class Innovations:
     dt: float
 
 
-def under_own_noise(fitted: Fit, longest: int = ORDERS[-1]) -> Fit:
-    """The same model, linearized where it is under the noise that its residuals show; `longest` as in `noise_of`."""
-    noise = noise_of(fitted, longest)
+@dataclass(frozen=True)
+class Stretch:
+    """Where one channel of one trial lies among the whitened residuals of all, end to end.
+
+    Attributes
+    ----------
+    number, output
+        Of the trial, and of the channel among the trial's outputs.
+    dt
+        Time step of the innovations, s.
+    """
+
+    trial: Trial
+    number: int
+    channel: str
+    output: int
+    rows: slice
+    noise: Noise
+    dt: float
+
+
+def under_own_noise(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> Fit:
+    """The same model, linearized where it is under the noise that its residuals show, of orders as in `noise_of`."""
+    noise = noise_of(fitted, longest, least)
     parts = Problem(fitted.model, fitted.trials, noise, fitted.free).linearize(fitted.values, fitted.unknowns)
     return replace(fitted, noise=noise, parts=tuple(parts))
 
 
-def channels(fitted: Fit) -> list[tuple[Noise, list[Innovations]]]:
-    """Innovations by channel and time step, with the noise that whitened them."""
-    found: dict[tuple[str, float], list[Innovations]] = {}
-    for trial, part in zip(fitted.trials, fitted.parts, strict=True):
-        at = 0
-        for name in fitted.model.rig.outputs(trial.kind):
+def stretches(fitted: Fit) -> list[Stretch]:
+    """Each channel of each trial, in the order of the whitened residuals."""
+    out, at = [], 0
+    for number, trial in enumerate(fitted.trials):
+        for output, name in enumerate(fitted.model.rig.outputs(trial.kind)):
             if name not in trial.columns or name not in fitted.noise:
                 continue
             noise = fitted.noise[name]
             count = thinning(trial.dt, noise.step_s)
-            size = max(len(trial) // count - len(noise.ar), 0)
-            step = round(trial.dt * count, 9)
-            found.setdefault((name, step), []).append(Innovations(trial, part.residual[at : at + size], step))
-            at += size
+            rows = slice(at, at + max(len(trial) // count - len(noise.ar), 0))
+            at = rows.stop
+            out.append(Stretch(trial, number, name, output, rows, noise, round(trial.dt * count, 9)))
+    return out
+
+
+def channels(fitted: Fit) -> list[tuple[Noise, list[Innovations]]]:
+    """Innovations by channel and time step, with the noise that whitened them."""
+    values = np.concatenate([p.residual for p in fitted.parts])
+    found: dict[tuple[str, float], list[Innovations]] = {}
+    for one in stretches(fitted):
+        found.setdefault((one.channel, one.dt), []).append(Innovations(one.trial, values[one.rows], one.dt))
     return [(fitted.noise[name], pieces) for (name, _), pieces in found.items()]
 
 

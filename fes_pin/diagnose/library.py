@@ -151,6 +151,15 @@ class Projection:
         """Columns of shape (m, k) without the part that the fit could take up."""
         return self._without_shared(self._without_locals(columns))
 
+    def taken(self, rows: slice) -> list[np.ndarray]:
+        """Orthonormal vectors, cut to rows of one trial, that are taken from columns which are zero elsewhere."""
+        own = [
+            basis[rows.start - where.start : rows.stop - where.start]
+            for basis, where in zip(self._bases, self._slices, strict=True)
+            if where.start <= rows.start and rows.stop <= where.stop
+        ]
+        return [*own, self._basis[rows]]
+
     def _without_shared(self, columns: np.ndarray) -> np.ndarray:
         return columns - self._basis @ (self._basis.T @ columns)
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.fft
 import scipy.ndimage
 
-from fes_pin.diagnose.innovations import Innovations, driven
+from fes_pin.diagnose.innovations import CLIP, Innovations, driven
 from fes_pin.identify.distributions import chi2_quantile, f_tail
 
 LOWEST_HZ = 2.0
@@ -23,8 +23,6 @@ LONGEST_NOISE = 4
 frequencies, and too little to take a line for noise."""
 MEDIAN_EFFICIENCY = 0.64
 """Of a median against a mean as a measure of level: 2 / pi."""
-CLIP = 4.0
-"""Innovations beyond this, in standard deviations, count as this."""
 
 
 def line_p_value(pieces: Sequence[Innovations]) -> tuple[float, str]:

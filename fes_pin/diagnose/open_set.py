@@ -1,9 +1,9 @@
 """What no cause in the library explains, and where it is.
 
-Six tests share one level: lack of fit on smooth features of the motion; bursts at times of their own; spectral lines;
+Eight tests share one level: lack of fit on smooth features of the motion; bursts at times of their own; spectral lines;
 torque that repeats with the angle over short distances; deviations that come again at the same time of every trial;
-deviations that grow with the stimulus. The last five see what the first is blind to, and what an autoregressive noise
-model takes for noise.
+deviations that grow with the stimulus; readings that slip once within a trial; readings that lag where the motion
+turns. All but the first see what it is blind to, and what an autoregressive noise model takes for noise.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from fes_pin.diagnose.detents import detent_p_value
 from fes_pin.diagnose.innovations import channels, driven, under_own_noise
 from fes_pin.diagnose.library import Projection
 from fes_pin.diagnose.lines import LONGEST_NOISE, line_p_value
+from fes_pin.diagnose.play import play_p_value
 from fes_pin.diagnose.repeated import repeated_p_value
+from fes_pin.diagnose.slips import slip_p_value
 from fes_pin.diagnose.uneven import uneven_p_value
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
@@ -29,12 +31,17 @@ from fes_pin.models.simulate import Simulator
 
 REMAINDER_LEVEL = 0.02
 """Level of all tests of the remainder together; see `search.CLAIM_LEVEL`."""
-SHARES = {"smooth": 1 / 2, "burst": 1 / 10, "line": 1 / 10, "detent": 1 / 10, "repeated": 1 / 10, "uneven": 1 / 10}
+OTHERS = ("burst", "line", "detent", "repeated", "uneven", "slip", "play")
+SHARES = {"smooth": 1 / 2, **dict.fromkeys(OTHERS, 1 / (2 * len(OTHERS)))}
 """Of the level, for each test."""
 SMOOTH_LEVEL = REMAINDER_LEVEL * SHARES["smooth"]
 SHORT_NOISE = 2
 """Order of the noise that bursts, repeated and uneven deviations are looked for under: these tests hold for noise of
 any spectrum, and a longer autoregression learns slow deviations as noise."""
+FULL_NOISE = 24
+"""Order of the noise that slips and play are looked for under. It whitens a random torque down to the lowest
+frequencies, also where a criterion finds it too weak to be worth the coefficients, and reaches back too short a time,
+0.12 s, to learn a jump that lasts."""
 STRONG_LEVEL = 1e-12
 """Level at which a remainder counts although it differs from trial to trial: a spasm, not noise."""
 SIGN_DRAWS = 400
@@ -80,10 +87,9 @@ def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Featur
             if output not in trial.columns or output not in noise:
                 continue
             made = _of_trial(trial, one.readings[:, k], output)
-            whitened = {n: noise[output].whiten(v, trial.dt) for n, v in made.items()}
-            for n in whitened:
-                names[f"{output} {n}"] = n
-            blocks.append({f"{output} {n}": v for n, v in whitened.items()})
+            whitened = noise[output].whiten(np.stack(list(made.values()), axis=1), trial.dt)
+            names |= {f"{output} {n}": n for n in made}
+            blocks.append(dict(zip((f"{output} {n}" for n in made), whitened.T, strict=True)))
     keys = list(names)
     rows = []
     for block in blocks:
@@ -140,9 +146,11 @@ def _of_trial(trial: Trial, reading: np.ndarray, output: str) -> dict[str, np.nd
                 "history: act t": act * time,
                 "history: act slow": act * slow,
             }
-    through = {f"{n} filtered": _low_pass(_low_pass(x, 0.05, dt), 0.05, dt) for n, x in {**base, **driven}.items()}
+    plain = {**base, **driven}
+    lagged = _low_pass(_low_pass(np.stack(list(plain.values()), axis=1), 0.05, dt), 0.05, dt)
+    through = dict(zip((f"{n} filtered" for n in plain), lagged.T, strict=True))
     kind = "angle" if output != "force_n" else "force"
-    return {n.replace("angle:", f"{kind}:"): x for n, x in {**base, **driven, **through}.items()}
+    return {n.replace("angle:", f"{kind}:"): x for n, x in {**plain, **through}.items()}
 
 
 def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
@@ -152,10 +160,10 @@ def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
 def remainder(fitted: Fit, seed: int = 0) -> Remainder:
     """Test whether a fit leaves anything but noise.
 
-    The p-value is that of the most significant of the six tests, over its share of the level.
+    The p-value is that of the most significant of the eight tests, over its share of the level.
     """
     smooth = smooth_remainder(fitted, seed)
-    found = [(smooth.p_value / SHARES["smooth"], smooth.where), *_others(fitted)]
+    found = [(smooth.p_value / SHARES["smooth"], smooth.where), *_others(fitted, seed)]
     p_value, where = min(found, key=lambda f: f[0])
     if smooth.unexplained:
         return replace(smooth, p_value=min(1.0, p_value, smooth.p_value))
@@ -163,9 +171,11 @@ def remainder(fitted: Fit, seed: int = 0) -> Remainder:
     return Remainder(unexplained, min(1.0, p_value), where if unexplained else None, smooth.excess)
 
 
-def _others(fitted: Fit) -> list[tuple[float, str]]:
+def _others(fitted: Fit, seed: int) -> list[tuple[float, str]]:
     """p-values of all but the smooth features over their shares of the level, and what each depends on."""
     own = under_own_noise(fitted)
+    full = under_own_noise(fitted, FULL_NOISE, FULL_NOISE)
+    beside = Projection(full.parts)
     short = channels(under_own_noise(fitted, SHORT_NOISE))
     count = len(short)
     bursts = min(burst_p_value([e.values for e in pieces], noise, pieces[0].dt) for noise, pieces in short)
@@ -182,6 +192,8 @@ def _others(fitted: Fit) -> list[tuple[float, str]]:
         (detents / SHARES["detent"], "angle"),
         (count * repeated / SHARES["repeated"], "time"),
         (count * uneven / SHARES["uneven"], "stimulus"),
+        (slip_p_value(full, beside, seed) / SHARES["slip"], "time"),
+        (play_p_value(full, beside) / SHARES["play"], "rate"),
     ]
 
 

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.diagnose.innovations import autocorrelation
+from fes_pin.diagnose.innovations import CLIP, autocorrelation
 from fes_pin.identify.distributions import f_tail
 
 SCALES_S = (0.0, 0.03, 0.08, 0.2, 0.5)
 """Lengths that the innovations are averaged over, s; 0 takes them as they are."""
 FEWEST = 3
 """Trials that differences are judged from."""
-CLIP = 4.0
-"""Innovations beyond this, in standard deviations, count as this."""
 
 
 def repeated_p_value(innovations: Sequence[np.ndarray], dt: float) -> float:

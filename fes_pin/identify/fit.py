@@ -227,8 +227,8 @@ def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
     return out
 
 
-def noise_of(fitted: Fit, longest: int = ORDERS[-1]) -> dict[str, Noise]:
-    """The noise that a fit's residuals show, by output column, with autoregressions up to the order `longest`."""
+def noise_of(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> dict[str, Noise]:
+    """The noise that a fit's residuals show, by output column, with autoregressions of orders `least` to `longest`."""
     problem = Problem(fitted.model, fitted.trials, fitted.noise, free=())
     step = noise_step([t.dt for t in fitted.trials])
     columns: dict[str, list[np.ndarray]] = {}
@@ -238,7 +238,7 @@ def noise_of(fitted: Fit, longest: int = ORDERS[-1]) -> dict[str, Noise]:
             columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
             squares.setdefault(name, []).append(float(np.mean(residual**2)))
     return {
-        name: estimate_noise(pieces, fitted.degrees, math.sqrt(float(np.mean(squares[name]))), step, longest)
+        name: estimate_noise(pieces, fitted.degrees, math.sqrt(float(np.mean(squares[name]))), step, longest, least)
         for name, pieces in columns.items()
     }
 

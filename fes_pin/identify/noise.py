@@ -80,6 +80,7 @@ def estimate_noise(
     std: float | None = None,
     step_s: float = 0.0,
     longest: int = ORDERS[-1],
+    least: int = 0,
 ) -> Noise:
     """Fit autoregressive noise to the residuals of one channel, by least squares.
 
@@ -93,12 +94,13 @@ def estimate_noise(
         Standard deviation of single samples, where the residuals are averages.
     step_s
         Time step of the residuals, if they are averages.
-    longest
-        Highest order that is tried.
+    longest, least
+        Highest and lowest order that is tried; the highest that the trials are long enough for, if that is lower.
     """
     total = sum(len(r) for r in residuals)
     shortest = min(len(r) for r in residuals)
-    orders = [p for p in ORDERS if p <= min(longest, shortest // 10)]
+    possible = [p for p in ORDERS if p <= min(longest, shortest // 10)]
+    orders = [p for p in possible if p >= least] or possible[-1:]
     order_limit = orders[-1]
     lagged = [_lags(r, order_limit) for r in residuals if len(r) > 2 * order_limit + 2]
     gram = np.sum([m.T @ m for m in lagged], axis=0)

@@ -101,7 +101,8 @@ def _left(diagnosis: Diagnosis) -> list[Markup]:
         f"({probability(left.p_value)}).{where}"
         if left.unexplained
         else "Nothing that depends smoothly on the motion, comes in bursts or waves, repeats with the angle or from "
-        f"trial to trial, or grows with the stimulus ({probability(left.p_value)})."
+        "trial to trial, grows with the stimulus, jumps once in a trial or lags where the motion turns "
+        f"({probability(left.p_value)})."
     )
     out = [element("p", told)]
     if diagnosis.absorbed:

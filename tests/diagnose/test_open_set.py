@@ -11,11 +11,14 @@ from identify.rigs import trials_of
 
 from fes_pin.diagnose.bursts import burst_p_value
 from fes_pin.diagnose.innovations import channels, under_own_noise
-from fes_pin.diagnose.open_set import REMAINDER_LEVEL, SHARES, remainder
+from fes_pin.diagnose.library import Projection
+from fes_pin.diagnose.open_set import FULL_NOISE, REMAINDER_LEVEL, SHARES, remainder
+from fes_pin.diagnose.play import play_p_value
 from fes_pin.diagnose.repeated import repeated_p_value
+from fes_pin.diagnose.slips import slip_p_value
 from fes_pin.diagnose.uneven import uneven_p_value
 from fes_pin.identify.fit import fit
-from fes_pin.identify.noise import Noise
+from fes_pin.identify.noise import Noise, estimate_noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
 
@@ -145,6 +148,58 @@ def test_a_sensor_that_slips_is_seen():
     rng = np.random.default_rng(47)
     left = remainder(forces(rng, lambda t, f: f + 0.5 * (t - t[0] > rng.uniform(1.0, 4.0))))
     assert left.unexplained, left
+
+
+def long_noise(rng, deviation=lambda y, t: 0.0 * y, poles=(1.0,), trials=8):
+    """A fit, under noise of one order, of a muscle's force with a deviation and noise of this denominator."""
+    model, made = trials_of("muscle", rng, count=trials, n=1000)
+    out = []
+    for trial in made:
+        true = predict(model, trial)["force_n"]
+        e = scipy.signal.lfilter([1.0], poles, rng.standard_normal(1500))[500:]
+        out.append(trial.with_columns(force_n=true + deviation(true, trial.time - trial.time[0]) + 0.2 * e))
+    full = under_own_noise(fit(model, out), FULL_NOISE, FULL_NOISE)
+    return full, Projection(full.parts)
+
+
+@pytest.mark.parametrize("poles", COLOURED, ids=["white", "slow", "slower"])
+def test_slips_and_play_keep_their_level(poles):
+    """At 5 %, more than 5 of 24 have a probability of 0.001 each."""
+    rng = np.random.default_rng(60)
+    made = [long_noise(rng, poles=poles) for _ in range(24)]
+    assert sum(slip_p_value(*one) < 0.05 for one in made) <= 5
+    assert sum(play_p_value(*one) < 0.05 for one in made) <= 5
+
+
+@pytest.mark.parametrize(("poles", "jump"), [((1.0,), 0.3), ((1.0, -0.8), 0.5)], ids=["white", "slow"])
+def test_a_jump_in_each_trial_is_told_from_slow_noise(poles, jump):
+    """Of one and a half standard deviations, at a time of each trial's own; of 60 other studies each, all pass."""
+    rng = np.random.default_rng(61)
+    made = [long_noise(rng, lambda y, t: jump * (t > rng.uniform(1.2, 3.8)), poles) for _ in range(4)]
+    assert max(slip_p_value(*one) for one in made) < 1e-3
+
+
+@pytest.mark.parametrize("poles", COLOURED[:2], ids=["white", "slow"])
+def test_a_reading_that_lags_where_the_motion_turns_is_play(poles):
+    """Half a standard deviation of white noise wide, beside what the fit takes up of it."""
+    rng = np.random.default_rng(63)
+
+    def lag(y, _):
+        out, follower = np.empty_like(y), 0.0
+        for i, now in enumerate(y):
+            follower = out[i] = min(max(follower, now - 0.1), now + 0.1)
+        return out - y
+
+    full, beside = long_noise(rng, lag, poles)
+    assert play_p_value(full, beside) < 1e-6
+    assert slip_p_value(full, beside) > play_p_value(full, beside)
+
+
+def test_noise_of_a_given_order_has_it():
+    rng = np.random.default_rng(64)
+    e = [rng.standard_normal(1000) for _ in range(2)]
+    assert [len(estimate_noise(e, longest=k, least=k).ar) for k in (0, 2, 24)] == [0, 2, 24]
+    assert len(estimate_noise([one[:70] for one in e], longest=24, least=24).ar) == 6, "a tenth of the trial, at most"
 
 
 @pytest.mark.parametrize("rig", ["ankle", "joint"])
