@@ -96,6 +96,10 @@ class JointFits:
         found = in_parallel(self._from_afar, names)
         self.fits.update({n: f for n, f in zip(names, found, strict=True) if f.price < self.fits[n].price})
 
+    def given_up(self) -> list[Names]:
+        """Single causes whose fit ended where they are absent, at a bound: what another amplitude would do is unseen."""
+        return [n for n in self.ranked(1) if _is_absent(self.fits[n], self.fits[n].model.effects[-1])]
+
     def _from_afar(self, names: Names) -> Fit:
         """Fit a set from the believed nominal values: first for least errors, then under the noise.
 
@@ -196,6 +200,12 @@ def names_of(fitted: Fit) -> Names:
 def subsets(names: Names) -> list[Names]:
     """The sets with one cause less."""
     return [tuple(m for m in names if m != n) for n in names]
+
+
+def _is_absent(fitted: Fit, effect: Effect) -> bool:
+    """True if a parameter of the effect stands at a bound that is its null."""
+    info = effect.parameters()
+    return any(f"{effect.name}.{n}" in fitted.at_bound and getattr(effect, n) == one.null for n, one in info.items())
 
 
 def _choices(model: Model) -> tuple[float, ...]:
