@@ -97,7 +97,7 @@ class JointFits:
         self.fits.update({n: f for n, f in zip(names, found, strict=True) if f.price < self.fits[n].price})
 
     def given_up(self) -> list[Names]:
-        """Single causes whose fit ended where they are absent, at a bound: what another amplitude would do is unseen."""
+        """Single causes whose fit ended where they are absent, at a bound: another amplitude has not been seen."""
         return [n for n in self.ranked(1) if _is_absent(self.fits[n], self.fits[n].model.effects[-1])]
 
     def _from_afar(self, names: Names) -> Fit:

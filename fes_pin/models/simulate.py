@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -113,9 +114,9 @@ class Simulator:
     def start(self, values: Mapping[str, float]) -> list[dict[str, float]]:
         """Each trial's unknowns as its first samples say.
 
-        What was measured at the first sample is taken from it; a rate that was not is the one with which the model
-        follows the first 0.2 s best, position and rate fitted together. What effects have of each trial's own is at its
-        null.
+        What was measured at the first sample is what the model reads there; a rate that was not is the one with which
+        the model follows the first 0.2 s best, position and rate fitted together. What effects have of each trial's own
+        is at its null.
         """
         rig = self.model.rig
         out = [self.model.initial_unknowns(t) for t in self.trials]
@@ -124,7 +125,30 @@ class Simulator:
             found = _first_motion(self.model, [self.trials[i] for i in todo], values, [out[i] for i in todo])
             for i, unknowns in zip(todo, found, strict=True):
                 out[i].update({n: unknowns[n] for n in rig.unmeasured(self.trials[i])})
+        if any(e.signal == "reading" for e in self.model.effects):
+            _read_through(self.model, self.trials, values, out)
         return out
+
+
+def _read_through(
+    model: Model, trials: Sequence[Trial], values: Mapping[str, float], unknowns: Sequence[dict[str, float]]
+) -> None:
+    """Move what a first sample tells until the model, its sensor included, reads that sample: Newton's steps."""
+    told = [model.rig.read_first(t) for t in trials]
+    names = dict.fromkeys(n for columns in told for n in columns)
+    if not names:
+        return
+    simulator = Simulator(model, [_first_samples(t) for t in trials])
+    for name, _ in itertools.product(names, range(NEWTON_STEPS)):
+        base = simulator.run(values, unknowns)
+        moved = simulator.run(values, [{**u, name: u[name] + NUDGE} for u in unknowns])
+        for i, trial in enumerate(trials):
+            if name not in told[i]:
+                continue
+            k = model.rig.outputs(trial.kind).index(told[i][name])
+            slope = float(moved[i].readings[0, k] - base[i].readings[0, k]) / NUDGE
+            step = float(trial[told[i][name]][0] - base[i].readings[0, k]) / slope if slope else 0.0
+            unknowns[i][name] += step if math.isfinite(step) else 0.0
 
 
 def _first_motion(

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fes_pin.models.maths import sqrt
+from fes_pin.models.maths import sqrt, where
 from fes_pin.models.parameters import Parameter, parameters_of
 
 
@@ -179,6 +179,17 @@ class Signals(SimpleNamespace):
             if effect.signal == signal:
                 value = effect.apply(value, self.of(effect))
         return value
+
+
+def counted_from(s: Any, place: Any) -> Any:
+    """The reading that a sensor's deviations are counted from: where the trial begins at 0, at 1 where the joint rests
+    when nothing drives it, at 2 the model's own zero. On an ankle the first two are one."""
+    return where(place < 0.5, s.rest_reading, where(place < 1.5, s.idle_reading, 0.0))
+
+
+def places(measured: Mapping[str, np.ndarray]) -> tuple[float, ...]:
+    """The choices of `counted_from` that a search has: a joint's trial may begin anywhere."""
+    return (1.0, 0.0, 2.0) if "position" in measured else (0.0,)
 
 
 def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, Any]:

@@ -30,7 +30,24 @@ class Offset(_Signed):
         return y + self.size * self.p["sign"]
 
 
-class Gain(_Signed):
+class _Deviating(_Signed):
+    """Deviations from a trial's rest; on a joint from there, from where it hangs or from zero."""
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {**super().draw(rng, angles), "place": float(rng.integers(3))}
+
+    def begin(self, s, lanes):
+        self.lanes = lanes
+
+    def rest_of(self, rest):
+        if self.lanes.rig != "joint":
+            return rest
+        hanging = np.arctan2(-self.lanes.k["gravity_cos"], self.lanes.k["gravity_sin"])
+        return np.choose(self.p["place"].astype(int), (rest, hanging, 0.0 * rest))
+
+
+class Gain(_Deviating):
     cause, rigs, unit, cap = "sensor_gain", BOTH, 0.02, 0.6
 
     @classmethod
@@ -38,6 +55,7 @@ class Gain(_Signed):
         return {"error": size * p["sign"]}
 
     def reading(self, y, v, time, rest):
+        rest = self.rest_of(rest)
         return rest + (1.0 + self.size * self.p["sign"]) * (y - rest)
 
 
@@ -98,7 +116,7 @@ class TimeShift(LowPass):
         return out
 
 
-class Curved(_Signed):
+class Curved(_Deviating):
     cause, rigs, unit, cap = "sensor_nonlinearity", BOTH, 0.05, 1.2
 
     @classmethod
@@ -106,7 +124,7 @@ class Curved(_Signed):
         return {"curvature": size * p["sign"]}
 
     def reading(self, y, v, time, rest):
-        return y + self.size * self.p["sign"] * (y - rest) ** 2
+        return y + self.size * self.p["sign"] * (y - self.rest_of(rest)) ** 2
 
 
 class CurvedMore(Curved):
@@ -117,8 +135,8 @@ class CurvedMore(Curved):
         return {}
 
     def reading(self, y, v, time, rest):
-        away, sign = y - rest, self.p["sign"]
-        return rest + away + self.size * sign * (np.expm1(3.0 * away) - 3.0 * away) / 4.5
+        away, sign = y - self.rest_of(rest), self.p["sign"]
+        return y + self.size * sign * (np.expm1(3.0 * away) - 3.0 * away) / 4.5
 
 
 class Hum(Form):

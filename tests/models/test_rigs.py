@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.trial import Trial
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import make_layout
 from fes_pin.models.model import Model
@@ -146,7 +147,7 @@ def test_any_joint_is_pinocchio_to_1e_12(tmp_path, kind, axis, base):
     assert (body.nv, is_revolute(body)) == (1, kind != "prismatic")
     scales = {"inertia_scale": 1.0, "damping": 0.3, "gravity_scale": 1.0}
     rig = joint_model(path, {}, scales)
-    engine = acceleration(Model(rig), "motion", ("effort",), rig.constants, ("q", "v"))
+    engine = acceleration(Model(rig), "motion", ("effort",), {**rig.constants, "idle": 0.0}, ("q", "v"))
     for _ in range(20):
         q, v, effort = rng.uniform(-4.0, 4.0), rng.uniform(-5.0, 5.0), rng.uniform(-3.0, 3.0)
         a = engine({"q": q, "v": v}, (effort,))
@@ -173,7 +174,7 @@ def test_gravity_pulls_downwards(tmp_path):
 def test_a_prismatic_joint_weighs_the_same_everywhere(tmp_path):
     path = robot(tmp_path, "prismatic", "0.6 0 0.8", "0.4 -1.1 2.0")
     rig = joint_model(path, {}, {"inertia_scale": 1.0, "damping": 0.0, "gravity_scale": 1.0})
-    engine = acceleration(Model(rig), "motion", (), rig.constants, ("q", "v"))
+    engine = acceleration(Model(rig), "motion", (), {**rig.constants, "idle": 0.0}, ("q", "v"))
     assert engine({"q": 0.0, "v": 0.0}) == pytest.approx(engine({"q": 2.7, "v": 0.0}), rel=1e-14)
     assert engine({"q": 0.0, "v": 0.0}) != 0.0
 
@@ -213,3 +214,14 @@ def test_a_urdf_that_pinocchio_refuses_is_an_input_error(tmp_path):
     )
     with pytest.raises(InputError, match="Pinocchio cannot read"):
         load_urdf(path)
+
+
+@pytest.mark.parametrize("base", ["0 0 0", "0.4 -1.1 2.0"])
+def test_a_joint_idles_where_it_hangs(tmp_path, base):
+    """Gravity is zero there, and brings the joint back."""
+    rig = joint_model(robot(tmp_path, "revolute", "0 1 0", base), {}, {"inertia_scale": 1.0, "damping": 0.0})
+    idle = rig.trial_constants(Trial("swing", "motion", {"position": np.zeros(2)}, np.arange(2.0)))["idle"]
+    engine = acceleration(Model(rig), "motion", (), {**rig.constants, "idle": idle}, ("q", "v"))
+    beside = [engine({"q": idle + x, "v": 0.0}) for x in (-0.1, 0.0, 0.1)]
+    assert beside[0] > 0 > beside[2]
+    assert abs(beside[1]) < 1e-12 * beside[0]

@@ -8,6 +8,9 @@ from models.cases import MUSCLE, RIGS, pulses, trial
 
 from fes_pin.data.trial import Trial
 from fes_pin.models.effects.electromechanical_delay import ElectromechanicalDelay
+from fes_pin.models.effects.sensor_gain import SensorGain
+from fes_pin.models.effects.sensor_nonlinearity import SensorNonlinearity
+from fes_pin.models.effects.sensor_offset import SensorOffset
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import Simulator, simulate, substeps
@@ -157,3 +160,17 @@ def test_a_measured_rate_is_taken_as_it_is():
         RIGS["joint"].parameters()
     )
     assert (start["initial_position"], start["initial_velocity"]) == (1.0, 3.0)
+
+
+@pytest.mark.parametrize("of_sensor", [SensorOffset(0.2), SensorGain(0.1, 1.0), SensorNonlinearity(0.1, 2.0)])
+def test_a_prediction_starts_where_the_sensor_reads_the_first_sample(of_sensor):
+    """Not where the reading would be if it were the angle."""
+    model, time = Model(RIGS["joint"]) + of_sensor, np.arange(400) * 5e-3
+    known = Trial("swing", "motion", {}, time, {"position0": 0.4, "velocity0": 0.0})
+    reading = simulate(model, known)["position"]
+    (start,) = Simulator(model, [Trial("swing", "motion", {"position": reading}, time)]).start(model.parameters())
+    assert abs(reading[0] - 0.4) > 5e-3
+    assert start["initial_position"] == pytest.approx(0.4, abs=1e-9)
+    assert start["initial_velocity"] == pytest.approx(0.0, abs=1e-6)
+    (told,) = Simulator(model, [known]).start(model.parameters())
+    assert (told["initial_position"], told["initial_velocity"]) == (0.4, 0.0), "told as the angle, not as read"

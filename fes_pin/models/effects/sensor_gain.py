@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Effect, Stage, counted_from, places
 
 
 @dataclass(frozen=True)
@@ -15,13 +18,21 @@ class SensorGain(Effect):
 
         y_rest + (1 + error) (y - y_rest)
 
+    On a joint y_rest is where a trial begins, where the joint hangs, or the zero of its URDF, whichever fits.
+
     Tell-tale: every excursion is too large or too small by the same factor, rest angles are right.
     Source: a potentiometer's supply or an amplifier's gain that is off.
     """
 
     error: float = parameter(0.05, null=0.0, lower=-0.9, upper=9.0, scale=0.02)
+    place: float = parameter(0.0, lower=0.0, upper=2.0, grid=(0.0, 1.0, 2.0), fitted=False)
 
     name, stage, signal, rigs = "sensor_gain", Stage.SENSOR, "reading", ("ankle", "joint")
 
+    @classmethod
+    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """Deviations are counted from any place that the rig has."""
+        return {**super().grids(measured), "place": places(measured)}
+
     def apply(self, value: Any, s: Any) -> Any:
-        return value + self.error * (value - s.rest_reading)
+        return value + self.error * (value - counted_from(s, self.place))

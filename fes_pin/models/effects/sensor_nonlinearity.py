@@ -2,27 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Effect, Stage, counted_from, places
 
 
 @dataclass(frozen=True)
 class SensorNonlinearity(Effect):
     """Curvature of the sensor's characteristic.
 
-        y + curvature (y - y_rest)^2
+        y + curvature x^2 (1 + skew x),   x = y - y_rest
+
+    On a joint y_rest is where a trial begins, where the joint hangs, or the zero of its URDF, whichever fits.
 
     Tell-tale: large excursions are read wrongly to one side, small ones and rest rightly.
-    Source: the second-order term of a potentiometer's characteristic, loaded or off its axis.
+    Source: the second-order term of a potentiometer's characteristic, loaded or off its axis, and the third.
     """
 
     curvature: float = parameter(0.1, unit="1/rad", null=0.0, lower=-20.0, upper=20.0, scale=0.05)
+    place: float = parameter(0.0, lower=0.0, upper=2.0, grid=(0.0, 1.0, 2.0), fitted=False)
+    skew_per_rad: float = parameter(
+        0.0, unit="1/rad", null=0.0, lower=-20.0, upper=20.0, scale=0.5, optional=True, grid=(0.5, -0.5)
+    )
 
     name, stage, signal, rigs = "sensor_nonlinearity", Stage.SENSOR, "reading", ("ankle", "joint")
 
+    @classmethod
+    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """Deviations are counted from any place that the rig has."""
+        return {**super().grids(measured), "place": places(measured)}
+
     def apply(self, value: Any, s: Any) -> Any:
-        away = value - s.rest_reading
-        return value + self.curvature * away * away
+        x = value - counted_from(s, self.place)
+        return value + self.curvature * x * x * (1.0 + self.skew_per_rad * x)

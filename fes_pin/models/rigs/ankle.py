@@ -128,7 +128,8 @@ class Ankle(Rig):
 
     def readings(self, s: Signals) -> tuple[Any, ...]:
         if s.kind == "motion":
-            s.rest_reading, s.sensed = s.m.rest, s.x.q
+            s.rest_reading = s.idle_reading = s.m.rest
+            s.sensed = s.x.q
             return (s.through("reading", s.x.q),)
         self.rates(s)
         return (s.force,)

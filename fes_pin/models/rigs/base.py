@@ -91,6 +91,10 @@ class Rig:
         """Names of the unknowns that a trial's first sample does not tell."""
         return ()
 
+    def read_first(self, trial: Trial) -> Mapping[str, str]:
+        """The unknowns of a trial that its first sample tells, with the column that they are read in."""
+        return {}
+
     def guess(self, trial: Trial) -> float:
         """Where the search for the static equilibrium starts."""
         return 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +25,8 @@ class Joint(Rig):
 
     M, A and B are read off Pinocchio's CRBA and gravity of the URDF (`constants`: `inertia`, `gravity_cos`,
     `gravity_sin`, `revolute`); for a prismatic joint (`revolute` 0) gravity is the constant A. The effort is held
-    between samples. Each trial has its own initial position and velocity.
+    between samples. Each trial has its own initial position and velocity. `idle` is where it rests without an effort:
+    A cos(q) + B sin(q) = 0, hanging; 0 for a prismatic joint.
 
     The bearing of a revolute joint carries the pull along the arm, in units of the URDF's weight at rest W (that of the
     simple pendulum with the same A, B and M; 1 for a prismatic joint, and where the joint feels no gravity):
@@ -56,10 +59,12 @@ class Joint(Rig):
         return ("effort",) if "effort" in trial.columns else ()
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
-        return self.needed
+        return (*self.needed, "idle")
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
-        return {name: float(self.constants[name]) for name in self.constant_names(trial.kind)}
+        known = {name: float(self.constants[name]) for name in self.needed}
+        a, b = known["gravity_cos"], known["gravity_sin"]
+        return {**known, "idle": math.atan2(-a, b) if known["revolute"] and (a or b) else 0.0}
 
     def initial_unknowns(self, trial: Trial) -> dict[str, float]:
         position, rate = first_rate(trial.time, trial["position"]) if "position" in trial.columns else (0.0, 0.0)
@@ -76,6 +81,10 @@ class Joint(Rig):
     def unmeasured(self, trial: Trial) -> tuple[str, ...]:
         told = "velocity" in trial.columns or "velocity0" in trial.conditions
         return () if told or "position" not in trial.columns else ("initial_velocity",)
+
+    def read_first(self, trial: Trial) -> Mapping[str, str]:
+        told = "position0" in trial.conditions or "position" not in trial.columns
+        return {} if told else {"initial_position": "position"}
 
     def set_rest(self, s: Signals, z: Any) -> None:
         s.x.q, s.x.v, s.m.rest = s.initial.initial_position, s.initial.initial_velocity, s.initial.initial_position
@@ -104,5 +113,5 @@ class Joint(Rig):
         return {"q": s.v, "v": s.acceleration}
 
     def readings(self, s: Signals) -> tuple[Any, ...]:
-        s.rest_reading, s.sensed = s.m.rest, s.x.q
+        s.rest_reading, s.idle_reading, s.sensed = s.m.rest, s.c.idle, s.x.q
         return s.through("reading", s.x.q), s.x.v
