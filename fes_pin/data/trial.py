@@ -84,6 +84,13 @@ class Trial:
         """Time from the first to the last sample, s."""
         return float(self.time[-1] - self.time[0])
 
+    def first(self, count: int) -> Trial:
+        """The trial's first samples, itself if it has no more than `count`."""
+        if count >= len(self):
+            return self
+        columns = {n: v[:count] for n, v in self.columns.items()}
+        return Trial(self.name, self.kind, columns, self.time[:count], self.conditions, self.role)
+
     def with_columns(self, **columns: np.ndarray) -> Trial:
         """The same trial with columns added or replaced, each of shape (n,)."""
         return replace(self, columns={**self.columns, **columns})

@@ -13,7 +13,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.library import Library, Projection, Scored, Scores
 from fes_pin.diagnose.noise_floor import rich_noise
 from fes_pin.diagnose.workers import in_parallel
-from fes_pin.identify.fit import CONFIDENCE_95, MAX_ITERATIONS, Fit, fit_problem, go_on, noise_of
+from fes_pin.identify.fit import CONFIDENCE_95, MAX_ITERATIONS, Fit, fit_anyhow, fit_problem, go_on, noise_of
 from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
@@ -108,7 +108,7 @@ class JointFits:
         model = self.model
         for one in self.fits[names].model.effects:
             model = model + one
-        near = fit_problem(Problem(model, self.trials, as_white(self.noise)), model.parameters(), None, LOOK)
+        near = fit_anyhow(Problem(model, self.trials, as_white(self.noise)), model.parameters(), None, LOOK)
         return fit_problem(self.problem(model), near.values, near.unknowns, LOOK)
 
     def _pursue(self, size: int) -> None:

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.claims import Claims
-from fes_pin.diagnose.joint_fits import PURSUED, JointFits, Names, subsets
+from fes_pin.diagnose.joint_fits import LOOK, PURSUED, JointFits, Names, subsets
 from fes_pin.diagnose.library import Scored, best_by_effect, best_pairs
 from fes_pin.diagnose.significance import Family
 from fes_pin.diagnose.unfinished import choose_by_prediction, fit_for_prediction
-from fes_pin.identify.fit import Fit, rough_noise
+from fes_pin.identify.fit import Fit, fit_anyhow, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
 
@@ -133,7 +133,7 @@ class Search:
         sets = self.sets
         self.progress(0.02, "nominal model")
         sets.set_noise(rough_noise(sets.model, sets.trials))
-        first = sets.fit_from([sets.model], None)
+        first = fit_anyhow(sets.problem(sets.model), sets.model.parameters(), None, LOOK)
         sets.first_noise(first)
         sets.fits[()] = sets.fit_from([first.model], first.unknowns)
         sets.finish(())

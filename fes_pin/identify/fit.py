@@ -23,6 +23,14 @@ PARAMETER_PRICE = 3.84
 """Twice the log-likelihood that one more parameter must earn: chi-square with one degree of freedom at 95 %."""
 
 
+GROWTH = (1 / 8, 1 / 4, 1 / 2)
+"""Shares of every trial that a fit from afar begins with, one after another."""
+SHORTEST = 50
+"""Samples of a trial that are worth a fit, at least."""
+GROSS = 10.0
+"""Reduced chi-square from which a fit may have ended far from the optimum."""
+
+
 @dataclass(frozen=True)
 class Fit:
     """A model with fitted parameters; it can prove its own quality.
@@ -140,6 +148,36 @@ def fit_problem(
     return _run(Descent(problem, start, unknowns), max_iterations)
 
 
+def fit_growing(problem: Problem, start: Mapping[str, float], max_iterations: int = MAX_ITERATIONS) -> Fit:
+    """Fit a problem from afar: to the beginning of every trial, to twice as much of it, and so on to the whole.
+
+    What a wrong parameter does to an angle grows with time, past half a swing; the squares of a long trial then have
+    many minima, those of its beginning few. Source: Voss, Timmer and Kurths, Int. J. Bifurcation Chaos 14 (2004).
+    """
+    values, unknowns = start, None
+    for share in GROWTH:
+        trials = [t.first(max(SHORTEST, round(share * len(t)))) for t in problem.trials]
+        short = Problem(problem.model, trials, problem.noise, problem.free)
+        short.limits = problem.limits
+        near = fit_problem(short, values, unknowns, max_iterations)
+        values, unknowns = near.values, near.unknowns
+    return fit_problem(problem, values, unknowns, max_iterations)
+
+
+def fit_anyhow(
+    problem: Problem,
+    start: Mapping[str, float],
+    unknowns: Unknowns | None = None,
+    max_iterations: int = MAX_ITERATIONS,
+) -> Fit:
+    """Fit a problem from a start, and from afar as well where that leaves a gross misfit; the better of both."""
+    plain = fit_problem(problem, start, unknowns, max_iterations)
+    if plain.reduced < GROSS:
+        return plain
+    grown = fit_growing(problem, start, max_iterations)
+    return grown if grown.sse < plain.sse or not np.isfinite(plain.sse) else plain
+
+
 def go_on(problem: Problem, fitted: Fit, max_iterations: int = MAX_ITERATIONS) -> Fit:
     """Fit a problem from where a fit of the same model, to the same trials and perhaps more, has ended.
 
@@ -200,9 +238,10 @@ def fit(
     """
     with _linear_algebra().limit(limits=1):  # products this small are slower on several threads
         if noise is None:
-            first = fit_problem(Problem(model, trials, rough_noise(model, trials)), model.parameters())
+            first = fit_anyhow(Problem(model, trials, rough_noise(model, trials)), model.parameters())
             model, noise = first.model, noise_of(first)
-        return fit_problem(Problem(model, trials, noise), model.parameters(), max_iterations=max_iterations)
+            return fit_problem(Problem(model, trials, noise), first.values, first.unknowns, max_iterations)
+        return fit_anyhow(Problem(model, trials, noise), model.parameters(), max_iterations=max_iterations)
 
 
 @cache
@@ -228,12 +267,16 @@ def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:
 
 
 def noise_of(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> dict[str, Noise]:
-    """The noise that a fit's residuals show, by output column, with autoregressions of orders `least` to `longest`."""
+    """The noise that a fit's residuals show, by output column, with autoregressions of orders `least` to `longest`.
+
+    Noise of a long order does not hold a trial's initial state: what moves with that in the residuals would be learned
+    as noise again, and is taken out first.
+    """
     problem = Problem(fitted.model, fitted.trials, fitted.noise, free=())
     step = noise_step([t.dt for t in fitted.trials])
     columns: dict[str, list[np.ndarray]] = {}
     squares: dict[str, list[float]] = {}
-    for trial, residuals in zip(fitted.trials, problem.residuals(fitted.values, fitted.unknowns), strict=True):
+    for trial, residuals in zip(fitted.trials, problem.settled(fitted.values, fitted.unknowns), strict=True):
         for name, residual in residuals.items():
             columns.setdefault(name, []).append(thin(residual, thinning(trial.dt, step)))
             squares.setdefault(name, []).append(float(np.mean(residual**2)))

@@ -83,6 +83,22 @@ class Problem:
             out.append({n: trial[n] - simulated.readings[:, k] for k, n in enumerate(names) if n in trial.columns})
         return out
 
+    def settled(self, values: Mapping[str, float], unknowns: Unknowns) -> list[dict[str, np.ndarray]]:
+        """The residuals without what a step of each trial's initial state takes out of them by least squares."""
+        rig, out = self.model.rig, []
+        for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
+            told = [(k, n) for k, n in enumerate(rig.outputs(trial.kind)) if n in trial.columns]
+            left = {n: trial[n] - simulated.readings[:, k] for k, n in told}
+            own = [self.simulator.columns.index(n) for n in rig.unknowns(trial.kind)]
+            if own and np.isfinite(simulated.sensitivities).all():
+                scale = {n: self.noise[n].std if n in self.noise else math.inf for n in left}
+                moved = {n: simulated.sensitivities[:, k, own] for k, n in told}
+                joined = np.concatenate([moved[n] / scale[n] for n in left])
+                step = np.linalg.lstsq(joined, np.concatenate([left[n] / scale[n] for n in left]), rcond=1e-9)[0]
+                left = {n: left[n] - moved[n] @ step for n in left}
+            out.append(left)
+        return out
+
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Whitened residuals and sensitivities at a parameter value."""
         out, split = [], len(self.free)

@@ -173,9 +173,7 @@ def _first_motion(
 
 
 def _first_samples(trial: Trial) -> Trial:
-    count = max(FEWEST, math.ceil(FIRST_S / trial.dt))
-    columns = {n: v[:count] for n, v in trial.columns.items()}
-    return Trial(trial.name, trial.kind, columns, trial.time[:count], trial.conditions)
+    return trial.first(max(FEWEST, math.ceil(FIRST_S / trial.dt)))
 
 
 class _Block:
