@@ -11,7 +11,7 @@ from models.cases import JOINT, RIGS, trial
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.descent import TOLERANCE
-from fes_pin.identify.fit import fit, fit_problem
+from fes_pin.identify.fit import GROSS, fit, fit_anyhow, fit_problem, noise_of
 from fes_pin.identify.noise import Noise, thinning
 from fes_pin.identify.problem import Problem, normal_equations
 from fes_pin.models.effects import effect
@@ -132,6 +132,39 @@ def test_a_start_that_cannot_be_simulated_is_infinitely_bad():
     fitted = fit_problem(Problem(broken, trials, WHITE, ("damping",)), broken.parameters())
     assert not fitted.converged and not fitted.is_optimal()
     assert math.isinf(fitted.sse) and math.isinf(fitted.std("damping"))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_joint_that_tumbles_is_fitted_from_its_beginning(seed):
+    """Driven over the top by a square wave, from an inertia 30 % too large and two thirds of the damping."""
+    rng, time = np.random.default_rng(seed), np.arange(1500) * 5e-3
+    model = Model(RIGS["joint"]).with_parameters({"inertia_scale": 1.0, "damping": 0.006})
+    rate, trials = math.sqrt(JOINT["gravity_sin"] / JOINT["inertia"]), []
+    for phase in rng.uniform(0.0, 2.0 * math.pi, 4):
+        effort = 0.5 * JOINT["gravity_sin"] * np.sign(np.sin(0.8 * rate * time + phase))
+        begin = {"position0": 0.3, "velocity0": 0.0}
+        made = measured(model, Trial("tumbling", "motion", {"effort": effort}, time, begin), rng)
+        trials.append(Trial(made.name, made.kind, made.columns, time))
+    assert min(np.ptp(t["position"]) for t in trials) > 3.0 * math.pi
+    start = model.with_parameters({"inertia_scale": 1.3, "damping": 0.004})
+    problem = Problem(start, trials, WHITE)
+    assert fit_problem(problem, start.parameters()).reduced > 1e3 * GROSS
+    fitted = fit_anyhow(problem, start.parameters())
+    assert fitted.reduced == pytest.approx(1.0, abs=0.1)
+    for name in fitted.free:
+        assert abs(fitted.values[name] - model.parameters()[name]) < 4.0 * fitted.std(name)
+
+
+def test_an_initial_state_that_is_off_is_not_noise():
+    """By half a standard deviation of the noise in each trial, one of which comes near the top."""
+    model, trials = trials_of("joint", np.random.default_rng(12))
+    fitted = fit(off(model), trials, WHITE)
+    moved = [{**u, "initial_position": u["initial_position"] + 0.5 * SIZE["position"]} for u in fitted.unknowns]
+    (told,), (expected,) = noise_of(replace(fitted, unknowns=moved)).values(), noise_of(fitted).values()
+    assert told.std == pytest.approx(expected.std, rel=0.02)
+    assert told.ar == pytest.approx(expected.ar, abs=0.02)
+    left = Problem(model, trials, WHITE, ()).residuals(fitted.values, moved)
+    assert np.std(np.concatenate([r["position"] for r in left])) > 2.0 * expected.std
 
 
 def test_unequal_lengths_and_rates():
