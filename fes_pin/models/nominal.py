@@ -9,7 +9,7 @@ from typing import Any
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
-from fes_pin.models.rigs import Ankle, Joint, Muscle
+from fes_pin.models.rigs import Ankle, Joint, Muscle, pulse_period
 from fes_pin.models.rigs.rigid import gravity_coefficients, is_revolute, joint_inertia, load_urdf
 
 
@@ -26,7 +26,9 @@ def nominal_model(study: Study) -> Model:
     if study.rig == "ankle":
         return Model(Ankle(constants=constants, **start))
     if study.rig == "muscle":
-        return Model(Muscle(constants=constants, **start))
+        pulsed = [t for t in study.trials if "stim" in t.columns]
+        known = {**constants, "pulse_period_s": pulse_period(pulsed)} if pulsed else constants
+        return Model(Muscle(constants=known, **start))
     if study.rig == "joint":
         assert study.urdf is not None
         driven = any("effort" in t.columns for t in study.trials)

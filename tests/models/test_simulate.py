@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from models.cases import MUSCLE, RIGS, pulses, trial
 
+from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.effects.electromechanical_delay import ElectromechanicalDelay
 from fes_pin.models.effects.sensor_gain import SensorGain
 from fes_pin.models.effects.sensor_nonlinearity import SensorNonlinearity
 from fes_pin.models.effects.sensor_offset import SensorOffset
 from fes_pin.models.model import Model
+from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import Simulator, simulate, substeps
 
@@ -138,6 +140,18 @@ def test_recorded_pulses_carry_the_same_mean_at_any_rate():
         force = simulate(Model(RIGS["muscle"]), Trial("train", "isometric", {"stim": stim}, time))["force_n"]
         period = round(0.05 / dt)
         assert force[-10 * period :].mean() == pytest.approx(GAIN, rel=2e-3)
+
+
+def test_a_faster_train_makes_more_force():
+    """Pulses add up, whatever the rate: the area of one is the study's, not the trial's."""
+    time, trains = np.arange(4000) * 1e-3, []
+    for number, period in enumerate((50, 50, 25)):
+        stim = np.zeros(len(time))
+        stim[100:1600:period] = stim[2100:3600:period] = 1.0
+        trains.append(Trial(str(number), "isometric", {"stim": stim, "force_n": stim}, time))
+    model = nominal_model(Study("trains", "muscle", {}, {"gain": GAIN, "time_constant_s": TAU}, tuple(trains)))
+    slow, again, fast = (simulate(model, t)["force_n"][1550:1600].mean() for t in trains)
+    assert (slow, again, fast) == pytest.approx((GAIN, GAIN, 2.0 * GAIN), rel=2e-3)
 
 
 def test_a_rate_that_was_not_measured_is_estimated_with_the_model():

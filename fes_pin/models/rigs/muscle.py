@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.models.maths import clip
@@ -20,8 +23,8 @@ class Muscle(Rig):
         tau da/dt = r - a
         F         = gain a
 
-    A recorded pulse (`stim`) is an impulse of area P, the mean pulse period of its trial: a train averages r = 1, and
-    `gain` is the mean force that the train settles to.
+    A recorded pulse (`stim`) is an impulse of area P, the usual pulse period of the study: there a train averages
+    r = 1, and `gain` is the mean force that it settles to; one of twice the rate averages r = 2.
     """
 
     gain: float = parameter(30.0, unit="N", lower=1e-6, upper=1e5, scale=5.0)
@@ -52,14 +55,11 @@ class Muscle(Rig):
         return ("threshold_us", "saturation_us", "pulse_period_s")
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
-        period = 0.0
-        if "stim" in trial.columns:
-            times = trial.time[trial["stim"] > 0.5]
-            period = float((times[-1] - times[0]) / (len(times) - 1)) if len(times) > 1 else trial.dt
+        pulsed = [trial] if "stim" in trial.columns else []
         return {
             "threshold_us": float(self.constants.get("threshold_us", 0.0)),
             "saturation_us": float(self.constants.get("saturation_us", 1.0)),
-            "pulse_period_s": period,
+            "pulse_period_s": float(self.constants.get("pulse_period_s", pulse_period(pulsed))),
         }
 
     def set_rest(self, s: Signals, z: Any) -> None:
@@ -91,3 +91,10 @@ class Muscle(Rig):
         self.rates(s)
         s.rest_reading = 0.0
         return (s.through("reading", s.force),)
+
+
+def pulse_period(trials: Sequence[Trial]) -> float:
+    """The usual time between two pulses of recorded trains, s: the median; a sample where there are no two pulses."""
+    between = [np.diff(t.time[t["stim"] > 0.5]) for t in trials]
+    joined = np.concatenate(between) if between else np.empty(0)
+    return float(np.median(joined)) if len(joined) else min((t.dt for t in trials), default=0.0)
