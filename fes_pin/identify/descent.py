@@ -61,10 +61,10 @@ class Descent:
 
     def step(self) -> bool:
         """Go down once; True when there is nothing left to gain."""
+        if not np.isfinite(self.sse):
+            return True
         for _ in range(12):
             system = normal_equations(self.parts, self.damping)
-            if not np.isfinite(system.sse):
-                return True
             move = self._bounded_move(system)
             new_x = self.x + move
             promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move

@@ -195,8 +195,10 @@ def _run(search: Descent, max_iterations: int) -> Fit:
         done = search.step()
         if done:
             break
-    system = normal_equations(search.parts)
-    free = search.free_now(system.gradient)
+    with np.errstate(all="ignore"):
+        system = normal_equations(search.parts)
+        free = search.free_now(system.gradient)
+        decrement = _decrement(system.hessian, system.gradient, free)
     model = problem.model.with_parameters(search.values(search.x))
     return Fit(
         model=model,
@@ -207,7 +209,7 @@ def _run(search: Descent, max_iterations: int) -> Fit:
         sse=search.sse,
         samples=sum(len(p.residual) for p in search.parts),
         converged=bool(done and np.isfinite(search.sse)),
-        gradient_norm=_decrement(system.hessian, system.gradient, free),
+        gradient_norm=decrement,
         unknowns=search.unknowns,
         at_bound=tuple(n for n, f in zip(problem.free, free, strict=True) if not f),
         parts=tuple(search.parts),

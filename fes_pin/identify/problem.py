@@ -17,6 +17,9 @@ Unknowns = list[dict[str, float]]
 SINGULAR = 1e-12
 """Share of an unknown's own information added to it: two that the trial cannot tell apart do not stop a fit."""
 
+STEEPEST = 1e120
+"""Sensitivities beyond this, in deviations of the noise per unit, count as infinite: their squares would be."""
+
 
 @dataclass(frozen=True)
 class Linearized:
@@ -194,7 +197,8 @@ def _solved(own: np.ndarray, right: np.ndarray, damping: float) -> np.ndarray:
 
 
 def whitened_sse(parts: Sequence[Linearized]) -> float:
-    """Sum of squared whitened residuals; infinite where the simulation did not stay finite."""
+    """Sum of squared whitened residuals; infinite where the simulation or its sensitivities run away."""
     with np.errstate(over="ignore", invalid="ignore"):
         total = float(sum(p.residual @ p.residual for p in parts))
-    return total if math.isfinite(total) else math.inf
+    tame = all(float(np.abs(x).max(initial=0.0)) < STEEPEST for p in parts for x in (p.jacobian, p.local))
+    return total if math.isfinite(total) and tame else math.inf

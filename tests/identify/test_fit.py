@@ -134,6 +134,17 @@ def test_a_start_that_cannot_be_simulated_is_infinitely_bad():
     assert math.isinf(fitted.sse) and math.isinf(fitted.std("damping"))
 
 
+@pytest.mark.parametrize("size", [1e160, 1e290, math.inf, math.nan])
+def test_sensitivities_that_run_away_end_a_fit(size, monkeypatch):
+    """While the residuals stay finite."""
+    model, trials = trials_of("muscle", np.random.default_rng(7))
+    problem = Problem(model, trials, WHITE)
+    tame = problem.linearize
+    monkeypatch.setattr(problem, "linearize", lambda *a: [replace(p, jacobian=size * p.jacobian) for p in tame(*a)])
+    fitted = fit_problem(problem, model.parameters())
+    assert math.isinf(fitted.sse) and not fitted.converged
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_joint_that_tumbles_is_fitted_from_its_beginning(seed):
     """Driven over the top by a square wave, from an inertia 30 % too large and two thirds of the damping."""
