@@ -18,6 +18,7 @@ from fes_pin.data.trial import read_trial
 from fes_pin.diagnose.diagnosis import diagnose
 from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files, diagnosis_record
 from fes_pin.models.effects import EFFECTS
+from fes_pin.models.parameters import ROTARY
 from fes_pin.models.simulate import simulate
 from fes_pin.models.store import load_model, save_model
 
@@ -339,7 +340,7 @@ def test_effects_lists_every_cause(monkeypatch, capsys):
     for one in EFFECTS:
         assert f"{one.name} ({one.stage}; " in printed
         for name, info in one.parameters().items():
-            assert f"{name} [{info.unit or '1'}]" in printed
+            assert f"{name} [{info.in_units(ROTARY).unit or '1'}]" in printed
 
 
 def test_help_is_not_an_error(monkeypatch):

@@ -287,7 +287,8 @@ def _estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
     (one,) = (e for e in fitted.model.effects if e.name == name)
     refined = one.refined()
     if one.each_trial:
-        out["amplitude"] = ParameterEstimate(*amplitude(fitted, one), one.parameters()[one.unknowns()[0]].unit)
+        first = one.parameters()[one.unknowns()[0]]
+        out["amplitude"] = ParameterEstimate(*amplitude(fitted, one), first.in_units(fitted.model.rig.units()).unit)
     for n in one.common():
         key = f"{name}.{n}"
         if info[key].optional and n not in refined:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 
+from fes_pin.models.parameters import ROTARY
 from fes_pin.models.stage import Effect
 
 
@@ -39,5 +40,7 @@ def describe(effect: type[Effect]) -> str:
     for name, info in effect.parameters().items():
         absent = f"absent at {info.null:g}" if info.null is not None else "a shape"
         also = ", a refinement" if info.optional else ""
-        lines.append(f"    {name} [{info.unit or '1'}] in [{info.lower:g}, {info.upper:g}], {absent}{also}")
+        lines.append(
+            f"    {name} [{info.in_units(ROTARY).unit or '1'}] in [{info.lower:g}, {info.upper:g}], {absent}{also}"
+        )
     return "\n".join(lines) + "\n"

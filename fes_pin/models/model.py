@@ -47,7 +47,7 @@ class Model:
         for effect in self.effects:
             own = effect.parameters()
             info.update({f"{effect.name}.{n}": own[n] for n in effect.common()})
-        return info
+        return {n: one.in_units(self.rig.units()) for n, one in info.items()}
 
     def own_unknowns(self) -> tuple[str, ...]:
         """Names of what each trial must estimate for itself because an effect says so."""

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 _KEY = "fes_pin"
+ROTARY = {"q": "rad", "y": "rad", "effort": "N m"}
+"""Units of a revolute joint."""
+SLIDING = {"q": "m", "y": "m", "effort": "N"}
+"""Units of a prismatic joint."""
+HELD = {**ROTARY, "y": "N"}
+"""Units where force is read."""
 
 
 @dataclass(frozen=True)
@@ -17,7 +24,7 @@ class Parameter:
     Attributes
     ----------
     unit
-        Unit as printed; "" for a pure number.
+        Unit as printed; "" for a pure number. {q}, {y} and {effort} stand for what the rig has there: see `in_units`.
     null
         Value at which an effect vanishes; None for a shape parameter, which means something only beside the effect,
         and for a nominal parameter.
@@ -44,6 +51,16 @@ class Parameter:
     fitted: bool = True
     optional: bool = False
     rigs: tuple[str, ...] = ()
+
+    def in_units(self, units: Mapping[str, str]) -> Parameter:
+        """The same with the unit that it has on a rig.
+
+        Parameters
+        ----------
+        units
+            Of the position `q`, of the reading `y` and of the `effort`.
+        """
+        return dataclasses.replace(self, unit=self.unit.format_map(units)) if "{" in self.unit else self
 
 
 def parameter(

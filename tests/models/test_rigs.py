@@ -10,9 +10,10 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import make_layout
+from fes_pin.models.effects import effect
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import joint_model
-from fes_pin.models.rigs import Ankle
+from fes_pin.models.rigs import Ankle, Muscle
 from fes_pin.models.rigs.rigid import (
     configuration,
     gravity_coefficients,
@@ -225,3 +226,18 @@ def test_a_joint_idles_where_it_hangs(tmp_path, base):
     beside = [engine({"q": idle + x, "v": 0.0}) for x in (-0.1, 0.0, 0.1)]
     assert beside[0] > 0 > beside[2]
     assert abs(beside[1]) < 1e-12 * beside[0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "units"),
+    [("revolute", ("N m/rad", "rad", "rad/s", "N m s/rad")), ("prismatic", ("N/m", "m", "m/s", "N s/m"))],
+)
+def test_units_are_those_of_the_rig(tmp_path, kind, units):
+    rig = joint_model(robot(tmp_path, kind), {}, {"inertia_scale": 1.0, "damping": 0.0})
+    info = (Model(rig) + effect("parallel_stiffness")() + effect("sensor_drift")()).parameter_info()
+    names = ("parallel_stiffness.stiffness_nm_per_rad", "parallel_stiffness.rest_angle_rad", "sensor_drift.rate_per_s")
+    assert tuple(info[n].unit for n in (*names, "damping")) == units
+
+
+def test_a_force_sensor_is_off_by_newtons():
+    assert (Model(Muscle()) + effect("sensor_offset")()).parameter_info()["sensor_offset.offset"].unit == "N"

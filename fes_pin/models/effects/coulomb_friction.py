@@ -37,13 +37,13 @@ class CoulombFriction(Effect):
     friction, Proc. R. Soc. A 259 (1961).
     """
 
-    torque_nm: float = parameter(0.01, unit="N m", null=0.0, lower=0.0, upper=100.0, scale=0.01)
+    torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=0.0, upper=100.0, scale=0.01)
     stiction: float = parameter(0.0, null=0.0, lower=-1.0, upper=10.0, scale=0.1, optional=True, grid=(0.3, 1.0))
     stribeck_speed: float = parameter(
-        1.0, unit="rad/s", lower=1e-2, upper=30.0, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
+        1.0, unit="{q}/s", lower=1e-2, upper=30.0, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
     )
     creep_speed: float = parameter(
-        0.004, unit="rad/s", lower=1e-4, upper=0.1, scale=0.002, optional=True, grid=(0.004,)
+        0.004, unit="{q}/s", lower=1e-4, upper=0.1, scale=0.002, optional=True, grid=(0.004,)
     )
 
     load_exponent: float = parameter(

@@ -20,7 +20,7 @@ class EffortOffset(Effect):
     loop.
     """
 
-    offset: float = parameter(0.01, unit="N m", null=0.0, lower=-1000.0, upper=1000.0, scale=0.01)
+    offset: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1000.0, upper=1000.0, scale=0.01)
 
     name, stage, signal, rigs = "effort_offset", Stage.JOINT, "effort", ("joint",)
 

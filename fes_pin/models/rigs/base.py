@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.models.parameters import Parameter, parameters_of
+from fes_pin.models.parameters import ROTARY, Parameter, parameters_of
 from fes_pin.models.stage import Signals
 
 GRAVITY = 9.81
@@ -42,6 +42,10 @@ class Rig:
     def fitted_parameters(self) -> tuple[str, ...]:
         """The parameters that a nominal fit moves."""
         return tuple(self.parameters()) if self.fitted is None else self.fitted
+
+    def units(self) -> Mapping[str, str]:
+        """Units of position, reading and effort; see `Parameter.in_units`."""
+        return ROTARY
 
     def signals(self, kind: str) -> tuple[str, ...]:
         """Names of the signals that effects can change, in the order of the path."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from fes_pin.data.trial import Trial
 from fes_pin.models.maths import cos, sin, sqrt, where
-from fes_pin.models.parameters import parameter
+from fes_pin.models.parameters import ROTARY, SLIDING, parameter
 from fes_pin.models.rigs.base import Rig, first_rate
 from fes_pin.models.stage import Signals
 
@@ -35,10 +35,13 @@ class Joint(Rig):
     """
 
     inertia_scale: float = parameter(1.0, lower=1e-3, upper=1e3, scale=0.1)
-    damping: float = parameter(0.0, unit="N m s/rad", lower=0.0, upper=1e4, scale=1e-3)
+    damping: float = parameter(0.0, unit="{effort} s/{q}", lower=0.0, upper=1e4, scale=1e-3)
     gravity_scale: float = parameter(1.0, lower=-10.0, upper=10.0, scale=0.1)
 
     name, needed = "joint", ("inertia", "gravity_cos", "gravity_sin", "revolute")
+
+    def units(self) -> Mapping[str, str]:
+        return ROTARY if self.constants.get("revolute", 1.0) else SLIDING
 
     def signals(self, kind: str) -> tuple[str, ...]:
         return ("gravity_angle", "effort", "torque", "friction", "driving", "acceleration", "reading")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.models.maths import clip
-from fes_pin.models.parameters import parameter
+from fes_pin.models.parameters import HELD, parameter
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Signals
 
@@ -31,6 +31,9 @@ class Muscle(Rig):
     time_constant_s: float = parameter(0.05, unit="s", lower=2e-3, upper=2.0, scale=0.01)
 
     name = "muscle"
+
+    def units(self) -> Mapping[str, str]:
+        return HELD
 
     def signals(self, kind: str) -> tuple[str, ...]:
         return ("pulse_width", "recruitment", "delay", "time_constant", "activation", "force", "reading")
