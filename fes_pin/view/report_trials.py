@@ -17,7 +17,7 @@ DRAWN = 8
 
 def position_unit(diagnosis: Diagnosis) -> str:
     """Unit of the joint's position: "m" for a prismatic one."""
-    return "m" if diagnosis.model.rig.constants.get("revolute", 1.0) == 0.0 else "rad"
+    return diagnosis.model.rig.units()["q"]
 
 
 def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Markup]:

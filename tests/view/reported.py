@@ -109,8 +109,12 @@ def diagnosed(
 
 def _cause(extended, name: str, rivals: tuple[str, ...]) -> Cause:
     kind = effect(name)
-    info, values = kind.parameters(), extended.values
-    estimates = {n: ParameterEstimate(values[f"{name}.{n}"], 0.1, i.unit) for n, i in info.items() if not i.optional}
+    info, values = extended.model.parameter_info(), extended.values
+    estimates = {
+        n: ParameterEstimate(values[f"{name}.{n}"], 0.1, info[f"{name}.{n}"].unit)
+        for n, one in kind.parameters().items()
+        if not one.optional
+    }
     return Cause(name, str(kind.stage), estimates, rivals, 1e-9, 80.0, Gain(79.5, 74.0, 84.1))
 
 
