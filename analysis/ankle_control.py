@@ -15,7 +15,9 @@ import numpy as np
 from fes_pin.data.paper import STEPWISE, paper_twin
 from fes_pin.data.twin import RunningTwin, record, staircase
 from fes_pin.identify.ratios import RatioProblem, ankle_of, least_error
-from fes_pin.models.effects import Fatigue, FrameVibration, RecruitmentHysteresis
+from fes_pin.models.effects.fatigue import Fatigue
+from fes_pin.models.effects.frame_vibration import FrameVibration
+from fes_pin.models.effects.recruitment_hysteresis import RecruitmentHysteresis
 from fes_pin.stimulate.control import PositionController
 from fes_pin.stimulate.dynamics import AnkleDynamics
 from fes_pin.stimulate.endurance import budget, least_rest

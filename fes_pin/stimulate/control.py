@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.models.effects import RecruitmentHysteresis
+from fes_pin.models.effects.recruitment_hysteresis import RecruitmentHysteresis
 from fes_pin.models.model import Model
 from fes_pin.stimulate.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.stimulate.endurance import EnduranceWatch, fatigue_of

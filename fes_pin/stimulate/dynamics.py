@@ -14,7 +14,7 @@ from numbers import Real
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.models.effects import FrameVibration
+from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.ankle import Ankle
 from fes_pin.models.rigs.base import GRAVITY

@@ -13,7 +13,7 @@ from fes_pin.data.paper import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, p
 from fes_pin.data.twin import RunningTwin, record
 from fes_pin.identify.kalman import GainFilter, Recruitment
 from fes_pin.identify.ratios import ankle_of
-from fes_pin.models.effects import Fatigue
+from fes_pin.models.effects.fatigue import Fatigue
 from fes_pin.stimulate.control import PositionController
 from fes_pin.stimulate.loop import sine, track
 

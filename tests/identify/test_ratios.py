@@ -14,7 +14,7 @@ from fes_pin.identify.antagonist import carried_covariance, fit_antagonist, with
 from fes_pin.identify.error_region import ellipsoid_floor, error_domain, error_holding, follow, profile_intervals
 from fes_pin.identify.identifiability import identifiability
 from fes_pin.identify.ratios import RATIOS, RatioProblem, ankle_of, error_percent, least_error
-from fes_pin.models.effects import FrameVibration
+from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs import Muscle

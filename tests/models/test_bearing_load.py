@@ -10,7 +10,7 @@ from cases import JOINT
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.joint_fits import JointFits
 from fes_pin.identify.fit import rough_noise
-from fes_pin.models.effects import CoulombFriction
+from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import simulate

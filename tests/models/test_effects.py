@@ -3,6 +3,7 @@
 import inspect
 import math
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from models.cases import CASES, EFFECTS_OF_RIGS, JOINT, RIGS, everything, name_of, trial, with_effect
 
 from fes_pin.data.trial import Trial
+from fes_pin.models import effects
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import make_layout
 from fes_pin.models.compile.virtual import VirtualProgram
@@ -61,6 +63,36 @@ def test_parameters_are_inside_their_bounds(one):
         assert all(info.lower <= g <= info.upper for g in info.grid)
         assert info.scale > 0
         assert info.fitted or info.grid, "a choice needs something to choose from"
+
+
+NEW_CAUSE = '''
+from dataclasses import dataclass
+
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class JointCreep(Effect):
+    """A cause of this test alone."""
+
+    torque_nm: float = parameter(0.1, unit="N m", null=0.0)
+    name, stage, signal, rigs = "joint_creep", Stage.JOINT, "torque", ("joint",)
+
+    def apply(self, value, s):
+        return value - self.torque_nm
+'''
+
+
+def test_a_cause_is_one_file(tmp_path, monkeypatch):
+    """Nothing else has to be edited for it to stand at its place on the path."""
+    (tmp_path / "joint_creep.py").write_text(NEW_CAUSE)
+    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
+    names = [e.name for e in effects.catalogue()]
+    sys.modules.pop("fes_pin.models.effects.joint_creep")
+    at = names.index("joint_creep")
+    assert names[at - 1 : at + 2] == ["effort_offset", "joint_creep", "joint_stop"]
+    assert [n for n in names if n != "joint_creep"] == [e.name for e in EFFECTS]
 
 
 def test_effects_are_found_by_name_and_rig():

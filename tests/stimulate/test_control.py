@@ -14,7 +14,8 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.paper import paper_twin
 from fes_pin.data.twin import RunningTwin
 from fes_pin.identify.ratios import ankle_of
-from fes_pin.models.effects import Fatigue, RecruitmentHysteresis
+from fes_pin.models.effects.fatigue import Fatigue
+from fes_pin.models.effects.recruitment_hysteresis import RecruitmentHysteresis
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Muscle
 from fes_pin.stimulate.control import PositionController

@@ -11,7 +11,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.paper import STEPWISE, paper_trial, paper_twin
 from fes_pin.data.twin import RunningTwin, record, staircase
 from fes_pin.identify.ratios import RatioProblem, ankle_of, least_error
-from fes_pin.models.effects import FrameVibration
+from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.stimulate.control import PositionController
 from fes_pin.stimulate.dynamics import PULSE_S, AnkleDynamics, PulseToPulse
 from fes_pin.stimulate.loop import sine, track
