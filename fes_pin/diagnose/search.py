@@ -46,6 +46,8 @@ class Searched:
         The best set, fitted as its rivals are.
     without
         For each cause, the fit without it.
+    scored
+        Promise of every effect beside the nominal model, and of those that the best set has not beside that.
     floor
         The noise that no model can beat: as fitted, or, where the best set leaves more than noise, the sample-to-sample
         noise of the measurement.
@@ -235,8 +237,9 @@ class Search:
             rivals[name] = sorted((sets.fits[k] for k in dict.fromkeys(keys) if k != names), key=lambda f: f.sse)
             p_values[name] = self.claims.p_value(sets.fits[names], without[name])
         none, best = sets.fits[()], sets.fits[names]
+        scored = sets.scores(none).scored + (sets.scores(best).scored if names else [])
         return Searched(
-            none, best, p_values, rivals, best, without, self.claims.family, sets.scores(none).scored, best.noise
+            none, best, p_values, rivals, best, without, self.claims.family, scored, best.noise
         )
 
     def _siblings(self, names: Names, name: str) -> list[Names]:

@@ -49,7 +49,7 @@ def rivals_figure(diagnosis: Diagnosis, cause: Cause) -> Figure:
         names = [n for n, _ in rivals]
         colours = [_colour(n) for n in names]
         axes.set_xscale("log")
-        axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}".replace("e+0", "e"))
+        axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}" if x < 2e3 else f"{x:.0e}".replace("e+0", "e"))
         axes.minorticks_off()
         axes.axvspan(LEAST, SEPARABLE, color=BAND, lw=0)
         for k, (value, colour) in enumerate(zip(values, colours, strict=True)):
