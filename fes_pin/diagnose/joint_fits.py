@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.library import Library, Projection, Scored, Scores
+from fes_pin.diagnose.library import Library, Projection, Scored, Scores, near_null
 from fes_pin.diagnose.noise_floor import rich_noise
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import CONFIDENCE_95, MAX_ITERATIONS, Fit, fit_anyhow, fit_problem, go_on, noise_of
@@ -91,23 +91,41 @@ class JointFits:
         for size in sorted({len(n) for n in made}):
             self._pursue(size)
 
-    def restart(self, names: Sequence[Names]) -> None:
-        """Fit sets from afar, too: a strong cause has dragged the fit without it away from its nominal values."""
-        found = in_parallel(self._from_afar, names)
-        self.fits.update({n: f for n, f in zip(names, found, strict=True) if f.price < self.fits[n].price})
+    def restart(self, names: Sequence[Names], every_choice: bool = False) -> None:
+        """Fit sets from afar, too: a strong cause has dragged the fit without it away from its nominal values.
+
+        Parameters
+        ----------
+        every_choice
+            With all discrete choices of a single cause, not only the one of its present fit.
+        """
+        starts = [(n, one) for n in names for one in (self._choices(n) if every_choice else [self._of(n)])]
+        for (n, _), found in zip(starts, in_parallel(lambda s: self._from_afar(s[1]), starts), strict=True):
+            if found.price < self.fits[n].price:
+                self.fits[n] = found
+
+    def _of(self, names: Names) -> Model:
+        """The model of a set, its nominal values as they are believed."""
+        return Model(self.model.rig, self.fits[names].model.effects)
+
+    def _choices(self, names: Names) -> list[Model]:
+        """The model of a single cause with every discrete choice that it has, next to its null."""
+        (one,) = self.fits[names].model.effects
+        info, grids = one.parameters(), one.grids(self.library.measured)
+        chosen = [n for n in one.shapes() if not info[n].fitted]
+        start: dict[str, Any] = {} if one.each_trial else {n: near_null(type(one), n) for n in one.amplitudes()}
+        values = itertools.product(*(grids[n] for n in chosen))
+        return [self.model + replace(one, **{**start, **dict(zip(chosen, v, strict=True))}) for v in values]
 
     def given_up(self) -> list[Names]:
         """Single causes whose fit ended where they are absent, at a bound: another amplitude has not been seen."""
         return [n for n in self.ranked(1) if _is_absent(self.fits[n], self.fits[n].model.effects[-1])]
 
-    def _from_afar(self, names: Names) -> Fit:
-        """Fit a set from the believed nominal values: first for least errors, then under the noise.
+    def _from_afar(self, model: Model) -> Fit:
+        """Fit a model from where it is: first for least errors, then under the noise.
 
         Slow noise leaves the fast parts of an answer to a fit, and those of a late one meet only where they are near.
         """
-        model = self.model
-        for one in self.fits[names].model.effects:
-            model = model + one
         near = fit_anyhow(Problem(model, self.trials, as_white(self.noise)), model.parameters(), None, LOOK)
         return fit_problem(self.problem(model), near.values, near.unknowns, LOOK)
 

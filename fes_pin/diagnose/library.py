@@ -58,7 +58,7 @@ class Library:
         """The effect at its null with every combination of its shapes."""
         grids = effect.grids(self.measured)
         shapes = effect.shapes()
-        start: dict[str, Any] = {n: _near_null(effect, n) for n in effect.amplitudes()}
+        start: dict[str, Any] = {n: near_null(effect, n) for n in effect.amplitudes()}
         return [
             effect(**{**start, **dict(zip(shapes, values, strict=True))})
             for values in itertools.product(*(grids[n] for n in shapes))
@@ -95,7 +95,8 @@ class Library:
         return out
 
 
-def _near_null(effect: type[Effect], name: str) -> float:
+def near_null(effect: type[Effect], name: str) -> float:
+    """The null of an amplitude, or next to it where that is a bound."""
     info = effect.parameters()[name]
     assert info.null is not None
     one_sided = info.null in {info.lower, info.upper}

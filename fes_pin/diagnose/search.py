@@ -27,6 +27,10 @@ SWAPS = 5
 POOL = 6
 """Sets of each size that are compared by prediction."""
 
+HOPELESS = 1e3
+"""Reduced chi-square, in the noise from sample to sample, of a nominal model so wrong that nothing follows from it:
+every cause is then fitted from afar."""
+
 Progress = Callable[[float, str], None]
 
 
@@ -136,6 +140,7 @@ class Search:
         self.progress(0.02, "nominal model")
         sets.set_noise(rough_noise(sets.model, sets.trials))
         first = fit_anyhow(sets.problem(sets.model), sets.model.parameters(), None, LOOK)
+        self._hopeless = first.reduced > HOPELESS
         sets.first_noise(first)
         sets.fits[()] = sets.fit_from([first.model], first.unknowns)
         sets.finish(())
@@ -150,7 +155,9 @@ class Search:
         by_effect = best_by_effect(scores.scored)
         sets.add({(n,): lambda v=v: sets.extend(base, v) for n, v in by_effect.items()})  # type: ignore[misc]
         sets.restart(sets.ranked(1)[:PURSUED])
-        if not self.claims.complete(sets.ranked(1)[0]):
+        if self._hopeless:
+            sets.restart(sets.ranked(1), every_choice=True)
+        elif not self.claims.complete(sets.ranked(1)[0]):
             sets.restart(sets.given_up())
 
     def _extend_beam(self, size: int, every: bool = False) -> bool:
@@ -238,9 +245,7 @@ class Search:
             p_values[name] = self.claims.p_value(sets.fits[names], without[name])
         none, best = sets.fits[()], sets.fits[names]
         scored = sets.scores(none).scored + (sets.scores(best).scored if names else [])
-        return Searched(
-            none, best, p_values, rivals, best, without, self.claims.family, scored, best.noise
-        )
+        return Searched(none, best, p_values, rivals, best, without, self.claims.family, scored, best.noise)
 
     def _siblings(self, names: Names, name: str) -> list[Names]:
         """Sets fitted already that differ from `names` in `name` alone."""
