@@ -13,7 +13,16 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.library import Library, Projection, Scored, Scores, near_null
 from fes_pin.diagnose.noise_floor import rich_noise
 from fes_pin.diagnose.workers import in_parallel
-from fes_pin.identify.fit import CONFIDENCE_95, MAX_ITERATIONS, Fit, fit_anyhow, fit_problem, go_on, noise_of
+from fes_pin.identify.fit import (
+    CONFIDENCE_95,
+    MAX_ITERATIONS,
+    Fit,
+    fit_anyhow,
+    fit_problem,
+    go_on,
+    noise_of,
+    rough_noise,
+)
 from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
@@ -91,22 +100,23 @@ class JointFits:
         for size in sorted({len(n) for n in made}):
             self._pursue(size)
 
-    def restart(self, names: Sequence[Names], every_choice: bool = False) -> None:
-        """Fit sets from afar, too: a strong cause has dragged the fit without it away from its nominal values.
+    def restart(self, names: Sequence[Names]) -> None:
+        """Fit sets from afar, too: a strong cause has dragged the fit without it away from its nominal values."""
+        white = as_white(self.noise)
+        self._restart([(n, Model(self.model.rig, self.fits[n].model.effects)) for n in names], white)
 
-        Parameters
-        ----------
-        every_choice
-            With all discrete choices of a single cause, not only the one of its present fit.
+    def restart_every(self) -> None:
+        """Fit every single cause from afar, with all its discrete choices: where the nominal model says nothing.
+
+        Neither does the noise that it leaves; the errors count in the noise from sample to sample.
         """
-        starts = [(n, one) for n in names for one in (self._choices(n) if every_choice else [self._of(n)])]
-        for (n, _), found in zip(starts, in_parallel(lambda s: self._from_afar(s[1]), starts), strict=True):
+        white = rough_noise(self.model, self.trials)
+        self._restart([(n, one) for n in self.ranked(1) for one in self._choices(n)], white)
+
+    def _restart(self, starts: Sequence[tuple[Names, Model]], white: NoiseModel) -> None:
+        for (n, _), found in zip(starts, in_parallel(lambda s: self._from_afar(s[1], white), starts), strict=True):
             if found.price < self.fits[n].price:
                 self.fits[n] = found
-
-    def _of(self, names: Names) -> Model:
-        """The model of a set, its nominal values as they are believed."""
-        return Model(self.model.rig, self.fits[names].model.effects)
 
     def _choices(self, names: Names) -> list[Model]:
         """The model of a single cause with every discrete choice that it has, next to its null."""
@@ -121,12 +131,12 @@ class JointFits:
         """Single causes whose fit ended where they are absent, at a bound: another amplitude has not been seen."""
         return [n for n in self.ranked(1) if _is_absent(self.fits[n], self.fits[n].model.effects[-1])]
 
-    def _from_afar(self, model: Model) -> Fit:
-        """Fit a model from where it is: first for least errors, then under the noise.
+    def _from_afar(self, model: Model, white: NoiseModel) -> Fit:
+        """Fit a model from where it is: first for least errors, under white noise, then under the present one.
 
         Slow noise leaves the fast parts of an answer to a fit, and those of a late one meet only where they are near.
         """
-        near = fit_anyhow(Problem(model, self.trials, as_white(self.noise)), model.parameters(), None, LOOK)
+        near = fit_anyhow(Problem(model, self.trials, white), model.parameters(), None, LOOK)
         return fit_problem(self.problem(model), near.values, near.unknowns, LOOK)
 
     def _pursue(self, size: int) -> None:

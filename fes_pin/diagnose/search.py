@@ -156,7 +156,7 @@ class Search:
         sets.add({(n,): lambda v=v: sets.extend(base, v) for n, v in by_effect.items()})  # type: ignore[misc]
         sets.restart(sets.ranked(1)[:PURSUED])
         if self._hopeless:
-            sets.restart(sets.ranked(1), every_choice=True)
+            sets.restart_every()
         elif not self.claims.complete(sets.ranked(1)[0]):
             sets.restart(sets.given_up())
 
