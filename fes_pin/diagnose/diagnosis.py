@@ -57,12 +57,12 @@ class Cause:
         """True if trials that took no part speak for it.
 
         By their likelihood where the model leaves only noise, by their open-loop errors where it does not; where other
-        causes stand beside it by both, for several flexible forms together come near to anything.
+        causes stand beside it by both, for several flexible forms together come near to anything. A cause alone may
+        have no gain: if one trial of many reaches a stop, the others do not foretell it.
         """
         known = self.evidence if complete else None
         likely = known is None or known.low > 0.0
-        useful = self.gain_held_out.percent if known and alone else self.gain_held_out.low
-        return likely and useful > 0.0
+        return likely and (self.gain_held_out.low > 0.0 or (known is not None and alone))
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,8 @@ def test_held_out_trials_speak_by_likelihood_only_where_noise_is_all_that_is_lef
     assert not cause(evidence=unsure, low=5.0).helps(complete=True, alone=True)
     assert not cause(evidence=sure, low=-5.0).helps(complete=False, alone=True)
     assert cause(evidence=unsure, low=5.0).helps(complete=False, alone=False)
-    assert not cause(evidence=sure, percent=-1.0, low=-5.0).helps(complete=True, alone=True)
+    assert cause(evidence=sure, percent=-1.0, low=-5.0).helps(complete=True, alone=True)
+    assert not cause(evidence=unsure, percent=-1.0, low=-5.0).helps(complete=True, alone=True)
     assert cause(low=5.0).helps(complete=True, alone=True) and not cause(low=-5.0).helps(complete=True, alone=True)
 
 
