@@ -154,11 +154,10 @@ class Search:
         self.progress(0.12, "every cause, fitted jointly")
         by_effect = best_by_effect(scores.scored)
         sets.add({(n,): lambda v=v: sets.extend(base, v) for n, v in by_effect.items()})  # type: ignore[misc]
-        sets.restart(sets.ranked(1)[:PURSUED])
         if self._hopeless:
             sets.restart_every()
-        elif not self.claims.complete(sets.ranked(1)[0]):
-            sets.restart(sets.given_up())
+        else:
+            sets.restart(list(dict.fromkeys([*sets.ranked(1)[:PURSUED], *sets.given_up()])))
 
     def _extend_beam(self, size: int, every: bool = False) -> bool:
         """Fit the most promising sets of a size, or every one; False if nothing at all is left to find."""
