@@ -5,9 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
-from threading import Thread
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -39,13 +37,11 @@ def diagnose(
     from fes_pin.data.study import read_study  # noqa: PLC0415
     from fes_pin.diagnose.diagnosis import diagnose as find  # noqa: PLC0415
     from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files  # noqa: PLC0415
-
-    measured = read_study(study)
-    Thread(target=import_module, args=["fes_pin.view.report"]).start()  # a second core has it by the time of the report
-    with _progress() as tell:
-        diagnosis = find(measured, seed=seed, progress=tell)
     from fes_pin.view.report import report_html  # noqa: PLC0415
 
+    measured = read_study(study)
+    with _progress() as tell:
+        diagnosis = find(measured, seed=seed, progress=tell)
     files = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
     write_files(out, files)
     if NEXT_FILE not in files:  # what an earlier diagnosis proposed is not this one's

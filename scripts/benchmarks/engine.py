@@ -78,13 +78,23 @@ def _scipy(trial: Trial, p: dict[str, float], **how: float | str) -> np.ndarray:
     return angle
 
 
-def _median(function, times: int) -> float:
+def _times(function, times: int) -> list[float]:
     took = []
     for _ in range(times):
         began = time.perf_counter()
         function()
         took.append(time.perf_counter() - began)
-    return float(np.median(took))
+    return took
+
+
+def _median(function, times: int) -> float:
+    return float(np.median(_times(function, times)))
+
+
+def _medians(ours, theirs, turns: int = 7, times: int = 60) -> tuple[float, float]:
+    """Of both, measured by turns: what slows the machine for a while slows either."""
+    pairs = [(_times(ours, times), _times(theirs, 1)) for _ in range(turns)]
+    return float(np.median([p[0] for p in pairs])), float(np.median([p[1] for p in pairs]))
 
 
 def _simulation() -> list[Row]:
@@ -92,12 +102,11 @@ def _simulation() -> list[Row]:
     simulator = Simulator(model, [trial])
     angle = simulator.run(TRUE)[0].readings[:, 0]
     exact = _scipy(trial, KNOWN | TRUE, method="DOP853", rtol=1e-12, atol=1e-13)
-    ours = _median(lambda: simulator.run(TRUE), 31)
+    ours, theirs = _medians(lambda: simulator.run(TRUE), lambda: _scipy(trial, KNOWN | TRUE, method="LSODA", rtol=1e-6))
     four = Simulator(model, [trial] * WIDTH)
     packed = _median(lambda: four.run(TRUE), 31) / WIDTH
     bent = Simulator(model, [trial] * WIDTH, tuple(TRUE))
     sensitive = _median(lambda: bent.run(TRUE), 31) / WIDTH
-    theirs = _median(lambda: _scipy(trial, KNOWN | TRUE, method="LSODA", rtol=1e-6), 5)
     return [
         ("one simulation, 10 s at 1 kHz, alone in its block of lanes", 1e3 * ours, None, "ms"),
         (f"one of {WIDTH} that fill a block", 1e3 * packed, None, "ms"),
