@@ -11,7 +11,7 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
-from fes_pin.models.simulate import Simulator
+from fes_pin.models.simulate import Simulated, Simulator
 
 Unknowns = list[dict[str, float]]
 SINGULAR = 1e-12
@@ -80,22 +80,23 @@ class Problem:
 
     def residuals(self, values: Mapping[str, float], unknowns: Unknowns) -> list[dict[str, np.ndarray]]:
         """Measured minus simulated, for each trial by output column; not whitened."""
-        out = []
-        for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
-            names = self.model.rig.outputs(trial.kind)
-            out.append({n: trial[n] - simulated.readings[:, k] for k, n in enumerate(names) if n in trial.columns})
-        return out
+        run = self.simulator.run(values, unknowns)
+        return [self._left(trial, simulated) for trial, simulated in zip(self.trials, run, strict=True)]
+
+    def _left(self, trial: Trial, simulated: Simulated) -> dict[str, np.ndarray]:
+        names = self.model.rig.outputs(trial.kind)
+        return {n: trial[n] - simulated.readings[:, k] for k, n in enumerate(names) if n in trial.columns}
 
     def settled(self, values: Mapping[str, float], unknowns: Unknowns) -> list[dict[str, np.ndarray]]:
         """The residuals without what a step of each trial's initial state takes out of them by least squares."""
         rig, out = self.model.rig, []
         for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
-            told = [(k, n) for k, n in enumerate(rig.outputs(trial.kind)) if n in trial.columns]
-            left = {n: trial[n] - simulated.readings[:, k] for k, n in told}
+            left = self._left(trial, simulated)
             own = [self.simulator.columns.index(n) for n in rig.unknowns(trial.kind)]
             if own and np.isfinite(simulated.sensitivities).all():
                 scale = {n: self.noise[n].std if n in self.noise else math.inf for n in left}
-                moved = {n: simulated.sensitivities[:, k, own] for k, n in told}
+                outputs = rig.outputs(trial.kind)
+                moved = {n: simulated.sensitivities[:, outputs.index(n), own] for n in left}
                 joined = np.concatenate([moved[n] / scale[n] for n in left])
                 step = np.linalg.lstsq(joined, np.concatenate([left[n] / scale[n] for n in left]), rcond=1e-9)[0]
                 left = {n: left[n] - moved[n] @ step for n in left}

@@ -13,8 +13,9 @@ from fes_pin.models.simulate import simulate
 def predict(model: Model, trial: Trial) -> Trial:
     """What the model predicts for a trial: its time and the predicted output columns.
 
-    A joint's initial state is the first sample of `position` and `velocity`, or the conditions `position0` and
-    `velocity0`; a velocity that is missing is estimated from the first 0.2 s. Nothing else of the outputs is used.
+    A joint begins where the model, its sensor included, reads the first sample of `position`, at the first sample of
+    `velocity`; or at the conditions `position0` and `velocity0`, which are the joint's own, not readings. A velocity
+    that is missing is estimated from the first 0.2 s. Nothing else of the outputs is used.
 
     Raises
     ------

@@ -27,7 +27,7 @@ def main() -> None:
     from confusion_matrix.table import one_line, table  # noqa: PLC0415
 
     if given.only:
-        for record in runner.run([[Item.parse(name)] for name in given.only], None):
+        for record in runner.run([[Item.parse(name)] for name in given.only], None, given.workers):
             print(one_line(record))
         return
     if given.read_only:

@@ -18,7 +18,8 @@ class SensorGain(Effect):
 
         y_rest + (1 + error) (y - y_rest)
 
-    On a joint y_rest is where a trial begins, where the joint hangs, or the zero of its URDF, whichever fits.
+    On a joint y_rest is where a trial begins (`place` 0), where the joint hangs (1), or the zero of its URDF (2),
+    whichever fits.
 
     Tell-tale: every excursion is too large or too small by the same factor, rest angles are right.
     Source: a potentiometer's supply or an amplifier's gain that is off.
