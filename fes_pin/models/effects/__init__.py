@@ -28,6 +28,19 @@ EFFECTS = catalogue()
 """Every effect, in the order of the signal path."""
 
 
+def __getattr__(name: str) -> type[Effect]:
+    """An effect by the name of its class: `effects.CoulombFriction`."""
+    for one in EFFECTS:
+        if one.__name__ == name:
+            return one
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """What is written here, and the classes of the effects."""
+    return sorted((*globals(), *(one.__name__ for one in EFFECTS)))
+
+
 def effect(name: str) -> type[Effect]:
     """The effect of that name.
 
