@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -74,7 +75,7 @@ class Trial:
     def __contains__(self, column: object) -> bool:
         return column in self.columns
 
-    @property
+    @cached_property
     def dt(self) -> float:
         """Time step, s: the mean one, which printing rounds less than any single one."""
         return float(self.time[-1] - self.time[0]) / (len(self) - 1)

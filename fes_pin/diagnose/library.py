@@ -71,27 +71,36 @@ class Library:
         influence on another effect's sensitivity is of second order.
         """
         nominal = Model(fitted.model.rig)
-        wanted = [e for e in self.effects if e.name not in exclude and self._acts(e, nominal)]
+        wanted = [e for e in self.effects if e.name not in exclude and self._felt(e)]
         return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
 
     def silent(self) -> tuple[str, ...]:
         """Names of the effects that act in none of the trials: of a joint, where all are isometric."""
-        return tuple(e.name for e in self.effects if not self._acts(e, self.model))
+        return tuple(e.name for e in self.effects if not self._felt(e))
 
-    def _acts(self, effect: type[Effect], nominal: Model) -> bool:
-        rig = nominal.rig
-        return any(effect.signal in rig.changeable(t.kind, rig.input_columns(t)) for t in self.trials)
+    def _felt(self, effect: type[Effect]) -> list[int]:
+        """The trials in which an effect acts."""
+        rig = self.model.rig
+        return [i for i, t in enumerate(self.trials) if effect.signal in rig.changeable(t.kind, rig.input_columns(t))]
 
     def _probe(self, effect: type[Effect], nominal: Model, fitted: Fit, noise: NoiseModel) -> list[Probe]:
-        free = tuple(f"{effect.name}.{n}" for n in effect.amplitudes())
+        """The effect with every choice of its shapes; only the trials in which it acts are simulated."""
+        felt = self._felt(effect)
         if effect.name not in self._problems:
-            self._problems[effect.name] = Problem(nominal + effect.absent(), self.trials, noise, free)
+            free = tuple(f"{effect.name}.{n}" for n in effect.amplitudes())
+            self._problems[effect.name] = Problem(
+                nominal + effect.absent(), [self.trials[i] for i in felt], noise, free
+            )
         problem = self._problems[effect.name]
         problem.noise = noise
+        ends = np.cumsum([0, *(problem.rows(t) for t in self.trials)])
         out = []
         for one in self.grid(effect):
-            parts = problem.linearize((nominal + one).parameters(), fitted.unknowns)
-            out.append(Probe(one, np.concatenate([p.jacobian for p in parts])))
+            columns = np.zeros((ends[-1], len(problem.free)))
+            parts = problem.linearize((nominal + one).parameters(), [fitted.unknowns[i] for i in felt])
+            for i, part in zip(felt, parts, strict=True):
+                columns[ends[i] : ends[i + 1]] = part.jacobian
+            out.append(Probe(one, columns))
         return out
 
 

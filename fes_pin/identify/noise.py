@@ -67,6 +67,10 @@ class Noise:
             out = _correlated(columns, self._stretch)
         return out.reshape(len(out), *values.shape[1:])
 
+    def innovations(self, samples: int, dt: float) -> int:
+        """How many innovations that many samples have: see `whiten`."""
+        return max(samples // thinning(dt, self.step_s) - len(self.ar), 0)
+
     @cached_property
     def _stretch(self) -> np.ndarray:
         """What whitens `BLOCK` samples from these and the p before, shape (BLOCK, p + BLOCK)."""

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.noise import NoiseModel, thinning
 from fes_pin.models.model import Model
-from fes_pin.models.simulate import Simulated, Simulator
+from fes_pin.models.simulate import Abreast, Simulated, Simulator
 
 Unknowns = list[dict[str, float]]
 SINGULAR = 1e-12
@@ -68,6 +68,7 @@ class Problem:
         initial = dict.fromkeys(n for t in self.trials for n in model.rig.unknowns(t.kind))
         self.unknown_names = (*initial, *model.own_unknowns()) if self.trials else ()
         self.simulator = Simulator(model, self.trials, (*self.free, *self.unknown_names))
+        self._beside: dict[tuple[int, ...], np.ndarray] = {}
 
     def start_unknowns(self) -> Unknowns:
         """The unknowns of each trial as its first samples suggest."""
@@ -105,18 +106,57 @@ class Problem:
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Whitened residuals and sensitivities at a parameter value."""
-        out, split = [], len(self.free)
-        for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
-            residuals, sensitivities = [], []
-            for k, name in enumerate(self.model.rig.outputs(trial.kind)):
-                if name not in trial.columns or name not in self.noise:
-                    continue
-                noise = self.noise[name]
-                residuals.append(noise.whiten(trial[name] - simulated.readings[:, k], trial.dt))
-                sensitivities.append(noise.whiten(simulated.sensitivities[:, k], trial.dt))
-            rows = np.concatenate(sensitivities) if len(sensitivities) > 1 else sensitivities[0]
-            out.append(Linearized(np.concatenate(residuals), rows[:, :split], rows[:, split:]))
-        return out
+        out: list[Linearized | None] = [None] * len(self.trials)
+        for block in self.simulator.run_abreast(values, unknowns):
+            for i, part in zip(block.trials, self._whitened(block), strict=True):
+                out[i] = part
+        return [p for p in out if p is not None]
+
+    def rows(self, trial: Trial) -> int:
+        """How many whitened residuals a trial has, all channels end to end."""
+        weighed = [self.noise[n] for n in self.model.rig.outputs(trial.kind) if n in trial.columns and n in self.noise]
+        return sum(one.innovations(len(trial), trial.dt) for one in weighed)
+
+    def _whitened(self, block: Abreast) -> Iterator[Linearized]:
+        """Trials that were simulated side by side, whitened side by side."""
+        trials = [self.trials[i] for i in block.trials]
+        pieces: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in trials]
+        missed = self._measured(block) - block.readings
+        for k, name in enumerate(self.model.rig.outputs(trials[0].kind)):
+            if name not in self.noise:
+                continue
+            noise = self.noise[name]
+            counts = [thinning(t.dt, noise.step_s) for t in trials]
+            for count in dict.fromkeys(counts):
+                dt = trials[counts.index(count)].dt
+                residuals, moved = noise.whiten(missed[:, k], dt), noise.whiten(block.sensitivities[:, k], dt)
+                for lane, trial in enumerate(trials):
+                    if counts[lane] == count and name in trial.columns:
+                        rows = noise.innovations(len(trial), dt)
+                        pieces[lane].append((residuals[:rows, lane], moved[:rows, :, lane]))
+        return (self._linearized(own, block.columns) for own in pieces)
+
+    def _measured(self, block: Abreast) -> np.ndarray:
+        """What was measured of the trials of a block, as their readings stand in it; zero where nothing was."""
+        if block.trials not in self._beside:
+            out = np.zeros(block.readings.shape)
+            for lane, trial in enumerate(self.trials[i] for i in block.trials):
+                for k, name in enumerate(self.model.rig.outputs(trial.kind)):
+                    if name in trial.columns:
+                        out[: len(trial), k, lane] = trial[name]
+            self._beside[block.trials] = out
+        return self._beside[block.trials]
+
+    def _linearized(self, pieces: Sequence[tuple[np.ndarray, np.ndarray]], columns: Sequence[int]) -> Linearized:
+        """One trial from the whitened residuals of its channels and their sensitivities to some of all columns."""
+        split = len(self.free)
+        count, width = sum(len(r) for r, _ in pieces), split + len(self.unknown_names)
+        residual, rows, at = np.empty(count), np.zeros((count, width)), 0
+        places = slice(None) if len(columns) == width else list(columns)
+        for own, moved in pieces:
+            here = slice(at, at + len(own))
+            residual[here], rows[here, places], at = own, moved, here.stop
+        return Linearized(residual, rows[:, :split], rows[:, split:])
 
 
 def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:

@@ -42,6 +42,28 @@ class Simulated:
     sensitivities: np.ndarray
 
 
+@dataclass(frozen=True)
+class Abreast:
+    """Trials of one kind as they were simulated: side by side, each in its lane.
+
+    Attributes
+    ----------
+    trials
+        Their places among the simulator's trials, lane by lane; lanes beyond them say nothing.
+    columns
+        The places of the sensitivities among the columns that the simulator was asked for; the others are zero.
+    readings
+        Shape (n, outputs, WIDTH); zero after the end of a shorter trial.
+    sensitivities
+        Shape (n, outputs, len(columns), WIDTH).
+    """
+
+    trials: tuple[int, ...]
+    columns: tuple[int, ...]
+    readings: np.ndarray
+    sensitivities: np.ndarray
+
+
 class Simulator:
     """A model structure on a set of trials, ready to run for any parameter values.
 
@@ -99,17 +121,29 @@ class Simulator:
             For another value of a parameter that belongs to a form of an effect that is off in `model`: such forms are
             left out of the equations, unless sensitivities to them are asked for.
         """
+        out: list[Simulated | None] = [None] * len(self.trials)
+        for block in self.run_abreast(values, self.start(values) if unknowns is None else unknowns):
+            for lane, i in enumerate(block.trials):
+                n = len(self.trials[i])
+                out[i] = Simulated(block.readings[:n, :, lane], self._spread(block, block.sensitivities[:n, ..., lane]))
+        return [s for s in out if s is not None]
+
+    def run_abreast(self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]]) -> Iterator[Abreast]:
+        """Simulate every trial, as `run` does; what comes side by side is given as it comes."""
         for name, value in self._fixed.items():
             if values[name] != value:
                 raise ValueError(f"{name} is {value:g} in the model that this simulator is for, not {values[name]:g}")
-        if unknowns is None:
-            unknowns = self.start(values)
         delay = total_delay(self.model, values) if self._delayed else 0.0
-        out: list[Simulated | None] = [None] * len(self.trials)
         for block in self._blocks:
-            for i, simulated in block.run(values, unknowns, delay):
-                out[i] = simulated
-        return [s for s in out if s is not None]
+            yield block.run(values, unknowns, delay)
+
+    def _spread(self, block: Abreast, s: np.ndarray) -> np.ndarray:
+        """Sensitivities in the order asked for, zero where this kind of trial has no such unknown."""
+        if len(block.columns) == len(self.columns):
+            return s
+        full = np.zeros((*s.shape[:2], len(self.columns)))
+        full[..., list(block.columns)] = s
+        return full
 
     def start(self, values: Mapping[str, float]) -> list[dict[str, float]]:
         """Each trial's unknowns as its first samples say.
@@ -187,9 +221,9 @@ class _Block:
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
         self.inputs = rig.input_columns(first)
         available = set(model.parameters()) | set(model.unknowns(first.kind))
-        self.columns = columns
         self.program: Program = program(model, first.kind, self.inputs, tuple(c for c in columns if c in available))
         self.layout = self.program.layout
+        self.places = tuple(columns.index(n) for n in self.layout.columns)
         self.substeps = substeps(model, first.dt, max_step_s)
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
@@ -210,9 +244,7 @@ class _Block:
             self._shifted[shift] = u
         return self._shifted[shift]
 
-    def run(
-        self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]], delay: float
-    ) -> Iterator[tuple[int, Simulated]]:
+    def run(self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]], delay: float) -> Abreast:
         p = np.empty((len(self.layout.values), WIDTH))
         for k, name in enumerate(self.layout.values):
             if name in self.layout.unknowns:
@@ -226,17 +258,10 @@ class _Block:
             constants = constants.copy()
             constants[self.layout.constants.index("shift"), : len(shift)] = shift
         y, s = self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
-        for lane, (i, trial) in enumerate(zip(self.lanes, self.trials, strict=True)):
-            yield i, Simulated(y[: len(trial), :, lane], self._spread(s[: len(trial), ..., lane]))
-
-    def _spread(self, s: np.ndarray) -> np.ndarray:
-        """Sensitivities in the order asked for, zero where this kind of trial has no such unknown."""
-        if len(self.layout.columns) == len(self.columns):
-            return s
-        full = np.zeros((*s.shape[:2], len(self.columns)))
-        for k, name in enumerate(self.layout.columns):
-            full[..., self.columns.index(name)] = s[..., k]
-        return full
+        for lane, trial in enumerate(self.trials):
+            if len(trial) < self.count:
+                y[len(trial) :, :, lane] = s[len(trial) :, ..., lane] = 0.0
+        return Abreast(tuple(self.lanes), self.places, y, s)
 
 
 def max_step(model: Model) -> float:

@@ -38,8 +38,6 @@ class NativeProgram:
         rest, scratch = np.array(guess, dtype=float), np.zeros((self.sizes.scratch, WIDTH))
         memory = (*given, rest, out, scratch)  # a name for each: they must live until the machine code returns
         self._run(n, substeps, *[a.ctypes.data for a in memory])
-        if self.layout.columns:  # what comes next reads it lane by lane, often several times
-            out = np.ascontiguousarray(out.transpose(2, 0, 1)).transpose(1, 2, 0)
         return out[:, :outputs], out[:, outputs:].reshape(n, outputs, len(self.layout.columns), WIDTH)
 
 
