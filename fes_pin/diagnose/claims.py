@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fes_pin.diagnose.joint_fits import JointFits, Names
-from fes_pin.diagnose.library import Scores
 from fes_pin.diagnose.open_set import smooth_remainder
+from fes_pin.diagnose.promise import Scores
 from fes_pin.diagnose.significance import Family, coherence_p_value
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.distributions import chi2_tail

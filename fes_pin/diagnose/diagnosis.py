@@ -12,8 +12,8 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.experiment import SEPARABLE, NextExperiment, next_experiment
 from fes_pin.diagnose.held_out import Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
-from fes_pin.diagnose.library import best_by_effect
 from fes_pin.diagnose.open_set import Remainder, remainder
+from fes_pin.diagnose.promise import best_by_effect
 from fes_pin.diagnose.search import Search, Searched
 from fes_pin.diagnose.unfinished import alike
 from fes_pin.diagnose.workers import one_thread_each

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.library import Library, Projection, Scored, Scores, near_null
+from fes_pin.diagnose.library import Library, near_null
 from fes_pin.diagnose.noise_floor import rich_noise
+from fes_pin.diagnose.promise import Projection, Scored, Scores
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import (
     CONFIDENCE_95,

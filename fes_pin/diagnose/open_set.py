@@ -17,15 +17,16 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.bursts import burst_p_value
 from fes_pin.diagnose.detents import detent_p_value
 from fes_pin.diagnose.innovations import channels, driven, under_own_noise
-from fes_pin.diagnose.library import Projection
 from fes_pin.diagnose.lines import LONGEST_NOISE, line_p_value
 from fes_pin.diagnose.play import play_p_value
+from fes_pin.diagnose.promise import Projection
 from fes_pin.diagnose.repeated import repeated_p_value
 from fes_pin.diagnose.slips import slip_p_value
 from fes_pin.diagnose.uneven import uneven_p_value
+from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import NoiseModel, low_pass
+from fes_pin.identify.noise import Noise, NoiseModel, low_pass
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
 
@@ -80,22 +81,24 @@ def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Featur
     Each is also taken through a second-order low pass, as a torque would be by the joint.
     """
     simulated = Simulator(model, trials).run(model.parameters())
-    names: dict[str, str] = {}
-    blocks = []
-    for trial, one in zip(trials, simulated, strict=True):
-        for k, output in enumerate(model.rig.outputs(trial.kind)):
-            if output not in trial.columns or output not in noise:
-                continue
-            made = _of_trial(trial, one.readings[:, k], output)
-            whitened = noise[output].whiten(np.stack(list(made.values()), axis=1), trial.dt)
-            names |= {f"{output} {n}": n for n in made}
-            blocks.append(dict(zip((f"{output} {n}" for n in made), whitened.T, strict=True)))
-    keys = list(names)
-    rows = []
-    for block in blocks:
-        count = len(next(iter(block.values())))
-        rows.append(np.stack([block.get(k, np.zeros(count)) for k in keys], axis=1))
-    return Features(tuple(names[k].split(":")[0] for k in keys), np.concatenate(rows))
+    seen = [
+        (trial, one.readings[:, k], output)
+        for trial, one in zip(trials, simulated, strict=True)
+        for k, output in enumerate(model.rig.outputs(trial.kind))
+        if output in trial.columns and output in noise
+    ]
+    blocks = in_parallel(lambda channel: _whitened(*channel, noise[channel[2]]), seen)
+    keys = list(dict.fromkeys(n for names, _ in blocks for n in names))
+    rows = [np.zeros((len(columns), len(keys))) for _, columns in blocks]
+    for row, (names, columns) in zip(rows, blocks, strict=True):
+        row[:, [keys.index(n) for n in names]] = columns
+    return Features(tuple(n.split()[1].split(":")[0] for n in keys), np.concatenate(rows))
+
+
+def _whitened(trial: Trial, reading: np.ndarray, output: str, noise: Noise) -> tuple[list[str], np.ndarray]:
+    """Names and whitened features of one channel of one trial."""
+    made = _of_trial(trial, reading, output)
+    return [f"{output} {n}" for n in made], noise.whiten(np.stack(list(made.values()), axis=1), trial.dt)
 
 
 def _of_trial(trial: Trial, reading: np.ndarray, output: str) -> dict[str, np.ndarray]:
@@ -206,19 +209,20 @@ def smooth_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     projection = Projection(fitted.parts)
     made = features(fitted.model, fitted.trials, fitted.noise)
     columns = projection(made.columns)
-    before, after = np.linalg.norm(made.columns, axis=0), np.linalg.norm(columns, axis=0)
+    gram = columns.T @ columns
+    before, after = np.einsum("mi,mi->i", made.columns, made.columns) ** 0.5, np.diag(gram) ** 0.5
     good = after > 1e-3 * np.where(before > 0, before, 1.0)
-    columns, names = columns[:, good] / after[good], [n for n, g in zip(made.names, good, strict=True) if g]
-    values, vectors = np.linalg.eigh(columns.T @ columns)
+    names, scale = [n for n, g in zip(made.names, good, strict=True) if g], 1.0 / after[good]
+    values, vectors = np.linalg.eigh(gram[np.ix_(good, good)] * np.outer(scale, scale))
     kept = values > 1e-4 * values.max(initial=1e-300)
-    basis = (columns @ vectors[:, kept]) / np.sqrt(values[kept])
-    shares = _trial_shares(basis, projection.residual, fitted)
+    by_trial = _trial_shares(columns, projection.residual, fitted)[:, good] * scale
+    shares = by_trial @ vectors[:, kept] / np.sqrt(values[kept])
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
     plain = float(chi2_tail(statistic, rank))
     p_value = float(chi2_tail(statistic / _inflation(shares, rank, seed), rank))
     unexplained = p_value < SMOOTH_LEVEL or plain < STRONG_LEVEL
     scores: dict[str, float] = {}
-    for name, z in zip(names, columns.T @ projection.residual, strict=True):
+    for name, z in zip(names, by_trial.sum(axis=0), strict=True):
         scores[name] = max(scores.get(name, 0.0), float(z**2))
     where = max(scores, key=lambda n: scores[n]) if unexplained else None
     inflation = _inflation(shares, rank, seed)
@@ -227,13 +231,13 @@ def smooth_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     return Remainder(bool(unexplained), shown, where, excess)
 
 
-def _trial_shares(basis: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.ndarray:
-    """Each trial's part of the inner products of basis and residual, shape (trials, rank)."""
+def _trial_shares(columns: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.ndarray:
+    """Each trial's part of the inner products of columns and residual, shape (trials, columns)."""
     out, at = [], 0
     for part in fitted.parts:
         rows = slice(at, at + len(part.residual))
         at = rows.stop
-        out.append(basis[rows].T @ residual[rows])
+        out.append(columns[rows].T @ residual[rows])
     return np.array(out)
 
 

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from fes_pin.diagnose.innovations import Stretch, stretches
-from fes_pin.diagnose.library import Projection
+from fes_pin.diagnose.promise import Projection
 from fes_pin.identify.distributions import f_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.models.simulate import Simulator

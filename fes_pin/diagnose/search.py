@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.claims import Claims
 from fes_pin.diagnose.joint_fits import LOOK, PURSUED, JointFits, Names, subsets
-from fes_pin.diagnose.library import Scored, best_by_effect, best_pairs
+from fes_pin.diagnose.promise import Scored, best_by_effect, best_pairs
 from fes_pin.diagnose.significance import Family
 from fes_pin.diagnose.unfinished import choose_by_prediction, fit_for_prediction
 from fes_pin.identify.fit import Fit, fit_anyhow, rough_noise

@@ -11,9 +11,9 @@ from identify.rigs import trials_of
 
 from fes_pin.diagnose.bursts import burst_p_value
 from fes_pin.diagnose.innovations import channels, under_own_noise
-from fes_pin.diagnose.library import Projection
 from fes_pin.diagnose.open_set import FULL_NOISE, REMAINDER_LEVEL, SHARES, remainder
 from fes_pin.diagnose.play import play_p_value
+from fes_pin.diagnose.promise import Projection
 from fes_pin.diagnose.repeated import repeated_p_value
 from fes_pin.diagnose.slips import slip_p_value
 from fes_pin.diagnose.uneven import uneven_p_value

@@ -9,8 +9,8 @@ from diagnose.hidden import study_of
 from identify.rigs import WHITE, trials_of
 
 from fes_pin.diagnose.held_out import folds_of
-from fes_pin.diagnose.library import Scores
 from fes_pin.diagnose.open_set import remainder
+from fes_pin.diagnose.promise import Scores
 from fes_pin.diagnose.significance import Family, coherence_p_value
 from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import Linearized
