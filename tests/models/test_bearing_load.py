@@ -58,7 +58,7 @@ def test_where_gravity_does_not_swing_the_load_is_constant(constants):
     assert friction(0.3, 4.0, HERTZ, **constants) == pytest.approx(friction(0.3, 4.0, 0.0, **constants), rel=1e-5)
 
 
-@pytest.mark.parametrize("exponent", [0.0, HERTZ])
+@pytest.mark.parametrize("exponent", [0.0, 1.0, HERTZ, 1.5])
 def test_the_load_is_told_from_swings(exponent):
     """Of large and small swings together, the form that made them fits, and is what a refinement proposes."""
     nominal = Model(Joint(1.0, 0.005, 1.0, constants=JOINT, fitted=("damping", "gravity_scale")))

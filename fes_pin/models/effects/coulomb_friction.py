@@ -29,12 +29,13 @@ class CoulombFriction(Effect):
     falls out of x then, and friction changes its sign where the velocity does. Under a torque below T the joint still
     creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of small steps
     x = v / creep_speed. `load` is the bearing's: see the rig.
-    Rolling contacts lose by the elastic hysteresis of their Hertzian spots, as the load to the power 4/3.
+    Sliding contacts lose in proportion to the load; rolling ones by elastic hysteresis, the load times the width of the
+    contact: to the power 4/3 for balls, 3/2 for rollers.
 
     Tell-tale: the joint comes to rest at other angles from above than from below; free swings shrink by equal steps.
     Source: Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation,
-    European Journal of Control 4 (1998). Load: Greenwood, Minshall and Tabor, Hysteresis losses in rolling and sliding
-    friction, Proc. R. Soc. A 259 (1961).
+    European Journal of Control 4 (1998). Load: Tabor, The mechanism of rolling friction II: the elastic range, Proc. R.
+    Soc. A 229 (1955); Greenwood, Minshall and Tabor, Hysteresis losses in rolling and sliding friction, 259 (1961).
     """
 
     torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=0.0, upper=100.0, scale=0.01)
@@ -47,7 +48,7 @@ class CoulombFriction(Effect):
     )
 
     load_exponent: float = parameter(
-        0.0, null=0.0, lower=0.0, upper=2.0, scale=1.0, optional=True, fitted=False, grid=(4.0 / 3.0,)
+        0.0, null=0.0, lower=0.0, upper=2.0, scale=1.0, optional=True, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5)
     )
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
