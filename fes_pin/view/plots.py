@@ -163,7 +163,7 @@ def missing_figure(
     """
     with styled():
         figure = Figure(figsize=(PANEL, 2.5 + 0.25 * legend))
-        axes = figure.add_axes((0.19, 0.19, 0.79, 0.72 - 0.08 * legend))
+        axes = figure.add_axes((0.19, 0.19, 0.77, 0.72 - 0.08 * legend))
         factor, unit = milli(np.concatenate([m.value for m in before]), before[0].unit)
         _against(axes, before, after, name, factor)
         limit = factor * _limit(before)

@@ -28,7 +28,7 @@ from fes_pin.view.page import (
 from fes_pin.view.plots import stimulus_figure
 from fes_pin.view.report_causes import causes_section, stage_mark, value_and_interval
 from fes_pin.view.report_trials import missing_section, position_unit, trials_section
-from fes_pin.view.style import unit_of
+from fes_pin.view.style import styled, unit_of
 from fes_pin.view.svg import inline_svg
 
 
@@ -45,6 +45,11 @@ def report(diagnosis: Diagnosis, path: str | Path) -> None:
 
 def report_html(diagnosis: Diagnosis) -> str:
     """The report of a diagnosis as one HTML page that needs nothing else: no network, no script."""
+    with styled():
+        return _html(diagnosis)
+
+
+def _html(diagnosis: Diagnosis) -> str:
     replays = replay(diagnosis)
     parts = [
         _head(diagnosis),
