@@ -69,11 +69,11 @@ class Descent:
             new_x = self.x + move
             promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
             locals_ = self._moved(system.local_steps(move))
-            if promised < TOLERANCE:
+            if 0.0 <= promised < TOLERANCE:
                 return True
             parts = self._linearize(new_x, locals_)
             sse = whitened_sse(parts)
-            if np.isfinite(sse) and sse <= self.sse:
+            if promised > 0.0 and np.isfinite(sse) and sse <= self.sse:
                 gained = self.sse - sse
                 self.x, self.unknowns, self.parts, self.sse = new_x, locals_, parts, sse
                 self.damping = max(self.damping * _relief(gained / promised), 1e-9)
@@ -82,18 +82,18 @@ class Descent:
         return True
 
     def _bounded_move(self, system: NormalEquations) -> np.ndarray:
-        """Marquardt's step inside the bounds: what would leave them stops there, and the others step anew."""
+        """Marquardt's step inside the bounds: what would leave them first stops there, and the others step anew."""
         free, move = self.free_now(system.gradient), np.zeros(len(self.x))
-        for _ in range(len(self.x)):
-            held = ~free
-            gradient = system.gradient - system.hessian[:, held] @ move[held]
+        while free.any():
+            gradient = system.gradient - system.hessian[:, ~free] @ move[~free]
             move[free] = _damped(system.hessian[np.ix_(free, free)], gradient[free], self.damping)
-            inside = np.clip(self.x + move, self.lower, self.upper)
-            out = free & (inside != self.x + move)
-            if not out.any():
+            room = np.where(move > 0, self.upper, self.lower) - self.x
+            with np.errstate(divide="ignore", invalid="ignore"):
+                share = np.where(free & (move != 0.0), room / move, np.inf)
+            first = int(np.argmin(share))
+            if share[first] >= 1.0:
                 break
-            move[out] = (inside - self.x)[out]
-            free &= ~out
+            move[first], free[first] = room[first], False
         return np.clip(self.x + move, self.lower, self.upper) - self.x
 
     def _moved(self, steps: list[np.ndarray]) -> Unknowns:

@@ -85,6 +85,18 @@ def test_a_bound_holds():
     assert close.all()
 
 
+@pytest.mark.parametrize("start", [{"gain": 22.0, "time_constant_s": 2.0}, {"gain": 5.0, "time_constant_s": 1.0}])
+def test_a_step_beyond_two_bounds_is_no_end(start):
+    """One train, a start so slow that the first step would leave both bounds: the fit goes on to the optimum."""
+    time = np.arange(0.0, 1.2, 2e-3)
+    train = Trial("train", "isometric", {"pulse_width_us": np.where(time < 0.94, 900.0, 0.0)}, time)
+    true, rng = Model(RIGS["muscle"]), np.random.default_rng(5)
+    trials = [measured(true, train, rng) for _ in range(3)]
+    fitted = fit(true.with_parameters(start), trials, WHITE)
+    assert fitted.is_optimal()
+    assert fitted.sse == pytest.approx(fit(true, trials, WHITE).sse, abs=TOLERANCE)
+
+
 def test_free_motion_shows_ratios_only():
     """Inertia, gravity and damping by one common factor: the same motion."""
     rng = np.random.default_rng(4)
