@@ -20,6 +20,8 @@ MOST_REPEATS = 50
 SECONDS = 8.0
 ROOM = 0.5
 """Share of the measured range by which a proposed trial may leave it on either side: a model is not known beyond."""
+ALIKE = 0.01
+"""Squared noise units below which two predictions are the same."""
 QUIET_S = 0.4
 """At the beginning and the end of a trial the stimulus is as the shapes have it."""
 ROUNDS, CHILDREN = 24, 4
@@ -123,11 +125,9 @@ def next_experiment(best: Fit, rivals: Mapping[str, Fit], name: str, study: Stud
     closest = min(promised, key=lambda n: promised[n].worth)
     pair, promise = (name, closest), promised[closest]
     if promise.worth < 1.0:
-        why = (
-            f"no stimulus or load of this rig separates {name} and {closest}: the models differ by "
-            f"{promise.worth:.2g} squared noise units at most; turn the rig's base, or add a sensor on the other side "
-            "of the joint or frame"
-        )
+        most = f"{promise.worth:.2g} squared noise units at most" if promise.worth >= ALIKE else "nothing"
+        why = f"no stimulus or load of this rig separates {name} and {closest}: the models differ by {most}"
+        why = f"{why}; {best.model.rig.elsewhere}"
         return NextExperiment(why, pair, None)
     others = ", the other rivals by more" if len(rivals) > 1 else ""
     differ = f"{name} and {closest} differ by {promise.worth:.3g} squared noise units{others}"

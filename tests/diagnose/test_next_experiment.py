@@ -123,4 +123,5 @@ def test_what_no_input_separates_says_so():
     study = study_of("muscle", n_isometric=2, duration_s=2.0)
     same = fit(off(nominal_model(study)), study.trials, WHITE)
     plan = next_experiment(same, {"other": same}, "one", study)
-    assert plan.trial is None and "separates one and other" in plan.why
+    assert plan.trial is None and "separates one and other: the models differ by nothing" in plan.why
+    assert "the same force with another sensor" in plan.why  # a muscle held still has no base to turn

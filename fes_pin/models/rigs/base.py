@@ -33,6 +33,8 @@ class Rig:
     inputs: ClassVar[Mapping[str, str]]
     needed: ClassVar[tuple[str, ...]] = ()
     """Constants without which there are no equations."""
+    elsewhere: ClassVar[str] = "turn the rig's base, or add a sensor on the other side of the joint or frame"
+    """What tells causes apart that no input does."""
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:

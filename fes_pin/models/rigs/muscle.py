@@ -31,6 +31,7 @@ class Muscle(Rig):
     time_constant_s: float = parameter(0.05, unit="s", lower=2e-3, upper=2.0, scale=0.01)
 
     name = "muscle"
+    elsewhere = "record the same force with another sensor, or let the muscle move a joint"
 
     def units(self) -> Mapping[str, str]:
         return HELD
