@@ -74,12 +74,16 @@ def footnotes(diagnosis: Diagnosis) -> list[str]:
 
 
 def left_out_text(diagnosis: Diagnosis) -> str:
-    """How many samples of which trial were taken for spikes."""
+    """How many samples of which column were taken for spikes, and in which trials if they are few."""
     lengths = {t.name: len(t) for t in diagnosis.study.trials}
+    found: dict[str, dict[str, int]] = {}
+    for trial, columns in diagnosis.left_out.items():
+        for name, samples in columns.items():
+            found.setdefault(name, {})[trial] = len(samples)
     return ", ".join(
-        f"{len(k)} of {lengths[t]} samples of {n} in {t}"
-        for t, columns in diagnosis.left_out.items()
-        for n, k in columns.items()
+        f"{sum(counts.values())} of {sum(lengths[t] for t in counts)} samples of {name} in "
+        + (" and ".join(counts) if len(counts) < 3 else f"{len(counts)} trials")
+        for name, counts in found.items()
     )
 
 

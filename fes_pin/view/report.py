@@ -111,7 +111,10 @@ def _left(diagnosis: Diagnosis) -> list[Markup]:
     )
     out = [element("p", told)]
     if diagnosis.absorbed:
-        out.append(element("p", "Not testable here, which is not the same as absent: the nominal parameters take up"))
+        told = (
+            "Not testable here, which is not the same as absent: what the nominal parameters take up, or nothing drives"
+        )
+        out.append(element("p", told))
         rows: list[list[Content]] = [
             [element("code", n), stage_mark(str(effect(n).stage)), sentence(effect(n))] for n in diagnosis.absorbed
         ]
@@ -125,9 +128,9 @@ def _next(diagnosis: Diagnosis) -> list[Markup]:
     plan = diagnosis.next_experiment
     if plan is None:
         return [element("p", "None is needed to tell causes apart.", class_="soft")]
-    out = [element("p", f"To separate {' and '.join(plan.separates)}: {plan.why}.")]
     if plan.trial is None:
-        return out
+        return [element("p", f"{plan.why[0].upper()}{plan.why[1:]}.")]
+    out = [element("p", f"To separate {' and '.join(plan.separates)}: {plan.why}.")]
     conditions = "".join(f", {n} = {v:g}" for n, v in plan.trial.conditions.items())
     out.append(
         element("p", f"Its kind: {plan.trial.kind}{conditions}; its inputs are in ", element("code", NEXT_FILE), ".")
