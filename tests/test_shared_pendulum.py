@@ -1,4 +1,4 @@
-"""A real pendulum: its authors' model is viscous only; dry friction and drag are what it lacks."""
+"""A real pendulum: its authors' model is viscous only; dry friction is what it lacks."""
 
 import numpy as np
 import pytest
@@ -13,6 +13,8 @@ pytestmark = pytest.mark.shared
 
 PROMISED = {"held_0": 0.009, "held_1": 0.015}
 """Open-loop RMS of the extended model from the first sample, rad, at most."""
+PRINTED = {"held_0": (0.0135, 0.0037), "held_1": (0.0314, 0.0112)}
+"""What the README says: of the nominal model and of the extended one."""
 
 
 @pytest.fixture(scope="module")
@@ -39,13 +41,15 @@ def test_friction_or_drag_is_named(diagnosis):
 
 
 @pytest.mark.parametrize("name", PROMISED)
-def test_the_nominal_model_misses_the_held_out_swings(study, diagnosis, record_property, name):
+def test_the_nominal_model_misses_the_held_out_swings(study, diagnosis, name):
     missed = rms(diagnosis.nominal.model, study.trial(name))
-    record_property("nominal_rms_rad", missed)
     assert missed > PROMISED[name]
+    assert missed == pytest.approx(PRINTED[name][0], abs=3e-4)
 
 
 @pytest.mark.parametrize("name", PROMISED)
 def test_the_extended_model_meets_them(study, diagnosis, tmp_path, name):
     save_model(diagnosis.model, tmp_path / "model.toml")
-    assert rms(load_model(tmp_path / "model.toml"), study.trial(name)) <= PROMISED[name]
+    missed = rms(load_model(tmp_path / "model.toml"), study.trial(name))
+    assert missed <= PROMISED[name]
+    assert missed == pytest.approx(PRINTED[name][1], abs=3e-4)
