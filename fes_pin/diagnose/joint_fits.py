@@ -37,6 +37,8 @@ GLANCE = 5
 """Iterations after which the best start of a refinement is chosen, which alone goes on."""
 PURSUED = 6
 """Best sets of a size that go on until they converge."""
+ANOTHER_MINIMUM = 1.0
+"""Twice the log-likelihood between two fits of a set that have ended at different minima, at least."""
 
 Names = tuple[str, ...]
 
@@ -95,8 +97,9 @@ class JointFits:
 
     def add(self, made: dict[Names, Callable[[], Fit]]) -> None:
         """Fit sets side by side, and pursue the best of their size."""
-        fitted = in_parallel(lambda make: make(), made.values())
-        self.fits.update(zip(made, fitted, strict=True))
+        for names, fitted in zip(made, in_parallel(lambda make: make(), made.values()), strict=True):
+            if names not in self.fits or fitted.price < self.fits[names].price:
+                self.fits[names] = fitted
         self._looks.update(dict.fromkeys(made, 1))
         for size in sorted({len(n) for n in made}):
             self._pursue(size)
@@ -190,13 +193,29 @@ class JointFits:
     def base(self, rest: Names, names: Names) -> Fit:
         """The fit of a subset of a set, from the set's own values if there is none yet."""
         if rest not in self.fits:
-            whole = self.fits[names]
-            model = whole.model
-            for n in set(names) - set(rest):
-                model = model - n
-            self.fits[rest] = self.fit_from([model], whole.unknowns, MAX_ITERATIONS)
+            self.fits[rest] = self._part(rest, names)
         self.finish(rest)
         return self.fits[rest]
+
+    def better_bases(self, names: Names) -> list[Names]:
+        """Fit what a set is without each of its causes again, from the set's own values and forms; those that gain.
+
+        A subset that was fitted before its causes had their forms, or from afar, may have ended at another minimum.
+        """
+        rests = subsets(names)
+        known = [self.base(rest, names) for rest in rests]
+        found = in_parallel(lambda rest: self._part(rest, names), rests)
+        better = [k for k in range(len(rests)) if found[k].price < known[k].price - ANOTHER_MINIMUM]
+        self.fits.update({rests[k]: found[k] for k in better})
+        return [rests[k] for k in better]
+
+    def _part(self, rest: Names, names: Names) -> Fit:
+        """The fit of a subset of a set, from the set's own values."""
+        whole = self.fits[names]
+        model = whole.model
+        for n in set(names) - set(rest):
+            model = model - n
+        return self.fit_from([model], whole.unknowns, MAX_ITERATIONS)
 
     def refinement(self, names: Names) -> Fit | None:
         """The best fit of a set with the form of one of its effects refined; None if no form is, or none is told.

@@ -212,14 +212,14 @@ class Search:
             names = now
         return names
 
-    def _replace(self, names: Names, name: str, count: int | None) -> list[Names]:
-        """Fit the sets in which another cause takes the place of `name`; returns their names."""
+    def _replace(self, names: Names, name: str, count: int | None, again: bool = False) -> list[Names]:
+        """Fit the sets in which another cause takes the place of `name`, or fit them again; returns their names."""
         sets, rest = self.sets, tuple(n for n in names if n != name)
         base = sets.base(rest, names)
         scored = {n: v for n, v in best_by_effect(sets.scores(base).scored).items() if n != name}
         order = sorted(scored, key=lambda n: (-scored[n][0].gain, n))[:count]
         keys = {tuple(sorted((*rest, n))): scored[n] for n in order}
-        missing = {k: v for k, v in keys.items() if k not in sets.fits}
+        missing = {k: v for k, v in keys.items() if again or k not in sets.fits}
         sets.add({k: lambda v=v: sets.extend(base, v) for k, v in missing.items()})  # type: ignore[misc]
         return list(keys)
 
@@ -235,11 +235,13 @@ class Search:
     def _finish(self, names: Names) -> Searched:
         self.progress(0.8, "rivals")
         sets, without, rivals, p_values = self.sets, {}, {}, {}
+        better = sets.better_bases(names)
         for name in names:
             rest = tuple(n for n in names if n != name)
             without[name] = sets.base(rest, names)
             alone = len(names) == 1 and len(sets.ranked(1)) < SWAPS  # what was withdrawn left no rivals behind
-            keys = [*self._replace(names, name, None if alone else SWAPS), *self._siblings(names, name)]
+            replaced = self._replace(names, name, None if alone else SWAPS, rest in better)
+            keys = [*replaced, *self._siblings(names, name)]
             rivals[name] = sorted((sets.fits[k] for k in dict.fromkeys(keys) if k != names), key=lambda f: f.sse)
             p_values[name] = self.claims.p_value(sets.fits[names], without[name])
         none, best = sets.fits[()], sets.fits[names]
