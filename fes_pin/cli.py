@@ -25,6 +25,9 @@ app = typer.Typer(
 app.add_typer(body, name="body")
 app.command()(allocate)
 
+DIAGNOSING = 0.85
+"""Share of the time of `diagnose` before the report is drawn."""
+
 
 @app.command()
 def diagnose(
@@ -33,16 +36,20 @@ def diagnose(
     seed: Annotated[int, typer.Option(help="Of what is simulated: critical values and bootstrap intervals.")] = 0,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
-    from fes_pin.data.files import write_files  # noqa: PLC0415
+    from fes_pin.data.files import check_folder, write_files  # noqa: PLC0415
     from fes_pin.data.study import read_study  # noqa: PLC0415
+
+    measured = read_study(study)  # what cannot be read or written is said before anything else is even imported
+    check_folder(out)
     from fes_pin.diagnose.diagnosis import diagnose as find  # noqa: PLC0415
     from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files  # noqa: PLC0415
     from fes_pin.view.report import report_html  # noqa: PLC0415
 
-    measured = read_study(study)
     with _progress() as tell:
-        diagnosis = find(measured, seed=seed, progress=tell)
-    files = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
+        diagnosis = find(measured, seed=seed, progress=lambda share, words: tell(DIAGNOSING * share, words))
+        tell(DIAGNOSING, "report")
+        files = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
+        tell(1.0, "done")
     write_files(out, files)
     if NEXT_FILE not in files:  # what an earlier diagnosis proposed is not this one's
         (out / NEXT_FILE).unlink(missing_ok=True)

@@ -109,6 +109,23 @@ def write_text(path: str | Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
+def check_folder(folder: str | Path) -> None:
+    """Raise where `write_files` would, before the work that makes the files.
+
+    Raises
+    ------
+    InputError
+        The folder is a file, or cannot be written or made.
+    """
+    path = Path(folder).absolute()
+    with _input_errors(path):
+        nearest = next(p for p in (path, *path.parents) if p.exists())
+    if not nearest.is_dir():
+        raise InputError("is a file; expected a folder", file=nearest)
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise InputError("cannot be written", file=nearest)
+
+
 def write_files(folder: str | Path, contents: Mapping[str, str | bytes]) -> None:
     """Write several files into a folder: all of them, or none.
 

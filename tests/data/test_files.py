@@ -7,7 +7,7 @@ import pytest
 
 from fes_pin.data.datasets import DATASETS, fetch
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import write_files, write_text
+from fes_pin.data.files import check_folder, write_files, write_text
 
 
 def test_write_replaces_whole(tmp_path):
@@ -58,6 +58,21 @@ def test_what_cannot_be_written(tmp_path):
         write_files(tmp_path / "file", {"a": "x"})
     with pytest.raises(InputError, match="inside the folder"):
         write_files(tmp_path, {"../a": "x"})
+
+
+@pytest.mark.parametrize("below", ["", "/a/b"])
+def test_a_folder_that_cannot_be_is_said_before_the_work(tmp_path, monkeypatch, below):
+    check_folder(tmp_path)
+    check_folder(tmp_path / "new" / "newer")
+    assert list(tmp_path.iterdir()) == []
+    file = tmp_path / "file"
+    file.write_text("kept")
+    with pytest.raises(InputError, match="is a file; expected a folder"):
+        check_folder(f"{file}{below}")
+    monkeypatch.setattr(os, "access", lambda _path, _mode: False)
+    with pytest.raises(InputError, match="cannot be written"):
+        check_folder(f"{tmp_path}{below}")
+    assert file.read_text() == "kept"
 
 
 def test_fetch(tmp_path, monkeypatch):

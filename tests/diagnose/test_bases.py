@@ -1,4 +1,4 @@
-"""What a set is without one of its causes: fitted from the set's own values too, before rivals take the cause's place."""
+"""What a set is without one of its causes, fitted from the set's own values too: where its rivals begin."""
 
 import numpy as np
 import pytest
