@@ -16,6 +16,7 @@ from fes_pin.diagnose.promise import Projection, Scored, Scores
 from fes_pin.diagnose.workers import in_parallel
 from fes_pin.identify.fit import (
     CONFIDENCE_95,
+    GROSS,
     MAX_ITERATIONS,
     Fit,
     fit_anyhow,
@@ -116,6 +117,12 @@ class JointFits:
         """
         white = rough_noise(self.model, self.trials)
         self._restart([(n, one) for n in self.ranked(1) for one in self._choices(n)], white)
+
+    def restart_beside(self, names: Names) -> None:
+        """Fit the single causes that leave a gross misfit from the nominal values of one that does not."""
+        rig, far = self.fits[names].model.rig, [n for n in self.ranked(1) if self.fits[n].reduced > GROSS]
+        starts = [(n, Model(rig, one.effects)) for n in far for one in self._choices(n)]
+        self._restart(starts, as_white(self.noise))
 
     def _restart(self, starts: Sequence[tuple[Names, Model]], white: NoiseModel) -> None:
         for (n, _), found in zip(starts, in_parallel(lambda s: self._from_afar(s[1], white), starts), strict=True):

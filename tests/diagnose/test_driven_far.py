@@ -41,6 +41,12 @@ def test_a_joint_driven_over_the_top(cause, tmp_path):
     assert named(diagnose(study)) == ([{cause}] if cause else [])
 
 
+def test_a_twin_is_found_where_a_fit_from_far_off_does_not_arrive(tmp_path):
+    """On a joint that tumbles an offset of the sensor is a tilt of the base: the same motion, read the same."""
+    study = far_driven(86, {"sensor_offset": TYPICAL["sensor_offset"]}, tmp_path)
+    assert named(diagnose(study)) == [{"sensor_offset", "base_tilt"}]
+
+
 def trains(seed, late=0, dt=1e-3, seconds=4.0):
     """Isometric trains with a pause, each trial of other rates; the force is the lag's exact answer to held pulses."""
     rng, time = np.random.default_rng(seed), np.arange(round(seconds / dt)) * dt
