@@ -25,8 +25,8 @@ app = typer.Typer(
 app.add_typer(body, name="body")
 app.command()(allocate)
 
-DIAGNOSING = 0.85
-"""Share of the time of `diagnose` before the report is drawn."""
+DIAGNOSING = 0.8
+"""Share of the time of `diagnose` before the report is drawn, about."""
 
 
 @app.command()

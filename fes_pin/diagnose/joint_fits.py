@@ -119,7 +119,9 @@ class JointFits:
         self._restart([(n, one) for n in self.ranked(1) for one in self._choices(n)], white)
 
     def restart_beside(self, names: Names) -> None:
-        """Fit the single causes that leave a gross misfit from the nominal values of one that does not."""
+        """Fit the single causes that leave a gross misfit from the nominal values of one, if that leaves none."""
+        if self.fits[names].reduced > GROSS:
+            return
         rig, far = self.fits[names].model.rig, [n for n in self.ranked(1) if self.fits[n].reduced > GROSS]
         starts = [(n, Model(rig, one.effects)) for n in far for one in self._choices(n)]
         self._restart(starts, as_white(self.noise))

@@ -11,7 +11,7 @@ from fes_pin.diagnose.joint_fits import LOOK, PURSUED, JointFits, Names, subsets
 from fes_pin.diagnose.promise import Scored, best_by_effect, best_pairs
 from fes_pin.diagnose.significance import Family
 from fes_pin.diagnose.unfinished import choose_by_prediction, fit_for_prediction
-from fes_pin.identify.fit import GROSS, Fit, fit_anyhow, rough_noise
+from fes_pin.identify.fit import Fit, fit_anyhow, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
 
@@ -241,7 +241,7 @@ class Search:
             without[name] = sets.base(rest, names)
             alone = len(names) == 1 and len(sets.ranked(1)) < SWAPS  # what was withdrawn left no rivals behind
             replaced = self._replace(names, name, None if alone else SWAPS, rest in better)
-            if len(names) == 1 and sets.fits[names].reduced < GROSS:
+            if len(names) == 1:
                 sets.restart_beside(names)
             keys = [*replaced, *self._siblings(names, name)]
             rivals[name] = sorted((sets.fits[k] for k in dict.fromkeys(keys) if k != names), key=lambda f: f.sse)

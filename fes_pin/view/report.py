@@ -111,10 +111,8 @@ def _left(diagnosis: Diagnosis) -> list[Markup]:
     )
     out = [element("p", told)]
     if diagnosis.absorbed:
-        told = (
-            "Not testable here, which is not the same as absent: what the nominal parameters take up, or nothing drives"
-        )
-        out.append(element("p", told))
+        why = "what the nominal parameters take up, or no input of these trials drives"
+        out.append(element("p", f"Not testable here, which is not the same as absent: {why}"))
         rows: list[list[Content]] = [
             [element("code", n), stage_mark(str(effect(n).stage)), sentence(effect(n))] for n in diagnosis.absorbed
         ]
