@@ -3,7 +3,7 @@
 Measured walking (two strides, one adult) gives the joint torques; what ligaments and resting muscle give by themselves
 (Riener and Edrich 1999, healthy legs) is taken off; four sets of nerves are asked for the rest. Levers of the trunk's
 muscles are round figures of the size that imaging gives (Jorgensen et al. 2001, McGill et al. 1993), constant over
-posture: read "legs and trunk" as a sign and a size, no more (fes_pin/stimulate/tables/SOURCE.md).
+posture: read "legs and trunk" as a sign and a size, no more (fes_pin/muscles/tables/SOURCE.md).
 Run the cells, or `python analysis/allocate_walking.py`; the picture goes to out/allocate_walking.png.
 """
 
@@ -17,14 +17,14 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from fes_pin.allocate.allocate import Allocator, allocate
+from fes_pin.allocate.attainable import Attainable
+from fes_pin.allocate.walk import allocate_walk, clipped, direction_error, rescaled
 from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.measured_walk import read_walk
 from fes_pin.body.passive import PassiveLegs
-from fes_pin.stimulate.allocate import Allocator, allocate
-from fes_pin.stimulate.attainable import Attainable
-from fes_pin.stimulate.measured import read_walk
-from fes_pin.stimulate.nerves import Nerves
-from fes_pin.stimulate.recruitment import LinearRecruitment
-from fes_pin.stimulate.walk import allocate_walk, clipped, direction_error, rescaled
+from fes_pin.muscles.nerves import Nerves
+from fes_pin.muscles.recruitment import LinearRecruitment
 
 measured = read_walk()
 walk = measured.active(PassiveLegs())

@@ -10,11 +10,11 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.data.paper import ANGLE_NOISE_RAD, paper_trial, paper_twin
-from fes_pin.data.twin import GRAVITY
-from fes_pin.identify.antagonist import carried_covariance, fit_antagonist, with_antagonist
-from fes_pin.identify.error_region import profile_intervals
-from fes_pin.identify.ratios import RATIOS, RatioProblem, ankle_of, least_error
+from fes_pin.paper.antagonist import carried_covariance, fit_antagonist, with_antagonist
+from fes_pin.paper.constants import ANGLE_NOISE_RAD, paper_trial, paper_twin
+from fes_pin.paper.error_region import profile_intervals
+from fes_pin.paper.ratios import RATIOS, RatioProblem, ankle_of, least_error
+from fes_pin.paper.twin import GRAVITY
 
 OUT = Path(__file__).parents[1] / "out"
 OUT.mkdir(exist_ok=True)

@@ -9,13 +9,13 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.data.paper import PRINTED, STEPWISE, paper_study, paper_twin
-from fes_pin.data.twin import RunningTwin, staircase
 from fes_pin.diagnose.diagnosis import diagnose
 from fes_pin.identify.fit import fit
-from fes_pin.identify.ratios import RatioProblem, ankle_of, error_percent, least_error
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
+from fes_pin.paper.constants import PRINTED, STEPWISE, paper_study, paper_twin
+from fes_pin.paper.ratios import RatioProblem, ankle_of, error_percent, least_error
+from fes_pin.paper.twin import RunningTwin, staircase
 
 OUT = Path(__file__).parents[1] / "out"
 OUT.mkdir(exist_ok=True)

@@ -12,18 +12,18 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.data.paper import STEPWISE, paper_twin
-from fes_pin.data.twin import RunningTwin, record, staircase
-from fes_pin.identify.ratios import RatioProblem, ankle_of, least_error
+from fes_pin.control.control import PositionController
+from fes_pin.control.dynamics import AnkleDynamics
+from fes_pin.control.endurance import budget, least_rest
+from fes_pin.control.loop import sine, steps, track
+from fes_pin.control.observer import JointObserver
+from fes_pin.control.tuning import loop_at, margins
 from fes_pin.models.effects.fatigue import Fatigue
 from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.models.effects.recruitment_hysteresis import RecruitmentHysteresis
-from fes_pin.stimulate.control import PositionController
-from fes_pin.stimulate.dynamics import AnkleDynamics
-from fes_pin.stimulate.endurance import budget, least_rest
-from fes_pin.stimulate.loop import sine, steps, track
-from fes_pin.stimulate.observer import JointObserver
-from fes_pin.stimulate.tuning import loop_at, margins
+from fes_pin.paper.constants import STEPWISE, paper_twin
+from fes_pin.paper.ratios import RatioProblem, ankle_of, least_error
+from fes_pin.paper.twin import RunningTwin, record, staircase
 
 OUT = Path(__file__).parents[1] / "out"
 OUT.mkdir(exist_ok=True)

@@ -10,12 +10,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.data.paper import ANGLE_NOISE_RAD, PRINTED, STEPWISE, paper_study, paper_trial, paper_twin
-from fes_pin.data.twin import record, staircase
-from fes_pin.identify.error_region import ellipsoid_floor, error_domain, error_holding, profile_intervals
-from fes_pin.identify.identifiability import identifiability
-from fes_pin.identify.ratios import RATIOS, UNITS, RatioProblem, ankle_of, least_error
 from fes_pin.models.nominal import nominal_model
+from fes_pin.paper.constants import ANGLE_NOISE_RAD, PRINTED, STEPWISE, paper_study, paper_trial, paper_twin
+from fes_pin.paper.error_region import ellipsoid_floor, error_domain, error_holding, profile_intervals
+from fes_pin.paper.identifiability import identifiability
+from fes_pin.paper.ratios import RATIOS, UNITS, RatioProblem, ankle_of, least_error
+from fes_pin.paper.twin import record, staircase
 
 OUT = Path(__file__).parents[1] / "out"
 OUT.mkdir(exist_ok=True)

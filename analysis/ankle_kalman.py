@@ -9,13 +9,13 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.data.paper import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_twin
-from fes_pin.data.twin import record, staircase
 from fes_pin.identify.fit import fit
-from fes_pin.identify.kalman import GainFilter, Recruitment, chi2_band, nees, track_gain
 from fes_pin.identify.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
+from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_twin
+from fes_pin.paper.kalman import GainFilter, Recruitment, chi2_band, nees, track_gain
+from fes_pin.paper.twin import record, staircase
 
 OUT = Path(__file__).parents[1] / "out"
 OUT.mkdir(exist_ok=True)

@@ -20,7 +20,7 @@ from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.linearize import linearize
 from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto
-from fes_pin.stimulate.nerves import Nerves
+from fes_pin.muscles.nerves import Nerves
 
 body = Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
 legs = Nerves(tuple(n for n in Nerves().names if not n.endswith(("erector_spinae", "abdominals"))))

@@ -29,9 +29,9 @@ _WHERE = {
     "Body": "fes_pin.body.build",
     "linearize": "fes_pin.body.linearize",
     "minimal_sets": "fes_pin.body.minimal_sets",
-    "controllability": "fes_pin.stimulate.nerve_inputs",
-    "allocate": "fes_pin.stimulate.allocate",
-    "Nerves": "fes_pin.stimulate.nerves",
+    "controllability": "fes_pin.muscles.nerve_inputs",
+    "allocate": "fes_pin.allocate.allocate",
+    "Nerves": "fes_pin.muscles.nerves",
 }
 _CHAPTERS = {"effects": "fes_pin.models.effects", "rigs": "fes_pin.models.rigs"}
 

@@ -10,18 +10,18 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.decide.held_out import Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.experiment import SEPARABLE, NextExperiment, next_experiment
-from fes_pin.diagnose.held_out import Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
-from fes_pin.diagnose.open_set import Remainder, remainder
-from fes_pin.diagnose.promise import best_by_effect
-from fes_pin.diagnose.search import Search, Searched
-from fes_pin.diagnose.unfinished import alike
-from fes_pin.diagnose.workers import one_thread_each
+from fes_pin.diagnose.remainder.open_set import Remainder, remainder
+from fes_pin.diagnose.search.promise import best_by_effect
+from fes_pin.diagnose.search.search import Search, Searched
+from fes_pin.diagnose.search.unfinished import alike
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
 from fes_pin.identify.own import amplitude
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
+from fes_pin.workers import one_thread_each
 
 ABSORBED_BELOW = 0.04
 """Share of its norm that an effect's sensitivity must keep beside the nominal parameters to be testable."""

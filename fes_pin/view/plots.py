@@ -15,9 +15,9 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as MplPath
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.missing import Missing, binned, explained, smoothed
 from fes_pin.diagnose.replay import Replay
 from fes_pin.identify.noise import NoiseModel
+from fes_pin.view.missing import Missing, binned, explained, smoothed
 from fes_pin.view.style import (
     BAND,
     EXTENDED,

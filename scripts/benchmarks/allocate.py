@@ -17,13 +17,13 @@ if __name__ == "__main__":
 
 import numpy as np
 
+from fes_pin.allocate.allocate import Allocator, allocate
+from fes_pin.allocate.horizon import Horizon
+from fes_pin.allocate.walk import allocate_walk, clipped, direction_error, rescaled
 from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.measured_walk import read_walk
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.allocate import Allocator, allocate
-from fes_pin.stimulate.horizon import Horizon
-from fes_pin.stimulate.measured import read_walk
-from fes_pin.stimulate.nerves import Nerves
-from fes_pin.stimulate.walk import allocate_walk, clipped, direction_error, rescaled
+from fes_pin.muscles.nerves import Nerves
 
 SAMPLES = 100_000
 MUSCLES = (

@@ -14,7 +14,7 @@ from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.linearize import linearize, linearize_batch, linearize_chunks
 from fes_pin.body.observability import observability
-from fes_pin.stimulate.nerves import Nerves
+from fes_pin.muscles.nerves import Nerves
 
 POSTURES = 100_000
 

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.data.paper import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_twin
-from fes_pin.data.twin import RunningTwin, record
-from fes_pin.identify.kalman import GainFilter, Recruitment
-from fes_pin.identify.ratios import ankle_of
+from fes_pin.control.control import PositionController
+from fes_pin.control.loop import sine, track
 from fes_pin.models.effects.fatigue import Fatigue
-from fes_pin.stimulate.control import PositionController
-from fes_pin.stimulate.loop import sine, track
+from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_twin
+from fes_pin.paper.kalman import GainFilter, Recruitment
+from fes_pin.paper.ratios import ankle_of
+from fes_pin.paper.twin import RunningTwin, record
 
 FATIGUE = {"rate_per_s": 0.068, "recovery_s": 60.0}
 

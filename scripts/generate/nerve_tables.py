@@ -1,4 +1,4 @@
-"""Write the rounded tables in fes_pin/stimulate/tables from the measured moment arms.
+"""Write the rounded tables in fes_pin/muscles/tables from the measured moment arms.
 
 The measured data is not in the repository; it lies in FES_PIN_DATA or in `shared` beside the repository.
 Run: python scripts/generate/nerve_tables.py
@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("FES_PIN_DATA", ROOT.parent / "shared"))
 SOURCE = (DATA if (DATA / "nerve_moment_arms").is_dir() else DATA / "data") / "nerve_moment_arms"
-TABLES = ROOT / "fes_pin" / "stimulate" / "tables"
+TABLES = ROOT / "fes_pin" / "muscles" / "tables"
 POSTURES = ["neutral", "mid_stance", "mid_swing", "push_off"]
 # the measured model's coordinate -> this project's joint, and the sign between them (the model's knee extends positive)
 JOINTS = {

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 import scipy.optimize
 
-from fes_pin.data.paper import FRAME_DAMPING, FRAME_HZ, PRINTED, STEPWISE, twin_of_ratios
-from fes_pin.data.twin import AnkleTwin, record, staircase
-from fes_pin.identify.ratios import RATIOS, RatioProblem, ankle_of, least_error
+from fes_pin.paper.constants import FRAME_DAMPING, FRAME_HZ, PRINTED, STEPWISE, twin_of_ratios
+from fes_pin.paper.ratios import RATIOS, RatioProblem, ankle_of, least_error
+from fes_pin.paper.twin import AnkleTwin, record, staircase
 
 
 def on_frame(name: str, x: np.ndarray) -> AnkleTwin:
@@ -37,7 +37,7 @@ def conditions(x: np.ndarray, name: str) -> np.ndarray:
 
 
 def main() -> None:
-    """Print the constants of `fes_pin.data.paper.ON_FRAME`."""
+    """Print the constants of `fes_pin.paper.constants.ON_FRAME`."""
     for name, printed in PRINTED.items():
         table = np.log([printed.ratios[n] for n in RATIOS])
         start = np.r_[table + np.log([0.8, 0.8, 0.35]), np.log(1.2)]

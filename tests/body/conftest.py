@@ -1,29 +1,9 @@
 """What the tests of the body share: bodies, measured data, and slow oracles."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from fes_pin.body.build import Body
-
-REPOSITORY = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="session")
-def walk() -> Path:
-    """Folder of the measured walk; the test that needs it is skipped, and says so, where there is none."""
-    root = Path(os.environ.get("FES_PIN_DATA", REPOSITORY.parent / "shared"))
-    for folder in (root / "data/walking_subject01", root / "walking_subject01"):
-        if folder.is_dir():
-            return folder
-    pytest.skip(f"no measured walk: neither FES_PIN_DATA nor {root} holds walking_subject01")
-
-
-@pytest.fixture(scope="session")
-def body() -> Body:
-    return Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
 
 
 @pytest.fixture(scope="session")

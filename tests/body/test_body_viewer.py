@@ -13,7 +13,7 @@ import pytest
 from fes_pin.body.controllability import controllability
 from fes_pin.body.linearize import linearize
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.nerves import Nerves
+from fes_pin.muscles.nerves import Nerves
 from fes_pin.view.influence import influence_table, plot_influence
 from fes_pin.view.live import LiveViewer
 from fes_pin.view.viewer import Scene, show_influence, show_mode, show_walk
@@ -102,7 +102,7 @@ def test_a_live_viewer_shows_one_scene_after_the_other_and_moves(body, screensho
 @pytest.mark.parametrize("opened", [True, False], ids=["page open", "at once"])
 def test_the_command_serves_until_it_is_interrupted(opened):
     heard = "from signal import *; signal(SIGINT, default_int_handler)"  # a runner may have it ignored
-    run = f"{heard}; from fes_pin.cli import main; main()"
+    run = f"{heard}; from fes_pin.cli.main import main; main()"
     command = [sys.executable, "-c", run, "body", "view", "--live", "--mode", "9"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:

@@ -15,7 +15,7 @@ from fes_pin.body.linearize import linearize
 from fes_pin.body.observability import fewest_goniometers, observability
 from fes_pin.body.passive import ElasticJoints
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.nerves import Nerves
+from fes_pin.muscles.nerves import Nerves
 
 
 @pytest.fixture(scope="module")

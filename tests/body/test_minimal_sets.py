@@ -11,7 +11,7 @@ from fes_pin.body.inputs import Inputs
 from fes_pin.body.linearize import linearize
 from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto
 from fes_pin.data.errors import InputError
-from fes_pin.stimulate.nerves import Nerves
+from fes_pin.muscles.nerves import Nerves
 
 RIGHT = tuple(f"right_{n}" for n in ("superior_gluteal", "hamstrings", "femoral", "obturator", "iliopsoas", "tibial"))
 PEELED = (*ORTHOSES["corset"], *ORTHOSES["left_ankle_foot_orthosis"], *ORTHOSES["right_ankle_foot_orthosis"])

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fes_pin.diagnose.claims import Claims
+from fes_pin.diagnose.decide.claims import Claims
+from fes_pin.diagnose.decide.held_out import Evidence, Gain, _evidence
 from fes_pin.diagnose.diagnosis import REFUSED_LEVEL, Cause, _with_refused
-from fes_pin.diagnose.held_out import Evidence, Gain, _evidence
-from fes_pin.diagnose.open_set import Remainder
+from fes_pin.diagnose.remainder.open_set import Remainder
 
 
 def test_evidence_covers_what_the_difference_is_worth():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from diagnose.hidden import study_of
 
-from fes_pin.diagnose.held_out import RUNAWAY, errors_of, separate
+from fes_pin.diagnose.decide.held_out import RUNAWAY, errors_of, separate
 from fes_pin.identify.fit import fit
 from fes_pin.models.effects import effect
 from fes_pin.models.nominal import nominal_model

@@ -5,7 +5,7 @@ import pytest
 from identify.rigs import WHITE, measured
 from models.cases import RIGS, trial
 
-from fes_pin.diagnose.joint_fits import ANOTHER_MINIMUM, JointFits
+from fes_pin.diagnose.search.joint_fits import ANOTHER_MINIMUM, JointFits
 from fes_pin.identify.fit import fit_problem
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.effects.sensor_offset import SensorOffset

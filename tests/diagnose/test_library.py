@@ -4,8 +4,8 @@ import itertools
 
 import numpy as np
 
-from fes_pin.diagnose.library import Probe
-from fes_pin.diagnose.promise import Scored, Scores, best_pairs
+from fes_pin.diagnose.search.library import Probe
+from fes_pin.diagnose.search.promise import Scored, Scores, best_pairs
 from fes_pin.models.effects import effects_for
 
 

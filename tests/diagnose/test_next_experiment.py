@@ -11,7 +11,7 @@ from identify.rigs import WHITE, off
 from oracle import make_study, simulate
 from oracle.studies import _ankle
 
-from fes_pin import cli
+from fes_pin.cli import main
 from fes_pin.data.study import write_study
 from fes_pin.data.trial import read_trial, trial_csv
 from fes_pin.diagnose.experiment import ROOM, candidates, next_experiment, promises
@@ -27,7 +27,7 @@ DELAY, LAG = "electromechanical_delay", "second_order_activation"
 def run(monkeypatch, *words):
     monkeypatch.setattr(sys, "argv", ["fes-pin", *map(str, words)])
     with pytest.raises(SystemExit) as ended:
-        cli.main()
+        main.main()
     return ended.value.code or 0
 
 

@@ -9,14 +9,14 @@ import scipy.signal
 from diagnose.hidden import study_of
 from identify.rigs import trials_of
 
-from fes_pin.diagnose.bursts import burst_p_value
-from fes_pin.diagnose.innovations import channels, under_own_noise
-from fes_pin.diagnose.open_set import FULL_NOISE, REMAINDER_LEVEL, SHARES, remainder
-from fes_pin.diagnose.play import play_p_value
-from fes_pin.diagnose.promise import Projection
-from fes_pin.diagnose.repeated import repeated_p_value
-from fes_pin.diagnose.slips import slip_p_value
-from fes_pin.diagnose.uneven import uneven_p_value
+from fes_pin.diagnose.remainder.bursts import burst_p_value
+from fes_pin.diagnose.remainder.innovations import channels, under_own_noise
+from fes_pin.diagnose.remainder.open_set import FULL_NOISE, REMAINDER_LEVEL, SHARES, remainder
+from fes_pin.diagnose.remainder.play import play_p_value
+from fes_pin.diagnose.remainder.repeated import repeated_p_value
+from fes_pin.diagnose.remainder.slips import slip_p_value
+from fes_pin.diagnose.remainder.uneven import uneven_p_value
+from fes_pin.diagnose.search.promise import Projection
 from fes_pin.identify.fit import fit
 from fes_pin.identify.noise import Noise, estimate_noise
 from fes_pin.models.nominal import nominal_model

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from fes_pin.diagnose.library import Probe
-from fes_pin.diagnose.promise import Projection
+from fes_pin.diagnose.search.library import Probe
+from fes_pin.diagnose.search.promise import Projection
 from fes_pin.identify.fit import PARAMETER_PRICE
 from fes_pin.identify.problem import Linearized
 from fes_pin.models.effects.mains_hum import MainsHum

@@ -22,7 +22,19 @@ from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import Simulator, max_step, simulate
 
 GOLDEN = Path(__file__).with_name("causes.txt")
-NOT_YET = {"pulse_summation"}
+NOT_YET = {
+    "pulse_summation": {"muscle"},
+    "force_length": {"muscle"},
+    "force_velocity": {"muscle"},
+    "series_elasticity": {"muscle"},
+    "length_dependent_activation": {"muscle"},
+    "residual_force_enhancement": {"muscle"},
+    "effort_gain": {"joint"},
+    "cogging": {"joint"},
+    "backlash": {"joint"},
+    "condition_misread": {"ankle", "joint", "muscle"},
+}
+"""Rigs of the contract on which a cause is not built yet."""
 CASE = pytest.mark.parametrize(("one", "rig", "kind"), CASES, ids=name_of)
 
 
@@ -32,11 +44,8 @@ def golden():
 
 
 def test_names_stages_and_rigs_are_the_canonical_ones():
-    canonical = {n: row for n, row in golden().items() if row[0] != "body"}
-    assert {e.name for e in EFFECTS} == set(canonical) - NOT_YET
-    for one in EFFECTS:
-        stage, rigs = canonical[one.name]
-        assert (one.stage, set(one.rigs)) == (stage, rigs)
+    canonical = {n: (stage, rigs - NOT_YET.get(n, set())) for n, (stage, rigs) in golden().items() if stage != "body"}
+    assert {e.name: (e.stage, set(e.rigs)) for e in EFFECTS} == {n: row for n, row in canonical.items() if row[1]}
 
 
 def test_the_golden_table_is_the_contract(shared):

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from view.reported import ankle_diagnosis, ankle_study, joint_study
 
-from fes_pin.diagnose.missing import binned, explained, missing_input, smooth
 from fes_pin.diagnose.replay import replay
 from fes_pin.models.effects import effect
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
+from fes_pin.view.missing import binned, explained, missing_input, smooth
 
 
 def missing_of(study, added, index=0):

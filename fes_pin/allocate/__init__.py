@@ -1,0 +1,1 @@
+"""From joint torques to pulse widths: programs, certificates, what can be attained."""

@@ -1,0 +1,188 @@
+"""What an allocation says: pulse widths, what torque they make, what is short, why, and the proof."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fes_pin.allocate.certificate import Certificate
+
+if TYPE_CHECKING:
+    from fes_pin.allocate.allocator import Allocator
+
+REPORTED_NM = 0.5
+"""A shortfall is put in words from this size on, N m."""
+NEGLIGIBLE = 1e-7
+"""A multiplier smaller than this is 0 (of a cost whose largest curvature is about 1)."""
+WORTH_NAMING = 0.1
+"""A channel is named as a reason if it makes at least this fraction of what the most helpful limited one makes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Allocation:
+    """Pulse widths for a wanted torque.
+
+    Attributes
+    ----------
+    recruitment, pulse_width_us
+        (n,) fraction 0 to 1 and us, per channel in the order of `names`.
+    wanted, achieved
+        (joints,) N m.
+    gradient
+        (n,) slope of the cost over recruitment: negative at a limit that holds a channel down.
+    lower, upper
+        (n,) limits of recruitment that applied.
+    previous
+        (n,) recruitments that were in force before.
+    certificate
+        Recomputed from the moment arms; None where the choice is not convex (then `gap` speaks).
+    gap
+        No choice costs less than this one minus `gap` (of the cost divided by the certificate's scale).
+    allocator
+        The program: names, moment arms, weights.
+    """
+
+    recruitment: np.ndarray
+    pulse_width_us: np.ndarray
+    wanted: np.ndarray
+    achieved: np.ndarray
+    gradient: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    previous: np.ndarray
+    certificate: Certificate
+    gap: float
+    allocator: Allocator
+    note: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Channels."""
+        return self.allocator.names
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints."""
+        return self.allocator.joints
+
+    @property
+    def shortfall(self) -> np.ndarray:
+        """Wanted minus achieved torque, (joints,) N m."""
+        return self.wanted - self.achieved
+
+    @property
+    def pulse_widths_us(self) -> dict[str, float]:
+        """Pulse width per channel by name, us."""
+        return dict(zip(self.names, self.pulse_width_us.tolist(), strict=True))
+
+    @property
+    def multipliers(self) -> dict[str, float]:
+        """Price of every limit that binds, (N m)^2 per unit of recruitment: + for an upper limit, - for a lower one."""
+        price = -self.gradient * self.certificate.scale
+        binds = (self.lower < self.upper) & (np.abs(self.gradient) > NEGLIGIBLE)
+        return {name: float(p) for name, p, b in zip(self.names, price, binds, strict=True) if b}
+
+    @property
+    def active(self) -> dict[str, str]:
+        """What holds each channel at a limit: `off`, `saturated`, `rising`, `falling`, `least`, `dead`, `limited`."""
+        return {name: word for i, name in enumerate(self.names) if (word := self.limit(i))}
+
+    def limit(self, i: int) -> str:
+        """What holds channel i, empty if nothing does."""
+        r, program = self.recruitment[i], self.allocator
+        if program.upper[i] == 0.0 or not program.matrix[:, i].any():
+            return "dead"
+        if r >= self.upper[i]:
+            return "saturated" if r >= 1.0 else "limited" if r >= program.upper[i] else "rising"
+        if r <= self.lower[i] and r > program.lower[i]:
+            return "falling"
+        if r <= 0.0:
+            return "off"
+        return "least" if program.least is not None and r <= program.least[i] else ""
+
+    @property
+    def reasons(self) -> list[str]:
+        """One sentence per joint whose torque misses by `REPORTED_NM` or more, the worst first."""
+        weighed = np.abs(self.shortfall) * (self.allocator.weights > 0.0)
+        return [self.reason(int(j)) for j in np.argsort(-weighed) if weighed[j] >= REPORTED_NM]
+
+    def reason(self, j: int) -> str:
+        """Why the torque of joint j misses."""
+        short, wanted = self.shortfall[j], self.wanted[j]
+        word = "short" if short * wanted > 0.0 else "too much"
+        joint = self.joints[j].replace("_", " ")
+        return f"{joint} {abs(short):.1f} N m {word}: {self.cause(j, np.sign(short))}"
+
+    def cause(self, j: int, direction: float) -> str:
+        """What keeps joint j from more torque in a direction."""
+        program = self.allocator
+        help_ = program.nominal[j] * direction
+        by_name = [name.replace("_", " ") for name in self.names]
+        words = [self.limit(i) for i in range(len(self.names))]
+        if not help_.any():
+            weak = [name for name, column in zip(by_name, program.nominal.T, strict=True) if not column.any()]
+            return "no stimulated nerve turns it" + (f" ({', '.join(weak)} without strength)" if weak else "")
+        stuck = {"saturated", "limited", "rising", "dead"}
+        held = [int(i) for i in np.argsort(-help_) if help_[i] > 0.0 and words[i] in stuck]
+        held += [int(i) for i in np.argsort(help_) if help_[i] < 0.0 and words[i] == "falling"]
+        if held:
+            strongest = max(abs(help_[i]) for i in held)
+            named = [i for i in held if abs(help_[i]) >= WORTH_NAMING * strongest]
+            return ", ".join(f"{by_name[i]} {words[i]}" for i in named[:3])
+        if not (help_ > 0.0).any():
+            return "no stimulated nerve pulls that way"
+        return self.conflict(j, int(np.argmax(help_)), by_name)
+
+    def conflict(self, j: int, i: int, by_name: list[str]) -> str:
+        """What a little more of channel i, which would help joint j, would spoil."""
+        program = self.allocator
+        if program.least is not None and self.recruitment[i] == 0.0:
+            return f"{by_name[i]} off: its least recruitment would be too much"
+        costs = -program.weights * self.shortfall * program.matrix[:, i] / program.scale
+        k = int(np.argmax(costs))
+        if k == j or costs[k] < float(program.prices[i] * self.recruitment[i]):
+            return f"more {by_name[i]} is not worth its effort"
+        return f"more {by_name[i]} would spoil {self.joints[k].replace('_', ' ')}"
+
+    def __str__(self) -> str:
+        on = [
+            f"{name.replace('_', ' ')} {width:.0f} us"
+            for name, width in zip(self.names, self.pulse_width_us, strict=True)
+            if width > 0.0
+        ]
+        lines = [", ".join(on) or "nothing stimulated", *(self.reasons or ["every torque within 0.5 N m"])]
+        proof = (
+            f"optimal to {max(self.certificate.residual, 0.0):.0e}"
+            if not self.allocator.choosy
+            else f"gap {self.gap:.0e}"
+        )
+        return "\n".join([*lines, f"{proof}{'; ' + self.note if self.note else ''}"])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AllocationSequence:
+    """Allocations of a torque over time, as arrays; `at(k)` is one of them.
+
+    Attributes
+    ----------
+    recruitment, pulse_width_us, gradient
+        (samples, n).
+    wanted, achieved
+        (samples, joints), N m.
+    residual
+        (samples,) recomputed greatest residual of the optimality conditions (see `Certificate`).
+    """
+
+    recruitment: np.ndarray
+    pulse_width_us: np.ndarray
+    wanted: np.ndarray
+    achieved: np.ndarray
+    residual: np.ndarray
+    allocator: Any
+
+    @property
+    def shortfall(self) -> np.ndarray:
+        """Wanted minus achieved torque, (samples, joints), N m."""
+        return self.wanted - self.achieved

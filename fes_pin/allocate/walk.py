@@ -1,0 +1,121 @@
+"""Allocation over a motion: another posture, so other moment arms, at every sample; the rules of thumb beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fes_pin.allocate.allocation import Allocation
+from fes_pin.allocate.allocator import Allocator
+from fes_pin.allocate.box import solve_sequence
+from fes_pin.allocate.certificate import residuals
+from fes_pin.data.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WalkAllocation:
+    """Allocations along a motion.
+
+    Attributes
+    ----------
+    recruitment, pulse_width_us
+        (samples, n).
+    wanted, achieved
+        (samples, joints), N m.
+    residual
+        (samples,) greatest residual of the optimality conditions, recomputed from the moment arms.
+    matrices
+        (samples, joints, n) torque at full recruitment, N m.
+    allocator
+        The options; its own moment arms are those of the first sample.
+    """
+
+    recruitment: np.ndarray
+    pulse_width_us: np.ndarray
+    wanted: np.ndarray
+    achieved: np.ndarray
+    residual: np.ndarray
+    matrices: np.ndarray
+    allocator: Allocator
+
+    @property
+    def shortfall(self) -> np.ndarray:
+        """Wanted minus achieved torque, (samples, joints), N m."""
+        return self.wanted - self.achieved
+
+    def at(self, k: int) -> Allocation:
+        """Sample k with its reasons in words."""
+        p = self.allocator
+        options: dict[str, Any] = {
+            "weights": p.weights,
+            "effort": p.effort,
+            "lower": p.lower,
+            "upper": p.upper,
+            "change": p.change,
+        }
+        one = Allocator(self.matrices[k], recruitment=p.curves.curves, **options)
+        one.names, one.joints = p.names, p.joints
+        before = self.recruitment[k - 1] if k else np.zeros(p.n)
+        return one.result(self.recruitment[k], self.wanted[k], p.lower, p.upper, before)
+
+
+def allocate_walk(torques, nerves, q, **options) -> WalkAllocation:
+    """Allocate torques along a motion, each sample starting from the last.
+
+    Parameters
+    ----------
+    torques, q
+        (samples, joints) N m and (samples, joints) rad.
+    nerves
+        `Nerves`, or their matrices (samples, joints, n) (then `q` is not read).
+    options
+        See `Allocator`; no least recruitments, cubes or lexicographic, no rate.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, numbers that are not finite, or such an option.
+    """
+    wanted = np.asarray(torques, dtype=float)
+    named = hasattr(nerves, "torque_matrix")
+    matrices = np.array(nerves.torque_matrix(q) if named else nerves, dtype=float)
+    if matrices.ndim != 3 or wanted.shape != matrices.shape[:2] or not len(wanted):
+        raise InputError(f"torques of shape {wanted.shape} do not fit moment arms of shape {matrices.shape}")
+    if not np.isfinite(wanted).all() or not np.isfinite(matrices).all():
+        raise InputError("torques and moment arms along the motion must be finite numbers")
+    p = Allocator(nerves, np.asarray(q)[0], **options) if named else Allocator(matrices[0], **options)
+    if p.choosy or p.cubes or p.lexicographic or p.rate < np.inf:
+        raise InputError("least recruitments, cubes, lexicographic and rate are allocated one torque at a time")
+    matrices = matrices * (p.upper > 0.0)
+    weighed = np.swapaxes(matrices, 1, 2) * p.weights
+    H = weighed @ matrices
+    scale = float(np.einsum("kii->ki", H).max()) or 1.0
+    H /= scale
+    H[:, range(p.n), range(p.n)] += p.effort + p.change
+    F = -np.einsum("knj,kj->kn", weighed, wanted) / scale
+    r = solve_sequence(H, F, p.lower, p.upper, keep=p.change)
+    achieved = np.einsum("kjn,kn->kj", matrices, r)
+    before = np.vstack([np.zeros(p.n), r[:-1]])
+    gradient = np.einsum("knj,kj->kn", weighed, achieved - wanted) / scale + p.effort * r + p.change * (r - before)
+    residual = np.maximum.reduce(residuals(gradient, r, p.lower, p.upper)[:3])
+    return WalkAllocation(r, p.curves.pulse_width_us(r), wanted, achieved, residual, matrices, p)
+
+
+def clipped(matrix: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """Rule of thumb: least-squares recruitment without limits, then cut to 0 and 1."""
+    return np.clip(np.linalg.lstsq(matrix, torque, rcond=None)[0], 0.0, 1.0)
+
+
+def rescaled(matrix: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """Rule of thumb: the same, negatives to 0, then all divided by the largest if that exceeds 1."""
+    r = np.maximum(np.linalg.lstsq(matrix, torque, rcond=None)[0], 0.0)
+    return r / max(1.0, r.max(initial=0.0))
+
+
+def direction_error(wanted: np.ndarray, achieved: np.ndarray) -> np.ndarray:
+    """Angle between wanted and achieved torque, rad, over the last axis; a quarter turn where nothing is achieved."""
+    product = (wanted * achieved).sum(-1)
+    size = np.linalg.norm(wanted, axis=-1) * np.linalg.norm(achieved, axis=-1)
+    return np.arccos(np.clip(np.where(size > 0.0, product / np.where(size > 0.0, size, 1.0), 0.0), -1.0, 1.0))

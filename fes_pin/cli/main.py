@@ -1,0 +1,157 @@
+"""The command line: `fes-pin diagnose | predict | effects | body | allocate`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from fes_pin.cli.allocate import allocate
+from fes_pin.cli.body import app as body
+
+if TYPE_CHECKING:
+    from fes_pin.diagnose.diagnosis import Diagnosis
+
+app = typer.Typer(
+    help="Functional electrical stimulation on Pinocchio: what a simulation gets wrong, and its cause by name.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.add_typer(body, name="body")
+app.command()(allocate)
+
+DIAGNOSING = 0.8
+"""Share of the time of `diagnose` before the report is drawn, about."""
+
+
+@app.command()
+def diagnose(
+    study: Annotated[Path, typer.Argument(help="Folder of a study, or its study.toml.")],
+    out: Annotated[Path, typer.Option(help="Folder for diagnosis.json, model.toml and report.html.")],
+    seed: Annotated[int, typer.Option(help="Of what is simulated: critical values and bootstrap intervals.")] = 0,
+) -> None:
+    """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
+    from fes_pin.data.files import check_folder, write_files
+    from fes_pin.data.study import read_study
+
+    measured = read_study(study)  # what cannot be read or written is said before anything else is even imported
+    check_folder(out)
+    from fes_pin.diagnose.diagnosis import diagnose as find
+    from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files
+    from fes_pin.view.report import report_html
+
+    with _progress() as tell:
+        diagnosis = find(measured, seed=seed, progress=lambda share, words: tell(DIAGNOSING * share, words))
+        tell(DIAGNOSING, "report")
+        files = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
+        tell(1.0, "done")
+    write_files(out, files)
+    if NEXT_FILE not in files:  # what an earlier diagnosis proposed is not this one's
+        (out / NEXT_FILE).unlink(missing_ok=True)
+    _print_verdict(diagnosis)
+    typer.echo(f"report: {out / 'report.html'}")
+
+
+@app.command()
+def predict(
+    model: Annotated[Path, typer.Argument(help="model.toml of a diagnosis.")],
+    trial: Annotated[Path, typer.Argument(help="CSV with time_s and the inputs.")],
+    out: Annotated[Path, typer.Option(help="CSV to write: time_s and the predicted outputs.")],
+    setting: Annotated[
+        list[str] | None, typer.Option("--set", help="A condition of the trial: load_kg=1.5, kind=isometric ...")
+    ] = None,
+) -> None:
+    """Predict a trial from its inputs with a saved model."""
+    from fes_pin.data.trial import read_trial, write_trial
+    from fes_pin.models.predict import predict as run
+    from fes_pin.models.store import load_model
+
+    loaded = load_model(model)
+    kind, conditions = _settings(setting or [])
+    given = read_trial(trial, rig=loaded.rig.name, kind=kind, conditions=conditions, inputs_only=True)
+    write_trial(run(loaded, given), out)
+
+
+@app.command()
+def effects() -> None:
+    """List the causes it knows, with stage, equation and parameters."""
+    from fes_pin.models.describe import describe
+    from fes_pin.models.effects import EFFECTS
+
+    for one in EFFECTS:
+        typer.echo(describe(one))
+
+
+def _settings(pairs: list[str]) -> tuple[str | None, dict[str, float]]:
+    """`--set` options as the kind of trial and its numbers."""
+    from fes_pin.data.errors import InputError
+
+    kind, numbers = None, {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not equals or not name:
+            raise InputError(f"expected --set NAME=VALUE, found {pair!r}")
+        if name == "kind":
+            kind = value
+            continue
+        try:
+            numbers[name] = float(value)
+        except ValueError:
+            raise InputError(f"expected a number for --set {name}, found {value!r}") from None
+    return kind, numbers
+
+
+def _print_verdict(diagnosis: Diagnosis) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from fes_pin.diagnose.text import cause_row, footnotes, headline
+
+    console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=not sys.stdout.isatty(), highlight=False)
+    console.print(Text(f"{diagnosis.study.name}: {headline(diagnosis)}", style="bold"))
+    if diagnosis.causes:
+        table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+        for title in ("cause", "stage", "parameters", "held-out gain", "cannot be told from"):
+            table.add_column(title)
+        for cause in diagnosis.causes:
+            table.add_row(*(Text(cell) for cell in cause_row(cause)))
+        console.print(table)
+    for note in footnotes(diagnosis):
+        console.print(Text(note))
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[float, str], None]]:
+    """A progress bar on standard error, if a person is watching."""
+    if not sys.stderr.isatty():
+        yield lambda _share, _words: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("reading", total=1.0)
+        yield lambda share, words: bar.update(task, completed=share, description=words)
+
+
+def main() -> None:
+    """Run the command line: bad input gives one line and exit code 2."""
+    from fes_pin.data.errors import InputError
+
+    try:
+        app()
+    except InputError as error:
+        typer.echo(f"fes-pin: {error}", err=True)
+        raise SystemExit(2) from None
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,286 @@
+"""Gains of the position control by a stated rule, and the margins that they leave.
+
+The feedback's gains are those of a linear quadratic regulator at each angle. Its one weight follows a rule: one degree
+of error is worth `boldness` of the muscle (Bryson's rule), and `boldness` is that of a ladder with which the linear
+loop, its observer included, decays fastest at the worst corner of +-30 % in gain, time constant and stiffness over the
+whole range of angles; of several that are as good, the boldest. A frame that was identified (`frame_vibration`) swings
+in that loop, though the observer does not know it: an observer that takes the frame's swing for an unknown torque,
+answers it a little late and so feeds it, is made slower as far as that helps. Where no loop is stable, there is no
+tuning.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
+from fes_pin.control.observer import JointObserver
+from fes_pin.data.errors import InputError
+
+DEGREE = math.pi / 180.0
+LADDER = (0.5, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05, 0.03)
+"""Shares of the muscle that one degree of error may be worth, boldest first."""
+SLOWER = (1.0, 0.35, 0.12, 0.04)
+"""Shares of the observer's torque wander, quickest first: without a frame the first that is stable serves."""
+AS_GOOD = 0.002
+"""Difference of two moduli, per pulse, that does not count."""
+UNCERTAINTY = 0.3
+"""Of gain, time constant and stiffness."""
+ANGLES = 9
+"""Angles that gains are computed for."""
+FREQUENCIES = 4000
+"""Up to half the pulse rate, for the margins."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Feedback of (share times activation, angle, rate) to recruitment, by angle.
+
+    Attributes
+    ----------
+    angles
+        Shape (n,), rad.
+    table
+        Shape (n, 3).
+    boldness
+        As the rule chose it.
+    radius
+        Largest modulus of the loop's eigenvalues over corners and angles; below 1.
+    torque_wander
+        Of the observer that they belong to, N m.
+    """
+
+    angles: np.ndarray
+    table: np.ndarray
+    boldness: float
+    radius: float
+    torque_wander: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_rows", self.table.tolist())
+        object.__setattr__(self, "_ends", (float(self.angles[0]), float(self.angles[-1])))
+
+    def at(self, angle: float) -> list[float]:
+        """The three gains at an angle, between the table's by straight lines."""
+        rows: list[list[float]] = self._rows  # type: ignore[attr-defined]
+        first, last = self._ends  # type: ignore[attr-defined]
+        place = min(max((angle - first) / (last - first), 0.0), 1.0) * (len(rows) - 1)
+        k = min(int(place), len(rows) - 2)
+        part = place - k
+        (a, b, c), (d, e, f) = rows[k], rows[k + 1]
+        return [a + part * (d - a), b + part * (e - b), c + part * (f - c)]
+
+
+def plant(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """The joint held at an angle, from pulse to pulse, its frame at rest: transition (4, 4) of (activation, angle,
+    rate, torque), input (4,), and torque that full activation makes.
+    """
+    a, b = _held(dynamics.linear(q, dynamics.activation_for(q), 1.0)[:4, :4], dynamics.time_constant)
+    return a, b, dynamics.pull_nm * math.sin(q)
+
+
+def moved(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray]:
+    """Transition and input of what truly moves: (activation, angle, rate), and the frame where there is one."""
+    if dynamics.frame_coupling:
+        return swinging(dynamics, q)
+    a, b, _ = plant(dynamics, q)
+    return a[:3, :3], b[:3]
+
+
+def swinging(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray]:
+    """The joint on its frame: transition (5, 5) of (activation, angle, rate, frame's angle, frame's rate), input (5,).
+
+    phi'' = -omega^2 phi - 2 zeta omega phi' - coupling torque / J, and the sensor sees the joint against the frame.
+    """
+    f, c = np.zeros((5, 5)), dynamics.frame_coupling
+    omega = 2.0 * math.pi * dynamics.frame_hz
+    spring = np.array([0.0, 0.0, 0.0, -omega * omega, -2.0 * dynamics.frame_damping * omega])
+    joint = dynamics.linear(q, dynamics.activation_for(q), 1.0)[:3, :3]
+    f[:3, :3], f[3, 4] = joint, 1.0
+    f[4] = spring - c * np.r_[joint[2], 0.0, 0.0]
+    f[2] -= f[4]
+    return _held(f, dynamics.time_constant)
+
+
+def _held(f: np.ndarray, time_constant: float) -> tuple[np.ndarray, np.ndarray]:
+    """Transition over a pulse, and what recruitment adds in it, for rates f with activation first."""
+    n = len(f)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n], whole[0, n] = f, 1.0 / time_constant
+    a = scipy.linalg.expm(whole * PULSE_S)
+    return a[:n, :n], a[:n, n]
+
+
+def regulator(dynamics: AnkleDynamics, q: float, boldness: float) -> np.ndarray:
+    """Linear quadratic gains at an angle, shape (3,)."""
+    a, b, _ = plant(dynamics, q)
+    a, b = a[:3, :3], b[:3, None]
+    cost = np.diag([1e-6, (boldness / DEGREE) ** 2, 1e-6])
+    p = scipy.linalg.solve_discrete_are(a, b, cost, np.eye(1))
+    return np.linalg.solve(np.eye(1) + b.T @ p @ b, b.T @ p @ a)[0]
+
+
+def corners(dynamics: AnkleDynamics) -> list[AnkleDynamics]:
+    """Ankles that differ by +-30 % in gain, time constant and stiffness."""
+    low, high = 1.0 - UNCERTAINTY, 1.0 + UNCERTAINTY
+    found = []
+    for gain, tau, stiff in itertools.product((low, high), repeat=3):
+        other = replace(dynamics, pull_nm=dynamics.pull_nm * gain, time_constant=dynamics.time_constant * tau)
+        found.append(replace(other, f1=dynamics.f1 * stiff))
+    return found
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The linear loop at one angle: x+ = a x + b r of the truth, z+ = own z + seen angle and r = law z + direct angle
+    of observer and feedback.
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    own: np.ndarray
+    seen: np.ndarray
+    law: np.ndarray
+    direct: float
+
+    @classmethod
+    def of(
+        cls,
+        truth: tuple[np.ndarray, np.ndarray],
+        believed: tuple[np.ndarray, np.ndarray, float],
+        k: np.ndarray,
+        observer: np.ndarray,
+    ) -> Loop:
+        """From what moves (`moved`), what is believed (`plant`), feedback k (3,) and steady observer gain (4,)."""
+        model_a, model_b, pull = believed
+        # r = -k (x - x*) + x*_act, with x*_act = -torque / pull
+        law = np.r_[-k, -(1.0 + k[0]) / pull]
+        keep = np.eye(4) - np.outer(observer, [0.0, 1.0, 0.0, 0.0])
+        moves = model_a + np.outer(model_b, law)
+        return cls(*truth, moves @ keep, moves @ observer, law @ keep, float(law @ observer))
+
+    def radius(self) -> float:
+        """Largest modulus of its eigenvalues, per pulse."""
+        see = np.zeros(len(self.a))
+        see[1] = 1.0
+        top = np.hstack([self.a + np.outer(self.b, self.direct * see), np.outer(self.b, self.law)])
+        bottom = np.hstack([np.outer(self.seen, see), self.own])
+        return float(np.abs(np.linalg.eigvals(np.vstack([top, bottom]))).max())
+
+    def opened(self, frequencies_hz: np.ndarray) -> np.ndarray:
+        """What comes back of a recruitment at the nerve, the loop cut there, shape (n,), complex; at -1 it is unstable.
+
+        Where the observer has an integrator (its unknown torque), frequencies must be above 0.
+        """
+        found = []
+        for z in np.exp(2j * math.pi * frequencies_hz * PULSE_S):
+            angle = np.linalg.solve(z * np.eye(len(self.a)) - self.a, self.b)[1]
+            found.append(-(self.law @ np.linalg.solve(z * np.eye(4) - self.own, self.seen) + self.direct) * angle)
+        return np.array(found)
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How far a stable loop is from instability.
+
+    Attributes
+    ----------
+    gain
+        Factor on the muscle's gain that it bears: the least one above 1.
+    phase_deg
+        Phase lag that it bears at any frequency where it answers with gain 1, degrees.
+    delay_s
+        The dead time that it bears.
+    distance
+        Least distance of the open loop from -1: one over the greatest sensitivity.
+    distance_hz
+        Where that is.
+    """
+
+    gain: float
+    phase_deg: float
+    delay_s: float
+    distance: float
+    distance_hz: float
+
+
+def margins(loop: Loop) -> Margins:
+    """Margins of a loop, from its frequency response up to half the pulse rate."""
+    hz = np.linspace(0.0, 0.5 / PULSE_S, FREQUENCIES + 1)[1:]
+    answer = loop.opened(hz)
+    size, turn = np.abs(answer), np.unwrap(np.angle(answer))
+    real, flips = answer.real, np.diff(np.sign(answer.imag)) != 0
+    crossing = [1.0 / -r for r in 0.5 * (real[1:] + real[:-1])[flips] if -1.0 < r < 0.0]
+    ones = np.diff(np.sign(size - 1.0)) != 0
+    lag = np.mod(turn[1:][ones] + math.pi, 2.0 * math.pi)
+    least = int(np.argmin(np.abs(1.0 + answer)))
+    return Margins(
+        min(crossing, default=math.inf),
+        math.degrees(min(lag, default=math.inf)),
+        float(min(lag / (2.0 * math.pi * hz[1:][ones]), default=math.inf)),
+        float(np.abs(1.0 + answer[least])),
+        float(hz[least]),
+    )
+
+
+def loop_at(truth: AnkleDynamics, observer: JointObserver, gains: Gains, q: float) -> Loop:
+    """The loop of a controller with these gains and this observer at an angle, on another ankle or its own."""
+    believed = observer.dynamics
+    steady = observer.steady_gain(plant(believed, q)[0])
+    return Loop.of(moved(truth, q), plant(believed, q), np.array(gains.at(q)), steady)
+
+
+def tune(dynamics: AnkleDynamics, observer: JointObserver) -> Gains:
+    """The gains of the rule; see the module. The observer is made slower where that is needed.
+
+    Raises
+    ------
+    InputError
+        If the loop is unstable somewhere with every boldness and every observer.
+    """
+    angles = np.linspace(dynamics.rest_angle(), dynamics.rest_angle(1.0), ANGLES)
+    tables = [np.array([regulator(dynamics, q, boldness) for q in angles]) for boldness in LADDER]
+    around, quickest = _Around(dynamics, angles[::2]), observer.torque_wander
+    tried: list[Gains] = []
+    for share in SLOWER:
+        observer.torque_wander = share * quickest
+        rungs = zip(LADDER, tables, around.radii(tables, observer), strict=True)
+        tried += [Gains(angles, table, boldness, r, observer.torque_wander) for boldness, table, r in rungs]
+        if min(g.radius for g in tried) < 1.0 and not dynamics.frame_coupling:
+            break
+    least = min(g.radius for g in tried)
+    if least < 1.0:
+        best = next(g for g in tried if g.radius <= least + AS_GOOD and g.radius < 1.0)
+        observer.torque_wander = best.torque_wander
+        return best
+    frame = f" with its frame at {dynamics.frame_hz:.3g} Hz" if dynamics.frame_coupling else ""
+    raise InputError(
+        f"no gains hold this ankle{frame} over +-{100 * UNCERTAINTY:.0f} % in gain, time constant and stiffness: "
+        f"at best its swing grows by {100 * (least - 1.0):.2g} % a pulse"
+    )
+
+
+class _Around:
+    """An ankle and its corners at some angles."""
+
+    def __init__(self, dynamics: AnkleDynamics, angles: np.ndarray) -> None:
+        self.dynamics, self.angles = dynamics, angles
+        self.truths = [[moved(other, q) for other in (dynamics, *corners(dynamics))] for q in angles]
+        self.believed = [plant(dynamics, q) for q in angles]
+
+    def radii(self, tables: list[np.ndarray], observer: JointObserver) -> list[float]:
+        """Worst modulus for each table of gains."""
+        steady = [observer.steady_gain(a) for a, _, _ in self.believed]
+        return [
+            max(
+                Loop.of(truth, believed, k, see).radius()
+                for truths, believed, k, see in zip(self.truths, self.believed, table[::2], steady, strict=True)
+                for truth in truths
+            )
+            for table in tables
+        ]

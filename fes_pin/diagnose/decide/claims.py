@@ -1,0 +1,127 @@
+"""When a set of causes earns its place, and when it leaves only noise."""
+
+from __future__ import annotations
+
+from fes_pin.diagnose.decide.significance import Family, coherence_p_value
+from fes_pin.diagnose.remainder.open_set import smooth_remainder
+from fes_pin.diagnose.search.joint_fits import JointFits, Names
+from fes_pin.diagnose.search.promise import Scores
+from fes_pin.identify.distributions import chi2_tail
+from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
+from fes_pin.identify.problem import Problem
+from fes_pin.models.model import Model
+from fes_pin.workers import in_parallel
+
+CLAIM_LEVEL = 0.01
+"""Family-wise error of each round of claims; with the tests of the remainder (0.02) a diagnosis stays below 5 %, with
+room for noise that is not quite autoregressive."""
+FORM_SHARE = 0.0625
+"""A further cause must explain at least this share of what all causes do: a real cause differs from its equation, and
+an error of a quarter in its form leaves a sixteenth of its likelihood to whatever else comes near."""
+HOPE_LEVEL = 0.1
+"""A round of joint fits is left out only if neither a linear promise nor smooth features reach this level."""
+PROMISING = 25.0
+"""Linear promise of a further cause, in twice the log-likelihood, that keeps a set from being complete: 5 sigma."""
+SLOWEST_NOISE = 10.0
+"""Standard deviation of a residual over that of its sample-to-sample part beyond which it counts as misfit. First-order
+autoregressive noise has 3.8 at a coefficient of 0.9, 5.5 at 0.95, 12 at 0.99."""
+REFINE_LEVEL = 1e-3
+"""Level at which a refinement of an effect's form is adopted."""
+
+
+class Claims:
+    """Judges sets of causes of a search, each fit once.
+
+    Parameters
+    ----------
+    sets
+        The fits.
+    scores
+        Of the nominal model: the family of tests.
+    seed
+        Of simulated critical values.
+    """
+
+    def __init__(self, sets: JointFits, scores: Scores, seed: int) -> None:
+        self.sets, self.family, self.seed = sets, Family(scores, seed), seed
+        self._complete: dict[int, tuple[Fit, bool]] = {}
+        self._p_values: dict[tuple[int, int], tuple[Fit, Fit, float]] = {}
+
+    def complete(self, names: Names) -> bool:
+        """True if a set leaves only noise: no further cause promises anything, and neither do smooth features.
+
+        The promise is judged by the present noise; noise learned from the set itself can swallow a slow cause.
+        """
+        fitted = self.sets.fits[names]
+        if id(fitted) not in self._complete:
+            self._complete[id(fitted)] = (fitted, self._leaves_noise(fitted))
+        return self._complete[id(fitted)][1]
+
+    def _leaves_noise(self, fitted: Fit) -> bool:
+        if slow_misfit(fitted):
+            return False
+        promise = max(s.gain for s in self.sets.scores(fitted).scored)
+        if promise > max(PROMISING, FORM_SHARE * (self.sets.fits[()].sse - fitted.sse)):
+            return False
+        return not smooth_remainder(_again(fitted, fitted), self.seed).unexplained
+
+    def hopeful(self, size: int, promise: float) -> bool:
+        """True unless both the linear promise and the smooth features say that the best smaller set is complete."""
+        best, none = self.sets.fits[self.sets.ranked(size - 1)[0]], self.sets.fits[()]
+        gain = best.sse - promise
+        if gain > 0.5 * FORM_SHARE * (none.sse - best.sse) and self.family.p_value(gain, 1) < HOPE_LEVEL:
+            return True
+        return smooth_remainder(best, self.seed).p_value < HOPE_LEVEL
+
+    def better(self, names: Names, best: Names) -> bool:
+        """True if a larger set earns its place beside the best smaller one."""
+        if self.share(names, best) < FORM_SHARE:
+            return False
+        return self.p_value(self.sets.fits[names], self.sets.fits[best]) < CLAIM_LEVEL
+
+    def share(self, names: Names, best: Names) -> float:
+        """Share of what a larger set explains that a smaller one does not, of the likelihood or of the plain errors.
+
+        An error of form leaves little of either; but under slow noise a fast cause has nearly all the likelihood, and
+        beside a slow cause nearly none of the errors.
+        """
+        larger, smaller, none = (self.sets.fits[n] for n in (names, best, ()))
+        explained = [none.sse - larger.sse, none.plain - larger.plain]
+        added = [smaller.sse - larger.sse, smaller.plain - larger.plain]
+        return max((a / e for a, e in zip(added, explained, strict=True) if e > 0.0), default=0.0)
+
+    def p_value(self, larger: Fit, smaller: Fit) -> float:
+        """Family-wise p-value of what a larger model adds.
+
+        It must be significant under the present noise, and either under the noise that the smaller model leaves (which
+        can swallow a slow cause) or against the spread between trials (which no noise model enters).
+        """
+        key = (id(larger), id(smaller))
+        if key not in self._p_values:
+            self._p_values[key] = (larger, smaller, self._p_value(larger, smaller))
+        return self._p_values[key][2]
+
+    def _p_value(self, larger: Fit, smaller: Fit) -> float:
+        degrees = max(larger.degrees - smaller.degrees, 1)
+        p_value = self.family.p_value(smaller.sse - larger.sse, degrees)
+        coherent = self.family.adjusted(coherence_p_value(smaller, larger, degrees))
+        if coherent < p_value or p_value >= CLAIM_LEVEL:
+            return p_value
+        few, many = in_parallel(lambda one: _again(one, smaller), (smaller, larger))
+        return max(p_value, min(coherent, self.family.p_value(few.sse - many.sse, degrees)))
+
+    def demanded(self, refined: Fit, base: Fit) -> bool:
+        """True if the data demand a refinement of an effect's form."""
+        degrees = max(refined.degrees - base.degrees, 1)
+        return bool(chi2_tail(base.sse - refined.sse, degrees) < REFINE_LEVEL)
+
+
+def slow_misfit(fitted: Fit) -> bool:
+    """True if a residual is so much slower than the sample-to-sample noise that it cannot be told from misfit."""
+    rough, own = rough_noise(Model(fitted.model.rig), fitted.trials), noise_of(fitted)
+    return any(own[n].std > SLOWEST_NOISE * rough[n].std for n in own)
+
+
+def _again(fitted: Fit, noise_from: Fit) -> Fit:
+    """The same model fitted under the noise that another leaves."""
+    return go_on(Problem(fitted.model, fitted.trials, noise_of(noise_from)), fitted)

@@ -1,0 +1,233 @@
+"""Gain on trials that took no part in choosing or fitting."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem, go_on
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.own import predictions
+from fes_pin.identify.problem import Problem
+from fes_pin.models.model import Model
+from fes_pin.workers import in_parallel
+
+FOLDS = 5
+RESAMPLES = 2000
+RUNAWAY = 10.0
+"""A prediction that leaves the trials counts as this many times their largest reading: where it goes says nothing."""
+FAR = 1e6
+"""The same for whitened residuals, in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Share, in percent, of the nominal model's squared error above the noise that an extension removes."""
+
+    percent: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Squared errors of one model, by unit of evidence (trial, or second of a trial where there are few).
+
+    Attributes
+    ----------
+    squares
+        Shape (units,): sums of squares in units of the noise variance, all channels.
+    spread
+        The same of the measurement about its trial's mean.
+    counts
+        Samples in each unit.
+    """
+
+    squares: np.ndarray
+    spread: np.ndarray
+    counts: np.ndarray
+
+    def error_percent(self) -> float:
+        """E of eq. (2), pooled."""
+        return 100.0 * float(self.squares.sum() / max(self.spread.sum(), 1e-300))
+
+
+def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
+    """Open-loop errors of a model that starts each trial as a prediction does.
+
+    What is each trial's own is estimated from other parts of it than those that it is judged on; see `identify.own`.
+    """
+    squares, spread, counts = [], [], []
+    pieces = 1 if len(trials) >= 5 else 10
+    most = {n: RUNAWAY * max((float(np.abs(t[n]).max()) for t in trials if n in t.columns), default=0.0) for n in noise}
+    for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
+        total, around = np.zeros(len(trial)), np.zeros(len(trial))
+        channels = 0
+        for k, name in enumerate(model.rig.outputs(trial.kind)):
+            if name in trial.columns and name in noise:
+                variance = noise[name].std ** 2
+                total += _within(trial[name] - readings[:, k], most[name]) ** 2 / variance
+                around += (trial[name] - trial[name].mean()) ** 2 / variance
+                channels += 1
+        for a, b in zip(np.array_split(total, pieces), np.array_split(around, pieces), strict=True):
+            squares.append(float(a.sum()))
+            spread.append(float(b.sum()))
+            counts.append(channels * len(a))
+    return Errors(np.array(squares), np.array(spread), np.array(counts, dtype=float))
+
+
+def gain(nominal: Errors, without: Errors, extended: Errors, seed: int) -> Gain:
+    """What the step from `without` to `extended` removes of the nominal model's error above the noise.
+
+    The interval is a bootstrap over the units of evidence.
+    """
+    draws = np.random.default_rng(seed).integers(len(nominal.squares), size=(RESAMPLES, len(nominal.squares)))
+    many = _share(*(e[draws].sum(axis=1) for e in (nominal.squares, without.squares, extended.squares, nominal.counts)))
+    one = _share(nominal.squares.sum(), without.squares.sum(), extended.squares.sum(), nominal.counts.sum())
+    low, high = np.quantile(many, (0.025, 0.975))
+    return Gain(float(one), float(low), float(high))
+
+
+def _share(nominal: np.ndarray, without: np.ndarray, extended: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Percent; the error above the noise is at least what the extension removes."""
+    excess = np.maximum(np.maximum(nominal - count, nominal - extended), 1e-9 * count)
+    return 100.0 * (without - extended) / excess
+
+
+def folds_of(trials: Sequence[Trial], count: int = FOLDS) -> list[list[int]]:
+    """Trials to hold out together: every kind and every load dealt round."""
+    order = sorted(range(len(trials)), key=lambda i: (trials[i].kind, sorted(trials[i].conditions.items()), i))
+    count = min(count, len(trials))
+    return [sorted(order[k::count]) for k in range(count)]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a cause adds to the likelihood of trials that took no part.
+
+    The residual without it is the residual with it plus a difference Delta of predictions, all whitened:
+    |r + Delta|^2 - |r|^2 = |Delta|^2 + 2 r'Delta, which scatters by 2 |Delta| where r is noise.
+
+    Attributes
+    ----------
+    added
+        Twice the log-likelihood.
+    squares
+        |Delta|^2.
+    """
+
+    added: float
+    squares: float
+
+    @property
+    def low(self) -> float:
+        """Lower end of the 95 % interval."""
+        return self.added - 2.0 * CONFIDENCE_95 * math.sqrt(self.squares)
+
+    def __add__(self, other: Evidence) -> Evidence:
+        return Evidence(self.added + other.added, self.squares + other.squares)
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """On held-out trials: errors of the nominal model, the chosen extension, and it without each of its causes.
+
+    `evidence` is of each cause beside the others, in the extension as it was chosen on all trials.
+    """
+
+    nominal: Errors
+    extended: Errors
+    without: dict[str, Errors]
+    evidence: dict[str, Evidence]
+
+
+def cross_validate(
+    nominal: Fit, best: Fit, without: dict[str, Fit], contenders: Sequence[Fit], floor: NoiseModel
+) -> HeldOut:
+    """Leave trials out in turn, choose among the contenders again on the others, fit, and predict.
+
+    Parameters
+    ----------
+    contenders
+        Fits of all sets of causes that came near on the whole; each fold chooses anew among them and `best`.
+    """
+    folds = [f for f in folds_of(nominal.trials) if len(f) < len(nominal.trials)]
+    many = [nominal, best, *without.values(), *contenders]
+    again = iter(in_parallel(lambda pair: _left_out(*pair), [(held, one) for held in folds for one in many]))
+    results = in_parallel(
+        lambda pair: _fold(*pair, nominal.trials, list(without), floor),
+        [(held, [next(again) for _ in many]) for held in folds],
+    )
+    return HeldOut(
+        _joined([r.nominal for r in results]),
+        _joined([r.extended for r in results]),
+        {n: _joined([r.without[n] for r in results]) for n in without},
+        {n: sum((r.evidence[n] for r in results), Evidence(0.0, 0.0)) for n in without},
+    )
+
+
+def _left_out(held: Sequence[int], fitted: Fit) -> Fit:
+    """A fit again, without the trials that are held out."""
+    train = [t for i, t in enumerate(fitted.trials) if i not in held]
+    return go_on(Problem(fitted.model, train, fitted.noise), fitted)
+
+
+def _fold(
+    held: Sequence[int], fits: Sequence[Fit], trials: Sequence[Trial], names: Sequence[str], floor: NoiseModel
+) -> HeldOut:
+    """What fits of the nominal model, the best, it without each of `names` and the contenders say of held trials."""
+    nominal, best, *rest = fits
+    without, contenders = dict(zip(names, rest, strict=False)), rest[len(names) :]
+    test = [trials[i] for i in held]
+    chosen = min((best, *contenders), key=lambda f: f.price)
+    return replace(separate(nominal, best, without, test, floor), extended=errors_of(chosen.model, test, floor))
+
+
+def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Trial], floor: NoiseModel) -> HeldOut:
+    """Errors on trials that the study itself holds out."""
+    left = _whitened(best, test)
+    return HeldOut(
+        errors_of(nominal.model, test, floor),
+        errors_of(best.model, test, floor),
+        {n: errors_of(f.model, test, floor) for n, f in without.items()},
+        {n: _evidence(_whitened(f, test), left) for n, f in without.items()},
+    )
+
+
+def _whitened(fitted: Fit, test: Sequence[Trial]) -> np.ndarray:
+    """Whitened residuals on trials, each with its own unknowns estimated from it, end to end."""
+    problem = Problem(fitted.model, test, fitted.noise, ())
+    return foretold(fit_problem(problem, fitted.values, problem.simulator.start(fitted.values)))
+
+
+def foretold(own: Fit) -> np.ndarray:
+    """Whitened residuals of trials from their estimated initial states, end to end.
+
+    What effects have of each trial's own is estimated from other parts of it than those that it foretells.
+    """
+    if not own.model.own_unknowns():
+        return np.concatenate([p.residual for p in own.parts])
+    out = []
+    for trial, readings in zip(own.trials, predictions(own.model, own.trials, own.noise, own.unknowns), strict=True):
+        for k, name in enumerate(own.model.rig.outputs(trial.kind)):
+            if name in trial.columns and name in own.noise:
+                out.append(own.noise[name].whiten(trial[name] - readings[:, k], trial.dt))
+    return np.concatenate(out)
+
+
+def _within(errors: np.ndarray, most: float) -> np.ndarray:
+    return np.clip(np.nan_to_num(errors, nan=most, posinf=most, neginf=-most), -most, most)
+
+
+def _evidence(without: np.ndarray, extended: np.ndarray) -> Evidence:
+    without, extended = _within(without, FAR), _within(extended, FAR)
+    difference = without - extended
+    return Evidence(float(without @ without - extended @ extended), float(difference @ difference))
+
+
+def _joined(errors: Sequence[Errors]) -> Errors:
+    return Errors(*(np.concatenate([getattr(e, name) for e in errors]) for name in ("squares", "spread", "counts")))

@@ -1,0 +1,1 @@
+"""Which sets of causes are fitted, and how."""

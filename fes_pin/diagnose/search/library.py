@@ -1,0 +1,110 @@
+"""The candidate causes near a fitted model: sensitivities to each effect at its null, over its shapes."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.problem import Problem, measured_columns
+from fes_pin.models.effects import effects_for
+from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
+from fes_pin.workers import in_parallel
+
+TINY = 0.02
+"""Share of an amplitude's scale at which a one-sided effect is linearized: next to its null, on its own side."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One effect with one choice of shapes, linearized at its null.
+
+    Attributes
+    ----------
+    effect
+        The effect at (or next to) its null, with its shapes.
+    columns
+        Shape (m, amplitudes): whitened sensitivities, all trials end to end.
+    """
+
+    effect: Effect
+    columns: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """Of the cause."""
+        return self.effect.name
+
+
+class Library:
+    """The causes that a rig can have, ready to be linearized on trials."""
+
+    def __init__(self, model: Model, trials: Sequence[Trial]) -> None:
+        self.effects = effects_for(model.rig.name)
+        self.model, self.trials = Model(model.rig), tuple(trials)
+        self.measured = measured_columns(model, trials)
+        self._problems: dict[str, Problem] = {}
+
+    def grid(self, effect: type[Effect]) -> list[Effect]:
+        """The effect at its null with every combination of its shapes."""
+        grids = effect.grids(self.measured)
+        shapes = effect.shapes()
+        start: dict[str, Any] = {n: near_null(effect, n) for n in effect.amplitudes()}
+        return [
+            effect(**{**start, **dict(zip(shapes, values, strict=True))})
+            for values in itertools.product(*(grids[n] for n in shapes))
+        ]
+
+    def probes(self, fitted: Fit, noise: NoiseModel, exclude: Sequence[str] = ()) -> list[Probe]:
+        """Every effect, linearized at the nominal parameters of a fit.
+
+        The effects that the fit has already are left out of the linearization, as `exclude` is of the result: their
+        influence on another effect's sensitivity is of second order.
+        """
+        nominal = Model(fitted.model.rig)
+        wanted = [e for e in self.effects if e.name not in exclude and self._felt(e)]
+        return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
+
+    def silent(self) -> tuple[str, ...]:
+        """Names of the effects that act in none of the trials: of a joint, where all are isometric."""
+        return tuple(e.name for e in self.effects if not self._felt(e))
+
+    def _felt(self, effect: type[Effect]) -> list[int]:
+        """The trials in which an effect acts."""
+        rig = self.model.rig
+        return [i for i, t in enumerate(self.trials) if effect.signal in rig.changeable(t.kind, rig.input_columns(t))]
+
+    def _probe(self, effect: type[Effect], nominal: Model, fitted: Fit, noise: NoiseModel) -> list[Probe]:
+        """The effect with every choice of its shapes; only the trials in which it acts are simulated."""
+        felt = self._felt(effect)
+        if effect.name not in self._problems:
+            free = tuple(f"{effect.name}.{n}" for n in effect.amplitudes())
+            self._problems[effect.name] = Problem(
+                nominal + effect.absent(), [self.trials[i] for i in felt], noise, free
+            )
+        problem = self._problems[effect.name]
+        problem.noise = noise
+        ends = np.cumsum([0, *(problem.rows(t) for t in self.trials)])
+        out = []
+        for one in self.grid(effect):
+            columns = np.zeros((ends[-1], len(problem.free)))
+            parts = problem.linearize((nominal + one).parameters(), [fitted.unknowns[i] for i in felt])
+            for i, part in zip(felt, parts, strict=True):
+                columns[ends[i] : ends[i + 1]] = part.jacobian
+            out.append(Probe(one, columns))
+        return out
+
+
+def near_null(effect: type[Effect], name: str) -> float:
+    """The null of an amplitude, or next to it where that is a bound."""
+    info = effect.parameters()[name]
+    assert info.null is not None
+    one_sided = info.null in {info.lower, info.upper}
+    return info.null + (TINY * info.scale if one_sided else 0.0)

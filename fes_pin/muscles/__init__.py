@@ -1,0 +1,1 @@
+"""Nerves, the muscles they drive, moment arms and recruitment."""

@@ -1,0 +1,154 @@
+"""The passive antagonist F_ANT(theta) from static trials: loads hung, rest angles read, no stimulation.
+
+At rest eq. (1) leaves    F_ANT(theta) = M g + m g cot(theta),
+so each load is a force at a measured angle. The curve f0 (exp(f1 (theta - theta_r)) - 1) is fitted to the *angles*,
+because they carry the noise. Source: Dombre, Fournier and Coiffet, section II-2 ("F_ANT is first experimentally
+evaluated").
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+
+from fes_pin.data.errors import InputError
+from fes_pin.models.model import Model
+from fes_pin.models.rigs.base import GRAVITY
+from fes_pin.paper.ratios import RATIOS, Optimum, RatioProblem, least_error
+
+NAMES = ("f0_n", "f1_per_rad", "theta_r_rad")
+START = (np.log(5.0), np.log(2.0))
+"""Logarithms of f0 in N and f1 in 1/rad where the search starts; theta_r starts at the smallest angle less 0.3 rad."""
+
+
+@dataclass(frozen=True)
+class Antagonist:
+    """A fitted F_ANT.
+
+    Attributes
+    ----------
+    values
+        f0 in N, f1 in 1/rad, theta_r in rad; shape (3,).
+    covariance
+        Of them, shape (3, 3).
+    residual
+        Measured minus fitted rest angles, rad, shape (n,).
+    """
+
+    values: np.ndarray
+    covariance: np.ndarray
+    residual: np.ndarray
+
+    def force(self, angle_rad: np.ndarray) -> np.ndarray:
+        """F_ANT in N at angles in rad."""
+        f0, f1, start = self.values
+        return f0 * np.expm1(f1 * np.maximum(np.asarray(angle_rad) - start, 0.0))
+
+    def force_std(self, angle_rad: np.ndarray) -> np.ndarray:
+        """Standard deviation of F_ANT in N at angles in rad, to first order."""
+        slope = _slope(np.asarray(angle_rad, dtype=float), self.values)
+        return np.sqrt(np.einsum("...i,ij,...j->...", slope, self.covariance, slope))
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """As the numbers of a study's `[rig.passive]`."""
+        return dict(zip(NAMES, (float(v) for v in self.values), strict=True))
+
+    def __str__(self) -> str:
+        stds = np.sqrt(np.diag(self.covariance))
+        units = ("N", "1/rad", "rad")
+        rows = zip(NAMES, self.values, stds, units, strict=True)
+        return "\n".join(f"  {n:12s} {v:8.4f} +- {s:.4f} {u}" for n, v, s, u in rows)
+
+
+def _slope(angle: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Derivative of F_ANT by f0, f1, theta_r; shape (..., 3)."""
+    f0, f1, start = values
+    stretch = np.maximum(angle - start, 0.0)
+    grown = np.exp(f1 * stretch)
+    return np.stack([grown - 1.0, f0 * stretch * grown, -f0 * f1 * grown * (stretch > 0.0)], axis=-1)
+
+
+def rest_angles(values: np.ndarray, loads_kg: np.ndarray, foot_mass_kg: float) -> np.ndarray:
+    """Angles in rad at which loads rest, shape (n,); by Newton's method from above, where the curve is convex."""
+    q = np.full(len(loads_kg), 2.6)
+    weight = foot_mass_kg * GRAVITY
+    for _ in range(60):
+        missing = values[0] * np.expm1(values[1] * np.maximum(q - values[2], 0.0))
+        missing = missing - loads_kg * GRAVITY - weight / np.tan(q)
+        stiff = values[0] * values[1] * np.exp(values[1] * np.maximum(q - values[2], 0.0)) * (q > values[2])
+        q = np.clip(q - np.clip(missing / (stiff + weight / np.sin(q) ** 2), -0.2, 0.2), 0.1, 3.0)
+    return q
+
+
+def fit_antagonist(
+    loads_kg: Sequence[float], angles_rad: Sequence[float], angle_std_rad: float, foot_mass_kg: float
+) -> Antagonist:
+    """Fit F_ANT to loads and rest angles.
+
+    Parameters
+    ----------
+    loads_kg, angles_rad
+        One each per static trial, in any order; equal loads may repeat.
+    angle_std_rad
+        Of a rest angle as read.
+
+    Raises
+    ------
+    InputError
+        For fewer than four loads (the curve has three parameters), or numbers that are none.
+    """
+    loads, angles = np.array(loads_kg, dtype=float), np.array(angles_rad, dtype=float)
+    if loads.shape != angles.shape or loads.ndim != 1 or len(np.unique(loads)) < 4:
+        raise InputError("expected an angle for each of at least four different loads to find F_ANT from")
+    if not (np.isfinite(loads).all() and np.isfinite(angles).all() and angle_std_rad > 0.0):
+        raise InputError("expected finite loads and angles, and a noise above 0")
+
+    def values(x: np.ndarray) -> np.ndarray:
+        return np.array([np.exp(x[0]), np.exp(x[1]), x[2]])
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        return (angles - rest_angles(values(x), loads, foot_mass_kg)) / angle_std_rad
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        p = values(x)
+        q = rest_angles(p, loads, foot_mass_kg)
+        slope, (f0, f1, start) = _slope(q, p), p
+        stiff = f0 * f1 * np.exp(f1 * np.maximum(q - start, 0.0)) * (q > start)
+        rise = slope / (stiff + foot_mass_kg * GRAVITY / np.sin(q) ** 2)[:, None]
+        return rise * [p[0], p[1], 1.0] / angle_std_rad
+
+    found = scipy.optimize.least_squares(residual, [*START, angles.min() - 0.3], jac=jacobian, x_scale="jac")
+    to_values = np.diag([*np.exp(found.x[:2]), 1.0])
+    covariance = to_values @ np.linalg.pinv(found.jac.T @ found.jac) @ to_values
+    return Antagonist(values(found.x), covariance, found.fun * angle_std_rad)
+
+
+def with_antagonist(model: Model, constants: dict[str, float]) -> Model:
+    """The same ankle with another passive curve."""
+    return Model(dataclasses.replace(model.rig, constants={**model.rig.constants, **constants}), model.effects)
+
+
+def carried_covariance(problem: RatioProblem, optimum: Optimum, antagonist: Antagonist) -> np.ndarray:
+    """What the uncertainty of F_ANT alone does to k1, k2 and k3: covariance of their logarithms, shape (3, 3).
+
+    The ratios are found again with the curve one standard deviation off, up and down, along each principal axis.
+    """
+    values, vectors = np.linalg.eigh(antagonist.covariance)
+    start = problem.model_at(optimum.x)
+    covariance = np.zeros((len(RATIOS), len(RATIOS)))
+    for size, axis in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = dict(zip(NAMES, (float(v) for v in antagonist.values + sign * size * axis), strict=True))
+            moved_model = with_antagonist(problem.model, moved).with_parameters(start.parameters())
+            # the start moves with the model; the gain that is known does not
+            again = RatioProblem(moved_model, problem.trials, known_gain=problem.known["gain"])
+            ends.append(least_error(again, starts=1).x)
+        change = 0.5 * (ends[0] - ends[1])
+        covariance += np.outer(change, change)
+    return covariance

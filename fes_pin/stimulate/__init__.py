@@ -1,1 +1,0 @@
-"""Nerves, allocation of joint torques to pulse widths, control."""

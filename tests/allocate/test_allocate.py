@@ -1,0 +1,322 @@
+"""Allocation: optimal by an independent certificate, always within limits, and it says why a torque cannot be had."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fes_pin.allocate import certificate
+from fes_pin.allocate.allocate import Allocator, allocate
+from fes_pin.allocate.certificate import Certifier, residuals, slopes
+from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.data.errors import InputError
+from fes_pin.muscles.nerves import Nerves
+from fes_pin.muscles.recruitment import LinearRecruitment, SigmoidRecruitment
+
+LEFT = Nerves([n for n in Nerves().names if n.startswith("left_")])
+
+
+def random_problem(rng):
+    n, m = rng.integers(1, 10), rng.integers(1, 8)
+    matrix = rng.normal(size=(m, n)) * 50 * rng.choice([0.0, 1.0], (m, n), p=[0.4, 0.6])
+    if rng.random() < 0.2:
+        matrix[:, rng.integers(n)] = 0.0  # a muscle without strength
+    if n > 1 and rng.random() < 0.2:
+        matrix[:, 0] = matrix[:, 1]  # a singular matrix
+    weights = rng.choice([0.0, 0.3, 1.0, 10.0], m)
+    upper = rng.choice([0.0, 0.5, 1.0], n, p=[0.1, 0.2, 0.7])
+    lower = np.minimum(rng.choice([0.0, 0.1], n, p=[0.8, 0.2]), upper)
+    options = {"weights": weights, "upper": upper, "lower": lower, "effort": 10.0 ** rng.uniform(-6, -1)}
+    return matrix, rng.normal(size=m) * rng.choice([0.0, 5.0, 100.0]), options
+
+
+def within_limits(a, curve):
+    widths = np.asarray(a.pulse_width_us)
+    on = widths > 0.0
+    assert ((widths == 0.0) | ((widths >= curve.threshold_us) & (widths <= curve.saturation_us))).all()
+    assert (on == (a.recruitment > 0.0)).all()
+
+
+def test_two_thousand_random_problems_are_optimal_and_within_threshold_and_saturation():
+    rng, curve = np.random.default_rng(0), SigmoidRecruitment(150.0, 400.0)
+    for _ in range(2000):
+        matrix, torque, options = random_problem(rng)
+        a = Allocator(matrix, recruitment=curve, **options)(torque)
+        assert a.certificate.is_optimal(1e-11) and a.certificate.gap <= 1e-10
+        assert ((options["lower"] <= a.recruitment) & (a.recruitment <= options["upper"])).all()
+        within_limits(a, curve)
+        np.testing.assert_allclose(a.achieved, matrix @ a.recruitment, atol=1e-9)
+    assert "optimal to" in str(a)
+
+
+def test_two_thousand_random_problems_cost_what_a_reference_solver_finds():
+    """DAQP on the program written out from its definition, without any code of the allocator."""
+    import daqp
+
+    rng = np.random.default_rng(11)
+    for _ in range(2000):
+        matrix, torque, options = random_problem(rng)
+        a = Allocator(matrix, **options)(torque)
+        n, weights = matrix.shape[1], options["weights"]
+        alive = np.where(options["upper"] > 0.0, matrix, 0.0)
+        squares = alive.T @ (weights[:, None] * alive)
+        scale = squares.diagonal().max() or 1.0
+        H, f = squares / scale + options["effort"] * np.eye(n), -(torque * weights) @ alive / scale
+        none = np.zeros((0, n))
+        x, _, flag, _ = daqp.solve(H, f, none, options["upper"], options["lower"], np.zeros(n, dtype=np.int32))
+        assert flag == 1
+        allowed = np.clip(x, options["lower"], options["upper"])  # DAQP keeps limits to 1e-6
+        ours, theirs, least = (0.5 * v @ H @ v + f @ v for v in (a.recruitment, allowed, x))
+        assert least - 1e-6 * (1.0 + np.abs(f).sum()) <= ours <= theirs + 1e-12
+
+
+def test_channels_that_die_in_the_middle_of_random_runs():
+    """Rate limit and price of change carry on from what was in force; the dead are off at once and stay off."""
+    rng, curve = np.random.default_rng(12), LinearRecruitment()
+    for _ in range(150):
+        matrix, _, options = random_problem(rng)
+        options.update(rate=rng.choice([0.05, 0.3, np.inf]), change=rng.choice([0.0, 1e-2]))
+        before, program = np.zeros(matrix.shape[1]), Allocator(matrix, **options)
+        dead: list[str] = []
+        for k in range(12):
+            if k == 6:
+                dead = [n for n in program.names if rng.random() < 0.4]
+                program = Allocator(matrix, dead=dead, **options)
+            a = program(rng.normal(size=len(matrix)) * 60, before)
+            off = np.isin(program.names, dead)
+            assert (a.recruitment[off] == 0.0).all() and (a.pulse_width_us[off] == 0.0).all()
+            moved = np.abs(a.recruitment - np.clip(before, program.lower, program.upper))
+            assert (moved <= options["rate"] + 1e-12).all()
+            assert a.certificate.is_optimal(1e-11)
+            within_limits(a, curve)
+            before = a.recruitment
+
+
+def test_a_refused_torque_leaves_the_run_as_it_was():
+    torque, again = {"left_knee_flexion": -60.0}, Allocator(LEFT, rate=0.05)
+    program = Allocator(LEFT, rate=0.05)
+    for _ in range(3):
+        program(torque)
+        again(torque)
+        with pytest.raises(InputError, match="finite"):
+            program({"left_knee_flexion": float("nan")})
+        with pytest.raises(InputError, match="solver"):
+            program(torque, solver="abacus")
+    np.testing.assert_array_equal(program(torque).recruitment, again(torque).recruitment)
+
+
+@pytest.mark.parametrize("solver", ["daqp", "osqp"])
+def test_other_solvers_give_the_same_allocation_and_cost_no_less(solver):
+    rng = np.random.default_rng(1)
+    for _ in range(100):
+        matrix, torque, options = random_problem(rng)
+        program = Allocator(matrix, **options)
+        ours, theirs = program(torque), program(torque, solver=solver)
+        assert ours.certificate.cost <= theirs.certificate.cost + 1e-12
+        assert theirs.certificate.cost <= ours.certificate.cost + 1e-3 * (1 + abs(ours.certificate.cost))
+
+
+def test_certificate_in_machine_code_equals_its_formulas_and_rejects_a_wrong_answer():
+    rng = np.random.default_rng(2)
+    for cubes in (False, True):
+        matrix, weights, prices = rng.normal(size=(6, 5)) * 30, rng.uniform(0, 2, 6), rng.uniform(1e-4, 1, 5)
+        certify = Certifier(matrix, weights, prices, 900.0, 0.3, cubes)
+        for _ in range(50):
+            before, r, wanted = rng.uniform(0, 1, 5), rng.uniform(0, 1, 5), rng.normal(size=6) * 40
+            lower, upper = rng.uniform(0, 0.3, 5), rng.uniform(0.6, 1, 5)
+            proof, achieved, gradient = certify(before, wanted, r, lower, upper)
+            expected = slopes(matrix, weights, 900.0, matrix @ r - wanted, prices, r, 0.3, before, cubes)
+            np.testing.assert_allclose(gradient, expected, atol=1e-12)
+            np.testing.assert_allclose(achieved, matrix @ r, atol=1e-11)
+            got = (proof.primal, proof.dual, proof.complementarity, proof.gap)
+            for value, formula in zip(got[:2], residuals(expected, r, lower, upper)[:2], strict=True):
+                assert value == pytest.approx(formula, abs=1e-12)
+            if proof.primal == 0.0:
+                for value, formula in zip(got[2:], residuals(expected, r, lower, upper)[2:], strict=True):
+                    assert value == pytest.approx(formula, abs=1e-12)
+            assert not proof.is_optimal()
+
+
+def test_certified_gap_bounds_what_any_other_choice_could_save():
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        matrix, torque, options = random_problem(rng)
+        program = Allocator(matrix, **options)
+        best = program(torque).certificate.cost
+        r = rng.uniform(program.lower, program.upper)
+        other = program.result(r, torque, program.lower, program.upper, r)
+        assert other.certificate.cost - other.certificate.gap <= best + 1e-12
+        assert other.certificate.cost >= best - 1e-12
+
+
+def test_certificate_takes_nothing_from_the_solver():
+    text = Path(certificate.__file__).read_text()
+    assert "allocate.box" not in text and "allocate.allocate" not in text
+
+
+def test_sequence_equals_single_allocations_and_certifies_itself():
+    rng = np.random.default_rng(4)
+    t = np.linspace(0, 2, 300)[:, None]
+    torque = 60 * rng.normal(size=19) * np.sin(2 * np.pi * t + rng.uniform(0, 6, 19))
+    for options in (
+        {},
+        {"change": 0.05},
+        {"rate": 0.02},
+        {"rate": 0.05, "change": 0.01, "upper": {"left_tibial": 0.5}},
+    ):
+        together = Allocator(LEFT, **options).sequence(torque)
+        assert together.residual.max() <= 1e-11
+        single = Allocator(LEFT, **options)
+        for k in range(0, 300):
+            a = single(torque[k])
+            np.testing.assert_allclose(a.recruitment, together.recruitment[k], atol=1e-8)
+            assert a.certificate.is_optimal(1e-11)
+
+
+def test_words_name_the_saturated_nerve():
+    a = allocate({"left_ankle_dorsiflexion": -400.0}, Nerves(["left_tibial", "right_femoral"]))
+    assert a.reasons[0].startswith("left ankle dorsiflexion") and a.reasons[0].endswith("left tibial saturated")
+    short = -400.0 - a.achieved[JOINT_NAMES.index("left_ankle_dorsiflexion")]
+    assert f"{abs(short):.1f} N m short" in a.reasons[0]
+    assert a.active == {"left_tibial": "saturated", "right_femoral": "off"}
+    assert a.multipliers["left_tibial"] > 0.0
+    assert a.pulse_widths_us == {"left_tibial": 1000.0, "right_femoral": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("torque", "nerves", "options", "words"),
+    [
+        ({"left_ankle_rotation": 5.0}, ["left_tibial"], {}, "no stimulated nerve turns it"),
+        ({"left_knee_flexion": 30.0}, ["left_femoral"], {}, "no stimulated nerve pulls that way"),
+        ({"left_knee_flexion": -30.0}, ["left_femoral"], {"dead": "left_femoral"}, "left femoral dead"),
+        ({"left_knee_flexion": -300.0}, ["left_femoral"], {"upper": 0.4}, "left femoral limited"),
+        ({"left_knee_flexion": -200.0}, ["left_femoral"], {"rate": 0.1}, "left femoral rising"),
+        (
+            {"left_knee_flexion": -100.0},
+            ["left_femoral"],
+            {"weights": {"left_hip_flexion": 10.0}},
+            "would spoil left hip",
+        ),
+        ({"left_knee_flexion": -100.0}, ["left_femoral"], {"effort": 1.0}, "not worth its effort"),
+    ],
+)
+def test_words_for_every_kind_of_reason(torque, nerves, options, words):
+    a = allocate(torque, Nerves(nerves), **options)
+    joint = next(iter(torque)).replace("_", " ")
+    assert any(reason.startswith(joint) and words in reason for reason in a.reasons), a.reasons
+
+
+def test_a_met_torque_has_no_complaints():
+    nerves = Nerves(["left_tibial", "left_femoral", "right_obturator"])
+    a = allocate(nerves.torque_matrix() @ [0.3, 0.5, 0.0], nerves, effort=1e-8)
+    assert a.reasons == [] and "every torque within 0.5 N m" in str(a)
+
+
+def test_a_channel_that_dies_is_replaced_as_far_as_it_can_be():
+    torque = {"left_knee_flexion": 70.0, "left_hip_flexion": -110.0}
+    whole, without = allocate(torque, LEFT), allocate(torque, LEFT, dead=["left_hamstrings"])
+    assert without.pulse_widths_us["left_hamstrings"] == 0.0
+    assert without.certificate.is_optimal(1e-11) and without.certificate.cost > whole.certificate.cost
+    assert any("left hamstrings dead" in reason for reason in without.reasons)
+    assert (
+        without.recruitment[LEFT.names.index("left_biceps_short_head")]
+        > whole.recruitment[LEFT.names.index("left_biceps_short_head")]
+    )
+
+
+def test_dead_limb_gives_zero_pulses_and_no_error():
+    a = allocate({"left_knee_flexion": -50.0}, Nerves(["left_femoral"], strength=0.0))
+    assert a.pulse_width_us.tolist() == [0.0] and "left femoral without strength" in a.reasons[0]
+
+
+def test_redundant_muscles_share_as_arm_under_squares_and_as_its_root_under_cubes():
+    for arms in ([40.0, 10.0], [30.0, 20.0, 5.0]):
+        squares = allocate([15.0], [arms]).recruitment
+        cubes = allocate([15.0], [arms], effort_kind="cubes")
+        assert cubes.certificate.is_optimal(1e-10) and cubes.note == ""
+        np.testing.assert_allclose(squares / squares[0], np.array(arms) / arms[0], rtol=1e-9)
+        np.testing.assert_allclose(
+            cubes.recruitment / cubes.recruitment[0], np.sqrt(np.array(arms) / arms[0]), rtol=1e-6
+        )
+
+
+def test_cubes_on_random_problems_are_optimal():
+    rng = np.random.default_rng(7)
+    for _ in range(150):
+        matrix, torque, options = random_problem(rng)
+        a = allocate(torque, matrix, effort_kind="cubes", **options)
+        assert a.certificate.is_optimal(1e-10) and a.note == ""
+
+
+def test_lexicographic_reaches_the_least_error_then_the_least_effort():
+    rng = np.random.default_rng(5)
+    muscles = Nerves.muscles("left_tibial", "left_femoral", "left_hamstrings")
+    for _ in range(10):
+        torque = muscles.torque_matrix() @ rng.uniform(0, 0.6, muscles.n) + rng.normal(size=19)
+        squares = allocate(torque, muscles)
+        lexicographic = allocate(torque, muscles, lexicographic=True)
+        assert lexicographic.certificate.is_optimal(1e-11)  # of the error alone
+        error = [float(((a.shortfall) ** 2).sum()) for a in (lexicographic, squares)]
+        assert error[0] <= error[1]
+        # no other choice with the same error costs less: move along the null space of the matrix
+        null = np.linalg.svd(muscles.torque_matrix())[2][np.linalg.matrix_rank(muscles.torque_matrix()) :]
+        for direction in np.vstack([null, -null]):
+            other = lexicographic.recruitment + 1e-3 * direction
+            if (other >= 0).all() and (other <= 1).all():
+                assert (other**2).sum() >= (lexicographic.recruitment**2).sum() - 1e-8
+
+
+def test_fatigue_moves_the_load_to_fresh_channels():
+    names = ["left_hamstrings", "left_biceps_short_head"]
+    torque = {"left_knee_flexion": 8.0}
+    weights = {j: float(j == "left_knee_flexion") for j in JOINT_NAMES}
+    tired = Nerves(names).tired(left_hamstrings=0.3)
+    plain = allocate(torque, tired, weights=weights)
+    spared = allocate(torque, tired, weights=weights, effort_kind="fatigue")
+    assert spared.recruitment[0] < plain.recruitment[0] and spared.recruitment[1] > plain.recruitment[1]
+
+
+def test_one_joint_rig_is_a_matrix_of_one_number():
+    a = allocate([1.02], [[0.034 * 60.0]], recruitment=LinearRecruitment(180.0, 1000.0), effort=1e-9)
+    assert a.pulse_width_us[0] == pytest.approx(180.0 + 0.5 * 820.0, abs=1e-3)
+
+
+def test_allocate_again_is_warm_but_forgets_the_recruitments_before():
+    options = {"rate": 0.1}
+    first = allocate({"left_knee_flexion": -200.0}, Nerves(["left_femoral"]), **options)
+    again = allocate({"left_knee_flexion": -200.0}, Nerves(["left_femoral"]), **options)
+    np.testing.assert_array_equal(first.recruitment, again.recruitment)
+    carried = allocate({"left_knee_flexion": -200.0}, Nerves(["left_femoral"]), previous=first.recruitment, **options)
+    assert carried.recruitment[0] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: allocate({"left_knee_flexion": float("nan")}, LEFT),
+        lambda: allocate({"left_kneee": 1.0}, LEFT),
+        lambda: allocate(np.zeros(5), LEFT),
+        lambda: allocate({}, LEFT, weights={"left_knee_flexion": -1.0}),
+        lambda: allocate({}, LEFT, effort=0.0),
+        lambda: allocate({}, LEFT, effort=float("inf")),
+        lambda: allocate({}, LEFT, lower=0.5, upper=0.2),
+        lambda: allocate({}, LEFT, upper=1.5),
+        lambda: allocate({}, LEFT, dead=["right_tibial"]),
+        lambda: allocate({}, LEFT, rate=0.0),
+        lambda: allocate({}, LEFT, change=-1.0),
+        lambda: allocate({}, LEFT, least=2.0),
+        lambda: allocate({}, LEFT, least=0.2, effort_kind="cubes"),
+        lambda: allocate({}, LEFT, effort_kind="work"),
+        lambda: allocate({}, LEFT, solver="abacus"),
+        lambda: allocate({}, LEFT, recruitment=[LinearRecruitment()]),
+        lambda: allocate([1.0], [[float("nan")]]),
+        lambda: allocate([], np.zeros((0, 3))),
+        lambda: Allocator(LEFT).sequence(np.full((3, 19), np.nan)),
+        lambda: Allocator(LEFT).sequence(np.zeros((3, 18))),
+        lambda: Allocator(LEFT, least=0.2).sequence(np.zeros((3, 19))),
+    ],
+)
+def test_bad_input_is_one_clear_line(make):
+    with pytest.raises(InputError) as caught:
+        make()
+    assert "\n" not in str(caught.value)

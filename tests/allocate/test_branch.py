@@ -1,0 +1,109 @@
+"""Off, or at least so much: against every possible choice, with the gap told truly."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from fes_pin.allocate.allocate import Allocator, allocate
+from fes_pin.allocate.box import BoxProgram
+from fes_pin.allocate.branch import branch_and_bound, rounded
+from fes_pin.muscles.nerves import Nerves
+
+
+def every_choice(H, f, upper, least):
+    best, program = np.inf, BoxProgram(H)
+    for on in itertools.product((0, 1), repeat=len(f)):
+        if (np.array(on) * least > upper).any():
+            continue
+        program.lower[:], program.upper[:] = np.array(on) * least, np.array(on) * upper
+        program.status[:] = 1
+        program.restart()
+        assert program.solve(f)
+        best = min(best, 0.5 * program.r @ H @ program.r + f @ program.r)
+    return best
+
+
+def problems(count, seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        n, m = rng.integers(1, 8), rng.integers(1, 5)
+        B = rng.normal(size=(m, n))
+        least = rng.uniform(0, 0.7, n) * rng.choice([0.0, 1.0], n, p=[0.2, 0.8])
+        yield (
+            B.T @ B + 10.0 ** rng.uniform(-5, -1) * np.eye(n),
+            -B.T @ rng.normal(size=m) * 2,
+            rng.uniform(0.5, 1, n),
+            least,
+        )
+
+
+def test_the_best_of_all_choices_is_found_and_proven():
+    for H, f, upper, least in problems(1000, 0):
+        choice = branch_and_bound(H, f, np.zeros(len(f)), upper, least)
+        assert choice.gap == 0.0
+        assert choice.cost == pytest.approx(every_choice(H, f, upper, least), abs=1e-10)
+        assert (((choice.r == 0.0) | (choice.r >= least)) & (choice.r <= upper)).all()
+
+
+def test_rounding_is_allowed_never_better_and_its_gap_is_true():
+    worse = 0
+    for H, f, upper, least in problems(300, 1):
+        cheap, best = rounded(H, f, np.zeros(len(f)), upper, least), every_choice(H, f, upper, least)
+        assert (((cheap.r == 0.0) | (cheap.r >= least - 1e-15)) & (cheap.r <= upper)).all() or (least > upper).any()
+        assert best - 1e-10 <= cheap.cost <= best + cheap.gap + 1e-10
+        worse += cheap.cost > best + 1e-9
+    assert worse > 10  # so branching is worth something
+
+
+def test_stopped_early_the_gap_is_still_true():
+    stopped = 0
+    for H, f, upper, least in problems(300, 2):
+        choice = branch_and_bound(H, f, np.zeros(len(f)), upper, least, nodes=3)
+        best = every_choice(H, f, upper, least)
+        assert best - 1e-10 <= choice.cost <= best + choice.gap + 1e-10
+        stopped += choice.gap > 0.0
+    assert stopped > 10
+
+
+def test_allocation_with_least_recruitments():
+    rng = np.random.default_rng(3)
+    nerves = Nerves([n for n in Nerves().names if n.startswith("left_")][:12])
+    program, free = Allocator(nerves, least=0.3), Allocator(nerves)
+    for _ in range(30):
+        torque = nerves.torque_matrix() @ (rng.uniform(0, 0.5, 12) * rng.choice([0, 1], 12)) + rng.normal(size=19) * 5
+        a = program(torque)
+        assert a.gap == 0.0 and a.certificate.is_optimal(1e-11)
+        assert ((a.recruitment == 0.0) | (a.recruitment >= 0.3)).all()
+        assert a.certificate.cost >= free(torque).certificate.cost - 1e-12
+
+
+def test_rounded_allocation_is_allowed_and_its_gap_covers_the_best():
+    rng = np.random.default_rng(4)
+    nerves = Nerves([n for n in Nerves().names if n.startswith("left_")][:12])
+    best, cheap, hasty = (Allocator(nerves, least=0.3, **o) for o in ({}, {"rounding": True}, {"nodes": 2}))
+    gaps = []
+    for _ in range(30):
+        torque = nerves.torque_matrix() @ (rng.uniform(0, 0.5, 12) * rng.choice([0, 1], 12)) + rng.normal(size=19) * 5
+        cost = best(torque).certificate.cost
+        for program in (cheap, hasty):
+            a = program(torque)
+            assert ((a.recruitment == 0.0) | (a.recruitment >= 0.3)).all()
+            assert cost - 1e-12 <= a.certificate.cost <= cost + a.gap + 1e-12
+            gaps.append(a.gap)
+    assert max(gaps) > 0.0
+
+
+def test_a_small_torque_is_off_rather_than_too_much_and_says_so():
+    a = allocate({"left_knee_flexion": -20.0}, Nerves(["left_femoral"]), least=0.3)
+    assert a.recruitment[0] == 0.0
+    assert "left femoral off: its least recruitment would be too much" in a.reasons[0]
+
+
+def test_with_a_rate_limit_a_channel_may_jump_between_off_and_its_least():
+    program = Allocator(Nerves(["left_femoral"]), least=0.3, rate=0.1)
+    torque = {"left_knee_flexion": -250.0}
+    values = [program(torque).recruitment[0] for _ in range(4)]
+    np.testing.assert_allclose(values, [0.3, 0.4, 0.5, 0.6], atol=1e-12)
+    values = [program({}).recruitment[0] for _ in range(5)]
+    np.testing.assert_allclose(values, [0.5, 0.4, 0.3, 0.0, 0.0], atol=1e-12)

@@ -1,0 +1,348 @@
+"""`fes-pin diagnose`, `predict` and `effects`: exit codes, one line for bad input, files whole or not at all."""
+
+import json
+import os
+import subprocess
+import sys
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from data import studies, test_bad_studies
+from diagnose.hidden import study_of
+
+from fes_pin.cli import main
+from fes_pin.data.study import read_study, write_study
+from fes_pin.data.trial import read_trial
+from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files, diagnosis_record
+from fes_pin.models.effects import EFFECTS
+from fes_pin.models.parameters import ROTARY
+from fes_pin.models.simulate import simulate
+from fes_pin.models.store import load_model, save_model
+
+FILES = {"diagnosis.json", "model.toml", "report.html"}
+
+
+def run(monkeypatch, *words):
+    """Run the command line in this process; its exit code."""
+    monkeypatch.setattr(sys, "argv", ["fes-pin", *map(str, words)])
+    with pytest.raises(SystemExit) as ended:
+        main.main()
+    return ended.value.code or 0
+
+
+def fails(monkeypatch, capsys, *words):
+    """The one line on standard error of a command that must end with 2."""
+    assert run(monkeypatch, *words) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1 and printed.err.endswith("\n")
+    return printed.err.strip()
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """An ankle study on disk with friction hidden in it, and its diagnosis by the command line on one thread."""
+    folder = tmp_path_factory.mktemp("made")
+    small = study_of("ankle", ("coulomb_friction",), "ar1", 40, n_motion=3, n_isometric=1, duration_s=4.0)
+    write_study(small, folder / "study")
+    by_command(folder, folder / "one", "1")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def diagnosis(made):
+    """The same by the library."""
+    return diagnose(read_study(made / "study"))
+
+
+def by_command(folder, out, threads):
+    """Diagnose in a process of its own, with this many threads of ours and of the linear algebra's."""
+    known = dict.fromkeys(("FES_PIN_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), threads)
+    words = [sys.executable, "-m", "fes_pin.cli.main", "diagnose", str(folder / "study"), "--out", str(out)]
+    return subprocess.run(words, check=True, capture_output=True, text=True, env={**os.environ, **known})
+
+
+def record(folder):
+    found = json.loads((folder / "diagnosis.json").read_text())
+    assert found.pop("wall_s") > 0.0
+    return found
+
+
+def test_the_answer_does_not_depend_on_threads(made):
+    answered = by_command(made, made / "two", "2")
+    assert record(made / "one") == record(made / "two")
+    assert (made / "one/model.toml").read_bytes() == (made / "two/model.toml").read_bytes()
+    assert {p.name for p in (made / "one").iterdir()} >= FILES
+    assert "coulomb_friction" in answered.stdout and "report.html" in answered.stdout
+
+
+def test_the_library_says_the_same(made, diagnosis):
+    by_library = json.loads(json.dumps(diagnosis_record(diagnosis)))
+    by_library.pop("wall_s")
+    assert by_library == record(made / "one")
+    assert diagnosis_files(diagnosis)["model.toml"] == (made / "one/model.toml").read_text()
+
+
+def test_the_seed_changes_only_what_is_simulated(made):
+    found = diagnosis_record(diagnose(read_study(made / "study"), seed=7))
+    usual = record(made / "one")
+    for key in ("study", "verdict", "absorbed", "nominal", "extended", "noise", "ceiling_percent"):
+        assert json.loads(json.dumps(found[key])) == usual[key], key
+    for one, other in zip(found["causes"], usual["causes"], strict=True):
+        for key in ("name", "stage", "parameters", "equivalents"):
+            assert json.loads(json.dumps(one[key])) == other[key]
+        assert one["gain_percent"]["held_out"] == other["gain_percent"]["held_out"]
+    assert found["causes"][0]["gain_percent"]["ci95"] != usual["causes"][0]["gain_percent"]["ci95"]
+
+
+def test_the_record_is_as_the_contract_says(made):
+    found = json.loads((made / "one/diagnosis.json").read_text())
+    assert list(found) == [
+        *("study", "verdict", "causes", "remainder", "absorbed", "nominal", "extended", "noise"),
+        *("ceiling_percent", "next_experiment", "wall_s"),
+    ]
+    (cause,) = found["causes"]
+    assert list(cause) == ["name", "stage", "parameters", "equivalents", "p_value", "gain_percent"]
+    assert cause["name"] == "coulomb_friction" and cause["stage"] == "joint"
+    assert set(cause["parameters"]["torque_nm"]) == {"value", "std"}
+    assert set(cause["gain_percent"]) == {"fit", "held_out", "ci95"}
+    assert set(found["remainder"]) == {"unexplained", "p_value", "where"}
+    assert set(found["noise"]) == {"angle_rad", "force_n"}
+    assert found["extended"]["error_percent"]["held_out"] < found["nominal"]["error_percent"]["held_out"]
+
+
+def test_a_prediction_needs_the_model_alone(made, monkeypatch, tmp_path):
+    """The inputs of a trial and model.toml give what the fit gives, to 1e-9."""
+    diagnosis_model = load_model(made / "one/model.toml")
+    study = read_study(made / "study")
+    for trial in study.trials:
+        inputs = tmp_path / f"{trial.name}.csv"
+        with inputs.open("w") as stream:
+            stream.write("time_s,pulse_width_us\n")
+            for t, w in zip(trial.time, trial["pulse_width_us"], strict=True):
+                stream.write(f"{t!r},{w!r}\n".replace("np.float64(", "").replace(")", ""))
+        settings = [f"--set={n}={v!r}" for n, v in trial.conditions.items()] + [f"--set=kind={trial.kind}"]
+        out = tmp_path / f"{trial.name}-predicted.csv"
+        assert run(monkeypatch, "predict", made / "one/model.toml", inputs, *settings, "--out", out) == 0
+        column = "angle_rad" if trial.kind == "motion" else "force_n"
+        got = np.genfromtxt(out, delimiter=",", names=True)
+        assert got.dtype.names == ("time_s", column)
+        assert np.abs(got[column] - simulate(diagnosis_model, trial)[column]).max() < 1e-9
+
+
+def test_a_model_on_disk_is_the_fit_to_the_last_bit(made, diagnosis, tmp_path):
+    loaded = load_model(made / "one/model.toml")
+    assert loaded.parameters() == diagnosis.model.parameters()
+    assert loaded.structure() == diagnosis.model.structure()
+    save_model(loaded, tmp_path / "again.toml")
+    assert (tmp_path / "again.toml").read_bytes() == (made / "one/model.toml").read_bytes()
+
+
+BAD = [
+    *(("ankle", "study.toml", *row[:2]) for row in test_bad_studies.TOML.values()),
+    *(("ankle", "trials/00.csv", *row[:2]) for row in test_bad_studies.CSV.values()),
+    *(("joint", *row[:3]) for row in test_bad_studies.JOINT.values()),
+    *(("muscle", *row[:3]) for row in test_bad_studies.MUSCLE.values()),
+]
+NAMES = [name for table in ("TOML", "CSV", "JOINT", "MUSCLE") for name in getattr(test_bad_studies, table)]
+
+
+@pytest.mark.parametrize("case", BAD, ids=NAMES)
+def test_bad_input_is_one_line(monkeypatch, capsys, tmp_path, case):
+    rig, file, old, new = case
+    folder = getattr(studies, rig)(tmp_path / "study")
+    (tmp_path / "10.csv").write_text(studies.MOTION)
+    (folder / "link.csv").symlink_to(tmp_path / "10.csv")
+    (folder / "out").symlink_to(tmp_path)
+    test_bad_studies.make_fifo(folder / "pipe")
+    test_bad_studies.spoil(folder / file, old, new)
+    out = tmp_path / "answer"
+    line = fails(monkeypatch, capsys, "diagnose", folder, "--out", out)
+    assert line.startswith(f"fes-pin: {folder}")
+    assert not out.exists()
+
+
+def test_a_failed_write_leaves_the_old_answer(made, diagnosis, monkeypatch, capsys, tmp_path):
+    """The second rename fails, as if the disk were full: every old file is back and no new one stays."""
+    out = tmp_path / "out"
+    out.mkdir()
+    old = {name: f"old {name}" for name in FILES}
+    for name, text in old.items():
+        (out / name).write_text(text)
+    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose", lambda *_, **__: diagnosis)
+    usual, count = os.replace, []
+
+    def replace(source, target):
+        count.append(target)
+        if len(count) == 4:
+            raise OSError(28, "No space left on device")
+        usual(source, target)
+
+    monkeypatch.setattr(os, "replace", replace)
+    line = fails(monkeypatch, capsys, "diagnose", made / "study", "--out", out)
+    assert "No space left" in line
+    assert {p.name: p.read_text() for p in out.iterdir()} == old
+
+
+def test_what_an_earlier_diagnosis_proposed_does_not_stay(made, diagnosis, monkeypatch, tmp_path):
+    (tmp_path / NEXT_FILE).write_text("of another study")
+    decided = replace(diagnosis, next_experiment=None)
+    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose", lambda *_, **__: decided)
+    run(monkeypatch, "diagnose", made / "study", "--out", tmp_path)
+    assert (tmp_path / "diagnosis.json").exists() and not (tmp_path / NEXT_FILE).exists()
+
+
+def test_a_killed_report_leaves_no_folder(made, diagnosis, monkeypatch, tmp_path):
+    """What ends the work before the files are complete leaves nothing."""
+    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose", lambda *_, **__: diagnosis)
+    monkeypatch.setattr("fes_pin.view.report.report_html", _killed)
+    monkeypatch.setattr(sys, "argv", ["fes-pin", "diagnose", str(made / "study"), "--out", str(tmp_path / "out")])
+    with pytest.raises((KeyboardInterrupt, SystemExit)):
+        main.main()
+    assert not (tmp_path / "out").exists()
+
+
+def _killed(_):
+    raise KeyboardInterrupt
+
+
+SETTINGS = {
+    "no_load": ((), "load_kg"),
+    "not_a_number": (("--set=load_kg=heavy",), "load_kg"),
+    "no_value": (("--set=load_kg",), "NAME=VALUE"),
+    "no_name": (("--set==1",), "NAME=VALUE"),
+    "unknown": (("--set=load_kg=1", "--set=weight=2"), "weight"),
+    "negative": (("--set=load_kg=-1",), "load_kg"),
+    "nan": (("--set=load_kg=nan",), "load_kg"),
+    "unknown_kind": (("--set=kind=running", "--set=load_kg=1"), "kind"),
+    "isometric_without_angle": (("--set=kind=isometric",), "angle_rad"),
+    "angle_of_a_motion": (("--set=load_kg=1", "--set=angle_rad=1.9"), "angle_rad"),
+}
+
+
+@pytest.mark.parametrize("case", SETTINGS)
+def test_bad_settings(made, monkeypatch, capsys, tmp_path, case):
+    settings, words = SETTINGS[case]
+    trial, out = made / "study" / _first(made), tmp_path / "out.csv"
+    line = fails(monkeypatch, capsys, "predict", made / "one/model.toml", trial, *settings, "--out", out)
+    assert words in line
+    assert not out.exists()
+
+
+def _first(made):
+    return tomllib.loads((made / "study/study.toml").read_text())["trial"][0]["file"]
+
+
+MODELS = {  # old, new, words
+    "not_toml": ("[nominal]", "[nominal", "not TOML"),
+    "no_format": ("format = 1\n", "", "format = 1"),
+    "other_format": ("format = 1", "format = 2", "format = 1"),
+    "other_rig": ('rig = "ankle"', 'rig = "knee"', "expected one of"),
+    "missing_nominal": ("gain = ", "gian = ", "gian"),
+    "text": ("damping_nms = ", 'damping_nms = "x" # ', "expected a finite number"),
+    "unknown_effect": ("[effects.coulomb_friction]", "[effects.gremlins]", "gremlins"),
+    "effect_without_parameter": ("torque_nm = ", "# ", "torque_nm"),
+    "effect_with_another": ("torque_nm = ", "torque = 1.0\ntorque_nm = ", "torque"),
+    "not_a_number": ("torque_nm = ", "torque_nm = nan # ", "torque_nm"),
+    "missing_constant": ("foot_mass_kg = ", "# ", "foot_mass_kg"),
+    "mass_of_nothing": ("foot_mass_kg = ", "foot_mass_kg = inf # ", "foot_mass_kg"),
+}
+
+
+@pytest.mark.parametrize("case", MODELS)
+def test_a_malformed_model(made, monkeypatch, capsys, tmp_path, case):
+    old, new, words = MODELS[case]
+    text = (made / "one/model.toml").read_text()
+    assert old in text
+    (tmp_path / "model.toml").write_text(text.replace(old, new, 1))
+    trial, out = made / "study" / _first(made), tmp_path / "out.csv"
+    line = fails(monkeypatch, capsys, "predict", tmp_path / "model.toml", trial, "--set=load_kg=1", "--out", out)
+    assert str(tmp_path / "model.toml") in line and words in line
+    assert not out.exists()
+
+
+def test_nothing_there(made, monkeypatch, capsys, tmp_path):
+    out = tmp_path / "out.csv"
+    trial = made / "study" / _first(made)
+    assert "none.toml" in fails(monkeypatch, capsys, "predict", tmp_path / "none.toml", trial, "--out", out)
+    model = made / "one/model.toml"
+    line = fails(monkeypatch, capsys, "predict", model, tmp_path / "none.csv", "--set=load_kg=1", "--out", out)
+    assert "none.csv" in line
+    line = fails(monkeypatch, capsys, "predict", model, trial, "--set=load_kg=1", "--out", tmp_path / "no/out.csv")
+    assert "does not exist" in line
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def pendulum(tmp_path):
+    """The nominal model of a pendulum on disk, and a swing of it."""
+    study = read_study(studies.joint(tmp_path / "swing"))
+    from fes_pin.models.nominal import nominal_model
+
+    save_model(nominal_model(study), tmp_path / "model.toml")
+    return tmp_path
+
+
+START = {  # columns of the file, settings, initial position and velocity (None: the file's)
+    "both_columns": ("position,velocity", (), None, None),
+    "settings_win": ("position,velocity", ("--set=position0=0.3", "--set=velocity0=0.1"), 0.3, 0.1),
+    "settings_alone": ("", ("--set=position0=0.3", "--set=velocity0=0.1"), 0.3, 0.1),
+    "velocity_is_estimated": ("position", (), None, None),
+    "one_setting": ("position,velocity", ("--set=velocity0=-0.5",), None, -0.5),
+}
+
+
+@pytest.mark.parametrize("case", START)
+def test_a_joint_starts_at_its_first_sample(pendulum, monkeypatch, case):
+    """Only the first samples of the outputs count: what follows may be anything."""
+    columns, settings, position0, velocity0 = START[case]
+    model = load_model(pendulum / "model.toml")
+    time = np.arange(200) * 5e-3
+    true = read_swing(pendulum, model, time)
+    names = [n for n in columns.split(",") if n]
+    data = {n: true[n].copy() for n in names}
+    for values in data.values():
+        values[50:] = 99.0
+    table = np.column_stack([time, *data.values()]).tolist()
+    rows = [",".join(["time_s", *names]), *(",".join(map(repr, row)) for row in table)]
+    (pendulum / "in.csv").write_text("\n".join(rows) + "\n")
+    out = pendulum / "out.csv"
+    assert run(monkeypatch, "predict", pendulum / "model.toml", pendulum / "in.csv", *settings, "--out", out) == 0
+    got = np.genfromtxt(out, delimiter=",", names=True)
+    assert got.dtype.names == ("time_s", "position", "velocity")
+    assert got["position"][0] == pytest.approx(true["position"][0] if position0 is None else position0, abs=1e-12)
+    wanted = true["velocity"][0] if velocity0 is None else velocity0
+    assert got["velocity"][0] == pytest.approx(wanted, abs=2e-2 if case == "velocity_is_estimated" else 1e-12)
+    if case == "both_columns":
+        assert np.abs(got["position"] - true["position"]).max() < 1e-9
+
+
+def read_swing(folder, model, time):
+    (folder / "bare.csv").write_text("time_s\n" + "".join(f"{t!r}\n" for t in map(float, time)))
+    conditions = {"position0": 0.8, "velocity0": 0.4}
+    bare = read_trial(folder / "bare.csv", rig="joint", conditions=conditions, inputs_only=True)
+    return simulate(model, bare)
+
+
+def test_a_joint_needs_a_start(pendulum, monkeypatch, capsys):
+    (pendulum / "in.csv").write_text("time_s\n0.0\n0.1\n0.2\n")
+    out = pendulum / "out.csv"
+    line = fails(monkeypatch, capsys, "predict", pendulum / "model.toml", pendulum / "in.csv", "--out", out)
+    assert "position0" in line and not out.exists()
+
+
+def test_effects_lists_every_cause(monkeypatch, capsys):
+    run(monkeypatch, "effects")
+    printed = capsys.readouterr().out
+    for one in EFFECTS:
+        assert f"{one.name} ({one.stage}; " in printed
+        for name, info in one.parameters().items():
+            assert f"{name} [{info.in_units(ROTARY).unit or '1'}]" in printed
+
+
+def test_help_is_not_an_error(monkeypatch):
+    assert run(monkeypatch, "--help") == 0
+    assert run(monkeypatch, "diagnose") == 2

@@ -1,0 +1,128 @@
+"""Recruitment curves and their exact inverses."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fes_pin.data.errors import InputError
+from fes_pin.muscles.recruitment import (
+    ChannelRecruitment,
+    GompertzRecruitment,
+    HillRecruitment,
+    Hysteresis,
+    LinearRecruitment,
+    MeasuredRecruitment,
+    SaturatingRecruitment,
+    SigmoidRecruitment,
+)
+
+CURVES = [
+    LinearRecruitment(),
+    LinearRecruitment(0.0, 300.0),
+    SaturatingRecruitment(150.0, 500.0, 4.0),
+    SaturatingRecruitment(150.0, 500.0, -2.0),
+    SigmoidRecruitment(100.0, 400.0, 12.0, 0.4),
+    GompertzRecruitment(180.0, 1000.0, 4.0, 5.0),
+    HillRecruitment(180.0, 1000.0, 0.8, 1.5),
+    HillRecruitment(180.0, 1000.0, -0.7, -1.0),
+    MeasuredRecruitment([120, 200, 260, 500], [0, 0.2, 0.8, 1]),
+]
+MIXED = ChannelRecruitment(CURVES, len(CURVES))
+
+
+@pytest.mark.parametrize("curve", CURVES, ids=lambda c: type(c).__name__)
+def test_inverse_is_exact_and_within_threshold_and_saturation(curve):
+    r = np.concatenate([np.linspace(0, 1, 20_001), 10.0 ** np.linspace(-15, -1, 50)])
+    width = curve.pulse_width_us(r)
+    np.testing.assert_allclose(curve.recruitment(width), r, atol=3e-13)
+    assert (width[r == 0] == 0).all()
+    assert ((width[r > 0] >= curve.threshold_us) & (width <= curve.saturation_us)[r > 0]).all()
+    assert curve.pulse_width_us(1.0) == curve.saturation_us and curve.pulse_width_us(-0.1) == 0.0
+
+
+@pytest.mark.parametrize("curve", CURVES, ids=lambda c: type(c).__name__)
+def test_curves_rise_from_threshold_to_saturation_and_stay(curve):
+    w = np.linspace(float(curve.threshold_us), float(curve.saturation_us), 1001)
+    assert (np.diff(curve.recruitment(w)) > 0).all()
+    assert curve.recruitment(float(curve.threshold_us)) == 0.0 and curve.recruitment(float(curve.saturation_us)) == 1.0
+    assert curve.recruitment(0.0) == 0.0 and curve.recruitment(1e6) == 1.0
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.floats(0, 400),
+    st.floats(1, 2000),
+    st.floats(0.5, 15),
+    st.floats(0.1, 0.9),
+    st.floats(0, 1),
+)
+def test_sigmoid_inverse_for_any_parameters(threshold, span, steepness, middle, r):
+    curve = SigmoidRecruitment(threshold, threshold + span, steepness, middle)
+    width = float(curve.pulse_width_us(r))
+    assert width == 0.0 if r == 0 else threshold <= width <= threshold + span
+    # the slope of the curve turns the rounding of a pulse width into one of recruitment
+    rounding = 4 * np.spacing(threshold + span) / span * steepness
+    assert curve.recruitment(width) == pytest.approx(r, abs=1e-12 + rounding)
+
+
+def test_mixed_channels_equal_each_curve_alone():
+    r = np.random.default_rng(0).uniform(-0.1, 1.1, (100, len(CURVES)))
+    widths = MIXED.pulse_width_us(r)
+    for i, curve in enumerate(CURVES):
+        np.testing.assert_array_equal(widths[:, i], curve.pulse_width_us(np.minimum(r[:, i], 1.0)))
+    np.testing.assert_allclose(MIXED.recruitment(widths), np.clip(r, 0, 1), atol=1e-12)
+    np.testing.assert_array_equal(MIXED.threshold_us[:2], [180.0, 0.0])
+
+
+def test_one_curve_with_arrays_of_thresholds():
+    curve = ChannelRecruitment(LinearRecruitment(np.array([100.0, 200.0]), np.array([300.0, 500.0])), 2)
+    np.testing.assert_allclose(curve.pulse_width_us(np.array([0.5, 0.5])), [200.0, 350.0])
+    np.testing.assert_array_equal(curve.saturation_us, [300.0, 500.0])
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: LinearRecruitment(500.0, 500.0),
+        lambda: LinearRecruitment(-1.0, 500.0),
+        lambda: LinearRecruitment(float("nan"), 500.0),
+        lambda: SaturatingRecruitment(100.0, 500.0, 0.0),
+        lambda: SigmoidRecruitment(100.0, 500.0, -1.0),
+        lambda: GompertzRecruitment(100.0, 500.0, 0.0),
+        lambda: Hysteresis(LinearRecruitment(), -1.0),
+        lambda: MeasuredRecruitment([100, 200], [0, 0.9]),
+        lambda: MeasuredRecruitment([100, 200, 150], [0, 0.5, 1]),
+        lambda: MeasuredRecruitment([100], [0]),
+        lambda: ChannelRecruitment([LinearRecruitment()], 2),
+    ],
+)
+def test_bad_curves_are_refused(make):
+    with pytest.raises(InputError):
+        make()
+
+
+def test_hill_curve_is_the_models_formula():
+    x, n, e = np.linspace(0.01, 1, 50), np.exp(0.8), np.exp(1.5) - 1
+    got = HillRecruitment(100.0, 200.0, 0.8, 1.5).recruitment(100.0 + 100.0 * x)
+    np.testing.assert_allclose(got, (1 + e) * x**n / (1 + e * x**n), atol=1e-13)
+
+
+@pytest.mark.parametrize("curve", [LinearRecruitment(180.0, 1000.0), SigmoidRecruitment(180.0, 600.0)])
+def test_hysteresis_is_undone_wherever_it_can_be(curve):
+    rng, exact, cut = np.random.default_rng(0), 0, 0
+    for half_width in (0.0, 15.0, 80.0):
+        play = Hysteresis(curve, half_width, acting_us=300.0)
+        wanted = np.clip(0.5 + 0.6 * np.sin(np.cumsum(rng.normal(size=2000)) * 0.3), 0, 1)
+        for r in wanted:
+            low, high = play.reach()
+            width = play.pulse_width_us(r)
+            assert width == 0.0 if r == 0 else curve.threshold_us <= width <= curve.saturation_us
+            got = play.recruitment(width)
+            if r == 0.0 or low <= r <= high:
+                assert got == pytest.approx(r, abs=1e-12)
+                exact += 1
+            else:
+                assert got == pytest.approx(low if r < low else high, abs=1e-12)
+                cut += 1
+    assert exact > 3000 and cut > 100

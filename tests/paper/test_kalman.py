@@ -1,0 +1,120 @@
+"""Gain and time constant by Kalman filter: accuracy, consistency, online use, agreement with the batch fit."""
+
+import numpy as np
+import pytest
+
+from fes_pin.data.errors import InputError
+from fes_pin.identify.fit import fit
+from fes_pin.identify.noise import Noise
+from fes_pin.models.nominal import nominal_model
+from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_trial, paper_twin
+from fes_pin.paper.kalman import GainFilter, Recruitment, chi2_band, nees, track_gain
+from fes_pin.paper.twin import record
+
+TWIN = paper_twin("3-23")
+CONSTANTS = TWIN.constants()
+CHECKS = (112, 225, 450, 1125)
+"""Samples at 0.5, 1, 2 and 5 s."""
+RUNS = 60
+
+
+def isometric(seed, noise=FORCE_NOISE_N, seconds=8.0):
+    return record(TWIN, isometric_stimulus(seconds), "held", held_at_rad=HELD_AT_RAD, noise_std=noise, seed=seed)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """NEES at the checks, shape (runs, checks), and NIS, shape (runs, samples)."""
+    squares, innovations = [], []
+    for seed in range(RUNS):
+        trial = isometric(2000 + seed, seconds=5.25)
+        tracker = GainFilter(trial.dt, Recruitment.of(CONSTANTS), FORCE_NOISE_N)
+        at, nis = [], []
+        for k, (force, width) in enumerate(zip(trial["force_n"], trial["pulse_width_us"], strict=True)):
+            tracker.step(force, width)
+            nis.append(tracker.nis)
+            if k in CHECKS:
+                at.append(nees(tracker, TWIN.gain, TWIN.time_constant_s))
+        squares.append(at)
+        innovations.append(nis)
+    return np.array(squares), np.array(innovations)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_within_two_percent_after_five_seconds(seed):
+    gain, tau = track_gain(isometric(seed), CONSTANTS, FORCE_NOISE_N).at(5.0)
+    assert gain == pytest.approx(0.65, rel=0.02) and tau == pytest.approx(0.05, rel=0.02)
+
+
+def test_the_filter_does_the_sums_of_a_kalman_filter():
+    """Against matrices: the correction in Joseph's form, the prediction with the product's exact moments."""
+    trial, noise = isometric(11, seconds=2.0), FORCE_NOISE_N
+    tracker = GainFilter(trial.dt, Recruitment.of(CONSTANTS), noise, wander=0.05)
+    x, p = tracker.x, tracker.p
+    for force, width in zip(trial["force_n"], trial["pulse_width_us"], strict=True):
+        tracker.step(float(force), float(width))
+        gain = p[:, 0] / (p[0, 0] + noise**2)
+        keep = np.eye(3) - np.outer(gain, [1.0, 0.0, 0.0])
+        x, p = x + gain * (force - x[0]), keep @ p @ keep.T + noise**2 * np.outer(gain, gain)
+        moves = np.array([[x[1], x[0], tracker.recruitment(width)], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        product = p[0, 0] * p[1, 1] + p[0, 1] ** 2
+        x = np.array([x[1] * x[0] + p[0, 1] + tracker.recruitment(width) * x[2], x[1], x[2]])
+        p = moves @ p @ moves.T + np.diag([product, 0.0, (0.05 * x[2]) ** 2 * trial.dt])
+        np.testing.assert_allclose(tracker.x, x, rtol=1e-9)
+        np.testing.assert_allclose(tracker.p, p, rtol=1e-6, atol=1e-12)
+
+
+def test_nees_lies_in_its_band(runs):
+    squares, _ = runs
+    assert squares.shape == (RUNS, len(CHECKS))
+    low, high = chi2_band(2, RUNS)
+    assert low < squares.mean(axis=0)[-1] < high  # the 95 % band after 5 s
+    low, high = chi2_band(2, RUNS, 0.95 ** (1 / len(CHECKS)))
+    assert ((squares.mean(axis=0) > low) & (squares.mean(axis=0) < high)).all()
+
+
+def test_nis_lies_in_its_band(runs):
+    _, innovations = runs
+    low, high = chi2_band(1, innovations[:, 225:].size)
+    assert low < innovations[:, 225:].mean() < high
+
+
+def test_plain_regression_is_biased_by_noise_and_the_filter_is_not():
+    plain = track_gain(isometric(3, noise=1.0), CONSTANTS, 1.0, plain=True).at(8.0)
+    good = track_gain(isometric(3, noise=1.0), CONSTANTS, 1.0).at(8.0)
+    assert plain[1] < 0.045 and good[1] == pytest.approx(0.05, rel=0.03)
+
+
+def test_agrees_with_the_batch_fit_of_the_same_trial():
+    trial, study = isometric(7), paper_study("3-23")
+    history = track_gain(trial, CONSTANTS, FORCE_NOISE_N)
+    batch = fit(nominal_model(study), [trial], {"force_n": Noise(FORCE_NOISE_N)})
+    for name, value, std in (
+        ("gain", history.gain[-1], history.gain_std[-1]),
+        ("time_constant_s", history.time_constant_s[-1], history.time_constant_std_s[-1]),
+    ):
+        assert abs(value - batch.values[name]) < 0.5 * batch.std(name)
+        assert std == pytest.approx(batch.std(name), rel=0.1)
+
+
+def test_missing_samples_are_bridged():
+    trial = isometric(9)
+    force = trial["force_n"].copy()
+    force[np.random.default_rng(0).random(len(force)) < 0.3] = np.nan
+    gain, tau = track_gain(trial.with_columns(force_n=force), CONSTANTS, FORCE_NOISE_N).at(8.0)
+    assert gain == pytest.approx(0.65, rel=0.02) and tau == pytest.approx(0.05, rel=0.02)
+
+
+def test_a_wandering_gain_is_followed():
+    trial = isometric(4)
+    fading = trial.with_columns(force_n=trial["force_n"] * np.linspace(1.0, 0.7, len(trial)))
+    moving = track_gain(fading, CONSTANTS, FORCE_NOISE_N, wander=0.05).gain[-1]
+    assert moving == pytest.approx(0.7 * 0.65, rel=0.04)
+    assert track_gain(fading, CONSTANTS, FORCE_NOISE_N).gain[-1] > 1.08 * 0.7 * 0.65
+
+
+def test_bad_input_is_one_line():
+    with pytest.raises(InputError, match="no column force_n"):
+        track_gain(paper_trial("3-23"), CONSTANTS, FORCE_NOISE_N)
+    with pytest.raises(InputError, match="above 0"):
+        GainFilter(0.0, Recruitment(), 0.2)
