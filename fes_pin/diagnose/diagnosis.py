@@ -221,7 +221,7 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         nominal=nominal,
         extended=best,
         nominal_error=(_error(nominal, searched.floor), held.nominal.error_percent() if held else None),
-        extended_error=(in_sample.error_percent(), held.extended.error_percent() if held else None),
+        extended_error=(in_sample.error_percent(), held.chosen.error_percent() if held else None),
         ceiling_percent=100.0 * float(in_sample.counts.sum() / max(in_sample.spread.sum(), 1e-300)),
         next_experiment=_experiment(searched, causes, study),
         ranking=_ranking(searched),
@@ -266,7 +266,7 @@ def _causes(
     out = []
     for one in best.model.effects:
         name = one.name
-        measured = held or HeldOut(inside_nominal, inside_best, inside, {})
+        measured = held or HeldOut(inside_nominal, inside_best, inside, {}, inside_best)
         out.append(
             Cause(
                 name=name,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from diagnose.hidden import study_of
 
-from fes_pin.diagnose.decide.held_out import RUNAWAY, errors_of, separate
+from fes_pin.diagnose.decide.held_out import RUNAWAY, cross_validate, errors_of, gain, separate
 from fes_pin.identify.fit import fit
 from fes_pin.models.effects import effect
 from fes_pin.models.nominal import nominal_model
@@ -34,3 +34,18 @@ def test_evidence_against_a_model_that_runs_away_is_a_number():
     )
     assert 1e6 < with_it.evidence["cause"].low < np.inf
     assert -np.inf < without_it.evidence["cause"].low < -1e6
+
+
+def test_a_causes_gain_is_not_that_of_another_set_which_the_folds_prefer():
+    """Dry friction is hidden; an offset is judged beside it: what the friction removes is not the offset's gain."""
+    study = study_of("joint", ("coulomb_friction",))
+    nominal = fit(nominal_model(study), study.trials)
+    offset, friction = (
+        fit(nominal.model + effect(name)(), study.trials, nominal.noise)
+        for name in ("effort_offset", "coulomb_friction")
+    )
+    alone = cross_validate(nominal, offset, {"effort_offset": nominal}, [], nominal.noise)
+    beside = cross_validate(nominal, offset, {"effort_offset": nominal}, [friction], nominal.noise)
+    own, found = (gain(h.nominal, h.without["effort_offset"], h.extended, 0) for h in (alone, beside))
+    assert own.high < 50.0 < gain(beside.nominal, beside.nominal, beside.chosen, 0).low
+    assert found == own

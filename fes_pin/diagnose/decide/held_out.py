@@ -134,15 +134,18 @@ class Evidence:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """On held-out trials: errors of the nominal model, the chosen extension, and it without each of its causes.
+    """On held-out trials: errors of the nominal model, of the extension, and of it without each of its causes.
 
-    `evidence` is of each cause beside the others, in the extension as it was chosen on all trials.
+    A cause's gain and its `evidence` are what it adds to the other causes of one model, the extension as it was chosen
+    on all trials: from `without` to `extended`. `chosen` are the errors of what each fold itself would have chosen,
+    which may be another set.
     """
 
     nominal: Errors
     extended: Errors
     without: dict[str, Errors]
     evidence: dict[str, Evidence]
+    chosen: Errors
 
 
 def cross_validate(
@@ -167,6 +170,7 @@ def cross_validate(
         _joined([r.extended for r in results]),
         {n: _joined([r.without[n] for r in results]) for n in without},
         {n: sum((r.evidence[n] for r in results), Evidence(0.0, 0.0)) for n in without},
+        _joined([r.chosen for r in results]),
     )
 
 
@@ -184,17 +188,19 @@ def _fold(
     without, contenders = dict(zip(names, rest, strict=False)), rest[len(names) :]
     test = [trials[i] for i in held]
     chosen = min((best, *contenders), key=lambda f: f.price)
-    return replace(separate(nominal, best, without, test, floor), extended=errors_of(chosen.model, test, floor))
+    told = separate(nominal, best, without, test, floor)
+    return told if chosen is best else replace(told, chosen=errors_of(chosen.model, test, floor))
 
 
 def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Trial], floor: NoiseModel) -> HeldOut:
     """Errors on trials that the study itself holds out."""
-    left = _whitened(best, test)
+    left, extended = _whitened(best, test), errors_of(best.model, test, floor)
     return HeldOut(
         errors_of(nominal.model, test, floor),
-        errors_of(best.model, test, floor),
+        extended,
         {n: errors_of(f.model, test, floor) for n, f in without.items()},
         {n: _evidence(_whitened(f, test), left) for n, f in without.items()},
+        extended,
     )
 
 
