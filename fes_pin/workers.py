@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -10,14 +9,10 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from fes_pin.settings import threads
+
 In = TypeVar("In")
 Out = TypeVar("Out")
-
-
-def threads() -> int:
-    """How many threads to use: `FES_PIN_THREADS`, else one a core, at most 8."""
-    chosen = os.environ.get("FES_PIN_THREADS", "")
-    return max(1, int(chosen)) if chosen.isdigit() else max(1, min(8, os.cpu_count() or 1))
 
 
 @contextmanager

@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin import settings
+
 Reals = np.ndarray
 """A flat array of doubles."""
 Integers = np.ndarray
@@ -246,9 +248,8 @@ class Native:
             lowered = _Lowering(module, source, known)
             known[source.name] = lowered.function
             kinds[source.name] = [CTYPES[kind] for kind in lowered.kinds.values()]
-        machine = llvm.Target.from_default_triple().create_target_machine(
-            cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=3
-        )
+        name, features = settings.target()
+        machine = llvm.Target.from_default_triple().create_target_machine(cpu=name, features=features, opt=3)
         parsed = llvm.parse_assembly(str(module))
         parsed.verify()
         options = llvm.create_pipeline_tuning_options(speed_level=3)

@@ -10,9 +10,10 @@ from typing import Annotated
 
 import typer
 
+from fes_pin.cli.group import Commands, release_output
 from fes_pin.data.errors import InputError
 
-app = typer.Typer(help="The walking body: modes, nerves, view.", no_args_is_help=True)
+app = typer.Typer(cls=Commands, help="The walking body: modes, nerves, view.")
 
 
 def _body_options(
@@ -47,20 +48,13 @@ def _body_options(
 
 
 def _of_a_body(command: Callable) -> Callable:
-    """The options of `_body_options` before the command's own; its first argument is what they make.
-
-    Bad input becomes one line on standard error and exit code 2.
-    """
+    """The options of `_body_options` before the command's own; its first argument is what they make."""
     common = signature(_body_options, eval_str=True).parameters
     own = list(signature(command, eval_str=True).parameters.values())[1:]
 
     @wraps(command)
     def run(**given):
-        try:
-            return command(_body_options(**{name: given.pop(name) for name in common}), **given)
-        except InputError as error:
-            typer.echo(str(error), err=True)
-            raise typer.Exit(2) from None
+        return command(_body_options(**{name: given.pop(name) for name in common}), **given)
 
     run.__signature__ = Signature([*own, *common.values()])  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in (*own, *common.values())}
@@ -177,6 +171,7 @@ def _serve(scene) -> None:
         viewer.show(scene)
         try:  # from the first sign that it can be interrupted
             typer.echo(f"{scene.caption}\n{viewer.url} (Ctrl-C ends it)")
+            release_output()
             viewer.wait()
         except KeyboardInterrupt:
             typer.echo("ended")

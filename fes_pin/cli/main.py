@@ -12,16 +12,12 @@ import typer
 
 from fes_pin.cli.allocate import allocate
 from fes_pin.cli.body import app as body
+from fes_pin.cli.group import Commands
 
 if TYPE_CHECKING:
     from fes_pin.diagnose.diagnosis import Diagnosis
 
-app = typer.Typer(
-    help="Functional electrical stimulation on Pinocchio: what a simulation gets wrong, and its cause by name.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
+app = typer.Typer(cls=Commands, pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
 app.command()(allocate)
 
@@ -29,11 +25,31 @@ DIAGNOSING = 0.8
 """Share of the time of `diagnose` before the report is drawn, about."""
 
 
+def _print_version(is_asked: bool) -> None:
+    if is_asked:
+        from fes_pin import __version__
+
+        typer.echo(f"fes-pin {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def before_any_command(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version, and end.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    """Functional electrical stimulation on Pinocchio: what a simulation gets wrong, and its cause by name."""
+    from fes_pin import settings
+
+    settings.check()  # a wrong setting of the environment is said before any work
+
+
 @app.command()
 def diagnose(
     study: Annotated[Path, typer.Argument(help="Folder of a study, or its study.toml.")],
     out: Annotated[Path, typer.Option(help="Folder for diagnosis.json, model.toml and report.html.")],
-    seed: Annotated[int, typer.Option(help="Of what is simulated: critical values and bootstrap intervals.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values and bootstrap intervals.")] = 0,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
     from fes_pin.data.files import check_folder, write_files
@@ -143,14 +159,8 @@ def _progress() -> Iterator[Callable[[float, str], None]]:
 
 
 def main() -> None:
-    """Run the command line: bad input gives one line and exit code 2."""
-    from fes_pin.data.errors import InputError
-
-    try:
-        app()
-    except InputError as error:
-        typer.echo(f"fes-pin: {error}", err=True)
-        raise SystemExit(2) from None
+    """Run the command line; see `fes_pin.cli.group`."""
+    app(prog_name="fes-pin")
 
 
 if __name__ == "__main__":

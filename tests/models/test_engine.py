@@ -1,12 +1,15 @@
 """The machine code against CasADi's virtual machine: two ways from the same expressions to numbers."""
 
 import logging
+import re
 from dataclasses import dataclass
 
+import llvmlite.binding as llvm
 import numpy as np
 import pytest
 from models.cases import CASES, KINDS, RIGS, everything, jitter, name_of, trial, with_effect
 
+from fes_pin import settings
 from fes_pin.data.errors import InputError
 from fes_pin.models.compile import machine, native, program
 from fes_pin.models.compile.equations import derive
@@ -89,8 +92,28 @@ def test_the_environment_chooses_the_engine(fresh, monkeypatch):
     assert answer() == pytest.approx(expected, abs=1e-10)
     assert {type(p).__name__ for p in program._PROGRAMS.values()} == {"NativeProgram", "VirtualProgram"}
     monkeypatch.setenv("FES_PIN_ENGINE", "abacus")
-    with pytest.raises(InputError, match="expected llvm or casadi, found 'abacus'"):
+    with pytest.raises(InputError, match="FES_PIN_ENGINE: expected llvm or casadi, found 'abacus'"):
         answer()
+
+
+def test_generic_code_uses_no_wide_registers_and_says_the_same(fresh, monkeypatch):
+    """What any x86-64 has: neither AVX nor a fused multiply-add; kept apart from this processor's own."""
+    expected = answer()
+    monkeypatch.setenv("FES_PIN_CPU", "generic")
+    found = answer()
+    assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    assert len(list(fresh.iterdir())) == 2 and len(program._PROGRAMS) == 2
+    if "x86_64" in llvm.get_default_triple():
+        layout, _ = lanes(everything("ankle"), "motion", np.random.default_rng(0), 10)
+        module = llvm.parse_assembly(native.emit(derive(everything("ankle"), layout)))
+        text = machine._target(*settings.target()).emit_assembly(module)
+        assert "mulpd" in text and not re.search(r"%[yz]mm|vfn?m(add|sub)|\bv[a-z]+pd\b", text)
+
+
+@pytest.mark.parametrize(("rig", "kind"), [(r, k) for r in RIGS for k in KINDS[r]])
+def test_all_effects_at_once_are_the_same_in_generic_code(monkeypatch, rig, kind):
+    monkeypatch.setenv("FES_PIN_CPU", "generic")
+    compare(everything(rig), kind, 40)
 
 
 @pytest.mark.parametrize("error", [RuntimeError("no such\nprocessor"), NotImplementedError("CasADi operation 99")])

@@ -14,6 +14,7 @@ from pathlib import Path
 import llvmlite
 import llvmlite.binding as llvm
 
+from fes_pin import settings
 from fes_pin.data.files import write_bytes
 
 _LOCK = threading.Lock()
@@ -30,25 +31,22 @@ def cache_folder() -> Path:
     return Path(base) / "fes_pin"
 
 
-def _new_target() -> llvm.TargetMachine:
+def _new_target(name: str, features: str) -> llvm.TargetMachine:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=1, jit=True
-    )
+    triple = llvm.Target.from_default_triple()
+    return triple.create_target_machine(cpu=name, features=features, opt=1, jit=True)
 
 
 @cache
-def _target() -> llvm.TargetMachine:
+def _target(name: str, features: str) -> llvm.TargetMachine:
     """The one that compiles. An execution engine takes its target machine with it when it goes: it needs its own."""
-    return _new_target()
+    return _new_target(name, features)
 
 
-@cache
-def processor() -> str:
-    """What the object code was made for and by."""
-    features = llvm.get_host_cpu_features().flatten()
-    return f"{llvm.get_host_cpu_name()} {features} llvmlite {llvmlite.__version__}"
+def made_for() -> str:
+    """What object code is made for and by: processor, its features, compiler."""
+    return " ".join((*settings.target(), "llvmlite", llvmlite.__version__))
 
 
 class MachineCode:
@@ -56,7 +54,7 @@ class MachineCode:
 
     def __init__(self, object_code: bytes) -> None:
         with _LOCK:
-            target = _new_target()
+            target = _new_target(*settings.target())
             self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target)
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(object_code))
             self._engine.finalize_object()
@@ -73,12 +71,12 @@ def compile_object(assembly: str) -> bytes:
     gain a tenth of the running time. NaN and infinity are honoured.
     """
     with _LOCK:
-        return _target().emit_object(llvm.parse_assembly(assembly))
+        return _target(*settings.target()).emit_object(llvm.parse_assembly(assembly))
 
 
 def cached_path(key: str, suffix: str) -> Path:
     """The file of the cache that belongs to `key`."""
-    return cache_folder() / f"{hashlib.sha256((processor() + key).encode()).hexdigest()[:40]}{suffix}"
+    return cache_folder() / f"{hashlib.sha256((made_for() + key).encode()).hexdigest()[:40]}{suffix}"
 
 
 def read_cached(path: Path) -> bytes | None:

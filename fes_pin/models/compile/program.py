@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import threading
 from dataclasses import asdict
 from functools import cache
@@ -12,13 +11,12 @@ from typing import Protocol
 
 import numpy as np
 
-from fes_pin.data.errors import InputError
+from fes_pin import settings
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import Layout, make_layout
 from fes_pin.models.compile.virtual import VirtualProgram
 from fes_pin.models.model import Model
 
-ENGINES = ("llvm", "casadi")
 _LOG = logging.getLogger("fes_pin")
 
 
@@ -53,7 +51,7 @@ class Program(Protocol):
 
 
 _LOCK = threading.Lock()  # CasADi's expressions are not made for two threads
-_PROGRAMS: dict[tuple[str, tuple[type, ...], Layout], Program] = {}
+_PROGRAMS: dict[tuple[str, str, tuple[type, ...], Layout], Program] = {}
 
 
 def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...]) -> Program:
@@ -71,24 +69,16 @@ def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str
     Raises
     ------
     InputError
-        If FES_PIN_ENGINE names no engine.
+        If FES_PIN_ENGINE names no engine, or FES_PIN_CPU no processor.
     """
-    layout, engine = make_layout(model, kind, inputs, columns), chosen_engine()
-    key = (engine, _classes(model), layout)
+    layout, engine = make_layout(model, kind, inputs, columns), settings.engine()
+    key = (engine, settings.processor(), _classes(model), layout)
     if key not in _PROGRAMS:
         with _LOCK:
             if key not in _PROGRAMS:
                 made = _native(model, layout) if engine == "llvm" else None
                 _PROGRAMS[key] = made or VirtualProgram(derive(model, layout))
     return _PROGRAMS[key]
-
-
-def chosen_engine() -> str:
-    """What programs run on: `FES_PIN_ENGINE`, "llvm" for machine code (default) or "casadi" for its virtual machine."""
-    engine = os.environ.get("FES_PIN_ENGINE") or ENGINES[0]
-    if engine not in ENGINES:
-        raise InputError(f"FES_PIN_ENGINE: expected {' or '.join(ENGINES)}, found {engine[:40]!r}")
-    return engine
 
 
 def _classes(model: Model) -> tuple[type, ...]:
