@@ -1,4 +1,7 @@
-"""The imports run one way: view -> diagnose -> identify -> models -> data; control -> allocate -> muscles -> body."""
+"""The imports run one way: view -> diagnose -> identify -> models -> data; control -> allocate -> muscles -> body.
+
+Measured walking (walk) reads the body, and the parameters and stages of models for its causes.
+"""
 
 import ast
 from pathlib import Path
@@ -13,10 +16,11 @@ ALLOWED = {
     "diagnose": {"identify", "models", "data"},
     "paper": {"identify", "models", "data"},
     "body": {"data"},
+    "walk": {"body", "models", "data"},
     "muscles": {"body", "models", "data"},
     "allocate": {"muscles", "body", "data"},
     "control": {"allocate", "muscles", "identify", "models", "data"},
-    "view": {"paper", "diagnose", "identify", "models", "data", "control", "allocate", "muscles", "body"},
+    "view": {"paper", "diagnose", "identify", "models", "data", "control", "allocate", "muscles", "body", "walk"},
 }
 
 

@@ -1,0 +1,248 @@
+"""Measured walking as motion of a body that is let go of the ground: Pinocchio's q, v, a in every sample."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pinocchio as pin
+
+from fes_pin.body.build import GRAVITY, Body
+from fes_pin.body.gait import pelvis_turns, postures_of_walk
+from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.data.errors import InputError
+from fes_pin.data.motion import OPTIONAL, REQUIRED
+from fes_pin.walk.smooth import CUTOFF_HZ, low_pass, rates, smoothing_spline
+
+TO_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""OpenSim's axes (x forward, y up, z right) to ours (x forward, y left, z up)."""
+PELVIS_TO_HIP = np.array([-0.0402431, -0.0376247, 0.0475290])
+"""Right hip centre in OpenSim's pelvis, in standing heights: gait2354 scaled to an adult of 1.80 m."""
+_STEP = 1e-4
+"""s; how far a sample's path is followed for its rates: truncation 1e-8, rounding 1e-8 of the acceleration."""
+
+
+def free_model(body: Body) -> pin.Model:
+    """The body's model let go of the ground: a free joint under the stance forefoot, then the 19."""
+    model = pin.buildModelFromXML(body.urdf, pin.JointModelFreeFlyer())
+    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
+    return model
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A body's motion, sample by sample.
+
+    Attributes
+    ----------
+    body, model
+        The body, and its model with a free joint at the stance forefoot.
+    time
+        (n,) s.
+    q, v, a
+        (n, 26), (n, 25), (n, 25) as Pinocchio has them: the free joint in its own frame, then the joints.
+    bandwidth_hz
+        Of the coordinates: the low pass, or the narrowest and widest spline's; None where the file gave the rates.
+    """
+
+    body: Body
+    model: pin.Model = field(repr=False)
+    time: np.ndarray = field(repr=False)
+    q: np.ndarray = field(repr=False)
+    v: np.ndarray = field(repr=False)
+    a: np.ndarray = field(repr=False)
+    bandwidth_hz: tuple[float, float] | None = None
+
+    @property
+    def dt(self) -> float:
+        """Time step, s."""
+        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The 19 joints in the order of `q[:, 7:]`."""
+        return tuple(self.model.names[2:])
+
+    def part(self, rows: np.ndarray | slice) -> Motion:
+        """Some of the samples."""
+        return replace(self, time=self.time[rows], q=self.q[rows], v=self.v[rows], a=self.a[rows])
+
+
+def pelvis_to_hip(body: Body, table: Mapping | None = None) -> np.ndarray:
+    """Right hip centre in OpenSim's pelvis frame and axes: (3,) m.
+
+    From the table of segments (`joints.hip_r.loc_in_parent`) if it says, else from gait2354 by the body's height.
+
+    Raises
+    ------
+    InputError
+        The table's entry is not three numbers, or neither it nor a height is known.
+    """
+    place = ((table or {}).get("joints", {}).get("hip_r", {}) or {}).get("loc_in_parent")
+    if place is not None:
+        try:
+            centre = np.array(place, dtype=float)
+        except (TypeError, ValueError):
+            centre = np.zeros(0)
+        if centre.shape != (3,) or not np.isfinite(centre).all():
+            raise InputError("must be three finite numbers in m", column="joints.hip_r.loc_in_parent")
+        return centre
+    if body.height_m is None:
+        raise InputError("the body's height must be known to place the pelvis", column="height_m")
+    return PELVIS_TO_HIP * body.height_m
+
+
+def motion_of(
+    body: Body,
+    time: np.ndarray,
+    columns: Mapping[str, np.ndarray],
+    hip: np.ndarray,
+    *,
+    cutoff_hz: float | None = CUTOFF_HZ,
+    belt_speed_mps: float = 0.0,
+) -> Motion:
+    """The body's motion from OpenSim's coordinates.
+
+    Rates and accelerations are the file's where it has both for every coordinate (`qd_`, `qdd_`), and then nothing is
+    filtered; else coordinates are low-passed at `cutoff_hz`, or smoothed by splines of estimated bandwidth if it is
+    None, and differentiated.
+
+    Parameters
+    ----------
+    body
+        The body.
+    time, columns
+        (n,) s; `q_<coordinate>`, and `qd_`, `qdd_` if known, (n,) in rad and m. What is optional and absent is 0.
+    hip
+        Right hip centre in OpenSim's pelvis, (3,) m; see `pelvis_to_hip`.
+    cutoff_hz
+        Of the low pass, Hz, or None for splines.
+    belt_speed_mps
+        Speed of a treadmill's belt, taken as walking over ground: its way is added to the pelvis's.
+
+    Raises
+    ------
+    InputError
+        A coordinate is missing or not finite.
+    """
+    model = free_model(body)
+    at, bandwidth = _followed(body, time, columns, hip, cutoff_hz)
+    belt = np.zeros((len(time), 3))
+    belt[:, 0] = belt_speed_mps * (time - time[0])
+    q, v, a = _joints(model, [angles for angles, _, _ in at])
+    speed = (at[1][2] - at[2][2]) / (2.0 * _STEP) + [belt_speed_mps, 0.0, 0.0]
+    gain = (at[1][2] - 2.0 * at[0][2] + at[2][2]) / _STEP**2
+    data, pelvis = model.createData(), model.getFrameId("pelvis")
+    rest = q[:, :7] * 0.0 + [0, 0, 0, 0, 0, 0, 1.0]
+    for k in range(len(time)):
+        turn = at[0][1][k]
+        plus, minus = pin.log3(turn.T @ at[1][1][k]), pin.log3(turn.T @ at[2][1][k])
+        omega, alpha = (plus - minus) / (2.0 * _STEP), (plus + minus) / _STEP**2
+        linear = turn.T @ speed[k]
+        place = pin.SE3(turn, at[0][2][k] + belt[k])
+        twist = pin.Motion(linear, omega)
+        change = pin.Motion(turn.T @ gain[k] - np.cross(omega, linear), alpha)
+        pin.forwardKinematics(
+            model, data, np.concatenate([rest[k], q[k, 7:]]), np.r_[np.zeros(6), v[k, 6:]], np.r_[np.zeros(6), a[k, 6:]]
+        )
+        pin.updateFramePlacement(model, data, pelvis)
+        within = data.oMf[pelvis]
+        own = pin.getFrameVelocity(model, data, pelvis, pin.LOCAL)
+        grown = pin.getFrameAcceleration(model, data, pelvis, pin.LOCAL)
+        q[k, :7] = pin.SE3ToXYZQUAT(place * within.inverse())
+        v[k, :6] = within.act(twist - own).vector
+        a[k, :6] = within.act(change - grown - twist.cross(own)).vector
+    return Motion(body, model, np.asarray(time, dtype=float), q, v, a, bandwidth)
+
+
+def rooted_motion(free: Motion, columns: Mapping[str, np.ndarray], hip: np.ndarray, rows: slice) -> Motion:
+    """The paper's motion in one single support: the stance forefoot rests flat on the ground, and only joints move.
+
+    The stance ankle takes up what the foot turned, so that the other segments stand in space as measured; the forefoot
+    keeps the mean of its place and heading.
+
+    Parameters
+    ----------
+    free
+        The motion of the body let go, whose `body.stance` is the foot that stands.
+    columns
+        As in `motion_of`, on the same times.
+    hip
+        As in `motion_of`.
+    rows
+        The samples of the single support.
+    """
+    cutoff = free.bandwidth_hz[0] if free.bandwidth_hz else None
+    at, _ = _followed(free.body, free.time, columns, hip, cutoff, flat_foot=True)
+    q, v, a = _joints(free.model, [angles[rows] for angles, _, _ in at])
+    data = free.model.createData()
+    foot = free.model.getFrameId(f"{free.body.stance}_forefoot")
+    places = []
+    for posture in free.q[rows]:
+        pin.framesForwardKinematics(free.model, data, posture)
+        places.append(data.oMf[foot].copy())
+    ahead = np.mean([place.rotation[:, 0] for place in places], axis=0)
+    middle = np.mean([place.translation for place in places], axis=0)
+    level = pin.utils.rotate("z", float(np.arctan2(ahead[1], ahead[0])))
+    q[:, :7] = pin.SE3ToXYZQUAT(pin.SE3(level, middle * [1.0, 1.0, 0.0]))
+    return Motion(free.body, free.model, free.time[rows], q, v, a, free.bandwidth_hz)
+
+
+def _followed(
+    body: Body,
+    time: np.ndarray,
+    columns: Mapping[str, np.ndarray],
+    hip: np.ndarray,
+    cutoff_hz: float | None,
+    flat_foot: bool = False,
+) -> tuple[list[tuple[np.ndarray, np.ndarray, np.ndarray]], tuple[float, float] | None]:
+    """Poses now, a small step later and a small step before, in every sample; the coordinates' bandwidth."""
+    names = [n.removeprefix("q_") for n in columns if n.startswith("q_")]
+    (place, rate, change), bandwidth = _paths(names, time, columns, cutoff_hz)
+    moved = [place + step * rate + 0.5 * step**2 * change for step in (0.0, _STEP, -_STEP)]
+    labels = [f"q_{n}" for n in names]
+    return [_pose(body, dict(zip(labels, m.T, strict=True)), hip, flat_foot) for m in moved], bandwidth
+
+
+def _joints(model: pin.Model, angles: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """q, v, a with the joints' columns filled from three poses (n, 19) in the order of `JOINT_NAMES`."""
+    order = [JOINT_NAMES.index(n) for n in model.names[2:]]
+    now, later, before = (each[:, order] for each in angles)
+    q, v, a = (np.zeros((len(now), size)) for size in (model.nq, model.nv, model.nv))
+    q[:, 7:] = now
+    v[:, 6:] = (later - before) / (2.0 * _STEP)
+    a[:, 6:] = (later - 2.0 * now + before) / _STEP**2
+    return q, v, a
+
+
+def _paths(
+    names: list[str], time: np.ndarray, columns: Mapping[str, np.ndarray], cutoff_hz: float | None
+) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], tuple[float, float] | None]:
+    """Coordinates, rates and accelerations (n, coordinates), and the bandwidth that was left to them."""
+    for name in REQUIRED:
+        if name not in names:
+            raise InputError("the coordinate is missing", column=f"q_{name}")
+    raw = np.stack([np.asarray(columns[f"q_{n}"], dtype=float) for n in names], axis=1)
+    if all(f"{kind}_{n}" in columns for kind in ("qd", "qdd") for n in names):
+        first, second = (np.stack([columns[f"{kind}_{n}"] for n in names], axis=1) for kind in ("qd", "qdd"))
+        return (raw, first, second), None
+    dt = float(time[-1] - time[0]) / (len(time) - 1)
+    if cutoff_hz is None:
+        smooth, first, second, bandwidth = smoothing_spline(raw, time)
+        return (smooth, first, second), (float(bandwidth.min()), float(bandwidth.max()))
+    smooth = low_pass(raw, dt, cutoff_hz)
+    return (smooth, *rates(smooth, time)), (cutoff_hz, cutoff_hz)
+
+
+def _pose(
+    body: Body, coordinates: dict[str, np.ndarray], hip: np.ndarray, flat_foot: bool = False
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Joint angles (n, 19), the pelvis's orientation (n, 3, 3) and where its link's origin is, (n, 3) m."""
+    for name in OPTIONAL:
+        coordinates.setdefault(f"q_{name}", np.zeros_like(coordinates["q_pelvis_tx"]))
+    angles = postures_of_walk(coordinates, body.stance, flat_foot)
+    turn = pelvis_turns(coordinates)
+    origin = np.stack([coordinates[f"q_pelvis_t{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
+    side = np.array([1.0, 1.0, 1.0 if body.stance == "right" else -1.0])
+    return angles, turn, origin + turn @ (TO_WORLD @ (hip * side))

@@ -1,0 +1,145 @@
+"""The measured ground reaction of both feet: as wrenches in our axes, low-passed like the motion, and its stances."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from fes_pin.body.joints import SIDES
+from fes_pin.data.errors import InputError
+from fes_pin.walk.motion import TO_WORLD
+from fes_pin.walk.smooth import CUTOFF_HZ, low_pass
+
+LOADED_N = 20.0
+"""A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""
+SHORTEST_S = 0.1
+"""A single support shorter than this is no step."""
+
+
+@dataclass(frozen=True)
+class Plates:
+    """Ground reaction of both feet, on one clock.
+
+    Attributes
+    ----------
+    time
+        (n,) s.
+    feet
+        By side, (n, 6): force, N, and moment about the world's origin, N m; x forward, y left, z up.
+    pressure
+        By side, (n, 3) m: the recorded centre of pressure; held while the foot is unloaded, where it means nothing.
+    loaded
+        By side, (n,) bool.
+    """
+
+    time: np.ndarray = field(repr=False)
+    feet: dict[str, np.ndarray] = field(repr=False)
+    pressure: dict[str, np.ndarray] = field(repr=False)
+    loaded: dict[str, np.ndarray] = field(repr=False)
+
+    @property
+    def total(self) -> np.ndarray:
+        """Both feet together: (n, 6)."""
+        return self.feet["left"] + self.feet["right"]
+
+    def support(self) -> np.ndarray:
+        """The one foot that stands in every sample: `left`, `right`, `both` or "" for none."""
+        left, right = self.loaded["left"], self.loaded["right"]
+        return np.where(left & right, "both", np.where(left, "left", np.where(right, "right", "")))
+
+    def single_supports(self) -> list[tuple[str, slice]]:
+        """Single supports in the order of time: the foot and its samples."""
+        kind = self.support()
+        ends = np.flatnonzero(np.r_[True, kind[1:] != kind[:-1], True])
+        dt = float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+        return [
+            (str(kind[a]), slice(int(a), int(b)))
+            for a, b in pairwise(ends)
+            if kind[a] in SIDES and (b - a) * dt >= SHORTEST_S
+        ]
+
+
+def plates_of(
+    time: np.ndarray,
+    columns: Mapping[str, np.ndarray],
+    at: np.ndarray,
+    *,
+    cutoff_hz: float | None = CUTOFF_HZ,
+    belt_speed_mps: float = 0.0,
+    start_s: float | None = None,
+) -> Plates:
+    """The ground reaction at the motion's times.
+
+    Parameters
+    ----------
+    time, columns
+        (m,) s; `r_` and `l_`: `F[xyz]`, `cop[xyz]`, `T[xyz]` as `fes_pin.data.motion.read_ground_reaction` gives them.
+    at
+        (n,) s; times of the motion.
+    cutoff_hz
+        Of the zero-phase low pass that forces and moments about the origin go through, Hz; None for none.
+    belt_speed_mps
+        Of a treadmill: its way since `start_s` is added to the centres of pressure, as to the pelvis.
+    start_s
+        Time at which the belt's way is 0, s; the motion's first without it.
+
+    Raises
+    ------
+    InputError
+        The two were not recorded at the same time.
+    """
+    if at[0] < time[0] - 1e-9 or at[-1] > time[-1] + 1e-9:
+        raise InputError(f"ground reaction is known from {time[0]:g} to {time[-1]:g} s, motion from {at[0]:g}")
+    dt = float(time[-1] - time[0]) / (len(time) - 1)
+    way = np.zeros((len(time), 3))
+    way[:, 0] = belt_speed_mps * (time - (at[0] if start_s is None else start_s))
+    feet, pressure, loaded = {}, {}, {}
+    for side in SIDES:
+        force, point, free = (
+            np.stack([columns[f"{side[0]}_{kind}{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
+            for kind in ("F", "cop", "T")
+        )
+        point = point + way
+        wrench = np.hstack([force, np.cross(point, force) + free])
+        smooth = wrench if cutoff_hz is None else low_pass(wrench, dt, cutoff_hz)
+        feet[side] = _at(at, time, smooth)
+        loaded[side] = _at(at, time, force[:, 2:]).ravel() > LOADED_N
+        pressure[side] = _held(_at(at, time, point), loaded[side])
+    return Plates(np.asarray(at, dtype=float), feet, pressure, loaded)
+
+
+def _at(at: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(at, time, column) for column in values.T], axis=1)
+
+
+def _held(point: np.ndarray, loaded: np.ndarray) -> np.ndarray:
+    """Points of loaded samples; others as at the nearest loaded one in time."""
+    rows = np.flatnonzero(loaded)
+    if not len(rows):
+        return np.zeros_like(point)
+    after = np.clip(np.searchsorted(rows, np.arange(len(loaded))), 0, len(rows) - 1)
+    before = np.clip(after - 1, 0, None)
+    count = np.arange(len(loaded))
+    nearest = np.where(np.abs(rows[before] - count) <= np.abs(rows[after] - count), rows[before], rows[after])
+    return point[nearest]
+
+
+def centre_of_pressure(wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where a reaction pierces the ground z = 0, and its free moment about the vertical there.
+
+    Parameters
+    ----------
+    wrench
+        (n, 6) force and moment about the world's origin.
+
+    Returns
+    -------
+    point, free
+        (n, 2) m and (n,) N m; NaN where the vertical force is below 20 N.
+    """
+    up = np.where(wrench[:, 2] > LOADED_N, wrench[:, 2], np.nan)
+    point = np.stack([-wrench[:, 4] / up, wrench[:, 3] / up], axis=1)
+    return point, wrench[:, 5] - (point[:, 0] * wrench[:, 1] - point[:, 1] * wrench[:, 0])

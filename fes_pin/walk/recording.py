@@ -1,0 +1,122 @@
+"""A study of walking made ready: the body that is believed, its motion, and the plates on the motion's clock."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fes_pin.body.build import Body
+from fes_pin.data.errors import InputError
+from fes_pin.data.motion import read_coordinates, read_ground_reaction
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
+from fes_pin.walk.motion import Motion, motion_of, pelvis_to_hip
+from fes_pin.walk.plates import Plates, plates_of
+from fes_pin.walk.smooth import CUTOFF_HZ
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One walking trial.
+
+    Attributes
+    ----------
+    name
+        Of the trial.
+    motion, plates
+        On one clock; the filter's ends are cut off.
+    raw_time, raw_plates
+        The plates' own clock and columns, as read.
+    belt_speed_mps
+        Of the treadmill.
+    role
+        As in the study.
+    """
+
+    name: str
+    motion: Motion
+    plates: Plates
+    raw_time: np.ndarray = field(repr=False)
+    raw_plates: dict[str, np.ndarray] = field(repr=False)
+    belt_speed_mps: float = 0.0
+    role: str | None = None
+
+
+def body_of(study: Study, stance: str = "right") -> tuple[Body, np.ndarray]:
+    """The body that a study believes in, and its right hip centre in OpenSim's pelvis, (3,) m.
+
+    Raises
+    ------
+    InputError
+        The study is of another rig, or its table of segments or URDF cannot be used.
+    """
+    if study.rig != "body":
+        raise InputError(f"expected a study of rig body, found {study.rig}", file=study.folder)
+    height = study.constants.get("height_m")
+    if "urdf" in study.files:
+        body = Body.from_urdf(study.files["urdf"])
+        if body.height_m is None and height is not None:
+            body = Body(body.urdf, body.stance, height, body.label)
+        return body, pelvis_to_hip(body)
+    if "segments" in study.files:
+        path = study.files["segments"]
+        body = Body.from_segments(path, stance)
+        try:
+            return _as_heavy(body, study), pelvis_to_hip(body, json.loads(path.read_text()))
+        except InputError as error:
+            raise InputError(error.message, file=path, column=error.column) from None
+    body = Body.from_subject(study.constants["mass_kg"], study.constants["height_m"], stance=stance)
+    return body, pelvis_to_hip(body)
+
+
+def _as_heavy(body: Body, study: Study) -> Body:
+    """The body itself, if the study's mass is not another one.
+
+    Raises
+    ------
+    InputError
+        The masses differ by more than 1 %.
+    """
+    mass = study.constants.get("mass_kg", body.mass_kg)
+    if abs(mass - body.mass_kg) > 0.01 * body.mass_kg:
+        raise InputError(f"its segments weigh {body.mass_kg:.2f} kg, and the study says mass_kg = {mass:g}")
+    return body
+
+
+def recordings_of(
+    study: Study, *, cutoff_hz: float | None = CUTOFF_HZ, stance: str = "right"
+) -> tuple[Body, list[Recording]]:
+    """Every trial of a walking study, each file at its own sample rate.
+
+    Raises
+    ------
+    InputError
+        As `body_of`, and for a trial too short to filter.
+    """
+    body, hip = body_of(study, stance)
+    return body, [_recording(study, trial, body, hip, cutoff_hz) for trial in study.trials]
+
+
+def _recording(study: Study, trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float | None) -> Recording:
+    if f"{trial.name}.coordinates" in study.files:
+        source = study.files[f"{trial.name}.coordinates"]
+        time, columns = read_coordinates(source)
+        raw_time, raw = read_ground_reaction(study.files[f"{trial.name}.ground_reaction"])
+    else:
+        source, time, raw_time = study.folder, trial.time, trial.time
+        columns = {n: v for n, v in trial.columns.items() if n.startswith(("q_", "qd_", "qdd_"))}
+        raw = {n: v for n, v in trial.columns.items() if n not in columns}
+    belt = trial.conditions.get("belt_speed_mps", 0.0)
+    edge = 0.5 / cutoff_hz if cutoff_hz else 0.0
+    inside = (time >= max(raw_time[0], time[0] + edge)) & (time <= min(raw_time[-1], time[-1] - edge))
+    if inside.sum() < 10:
+        raise InputError(f"trial {trial.name} has {inside.sum()} samples of motion and reaction together", file=source)
+    try:
+        whole = motion_of(body, time, columns, hip, cutoff_hz=cutoff_hz, belt_speed_mps=belt)
+        motion = whole.part(inside)
+        plates = plates_of(raw_time, raw, motion.time, cutoff_hz=cutoff_hz, belt_speed_mps=belt, start_s=float(time[0]))
+    except InputError as error:
+        raise InputError(error.message, file=source, column=error.column) from None
+    return Recording(trial.name, motion, plates, raw_time, raw, belt, trial.role)

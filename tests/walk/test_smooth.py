@@ -1,0 +1,54 @@
+"""Filters and splines: what they keep, what they take, and what they say of it."""
+
+import numpy as np
+import pytest
+
+from fes_pin.data.errors import InputError
+from fes_pin.walk.smooth import low_pass, rates, smoothing_spline
+
+TIME = np.arange(400) / 100.0
+
+
+def gain(frequency, cutoff):
+    wave = np.sin(2 * np.pi * frequency * TIME)
+    smooth = low_pass(wave, 0.01, cutoff)[100:-100]
+    return (smooth @ wave[100:-100]) / (wave[100:-100] @ wave[100:-100])
+
+
+def test_half_the_power_passes_at_the_cut_off_without_delay():
+    assert gain(6.0, 6.0) == pytest.approx(np.sqrt(0.5), abs=0.01)
+    assert gain(1.0, 6.0) == pytest.approx(1.0, abs=0.002)
+    assert gain(20.0, 6.0) < 0.02
+    wave = np.sin(2 * np.pi * 2.0 * TIME)
+    smooth = low_pass(wave, 0.01, 6.0)
+    assert np.argmax(np.correlate(smooth[100:-100], wave[100:-100], "full")) == 199
+
+
+def test_a_cut_off_beyond_the_sample_rate_changes_nothing():
+    wave = np.sin(TIME)
+    assert np.array_equal(low_pass(wave, 0.01, 100.0), wave)
+
+
+@pytest.mark.parametrize(("values", "cutoff", "words"), [(TIME, -1.0, "positive"), (TIME[:5], 6.0, "too few")])
+def test_what_cannot_be_filtered_is_refused(values, cutoff, words):
+    with pytest.raises(InputError, match=words):
+        low_pass(values, 0.01, cutoff)
+
+
+def test_splines_differentiate():
+    first, second = rates(np.sin(3 * TIME)[:, None], TIME)
+    assert np.abs(first[5:-5, 0] - 3 * np.cos(3 * TIME[5:-5])).max() < 1e-5
+    assert np.abs(second[5:-5, 0] + 9 * np.sin(3 * TIME[5:-5])).max() < 1e-3
+
+
+def test_a_smoothing_splines_bandwidth_falls_with_the_noise_and_its_rate_is_near():
+    random = np.random.default_rng(3)
+    truth = np.sin(2 * np.pi * TIME)
+    bands = []
+    for noise in (0.001, 0.1):
+        smooth, rate, _, band = smoothing_spline((truth + noise * random.normal(size=400))[:, None], TIME)
+        bands.append(band[0])
+        assert np.sqrt(np.mean((smooth[:, 0] - truth) ** 2)) < 0.7 * noise
+        error = rate[20:-20, 0] - 2 * np.pi * np.cos(2 * np.pi * TIME[20:-20])
+        assert np.sqrt(np.mean(error**2)) < 2 * np.pi * band[0] * noise
+    assert 1.0 < bands[1] < bands[0] < 20.0
