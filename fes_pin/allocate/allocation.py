@@ -73,6 +73,17 @@ class Allocation:
         return self.wanted - self.achieved
 
     @property
+    def held(self) -> tuple[str, ...]:
+        """One sentence per joint whose moment arms were taken at another angle than asked (`Nerves.held`)."""
+        return self.allocator.held
+
+    @property
+    def achieved_band(self) -> tuple[np.ndarray, np.ndarray]:
+        """Torque of these pulse widths with the weakest and the strongest muscles that are likely, (joints,) N m."""
+        low, high = self.allocator.band
+        return low * self.achieved, high * self.achieved
+
+    @property
     def pulse_widths_us(self) -> dict[str, float]:
         """Pulse width per channel by name, us."""
         return dict(zip(self.names, self.pulse_width_us.tolist(), strict=True))
@@ -146,6 +157,16 @@ class Allocation:
             return f"more {by_name[i]} is not worth its effort"
         return f"more {by_name[i]} would spoil {self.joints[k].replace('_', ' ')}"
 
+    def band_lines(self) -> list[str]:
+        """What these pulse widths make of the wanted torques if the muscles are weaker or stronger than assumed."""
+        low, high = self.achieved_band
+        shown = [j for j in range(len(self.joints)) if self.wanted[j] and abs(self.achieved[j]) >= REPORTED_NM]
+        weak, strong = self.allocator.band
+        if weak == strong or not shown:
+            return []
+        parts = [f"{self.joints[j].replace('_', ' ')} {low[j]:.1f} to {high[j]:.1f} N m" for j in shown]
+        return [f"with {weak:.2g} to {strong:.2g} of the strength assumed: {', '.join(parts)}"]
+
     def __str__(self) -> str:
         on = [
             f"{name.replace('_', ' ')} {width:.0f} us"
@@ -153,6 +174,7 @@ class Allocation:
             if width > 0.0
         ]
         lines = [", ".join(on) or "nothing stimulated", *(self.reasons or ["every torque within 0.5 N m"])]
+        lines += [*self.band_lines(), *self.held]
         proof = (
             f"optimal to {max(self.certificate.residual, 0.0):.0e}"
             if not self.allocator.choosy

@@ -34,8 +34,8 @@ class Allocator:
     ----------
     nerves
         `Nerves`, or an array (joints, n) of torque at full recruitment, N m.
-    q
-        Posture, if nerves are given.
+    q, v
+        Posture and, if it moves, its rates, if nerves are given: muscles that shorten pull less (`Nerves`).
     recruitment
         Curve for all channels or one per channel; the paper's threshold and saturation by default.
     weights
@@ -72,6 +72,7 @@ class Allocator:
         nerves,
         q=None,
         *,
+        v=None,
         recruitment=None,
         weights=1.0,
         effort=EFFORT,
@@ -87,8 +88,12 @@ class Allocator:
         dead: Sequence[str] = (),
     ) -> None:
         if hasattr(nerves, "torque_matrix"):
-            self.names, self.nominal = tuple(nerves.names), np.asarray(nerves.torque_matrix(q), dtype=float)
+            self.names, self.nominal = tuple(nerves.names), np.asarray(nerves.torque_matrix(q, v), dtype=float)
+            self.held, self.band = nerves.held(q), nerves.strength_band
         else:
+            if v is not None:
+                raise InputError("a velocity goes with nerves: a torque matrix holds what muscles make at theirs")
+            self.held, self.band = (), (1.0, 1.0)
             self.nominal = np.atleast_2d(np.array(nerves, dtype=float))
             self.names = tuple(f"channel_{i + 1}" for i in range(self.nominal.shape[-1]))
         if self.nominal.ndim != 2 or 0 in self.nominal.shape:
@@ -191,6 +196,8 @@ class Allocator:
         f = wanted @ self._from_torque
         if self.change:
             f -= self.change * before
+        if solver != "pivot" and (self.choosy or self.cubes or self.lexicographic):
+            raise InputError(f"solver {solver!r} does not go with least recruitments, cubes or lexicographic")
         if self.choosy:
             return self.choose(f, wanted, lower, upper, before)
         if self.cubes:

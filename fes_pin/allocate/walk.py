@@ -56,18 +56,18 @@ class WalkAllocation:
             "change": p.change,
         }
         one = Allocator(self.matrices[k], recruitment=p.curves.curves, **options)
-        one.names, one.joints = p.names, p.joints
+        one.names, one.joints, one.band = p.names, p.joints, p.band
         before = self.recruitment[k - 1] if k else np.zeros(p.n)
         return one.result(self.recruitment[k], self.wanted[k], p.lower, p.upper, before)
 
 
-def allocate_walk(torques, nerves, q, **options) -> WalkAllocation:
+def allocate_walk(torques, nerves, q, v=None, **options) -> WalkAllocation:
     """Allocate torques along a motion, each sample starting from the last.
 
     Parameters
     ----------
-    torques, q
-        (samples, joints) N m and (samples, joints) rad.
+    torques, q, v
+        (samples, joints) N m, rad, and rad/s; without rates muscles pull as at rest.
     nerves
         `Nerves`, or their matrices (samples, joints, n) (then `q` is not read).
     options
@@ -80,7 +80,7 @@ def allocate_walk(torques, nerves, q, **options) -> WalkAllocation:
     """
     wanted = np.asarray(torques, dtype=float)
     named = hasattr(nerves, "torque_matrix")
-    matrices = np.array(nerves.torque_matrix(q) if named else nerves, dtype=float)
+    matrices = np.array(nerves.torque_matrix(q, v) if named else nerves, dtype=float)
     if matrices.ndim != 3 or wanted.shape != matrices.shape[:2] or not len(wanted):
         raise InputError(f"torques of shape {wanted.shape} do not fit moment arms of shape {matrices.shape}")
     if not np.isfinite(wanted).all() or not np.isfinite(matrices).all():

@@ -109,6 +109,18 @@ class MuscleTable:
             arms += weight[..., p, :, None] * self.rest[:, p]
         return np.swapaxes(arms, -1, -2)
 
+    def held(self, q=None) -> tuple[str, ...]:
+        """What is held at the edge of the table, one sentence per joint (see `Nerves.held`)."""
+        angles = angles_of(q).reshape(-1, len(JOINT_NAMES))
+        inside = np.clip(angles, self.lower, self.upper)
+        farthest = np.argmax(np.abs(angles - inside), axis=0)
+        sentences = []
+        for j in np.flatnonzero(np.abs(angles - inside).max(axis=0) > 0.0):
+            asked, used = np.degrees(angles[farthest[j], j]), np.degrees(inside[farthest[j], j])
+            name = JOINT_NAMES[j].replace("_", " ")
+            sentences.append(f"moment arms at {name} {asked:.0f} degrees are not known: those at {used:.0f} are used")
+        return tuple(sentences)
+
     def lengths(self, q=None) -> np.ndarray:
         """Length of muscle and tendon, m: (..., m)."""
         angles = np.clip(angles_of(q), self.lower, self.upper)

@@ -145,6 +145,16 @@ class Nerves:
             force = force * table.velocity_fraction(q, v)
         return force
 
+    def held(self, q=None) -> tuple[str, ...]:
+        """One sentence per joint whose moment arms are taken at another angle than `q`, because none are known there.
+
+        Parameters
+        ----------
+        q
+            Joint angles, rad: mapping by joint name or array (..., 19); of many postures the farthest is told.
+        """
+        return self.table.held(q)
+
     def torque_matrix(self, q=None, v=None) -> np.ndarray:
         """Joint torque per channel at full recruitment: (..., 19, n), N m; joints in the order of `JOINT_NAMES`.
 

@@ -320,3 +320,32 @@ def test_bad_input_is_one_clear_line(make):
     with pytest.raises(InputError) as caught:
         make()
     assert "\n" not in str(caught.value)
+
+
+def test_what_is_printed_holds_the_band_of_strength():
+    nerves = Nerves(["left_tibial"])
+    a = allocate({"left_ankle_dorsiflexion": -50.0}, nerves)
+    low, high = nerves.strength_band
+    j = a.joints.index("left_ankle_dorsiflexion")
+    np.testing.assert_allclose([band[j] for band in a.achieved_band], [low * a.achieved[j], high * a.achieved[j]])
+    assert f"left ankle dorsiflexion {low * a.achieved[j]:.1f} to {high * a.achieved[j]:.1f} N m" in str(a)
+    assert "of the strength assumed" not in str(allocate([20.0], [[30.0]]))  # an array says nothing of its strengths
+
+
+def test_a_muscle_that_shortens_needs_more_recruitment():
+    nerves = Nerves(["left_femoral"])
+    wanted = {"left_knee_flexion": -30.0}
+    still, extends, flexes = (
+        Allocator(nerves, {"left_knee_flexion": 0.5}, v={"left_knee_flexion": v})(wanted).recruitment[0]
+        for v in (0.0, -2.0, 2.0)
+    )
+    assert flexes < still < extends
+    assert still == Allocator(nerves, {"left_knee_flexion": 0.5})(wanted).recruitment[0]
+    with pytest.raises(InputError, match="velocity"):
+        Allocator([[1.0]], v=[0.0])
+
+
+@pytest.mark.parametrize("options", [{"least": 0.2}, {"effort_kind": "cubes"}, {"lexicographic": True}])
+def test_a_solver_that_an_option_does_not_ask_is_refused(options):
+    with pytest.raises(InputError, match="daqp"):
+        Allocator([[2.0, 1.0]], **options)([1.0], solver="daqp")
