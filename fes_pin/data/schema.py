@@ -17,6 +17,40 @@ UNITS = (
 )
 
 
+MEANT: Mapping[str, set[str]] = {
+    "effort": {
+        "torque",
+        "force",
+        "moment",
+        "tau",
+        "motor",
+        "command",
+        "commanded",
+        "drive",
+        "actuation",
+        "current",
+        "u",
+    },
+    "position": {"angle", "theta", "q", "phi", "displacement", "encoder", "x", "pos"},
+    "velocity": {"speed", "rate", "omega", "qd", "dq", "v", "vel"},
+    "pulse_width_us": {
+        "pulse",
+        "width",
+        "pw",
+        "pulsewidth",
+        "stimulus",
+        "stimulation",
+        "duration",
+        "charge",
+        "current",
+    },
+    "stim": {"pulse", "pulses", "trigger", "stimulus", "stimulation", "sync"},
+    "angle_rad": {"theta", "q", "position", "goniometer", "ankle"},
+    "force_n": {"force", "load", "tension", "cell", "f"},
+}
+"""Other words for what a column holds, as measuring systems name it."""
+
+
 @dataclass(frozen=True)
 class Number:
     """A number that a table of the study holds: its unit and its bounds."""
@@ -82,7 +116,7 @@ class RigSchema:
     inputs
         Columns of which a trial holds one; for a joint none is needed.
     optional
-        Other columns that have a meaning.
+        Other columns that have a meaning. A column that has none is refused.
     """
 
     constants: Mapping[str, Number]
@@ -213,6 +247,19 @@ def unknown(name: str, known: Iterable[str]) -> str:
     if close:
         return f"unknown; did you mean {close[0]}?"
     return f"unknown; expected {'one of ' if len(known) > 1 else ''}{', '.join(known)}" if known else "unknown"
+
+
+def unread(name: str, known: Iterable[str]) -> str:
+    """What to say of a column that a rig does not read: the name that it knows the quantity by, and all that it knows.
+
+    A column that is passed over in silence may be the input under another name, and its absence then a model's error.
+    """
+    known = list(known)
+    words = set(name.lower().replace("-", "_").split("_"))
+    meant = [k for k in known if words & MEANT.get(k, set())]
+    near = meant or get_close_matches(quantity(name), known, n=1, cutoff=0.5)
+    hint = f"did you mean {near[0]}? " if near else ""
+    return f"unknown; {hint}this rig reads {', '.join(known)}: name the column so, or take it out"
 
 
 def is_like(name: str, known: Iterable[str], cutoff: float = 0.8) -> bool:

@@ -14,7 +14,18 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
-from fes_pin.data.schema import KINDS, RIGS, ROLES, SCHEMAS, RigSchema, check_conditions, is_like, one_of, unknown
+from fes_pin.data.schema import (
+    KINDS,
+    RIGS,
+    ROLES,
+    SCHEMAS,
+    RigSchema,
+    check_conditions,
+    is_like,
+    one_of,
+    unknown,
+    unread,
+)
 from fes_pin.data.table import MIN_ROWS, Table, check_time, format_csv, read_csv
 
 
@@ -217,7 +228,7 @@ def _columns(path: Path, rig: str, kind: str, inputs_only: bool) -> tuple[dict[s
 
 
 def _check_columns(table: Table, schema: RigSchema, kind: str, inputs_only: bool) -> None:
-    """Require the columns of this rig and kind; refuse another unit and what is likely a typo."""
+    """Require the columns of this rig and kind, and no others: another unit and a likely typo are told as such."""
     if table.names[0] != "time_s":
         raise table.error(f"expected time_s as the first column, found {table.names[0][:40]!r}", "time_s")
     absent = [name for name in schema.columns if name not in table.names]
@@ -232,6 +243,9 @@ def _check_columns(table: Table, schema: RigSchema, kind: str, inputs_only: bool
         raise table.error(f"expected one of {' and '.join(found)}, found both", found[1])
     if output not in table.names and not inputs_only:
         raise table.error(f"missing; a trial of kind {kind} measures it", output)
+    for name in table.names:
+        if name not in schema.columns:
+            raise table.error(unread(name, schema.columns), name)
 
 
 def _check_stimulus(table: Table) -> None:

@@ -147,6 +147,23 @@ def test_nothing_there(tmp_path):
         read_study("a\0b")
 
 
+@pytest.mark.parametrize(
+    ("column", "words"),
+    [
+        ("torque_nm", "did you mean effort?"),
+        ("motor_current_a", "did you mean effort?"),
+        ("angle_encoder", "did you mean position?"),
+        ("emg", "this rig reads time_s, effort, position, velocity"),
+    ],
+)
+def test_a_column_that_the_rig_does_not_read_is_refused(tmp_path, column, words):
+    """A torque passed over in silence is a missing input: the model then is wrong, and nothing tells why."""
+    folder = studies.joint(tmp_path)
+    lines = (folder / "b.csv").read_text().splitlines()
+    (folder / "b.csv").write_text("\n".join([f"{lines[0]},{column}", *(f"{line},0.1" for line in lines[1:])]) + "\n")
+    check(folder, folder / "b.csv", 1, column, words)
+
+
 JOINT = {  # file, old text, new text, blamed file, row, key, words
     "no_urdf": ("study.toml", 'urdf = "rig.urdf"\n', "", "study.toml", 4, "rig.urdf", "missing"),
     "urdf_not_there": ("study.toml", '"rig.urdf"', '"r.urdf"', "study.toml", 5, "rig.urdf", "nothing"),
