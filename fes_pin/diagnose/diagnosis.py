@@ -12,6 +12,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.experiment import SEPARABLE, NextExperiment, next_experiment
+from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.open_set import Remainder, remainder
 from fes_pin.diagnose.search.promise import best_by_effect
 from fes_pin.diagnose.search.search import Search, Searched
@@ -91,6 +92,8 @@ class Diagnosis:
         For each cause, its rivals by shortfall in twice the log-likelihood.
     left_out
         Samples taken for spikes, by trial and column; in `study` they hold what their neighbours say.
+    warnings
+        What is odd about the study, and what could not be done, one line each.
     """
 
     study: Study
@@ -108,6 +111,7 @@ class Diagnosis:
     held_out_by: str
     left_out: dict[str, dict[str, tuple[int, ...]]]
     wall_s: float = field(compare=False)
+    warnings: tuple[str, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -143,11 +147,13 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
     Raises
     ------
     InputError
-        If the study has no trial to fit, or a rig without a model of trials.
+        If the study has no trial to fit, a rig without a model of trials, or numbers that no verdict could follow
+        from; see `plausibility.check_study`.
     """
     began = time.perf_counter()
     tell = progress or (lambda _share, _words: None)
     study, left_out = despiked_study(study)
+    warnings = check_study(study, nominal_model(study))
     train, test = split(study)
     with one_thread_each():
         recorded = [t for t in study.trials if t.role != "held_out"]
@@ -156,7 +162,7 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
         tell(0.88, "held-out gain")
         diagnosis = _judge(study, search, searched, test, seed)
     tell(1.0, "done")
-    return replace(diagnosis, left_out=left_out, wall_s=time.perf_counter() - began)
+    return replace(diagnosis, left_out=left_out, warnings=tuple(warnings), wall_s=time.perf_counter() - began)
 
 
 def despiked_study(study: Study) -> tuple[Study, dict[str, dict[str, tuple[int, ...]]]]:

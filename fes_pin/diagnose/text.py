@@ -70,7 +70,7 @@ def footnotes(diagnosis: Diagnosis) -> list[str]:
         lines.append(f"not testable here: {', '.join(diagnosis.absorbed)}")
     if diagnosis.next_experiment:
         lines.append(f"next experiment: {diagnosis.next_experiment.why}")
-    return lines
+    return [*lines, *(f"warning: {words}" for words in diagnosis.warnings)]
 
 
 def left_out_text(diagnosis: Diagnosis) -> str:

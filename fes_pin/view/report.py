@@ -76,6 +76,7 @@ def _head(diagnosis: Diagnosis) -> Markup:
         element("p", f"{study.name} · rig {study.rig} · {kinds} trials, {seconds:.4g} s", class_="eyebrow"),
         element("h1", words[0].upper() + words[1:], class_=f"verdict {diagnosis.verdict}{partly}"),
         _facts(diagnosis),
+        *(element("p", element("strong", "Warning: "), f"{words}.") for words in diagnosis.warnings),
     )
 
 

@@ -1,0 +1,180 @@
+"""What a study's numbers alone say against it, before anything is fitted: refused, or warned of, in one line each.
+
+Refused, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change, too
+few samples, an angle that only degrees explain. Everything else is a warning: the diagnosis goes on, and tells it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.schema import SCHEMAS
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
+
+SAMPLES_EACH = 10
+"""Samples for each value that is fitted, at least: a standard deviation that is estimated from fewer is itself
+uncertain by more than a quarter (one over the root of twice their number)."""
+TURN = 2.0 * math.pi
+FEW = 16
+"""Samples of a trial below which it can hardly show a motion: a warning."""
+STRONGEST_N = 1e4
+"""Force in N that no limb exerts: the strongest knee extensions measured come to about 3 kN at the shank."""
+HEAVIEST_KG = 100.0
+"""Load in kg that nobody hangs on an ankle; grams begin there."""
+RUN = 20
+"""Equal samples in a row that noise does not make: two equal neighbours are rare where a reading resolves its noise."""
+COMMON = 0.05
+"""Share of equal neighbours from which a reading is coarse: equal samples in a row then say nothing."""
+CLIPPED = 0.01
+"""Share of a column's samples at its very largest or smallest value from which it counts as clipped."""
+RATE_RATIO = 5.0
+"""Factor by which a velocity may differ from the slope of its position: filters make less, degrees make 57."""
+PIECES = 8
+"""Pieces of a trial that velocity and slope are compared over: over one sample the position's noise would be all."""
+
+
+def implausible(study: Study) -> list[str]:
+    """Warnings about a study's trials, one line each.
+
+    Raises
+    ------
+    InputError
+        For what no verdict could follow from; see the module.
+    """
+    _check_rows(study)
+    warnings = [*_inputs(study), *_units(study)]
+    outputs = tuple(dict.fromkeys((*SCHEMAS[study.rig].outputs.values(), "velocity")))
+    measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in _driving(t)]
+    constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
+    if len(constant) == len(measured):
+        raise InputError("no output changes in any trial; there is nothing to compare a model with", file=study.folder)
+    warnings += _told("does not change at all", constant)
+    moving = [one for one in measured if one not in constant]
+    warnings += _told("is cut off at its largest or smallest value (clipping?)", [m for m in moving if _is_clipped(*m)])
+    for trial, name in moving:
+        warnings += _held(trial, name)
+    return [*warnings, *_rates(study.trials)]
+
+
+def _driving(trial: Trial) -> tuple[str, ...]:
+    """Columns that a trial has as inputs."""
+    return tuple(n for n in ("pulse_width_us", "stim", "effort") if n in trial)
+
+
+def _told(what: str, found: Sequence[tuple[Trial, str]]) -> list[str]:
+    """One warning for each column, however many trials have it."""
+    by_column: dict[str, list[str]] = {}
+    for trial, name in found:
+        by_column.setdefault(name, []).append(trial.name)
+    return [f"{name} {what} in {_trials(names)}" for name, names in by_column.items()]
+
+
+def _trials(names: Sequence[str]) -> str:
+    return f"trial {names[0]}" if len(names) == 1 else f"{len(names)} trials ({names[0]} to {names[-1]})"
+
+
+def _check_rows(study: Study) -> None:
+    fitted = [t for t in study.trials if t.role != "held_out"]
+    wanted = SAMPLES_EACH * len(study.start)
+    found = sum(map(len, fitted))
+    if fitted and found < wanted:
+        raise InputError(
+            f"expected at least {wanted} samples, {SAMPLES_EACH} for each value of [start], in all trials together; "
+            f"found {found}",
+            file=study.folder,
+        )
+
+
+def _inputs(study: Study) -> Iterable[str]:
+    """What is odd about inputs; refuses a muscle that is never stimulated."""
+    short = [t.name for t in study.trials if len(t) < FEW]
+    if short:
+        yield f"fewer than {FEW} samples in {_trials(short)}"
+    names = dict.fromkeys(n for t in study.trials for n in _driving(t))
+    if not names:
+        yield "no trial is driven: there is no column effort, and the motion is taken for free"
+    for name in names:
+        threshold = study.constants.get("threshold_us", 0.0) if name == "pulse_width_us" else 0.0
+        silent = [t.name for t in study.trials if name in t and not (np.abs(t[name]) > threshold).any()]
+        told = f"{name} is never above the threshold of {threshold:g} us" if threshold else f"{name} is zero throughout"
+        if len(silent) < len(study.trials):
+            if silent and name != "effort":  # a joint may swing free between driven trials
+                yield f"{told} in {_trials(silent)}"
+        elif name == "effort":
+            yield f"no trial is driven: {told}"
+        else:
+            raise InputError(
+                f"{told} in all trials; a muscle that is never stimulated shows nothing", file=study.folder
+            )
+
+
+def _units(study: Study) -> Iterable[str]:
+    """Ranges that another unit would explain; refuses an ankle's angle beyond a turn."""
+    for trial in study.trials:
+        angles = [trial["angle_rad"]] if "angle_rad" in trial else []
+        angles += [np.array([trial.conditions["angle_rad"]])] if "angle_rad" in trial.conditions else []
+        most = max((float(np.abs(a).max()) for a in angles), default=0.0)
+        if most > TURN:
+            message = f"trial {trial.name}: angle_rad reaches {most:.4g}; no ankle turns so far: is it in degrees?"
+            raise InputError(message, file=study.folder, column="angle_rad")
+    strong = [t.name for t in study.trials if "force_n" in t and float(np.abs(t["force_n"]).max()) > STRONGEST_N]
+    if strong:
+        yield f"force_n is beyond {STRONGEST_N:g} N, which no limb exerts, in {_trials(strong)}: is it in mN?"
+    heavy = [t.name for t in study.trials if t.conditions.get("load_kg", 0.0) > HEAVIEST_KG]
+    if heavy:
+        yield f"load_kg is above {HEAVIEST_KG:g} kg in {_trials(heavy)}: is it in g?"
+
+
+def _is_clipped(trial: Trial, name: str) -> bool:
+    """True if a column stays at an extreme far more often than it stays elsewhere."""
+    values = trial[name]
+    still = np.diff(values) == 0.0
+    for extreme in (values.max(), values.min()):
+        at = values[1:] == extreme
+        if np.count_nonzero(at & still) < max(CLIPPED * len(values), RUN):
+            continue
+        elsewhere = still[~at]
+        if len(elsewhere) and np.mean(still[at]) > 0.5 and np.mean(elsewhere) < COMMON:
+            return True
+    return False
+
+
+def _held(trial: Trial, name: str) -> Iterable[str]:
+    """A reading that repeats its values: in step, as sampled at a lower rate, or once, as where a sensor drops out."""
+    values = trial[name]
+    changes = np.flatnonzero(np.diff(values) != 0.0)
+    still = 1.0 - len(changes) / max(len(values) - 1, 1)
+    every = np.diff(changes)
+    if still > 0.4 and len(every) > 3 and (count := int(np.median(every))) > 1 and np.mean(every % count == 0) > 0.95:
+        yield f"{name} changes only every {count} samples in trial {trial.name}: it was sampled more slowly, and held"
+        return
+    ends = np.r_[-1, changes, len(values) - 1]
+    lengths = np.diff(ends)
+    longest = int(np.argmax(lengths))
+    inside = values[ends[longest] + 1]
+    apart = 1.0 - (len(changes) + lengths[longest] - 1) / max(len(values) - 1, 1)
+    if lengths[longest] >= RUN and apart < COMMON and values.min() < inside < values.max():
+        begin = float(trial.time[ends[longest] + 1])
+        yield f"{name} stays at {inside:.4g} for {lengths[longest]} samples from {begin:.4g} s on in trial {trial.name}"
+
+
+def _rates(trials: Sequence[Trial]) -> Iterable[str]:
+    """A measured velocity that is not the slope of its position, by the mean of each over pieces of a trial."""
+    wrong = []
+    for trial in trials:
+        if not {"position", "velocity"} <= set(trial.columns) or len(trial) < FEW:
+            continue
+        ends = np.linspace(0, len(trial) - 1, PIECES + 1).astype(int)
+        slopes = np.diff(trial["position"][ends]) / np.diff(trial.time[ends])
+        means = np.array([trial["velocity"][a : b + 1].mean() for a, b in itertools.pairwise(ends)])
+        power = float(slopes @ slopes)
+        if power > 0.0 and not 1.0 / RATE_RATIO < float(slopes @ means) / power < RATE_RATIO:
+            wrong.append(trial.name)
+    if wrong:
+        yield f"velocity is not the slope of position in {_trials(wrong)}: is one of them in another unit?"

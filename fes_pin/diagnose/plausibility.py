@@ -1,0 +1,77 @@
+"""What a study's time step and range say against it in the light of its model, before anything is fitted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.plausibility import implausible
+from fes_pin.data.study import Study
+from fes_pin.models.model import Model
+
+COARSE = 5.0
+"""Time constants that a sample step may be long: a first-order lag has then settled to less than a hundredth, and
+nothing of it is seen, were the start value wrong by half. Milliseconds under `time_s` make hundreds."""
+SLOWEST_S = 1.0
+"""Time step in s that is refused anyway: pulses come 20 to 50 times a second, and a limb swings about once."""
+RUN_OUT = "inertia over damping"
+"""What a joint without gravity has for a time constant; lightly damped, it outlasts any trial."""
+TURNS = 4.0
+"""Turns from zero beyond which an angle is likelier in degrees: 4 turns are 25 rad, and 25 degrees a small swing."""
+LONGEST_M = 10.0
+"""Position in m that no slide of a laboratory reaches; millimetres do."""
+
+
+def check_study(study: Study, model: Model) -> list[str]:
+    """Warnings about a study that are known before a fit, one line each.
+
+    Raises
+    ------
+    InputError
+        For what no verdict could follow from: see `data.plausibility`; or a time step much longer than the time
+        constants of the model's start values.
+    """
+    return [*implausible(study), *_steps(study, model), *_range(study, model)]
+
+
+def time_constants(model: Model) -> dict[str, float]:
+    """Times in s that a model's answer takes at its own parameters, by what they are; only those that there are."""
+    values, known = model.parameters(), model.rig.constants
+    if "time_constant_s" in values:
+        return {"the muscle's time constant": values["time_constant_s"]}
+    inertia = values["inertia_scale"] * known["inertia"]
+    stiffness = abs(values["gravity_scale"]) * math.hypot(known["gravity_cos"], known["gravity_sin"])
+    if known["revolute"] and stiffness > 0.0:
+        return {"the swing's period over a turn": math.sqrt(inertia / stiffness)}
+    return {RUN_OUT: inertia / values["damping"]} if values["damping"] > 0.0 else {}
+
+
+def _steps(study: Study, model: Model) -> Iterable[str]:
+    slowest = max(study.trials, key=lambda t: t.dt)
+    longest = max(t.duration for t in study.trials)
+    if slowest.dt > SLOWEST_S:
+        message = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s; expected at most {SLOWEST_S:g} s"
+        raise InputError(f"{message}: is time_s in ms?", file=study.folder, column="time_s")
+    for name, constant in time_constants(model).items():
+        told = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s, and {name} {constant:.4g} s"
+        if slowest.dt > COARSE * constant:
+            raise InputError(
+                f"{told}: is time_s in ms, or the value in [start] wrong?", file=study.folder, column="time_s"
+            )
+        if slowest.dt > constant:
+            yield f"{told}: what happens between samples is lost; is time_s in another unit?"
+        if longest < constant and name != RUN_OUT:
+            yield f"the longest trial lasts {longest:.4g} s, and {name} is {constant:.4g} s: is time_s in another unit?"
+
+
+def _range(study: Study, model: Model) -> Iterable[str]:
+    if study.rig != "joint":
+        return
+    most = max((float(np.abs(t["position"]).max()) for t in study.trials if "position" in t), default=0.0)
+    if model.rig.constants["revolute"] and most > TURNS * 2.0 * math.pi:
+        yield f"position reaches {most:.4g} rad, {most / (2.0 * math.pi):.1f} turns: is it in degrees?"
+    if not model.rig.constants["revolute"] and most > LONGEST_M:
+        yield f"position reaches {most:.4g} m: is it in mm?"
