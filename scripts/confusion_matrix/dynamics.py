@@ -70,12 +70,13 @@ class _Run:
         self.lanes, self.forms, self.steps, self.h = lanes, forms, steps, DT / steps
         self.s = SimpleNamespace(k=lanes.k, rig=lanes.rig, moving=lanes.moving, h=self.h, t=0.0, x={})
         self.muscled = lanes.rig != "joint"
-        self.drive = recruitment(lanes, forms) if self.muscled else lanes.input
         self.lates = [late for form in forms for late in form.delays()]
         self.s.tilt = self.s.offset = np.zeros(len(lanes.moving))
+        self.s.effort = lanes.input
         self.s.load = lanes.k.get("load_kg")
         for form in forms:
             form.begin(self.s, lanes)
+        self.drive = recruitment(lanes, forms) if self.muscled else self.s.effort
         self.names = [(form, name) for form in forms for name in form.states]
         self._rates_of = [form for form in forms if form.states]
         self._passed = self.hooked("passed")

@@ -49,7 +49,7 @@ class Form:
         return {}
 
     def begin(self, s: Any, lanes: Any) -> None:
-        """Change constants: `s.load`, `s.tilt`, `s.offset`; `lanes.k["number"]` is the number of each trial."""
+        """Change constants: `s.load`, `s.tilt`, `s.offset`, `s.effort`; `lanes.k["number"]` numbers the trials."""
 
     def width(self, w: np.ndarray, time: np.ndarray, lanes: Any) -> np.ndarray:
         return w

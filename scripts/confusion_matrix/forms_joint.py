@@ -211,7 +211,71 @@ class PureReflex(Reflex):
         return torque - self.p["side"] * self.size * np.maximum(self.p["side"] * self.late, 0.0)
 
 
+class Cogging(Form):
+    cause, rigs, unit, cap = "cogging", ("joint",), 0.005, 0.5
+
+    @classmethod
+    def draw(cls, rng, angles):
+        waves = 2.0 * np.pi * rng.uniform(4.0, 12.0) / max(float(np.ptp(angles)), 1e-3)
+        return {"waves": float(waves), "phase": float(rng.uniform(0.0, 2.0 * np.pi))}
+
+    @classmethod
+    def truth(cls, size, p):
+        in_phase, quadrature = size * np.cos(p["phase"]), size * np.sin(p["phase"])
+        return {"in_phase": float(in_phase), "quadrature": float(quadrature), "waves": p["waves"]}
+
+    def torque(self, torque, s):
+        return torque + self.size * np.sin(self.p["waves"] * s.q + self.p["phase"])
+
+
+class Detented(Cogging):
+    """Between two detents the torque rises slowly and falls fast."""
+
+    name = "sawtooth"
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def torque(self, torque, s):
+        angle = self.p["waves"] * s.q + self.p["phase"]
+        return torque + self.size * (np.sin(angle) + 0.4 * np.sin(2.0 * angle) + 0.15 * np.sin(3.0 * angle))
+
+
+class Backlash(Form):
+    cause, rigs, unit, cap = "backlash", ("joint",), 0.003, 0.2
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"half_width": size}
+
+    def reading(self, y, v, time, rest):
+        out, follower = np.empty_like(y), rest.copy()
+        for i, now in enumerate(y):
+            follower = np.clip(follower, now - self.size, now + self.size)
+            out[i] = follower
+        return out
+
+
+class WornBacklash(Backlash):
+    """Half of the slack is taken up softly: two plays of other widths, side by side."""
+
+    name = "two_plays"
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def reading(self, y, v, time, rest):
+        whole, self.size = self.size, 0.5 * self.size
+        narrow = super().reading(y, v, time, rest)
+        self.size = 3.0 * self.size
+        wide = super().reading(y, v, time, rest)
+        self.size = whole
+        return 0.5 * (narrow + wide)
+
+
 FORMS: tuple[type[Form], ...] = (
     *(Friction, Stiction, Drag, SteeperDrag, Stop, QuadraticStop, Spring, HardeningSpring, Maxwell, TwoMaxwell),
-    *(LoadInertia, PulleyInertia, Reflex, PureReflex),
+    *(LoadInertia, PulleyInertia, Reflex, PureReflex, Cogging, Detented, Backlash, WornBacklash),
 )

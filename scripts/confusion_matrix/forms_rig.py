@@ -26,6 +26,39 @@ class EffortOffset(Form):
         s.offset = s.offset + self.size * self.p["sign"]
 
 
+class EffortGain(Form):
+    cause, rigs, unit, cap = "effort_gain", ("joint",), 0.05, 0.9
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"sign": float(rng.choice((-1.0, 1.0)))}
+
+    @classmethod
+    def truth(cls, size, p):
+        return {"error": size * p["sign"]}
+
+    def begin(self, s, lanes):
+        s.effort = s.effort * (1.0 + self.size * self.p["sign"])
+
+
+class EffortSaturates(EffortGain):
+    """A gain that is lower, the lower the larger the effort."""
+
+    name, cap = "saturating", 0.5
+
+    @classmethod
+    def draw(cls, rng, angles):
+        return {"sign": -1.0}
+
+    @classmethod
+    def truth(cls, size, p):
+        return {}
+
+    def begin(self, s, lanes):
+        share = np.abs(s.effort) / np.maximum(np.abs(s.effort).max(axis=0), 1e-9)
+        s.effort = s.effort * (1.0 - self.size * (0.8 + 0.4 * share))
+
+
 class Tilt(Form):
     cause, rigs, unit, cap = "base_tilt", BOTH, 0.02, 0.5
 
@@ -131,5 +164,16 @@ class BreathingUnlocked(BreathingWithHarmonic):
 
 
 FORMS: tuple[type[Form], ...] = (
-    *(EffortOffset, Tilt, LoadError, Frame, FrameSeen, Breathing, BreathingWithHarmonic, BreathingUnlocked),
+    *(
+        EffortOffset,
+        EffortGain,
+        EffortSaturates,
+        Tilt,
+        LoadError,
+        Frame,
+        FrameSeen,
+        Breathing,
+        BreathingWithHarmonic,
+        BreathingUnlocked,
+    ),
 )

@@ -55,6 +55,21 @@ def test_causes_in_the_engines_form_agree_with_it(cause, short, tmp_path):
     assert np.sqrt(left) < 0.5 and left < 0.01 * without
 
 
+@pytest.mark.parametrize("cause", ["effort_gain", "cogging", "backlash"])
+def test_causes_of_joints_alone_agree_with_the_engine(cause, short, tmp_path):
+    """What noiseless readings of a form leave beside the engine's effect at the true values."""
+    item = Item("joint", (cause,), "same", 40, "white", 2)
+    (form,) = item.forms()
+    one = drafts.draft(item, tmp_path)
+    (bare,) = drafts.run_trials([one], [()], (), 5)
+    one.shapes, one.sizes = [form.draw(item.rng(10), np.concatenate(bare))], [form.unit]
+    (readings,) = drafts.run_trials([one], [one.sizes], (form,), 10)
+    study = drafts.study_of(one, readings)
+    extended = nominal_model(study) + effect(cause)()
+    left = generator.nominal_fit(study, generator._truth(one, (form,)), extended)
+    assert np.sqrt(left.sse) < 0.5 < 0.05 * generator.noncentrality(one, readings)
+
+
 def test_a_study_is_the_same_alone_and_in_company_and_has_its_size(short, tmp_path):
     items = [Item("ankle", ("quadratic_damping",), "power_2.4", d, "process", 3) for d in (15, 40)]
     alone = generator.make(items[1:], tmp_path)[0]

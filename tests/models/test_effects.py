@@ -29,9 +29,6 @@ NOT_YET = {
     "series_elasticity": {"muscle"},
     "length_dependent_activation": {"muscle"},
     "residual_force_enhancement": {"muscle"},
-    "effort_gain": {"joint"},
-    "cogging": {"joint"},
-    "backlash": {"joint"},
     "condition_misread": {"ankle", "joint", "muscle"},
 }
 """Rigs of the contract on which a cause is not built yet."""

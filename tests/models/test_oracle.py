@@ -112,6 +112,22 @@ def test_a_short_lag_is_told_from_a_delay(second_s):
     assert as_lag.values["second_order_activation.second_s"] == pytest.approx(second_s, rel=0.02)
 
 
+REFINED = [
+    ("coulomb_friction", "ankle", {"torque_nm": 0.02, "asymmetry": 0.4}),
+    ("coulomb_friction", "ankle", {"torque_nm": 0.02, "asymmetry": -0.7}),
+    ("cogging", "joint", {"in_phase": 0.02, "quadrature": 0.01, "waves": 9.0, "second": 0.02, "phase_rad": 0.7}),
+]
+
+
+@pytest.mark.parametrize(("name", "rig", "parameters"), REFINED)
+def test_refined_forms_mean_what_the_oracle_means(name, rig, parameters):
+    some = trials(rig, "motion")
+    error, _ = worst(Model(RIGS[rig]) + effect(name)(**parameters), {name: parameters}, rig, some)
+    plain = {n: v for n, v in parameters.items() if n not in ("asymmetry", "second", "phase_rad")}
+    unrefined, _ = worst(Model(RIGS[rig]) + effect(name)(**plain), {name: parameters}, rig, some)
+    assert error <= ANGLE_RAD * LOOSER.get(name, 1.0) < 0.1 * unrefined
+
+
 def test_friction_converges_to_its_law():
     one = oracle.TYPICAL["coulomb_friction"]
     model, some = Model(RIGS["ankle"]) + effect("coulomb_friction")(**one), trials("ankle", "motion")

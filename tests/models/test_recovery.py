@@ -1,5 +1,6 @@
 """Every effect recovers its own parameters from its own noiseless data, together with the nominal ones."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -68,11 +69,17 @@ def best_fit(problem, one, trials):
     return best
 
 
+def rig_with(one, rig):
+    """A gain of the effort is told only beside a gravity that is known."""
+    known = ("inertia_scale", "damping") if one.name == "effort_gain" else None
+    return dataclasses.replace(RIGS[rig], fitted=known)
+
+
 @pytest.mark.parametrize(("one", "rig"), EFFECTS_OF_RIGS, ids=name_of)
 def test_an_effect_recovers_its_own_parameters(one, rig):
-    true = Model(RIGS[rig]) + typical(one, rig)
+    true = Model(rig_with(one, rig)) + typical(one, rig)
     trials = measured(true, rig)
-    guess = Model(RIGS[rig]) + one()
+    guess = Model(true.rig) + one()
     found = best_fit(Problem(guess, trials, NOISE), one, trials)
     assert found.sse <= 10.0 * TOLERANCE, "the noiseless data are not reproduced"
     for name in found.free:

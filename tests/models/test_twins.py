@@ -26,6 +26,30 @@ def test_twins_read_alike(rig, kind, one, other):
         np.testing.assert_allclose(a, b, atol=1e-7 * np.abs(a).max())
 
 
+def test_friction_that_differs_by_the_direction_is_friction_beside_an_offset():
+    """Both ways of a slow and a fast motion, and at rest: why a joint's friction has no asymmetry of its own."""
+    made = [trial("joint", "motion", np.random.default_rng(k), 600, 2e-3) for k in range(3)]
+    one_way = readings("joint", made, ("coulomb_friction", {"torque_nm": 0.05, "asymmetry": 0.3}))
+    beside = readings(
+        "joint", made, ("coulomb_friction", {"torque_nm": 0.05}), ("effort_offset", {"offset": -0.3 * 0.05}), zero=0.0
+    )
+    for a, b, bare in zip(one_way, beside, readings("joint", made), strict=True):
+        assert np.abs(a - bare).max() > 0.05
+        assert np.abs(a - b).max() < 2e-3
+
+
+def test_a_gain_of_the_effort_is_a_lighter_body():
+    """Where inertia, damping and gravity are all unknown."""
+    made = [trial("joint", "motion", np.random.default_rng(4), 400, 5e-3)]
+    rig = RIGS["joint"]
+    smaller = replace(rig, **{n: getattr(rig, n) / 1.25 for n in rig.parameters()})
+    ((stronger,), (lighter,)) = (
+        [s.readings for s in Simulator(model, made).run(model.parameters())]
+        for model in (Model(rig) + effect("effort_gain")(error=0.25), Model(smaller))
+    )
+    np.testing.assert_allclose(stronger, lighter, atol=1e-9)
+
+
 @pytest.mark.parametrize(("rig", "kind"), [("ankle", "motion"), ("ankle", "isometric"), ("muscle", "isometric")])
 def test_a_clock_that_is_late_is_a_delay(rig, kind):
     """What begins at rest and is driven by a stimulus alone has no other clock than the stimulus."""
@@ -39,11 +63,11 @@ def test_a_clock_that_is_late_is_a_delay(rig, kind):
     np.testing.assert_allclose(delayed, read_late, atol=1e-7 * np.abs(prompt).max())
 
 
-def readings(rig, trials, *causes):
+def readings(rig, trials, *causes, zero=None):
     """From the same first reading of a joint, whatever its zero."""
     model = Model(RIGS[rig])
     for name, values in causes:
         model = model + effect(name)(**values)
-    zero = sum(values.get("offset", 0.0) for _, values in causes)
+    zero = sum(values.get("offset", 0.0) for _, values in causes) if zero is None else zero
     begun = [replace(t, conditions={n: v - zero * (n == "position0") for n, v in t.conditions.items()}) for t in trials]
     return [s.readings for s in Simulator(model, begun).run(model.parameters())]

@@ -27,9 +27,9 @@ def effective_width(width, time, causes):
     return felt - causes.get("threshold_shift", {}).get("shift_us", 0.0)
 
 
-def play(signal, half_width):
-    """A slack of +- half_width between a signal and what follows it, which starts at 0."""
-    out, follower = np.empty_like(signal), 0.0
+def play(signal, half_width, start=0.0):
+    """A slack of +- half_width between a signal and what follows it."""
+    out, follower = np.empty_like(signal), start
     for k, value in enumerate(signal):
         if follower > value + half_width:
             follower = value + half_width
@@ -126,7 +126,13 @@ def joint_torque(x, q, v, t, causes):
             share = math.tanh(v / p["sharp"])
         else:
             share = max(-1.0, min(v / p.get("creep_speed", 0.004), 1.0))
+        share *= 1.0 + p.get("asymmetry", 0.0) * math.copysign(1.0, v)
         total -= p["torque_nm"] * more * share
+    if "cogging" in causes:
+        p = causes["cogging"]
+        angle = p["waves"] * q
+        total += p["in_phase"] * math.sin(angle) + p.get("quadrature", 0.0) * math.cos(angle)
+        total += p.get("second", 0.0) * math.sin(2.0 * angle + p.get("phase_rad", 0.0))
     if "quadratic_damping" in causes:
         p = causes["quadratic_damping"]
         total -= p["coefficient"] * math.copysign(abs(v) ** p.get("power", 2.0), v)
@@ -171,6 +177,8 @@ def reading(value, rate, time, rest, causes):
     """
     out = np.array(value, dtype=float)
     since = time - time[0]
+    if "backlash" in causes:
+        out = play(out, causes["backlash"]["half_width"], start=out[0])
     p = causes.get("sensor_lag", {})
     if p.get("form") == "shift":
         out = _later(out, rate, since, p["lag_s"])

@@ -197,6 +197,7 @@ class Joint(_Moving):
         angle = (x["q"] if self.k["revolute"] else 0.0) + tilt
         weight = self.k["gravity_cos"] * math.cos(angle) + self.k["gravity_sin"] * math.sin(angle)
         effort = held.get("effort", 0.0) + self.causes.get("effort_offset", {}).get("offset", 0.0)
+        effort *= 1.0 + self.causes.get("effort_gain", {}).get("error", 0.0)
         torque = effort - self.nominal["gravity_scale"] * weight - self.nominal["damping"] * x["v"]
         torque += held.get("disturbance", 0.0)
         rates = self.joint_rates(x, t, torque, self.nominal["inertia_scale"] * self.k["inertia"])

@@ -19,23 +19,26 @@ UNLOADED = 1e-3
 
 @dataclass(frozen=True)
 class CoulombFriction(Effect):
-    """Dry friction at the joint, with or without more of it at rest (Stribeck) or under load.
+    """Dry friction at the joint, with or without more of it at rest (Stribeck), under load or one way.
 
-        torque - T clip(x),   T = torque_nm |load|^load_exponent (1 + stiction exp(-(v / stribeck_speed)^2))
+        torque - T clip(x)
+        T = torque_nm |load|^load_exponent (1 + stiction exp(-(v / stribeck_speed)^2)) (1 + one_way)
         x = y / max(1, |y|)^2 + k v / S,   y = torque / S,   S = T + k creep_speed,   k = STIFFEST J / h
 
     with clip(x) from -1 to 1 and h the integration step. It is T sign(v) in motion, and what holds the joint at rest:
     there x is torque / S, and k v brings the joint there within a step. A torque beyond T only turns the motion: y
     falls out of x then, and friction changes its sign where the velocity does. Under a torque below T the joint still
     creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of small steps
-    x = v / creep_speed. `load` is the bearing's: see the rig.
+    x = v / creep_speed. `load` is the bearing's: see the rig. one_way = asymmetry sign(x), x without it.
     Sliding contacts lose in proportion to the load; rolling ones by elastic hysteresis, the load times the width of the
-    contact: to the power 4/3 for balls, 3/2 for rollers.
+    contact: to the power 4/3 for balls, 3/2 for rollers. Friction that differs by the direction is, moving and at rest,
+    symmetric friction beside a constant torque: a joint has `effort_offset` for that, and no asymmetry.
 
     Tell-tale: the joint comes to rest at other angles from above than from below; free swings shrink by equal steps.
     Source: Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation,
     European Journal of Control 4 (1998). Load: Tabor, The mechanism of rolling friction II: the elastic range, Proc. R.
     Soc. A 229 (1955); Greenwood, Minshall and Tabor, Hysteresis losses in rolling and sliding friction, 259 (1961).
+    Asymmetry: Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, whose offset holds it.
     """
 
     torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=0.0, upper=100.0, scale=0.01)
@@ -50,6 +53,9 @@ class CoulombFriction(Effect):
     load_exponent: float = parameter(
         0.0, null=0.0, lower=0.0, upper=2.0, scale=1.0, optional=True, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5)
     )
+    asymmetry: float = parameter(
+        0.0, null=0.0, lower=-1.0, upper=1.0, scale=0.1, optional=True, grid=(0.3, -0.3), rigs=("ankle",)
+    )
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
     dissipative = True
@@ -58,12 +64,18 @@ class CoulombFriction(Effect):
         ratio = s.v / self.stribeck_speed
         loaded = exp(0.5 * self.load_exponent * log(s.bearing_load * s.bearing_load + UNLOADED * UNLOADED))
         most = self.torque_nm * loaded * (1.0 + self.stiction * exp(-ratio * ratio))
+        both_ways = self._share(most, value, s)
+        most = most * (1.0 + self.asymmetry * both_ways / _length(both_ways))
+        return value - most * self._share(most, value, s)
+
+    def _share(self, most: Any, value: Any, s: Any) -> Any:
+        """Share of the largest friction that acts, with its sign: clip(x)."""
         stopping = STIFFEST * s.inertia / s.step
         scale = most + stopping * self.creep_speed
         y = value / scale
         beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
         x = y / (beyond * beyond) + stopping * s.v / scale
-        return value - 0.5 * most * (_length(x + 1.0) - _length(x - 1.0))
+        return 0.5 * (_length(x + 1.0) - _length(x - 1.0))
 
 
 def _length(x: Any) -> Any:

@@ -97,6 +97,7 @@ class Joint(Rig):
         return z
 
     def sample(self, s: Signals) -> dict[str, Any]:
+        s.q = s.sensed = s.x.q
         return {}
 
     def rates(self, s: Signals) -> dict[str, Any]:

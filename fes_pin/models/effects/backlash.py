@@ -1,0 +1,54 @@
+"""Play between the joint and what is read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fes_pin.models.maths import where
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class Backlash(Effect):
+    """Play: the driven side, or the reading, follows only when the slack is taken up.
+
+        b+ = clip(b, q - half_width, q + half_width)      play, once per sample
+        y  = b+
+
+    The inertia is on the side that is driven, what is read on the other; what is driven through the slack is light or
+    held by friction. A trial begins in the middle of the slack.
+
+    Tell-tale: where the motion turns the reading stands still until the slack is crossed, whatever the speed.
+    Source: Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38 (2002). Play:
+    Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
+    """
+
+    half_width: float = parameter(0.01, unit="{q}", null=0.0, lower=0.0, upper=10.0, scale=0.005)
+
+    name, stage, signal, rigs = "backlash", Stage.JOINT, "reading", ("joint",)
+    memories = ("followed",)
+
+    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+        """A slack that the motion never crosses would hide all of it."""
+        position = measured.get("position", np.zeros(1))
+        size = float(np.max(position) - np.min(position))
+        return {"half_width": (0.0, 0.5 * size)} if size > 0.0 else {}
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return self._play(value, s)
+
+    def update(self, s: Any) -> Mapping[str, Any]:
+        return {"followed": self._play(s.sensed, s)}
+
+    def rest(self, s: Any) -> Mapping[str, Any]:
+        return {"followed": s.sensed}
+
+    def _play(self, position: Any, s: Any) -> Any:
+        # strict comparisons, unlike clip, keep the derivative of the side that pulls also at half width 0
+        b, low, high = s.own.followed, position - self.half_width, position + self.half_width
+        return where(b < low, low, where(b > high, high, b))
