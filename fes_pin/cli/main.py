@@ -66,9 +66,7 @@ def diagnose(
         tell(DIAGNOSING, "report")
         files = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
         tell(1.0, "done")
-    write_files(out, files)
-    if NEXT_FILE not in files:  # what an earlier diagnosis proposed is not this one's
-        (out / NEXT_FILE).unlink(missing_ok=True)
+    write_files(out, files, without={NEXT_FILE} - set(files))  # what an earlier diagnosis proposed is not this one's
     _print_verdict(diagnosis)
     typer.echo(f"report: {out / 'report.html'}")
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from fes_pin.data.errors import InputError
 
 MAX_BYTES = 1 << 30
+SCRATCH = ".fes_pin-"
+"""How the names of folders begin in which files are prepared."""
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -77,8 +80,13 @@ def inside(folder: Path, relative: object) -> Path:
     return path
 
 
-def write_bytes(path: str | Path, content: bytes) -> None:
+def write_bytes(path: str | Path, content: bytes, mode: int = 0o666) -> None:
     """Write one file whole or not at all: to a temporary file beside it, synchronised, then renamed over it.
+
+    Parameters
+    ----------
+    mode
+        Permissions of a new file, of which the process's mask takes its share.
 
     Raises
     ------
@@ -95,12 +103,8 @@ def write_bytes(path: str | Path, content: bytes) -> None:
         if not path.parent.is_dir():
             raise InputError("the folder to write into does not exist", file=path)
         target = path.resolve()
-        staged = _stage(target.parent, content)
-        try:
-            os.replace(staged, target)
-        except BaseException:
-            staged.unlink(missing_ok=True)
-            raise
+        with _scratch(target.parent) as scratch:
+            os.replace(_stage(scratch / "new", content, mode), target)
         _sync_folder(target.parent)
 
 
@@ -126,10 +130,11 @@ def check_folder(folder: str | Path) -> None:
         raise InputError("cannot be written", file=nearest)
 
 
-def write_files(folder: str | Path, contents: Mapping[str, str | bytes]) -> None:
+def write_files(folder: str | Path, contents: Mapping[str, str | bytes], without: Iterable[str] = ()) -> None:
     """Write several files into a folder: all of them, or none.
 
-    Every file is staged and synchronised first. Old files are moved aside and come back if any rename fails.
+    Every file is staged and synchronised first. Old files are moved aside, all of them before the first new one comes,
+    and come back if any rename fails: whenever a run is killed, what stands in the folder is whole, and of one run.
 
     Parameters
     ----------
@@ -137,6 +142,8 @@ def write_files(folder: str | Path, contents: Mapping[str, str | bytes]) -> None
         Made if it is missing (with its parents).
     contents
         Text or bytes by the path relative to `folder`, with forward slashes.
+    without
+        Files of an earlier run that go with its others, where they are there.
 
     Raises
     ------
@@ -147,36 +154,98 @@ def write_files(folder: str | Path, contents: Mapping[str, str | bytes]) -> None
     with _input_errors(folder):
         made = _make_folder(folder)
         try:
-            _write_into(folder, contents)
+            _write_into(folder, contents, without)
         except BaseException:
             if made is not None:
                 shutil.rmtree(made, ignore_errors=True)
             raise
 
 
-def _write_into(folder: Path, contents: Mapping[str, str | bytes]) -> None:
+def _write_into(folder: Path, contents: Mapping[str, str | bytes], without: Iterable[str]) -> None:
     targets = {name: _target(folder, name) for name in contents}
-    with tempfile.TemporaryDirectory(prefix=".fes_pin-", dir=folder) as scratch:
+    with _scratch(folder) as scratch:
         staged = {}
-        for name, content in contents.items():
-            staged[name] = _stage(Path(scratch), content.encode("utf-8") if isinstance(content, str) else content)
-        done: list[tuple[Path, Path | None]] = []
-        try:
-            for index, (name, target) in enumerate(targets.items()):
-                target.parent.mkdir(parents=True, exist_ok=True)
-                old = Path(scratch) / f"old-{index}" if target.exists() else None
-                if old is not None:
-                    os.replace(target, old)
-                done.append((target, old))
-                os.replace(staged[name], target)
-        except BaseException:
-            for target, old in reversed(done):
-                target.unlink(missing_ok=True)
-                if old is not None:
-                    os.replace(old, target)
-            raise
+        for index, (name, content) in enumerate(contents.items()):
+            whole = content.encode("utf-8") if isinstance(content, str) else content
+            staged[targets[name]] = _stage(scratch / f"new-{index}", whole)
+        _exchange(staged, [*targets.values(), *(_target(folder, name) for name in without)], scratch)
     for parent in {target.parent for target in targets.values()}:
         _sync_folder(parent)
+
+
+def _exchange(staged: Mapping[Path, Path], leaving: Iterable[Path], scratch: Path) -> None:
+    """Rename new files to their places after the old ones have left; where that fails, everything is as before."""
+    aside: list[tuple[Path, Path]] = []
+    placed: list[Path] = []
+    try:
+        for index, target in enumerate(leaving):
+            if target.exists():
+                aside.append((target, scratch / f"old-{index}"))
+                os.replace(*aside[-1])
+        for target, new in staged.items():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            placed.append(target)
+            os.replace(new, target)
+    except BaseException:
+        for target in placed:
+            target.unlink(missing_ok=True)
+        for target, old in aside:
+            if old.exists():
+                os.replace(old, target)
+        raise
+
+
+@contextmanager
+def _scratch(folder: Path) -> Iterator[Path]:
+    """A folder inside `folder`, and so on the same disk, to prepare files in; what killed runs left there goes first.
+
+    It is locked as long as it is used. A lock ends with its process: what can be locked is of a run that was killed.
+    """
+    _remove_litter(folder)
+    path, lock = _locked_folder(folder)
+    try:
+        yield path
+    finally:
+        shutil.rmtree(path, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def _locked_folder(folder: Path) -> tuple[Path, int | None]:
+    """A new folder and the handle that locks it; None on a disk that knows no locks."""
+    while True:
+        path = Path(tempfile.mkdtemp(prefix=SCRATCH, dir=folder))
+        try:
+            lock = _lock(path)
+        except (BlockingIOError, FileNotFoundError):  # another run takes it for litter
+            continue
+        except OSError:
+            return path, None
+        if path.exists():
+            return path, lock
+        os.close(lock)
+
+
+def _lock(path: Path) -> int:
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BaseException:
+        os.close(handle)
+        raise
+    return handle
+
+
+def _remove_litter(folder: Path) -> None:
+    """Remove what killed runs of this user left in a folder."""
+    for path in folder.glob(f"{SCRATCH}*"):
+        try:
+            lock = _lock(path)
+        except OSError:  # in use, gone, a link, or of somebody else
+            continue
+        if os.fstat(lock).st_uid == os.geteuid():
+            shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
+        os.close(lock)
 
 
 def _target(folder: Path, name: str) -> Path:
@@ -200,24 +269,13 @@ def _make_folder(folder: Path) -> Path | None:
     return made
 
 
-def _stage(folder: Path, content: bytes) -> Path:
-    handle, name = tempfile.mkstemp(prefix=".fes_pin-", dir=folder)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(name, 0o666 & ~_umask())
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-    return Path(name)
-
-
-def _umask() -> int:
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask
+def _stage(path: Path, content: bytes, mode: int = 0o666) -> Path:
+    """Write and synchronise a new file."""
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as stream:
+        stream.write(content)
+        stream.flush()
+        os.fsync(stream.fileno())
+    return path
 
 
 def _sync_folder(folder: Path) -> None:
@@ -236,7 +294,8 @@ def _input_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise InputError(f"cannot be written: {_reason(error)}", file=error.filename or path) from error
+        named = error.filename if error.filename and SCRATCH not in str(error.filename) else path
+        raise InputError(f"cannot be written: {_reason(error)}", file=named) from error
 
 
 def _reason(error: BaseException) -> str:

@@ -1,34 +1,18 @@
-"""LLVM on this processor: IR text in, callable machine code out, with a cache of object code on disk."""
+"""LLVM on this processor: IR text in, callable machine code out."""
 
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
-import sys
 import threading
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 
 import llvmlite
 import llvmlite.binding as llvm
 
 from fes_pin import settings
-from fes_pin.data.files import write_bytes
 
 _LOCK = threading.Lock()
-
-
-def cache_folder() -> Path:
-    """Where compiled models are kept: `FES_PIN_CACHE`, else the user's cache folder."""
-    chosen = os.environ.get("FES_PIN_CACHE")
-    if chosen:
-        return Path(chosen)
-    base = os.environ.get("XDG_CACHE_HOME") or (
-        Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
-    )
-    return Path(base) / "fes_pin"
 
 
 def _new_target(name: str, features: str) -> llvm.TargetMachine:
@@ -72,27 +56,3 @@ def compile_object(assembly: str) -> bytes:
     """
     with _LOCK:
         return _target(*settings.target()).emit_object(llvm.parse_assembly(assembly))
-
-
-def cached_path(key: str, suffix: str) -> Path:
-    """The file of the cache that belongs to `key`."""
-    return cache_folder() / f"{hashlib.sha256((made_for() + key).encode()).hexdigest()[:40]}{suffix}"
-
-
-def read_cached(path: Path) -> bytes | None:
-    """What the cache holds at `path`, or None; a damaged entry counts as none."""
-    try:
-        data = path.read_bytes()
-    except OSError:
-        return None
-    digest, body = data[:32], data[32:]
-    return body if hashlib.sha256(body).digest() == digest else None
-
-
-def write_cached(path: Path, body: bytes) -> None:
-    """Keep `body` at `path`; a cache that cannot be written is no error."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(path, hashlib.sha256(body).digest() + body)
-    except OSError:
-        return

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from fes_pin import settings
+from fes_pin.models.compile.disk_cache import read_cached, write_cached
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import Layout, make_layout
 from fes_pin.models.compile.virtual import VirtualProgram
@@ -95,11 +96,11 @@ def _native(model: Model, layout: Layout) -> Program | None:
         classes = [f"{c.__module__}.{c.__qualname__}" for c in _classes(model)]
         if not all(name.startswith("fes_pin.") for name in classes):  # the signature knows only our own source
             return native.NativeProgram(layout, native.compile_equations(derive(model, layout)))
-        path = machine.cached_path(json.dumps([source_signature(), classes, asdict(layout)]), ".program")
-        stored = machine.read_cached(path)
+        key = machine.made_for() + json.dumps([source_signature(), classes, asdict(layout)])
+        stored = read_cached(key)
         if stored is None:
             stored = native.compile_equations(derive(model, layout))
-            machine.write_cached(path, stored)
+            write_cached(key, stored)
         return native.NativeProgram(layout, stored)
     except (ImportError, OSError, RuntimeError, NotImplementedError) as problem:
         _say_slow(" ".join(str(problem).split()))
