@@ -2,10 +2,13 @@
 
 The paper ends on the question whether a nerve acts on one joint or on several, and leaves open what to stimulate.
 Here every nerve of the legs may be used; braces are added one by one; for each the fewest nerves are found, exactly.
-Run the cells, or `python analysis/body_which_nerves.py` (some minutes); the picture goes to out/body_which_nerves.png.
+Strength is a healthy adult's, so that no set is dropped that somebody's muscles could do; another is an argument.
+Run the cells, or `python analysis/body_which_nerves.py [0.5]` (some minutes); the picture goes to
+out/body_which_nerves.png.
 """
 
 # %% One adult on the right foot: standing on one leg with the weight over the foot, and at mid-stance of a step
+import sys
 from pathlib import Path
 
 import matplotlib
@@ -20,10 +23,12 @@ from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.linearize import linearize
 from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto
-from fes_pin.muscles.nerves import Nerves
+from fes_pin.muscles.nerves import HEALTHY, Nerves
 
 body = Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
-legs = Nerves(tuple(n for n in Nerves().names if not n.endswith(("erector_spinae", "abdominals"))))
+strength = float(sys.argv[1]) if len(sys.argv) > 1 else HEALTHY
+leg_nerves = tuple(n for n in Nerves().names if not n.endswith(("erector_spinae", "abdominals")))
+legs = Nerves(leg_nerves, strength=strength)
 LEAN = np.arctan(0.5 * 0.095 * 1.80 / 0.9)  # brings the hips' width over the stance foot, 0.9 m above its ankle
 POSTURES = {"standing on one leg": {"right_ankle_inversion": -LEAN}, "mid-stance": "mid_stance"}
 both = lambda name: (*ORTHOSES[f"left_{name}"], *ORTHOSES[f"right_{name}"])  # noqa: E731

@@ -9,10 +9,10 @@ from fes_pin.body.controllability import Controllability
 from fes_pin.body.controllability import controllability as _controllability
 from fes_pin.body.joints import JOINT_NAMES, SIDES
 from fes_pin.body.linearize import LinearBody
-from fes_pin.muscles.nerves import SUBJECT_HEIGHT, Nerves
+from fes_pin.muscles.nerves import HEALTHY, SUBJECT_HEIGHT, Nerves
 
 
-def subject_nerves(body: Body, names: Iterable[str] = (), **options) -> Nerves:
+def subject_nerves(body: Body, names: Iterable[str] = (), strength: float = HEALTHY, **options) -> Nerves:
     """The nerves of a body of this size: strength as mass, moment arms as height (1.80 m where it is not known).
 
     Parameters
@@ -21,6 +21,8 @@ def subject_nerves(body: Body, names: Iterable[str] = (), **options) -> Nerves:
         Whose nerves.
     names
         `left_femoral`; `femoral` stands for both sides. All nerves of the table by default.
+    strength
+        Of a healthy adult's of that size.
     options
         Further ones of `Nerves` (`fatigue`, `force_length`).
 
@@ -34,7 +36,8 @@ def subject_nerves(body: Body, names: Iterable[str] = (), **options) -> Nerves:
     for name in [names] if isinstance(names, str) else names:
         both = [f"{side}_{name}" for side in SIDES]
         wanted += both if known.issuperset(both) else [name]
-    return Nerves.of_subject(body.mass_kg, body.height_m or SUBJECT_HEIGHT, tuple(dict.fromkeys(wanted)), **options)
+    height = body.height_m or SUBJECT_HEIGHT
+    return Nerves.of_subject(body.mass_kg, height, tuple(dict.fromkeys(wanted)), strength, **options)
 
 
 def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> Controllability:

@@ -12,7 +12,16 @@ from fes_pin.data.errors import InputError
 from fes_pin.muscles.muscles import MuscleTable, standard_muscles
 
 STRENGTH_FACTOR = 1.8
-"""Strengths are known to this factor: how far another accepted model (Rajagopal 2016) lies from this table."""
+"""A given strength is known to this factor: two standard deviations between healthy people either way (a coefficient of
+variation of 15 to 30 %, Anderson et al. 2007, table 3), and how far another model (Rajagopal et al. 2016) lies off."""
+HEALTHY, PARALYSED = 1.0, 0.5
+"""Strength: the healthy young man whom the table describes; paralysed muscle, where nothing better is known."""
+PARALYSED_BAND = 0.3, 0.7
+"""Strength of paralysed muscle that is stimulated: 0.34 in the quadriceps of trained people (Neuromodulation 13:50-57,
+2010, doi 10.1111/j.1525-1403.2009.00245.x); cross-sections of leg muscles are 0.45 to 0.8 of other people's half a year
+after the injury (Castro et al. 1999, Eur. J. Appl. Physiol. 80:373-378), less later."""
+STRONGEST, LONGEST = 10.0, 3.0
+"""No body's muscles are stronger, and no body is longer, than this many times the table's."""
 SUBJECT_MASS, SUBJECT_HEIGHT = 72.6, 1.80
 """The adult whose legs the table describes, kg and m."""
 
@@ -27,18 +36,19 @@ class Nerves:
         One per channel, with its side: `left_femoral`. All nerves of the table by default; also single muscles
         by their name in the table (`right_soleus`), as an intramuscular electrode reaches them.
     strength
-        Factor on all strengths: 1 is the healthy adult of the table; paralysed muscle may have 0.3 to 0.7.
+        Factor on all strengths: 1 is the healthy young man of the table. Not given: `PARALYSED`, and the band is
+        that of paralysed muscle.
     length
         Factor on all moment arms and lengths (body height over 1.80 m).
     force_length
-        Whether strength falls off away from the optimal fibre length (rigid tendon); else it is that at the optimum.
+        Whether strength falls off away from the optimal fibre length; else it is that at the optimum everywhere.
     fatigue
         Factor per name on the strength that is left, 0 (nothing: a dead channel) to 1; absent names are fresh.
 
     Raises
     ------
     InputError
-        Unknown or repeated name, negative strength, length that is not positive, fatigue outside [0, 1].
+        Unknown or repeated name, strength or length of no body, fatigue outside [0, 1].
 
     Examples
     --------
@@ -47,9 +57,9 @@ class Nerves:
     """
 
     names: tuple[str, ...] = ()
-    strength: float = 1.0
+    strength: float | None = None
     length: float = 1.0
-    force_length: bool = False
+    force_length: bool = True
     fatigue: dict[str, float] = field(default_factory=dict)
     members: np.ndarray = field(init=False, repr=False, compare=False)
 
@@ -62,10 +72,10 @@ class Nerves:
                 raise InputError(f"unknown nerve {name!r}; the nerves are {', '.join(known)}")
         if len(set(names)) < len(names):
             raise InputError("a nerve is named twice")
-        if not (np.isfinite(self.strength) and self.strength >= 0.0):
-            raise InputError(f"strength must be 0 or more, got {self.strength}")
-        if not (np.isfinite(self.length) and self.length > 0.0):
-            raise InputError(f"length must be more than 0, got {self.length}")
+        if not 0.0 <= self.assumed_strength <= STRONGEST:
+            raise InputError(f"strength must lie between 0 and {STRONGEST:g} (1: a healthy adult), got {self.strength}")
+        if not 0.0 < self.length <= LONGEST:
+            raise InputError(f"length must be more than 0 and at most {LONGEST:g}, got {self.length}")
         for name, left in self.fatigue.items():
             if name not in names:
                 raise InputError(f"fatigue names {name!r}, which is not among the nerves")
@@ -81,8 +91,19 @@ class Nerves:
         return hash((self.names, self.strength, self.length, self.force_length, tuple(sorted(self.fatigue.items()))))
 
     @classmethod
-    def of_subject(cls, mass_kg: float, height_m: float, names: Iterable[str] = (), **options) -> Nerves:
+    def of_subject(
+        cls, mass_kg: float, height_m: float, names: Iterable[str] = (), strength: float = PARALYSED, **options
+    ) -> Nerves:
         """Nerves of an adult of other size: strength as mass, arms as height.
+
+        Parameters
+        ----------
+        mass_kg, height_m
+            Of the adult.
+        names, options
+            See `Nerves`.
+        strength
+            Of a healthy adult's of that size.
 
         Raises
         ------
@@ -91,7 +112,9 @@ class Nerves:
         """
         if not (mass_kg > 0.0 and height_m > 0.0):
             raise InputError(f"mass and height must be positive, got {mass_kg} kg and {height_m} m")
-        return cls(tuple(names), strength=mass_kg / SUBJECT_MASS, length=height_m / SUBJECT_HEIGHT, **options)
+        return cls(
+            tuple(names), strength=strength * mass_kg / SUBJECT_MASS, length=height_m / SUBJECT_HEIGHT, **options
+        )
 
     @classmethod
     def muscles(cls, *nerves: str, **options) -> Nerves:
@@ -116,8 +139,15 @@ class Nerves:
         return np.array([self.fatigue.get(name, 1.0) for name in self.names])
 
     @property
+    def assumed_strength(self) -> float:
+        """The strength given, else that of paralysed muscle."""
+        return PARALYSED if self.strength is None else self.strength
+
+    @property
     def strength_band(self) -> tuple[float, float]:
-        """Factors between which the true strength lies, on each nerve's strength."""
+        """Factors on the assumed strength between which the true one lies."""
+        if self.strength is None:
+            return PARALYSED_BAND[0] / PARALYSED, PARALYSED_BAND[1] / PARALYSED
         return 1.0 / STRENGTH_FACTOR, STRENGTH_FACTOR
 
     def select(self, names: Iterable[str]) -> Nerves:
@@ -138,9 +168,8 @@ class Nerves:
             Joint angles, rad, and rates, rad/s: mapping by joint name or array (..., 19). Without rates: isometric.
         """
         table = self.table
-        force = self.strength * table.strength * np.cos(table.pennation)
-        if self.force_length:
-            force = force * table.isometric_fraction(q)
+        force = self.assumed_strength * table.strength
+        force = force * (table.isometric_fraction(q) if self.force_length else np.cos(table.pennation))
         if v is not None:
             force = force * table.velocity_fraction(q, v)
         return force
@@ -176,14 +205,17 @@ class Nerves:
         return torque @ self.members * self.left_over
 
     def torque_band(self, q=None) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest torque matrix under the uncertainty of strength: each (19, n), N m (by magnitude)."""
+        """Least and greatest torque matrix within the band of strength: each (19, n), N m (by magnitude)."""
         low, high = self.strength_band
         torque = self.torque_matrix(q)
         return low * torque, high * torque
 
     def __str__(self) -> str:
+        low, high = (self.assumed_strength * factor for factor in self.strength_band)
+        kind = "paralysed muscle" if self.strength is None else "as given"
         lines = [
-            f"{self.n} channels, strengths known to a factor of {STRENGTH_FACTOR}; torque when full, neutral posture:"
+            f"{self.n} channels, {self.assumed_strength:g} of a healthy adult's strength ({kind}; "
+            f"{low:.2g} to {high:.2g}); torque when full, neutral posture:"
         ]
         matrix = self.torque_matrix()
         for name, column in zip(self.names, matrix.T, strict=True):

@@ -213,7 +213,7 @@ def test_a_met_torque_has_no_complaints():
 
 
 def test_a_channel_that_dies_is_replaced_as_far_as_it_can_be():
-    torque = {"left_knee_flexion": 70.0, "left_hip_flexion": -110.0}
+    torque = {"left_knee_flexion": 25.0, "left_hip_flexion": -35.0}
     whole, without = allocate(torque, LEFT), allocate(torque, LEFT, dead=["left_hamstrings"])
     assert without.pulse_widths_us["left_hamstrings"] == 0.0
     assert without.certificate.is_optimal(1e-11) and without.certificate.cost > whole.certificate.cost

@@ -95,7 +95,7 @@ def test_rounded_allocation_is_allowed_and_its_gap_covers_the_best():
 
 
 def test_a_small_torque_is_off_rather_than_too_much_and_says_so():
-    a = allocate({"left_knee_flexion": -20.0}, Nerves(["left_femoral"]), least=0.3)
+    a = allocate({"left_knee_flexion": -7.0}, Nerves(["left_femoral"]), least=0.3)
     assert a.recruitment[0] == 0.0
     assert "left femoral off: its least recruitment would be too much" in a.reasons[0]
 

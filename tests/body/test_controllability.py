@@ -153,7 +153,7 @@ def test_all_nerves_reach_every_fall_of_the_stance(standing):
 def test_influence_of_nerves_knows_biarticular_muscles(standing):
     """The paper's closing question in one row: the femoral nerve turns knee and hip, the hamstring branches both
     too."""
-    torque = Inputs.of(Nerves(("right_femoral", "right_hamstrings")), standing).on(standing)
+    torque = Inputs.of(Nerves(("right_femoral", "right_hamstrings"), strength=1.0), standing).on(standing)
     knee, hip = (standing.joint_names.index(f"right_{n}") for n in ("knee_flexion", "hip_flexion"))
     assert torque[knee, 0] < -100.0 < 10.0 < torque[hip, 0]
     assert torque[knee, 1] > 10.0 > -50.0 > torque[hip, 1]

@@ -7,11 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
-from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN
+from fes_pin.allocate.allocate import allocate
+from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, limits_of
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.muscles import standard_muscles
-from fes_pin.muscles.nerves import Nerves
+from fes_pin.muscles.fibres import active_force, tendon_force
+from fes_pin.muscles.muscles import KNOWN_DEG, standard_muscles
+from fes_pin.muscles.nerves import HEALTHY, PARALYSED, PARALYSED_BAND, Nerves
 
 SHARED = Path(os.environ.get("FES_PIN_DATA", Path(__file__).parents[2].parent / "shared"))
 MEASURED = (SHARED if (SHARED / "nerve_moment_arms").is_dir() else SHARED / "data") / "nerve_moment_arms"
@@ -31,13 +34,14 @@ SIGNS = {
 
 def random_angles(count, seed=0):
     table = standard_muscles()
-    return np.random.default_rng(seed).uniform(table.lower, table.upper, (count, len(JOINT_NAMES)))
+    low, high = (np.clip(edge, -0.5, 2.0) for edge in (table.lower, table.upper))
+    return np.random.default_rng(seed).uniform(low, high, (count, len(JOINT_NAMES)))
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("nerve", SIGNS)
 def test_every_nerve_turns_its_joints_the_anatomical_way(nerve, side):
-    nerves = Nerves([f"{side}_{nerve}"])
+    nerves = Nerves([f"{side}_{nerve}"], strength=HEALTHY)
     torque = dict(zip(JOINT_NAMES, nerves.torque_matrix()[:, 0], strict=True))
     for joint, sign in SIGNS[nerve].items():
         assert sign * torque[f"{side}_{joint}"] > 1.0
@@ -47,12 +51,12 @@ def test_every_nerve_turns_its_joints_the_anatomical_way(nerve, side):
 
 def test_left_is_the_mirror_of_right():
     q = random_angles(20)
-    mirrored = np.concatenate([q[:, 8:16], q[:, :8], q[:, 16:]], axis=1)
+    signs = np.array([MIRROR_SIGN.get(joint, 1.0) for joint in JOINT_NAMES[16:]])
+    mirrored = np.concatenate([q[:, 8:16], q[:, :8], signs * q[:, 16:]], axis=1)
     left = Nerves([n for n in Nerves().names if n.startswith("left_")]).torque_matrix(q)
     right = Nerves([n for n in Nerves().names if n.startswith("right_")]).torque_matrix(mirrored)
     np.testing.assert_allclose(left[:, :8], right[:, 8:16], atol=1e-12)
-    signs = [MIRROR_SIGN.get(joint, 1.0) for joint in JOINT_NAMES[16:]]
-    np.testing.assert_allclose(left[:, 16:], np.array(signs)[:, None] * right[:, 16:], atol=1e-12)
+    np.testing.assert_allclose(left[:, 16:], signs[:, None] * right[:, 16:], atol=1e-12)
 
 
 def test_right_erector_bends_right_and_right_external_oblique_turns_left():
@@ -61,18 +65,71 @@ def test_right_erector_bends_right_and_right_external_oblique_turns_left():
     assert torque[JOINT_NAMES.index("lumbar_rotation"), 1] > 0 and torque[JOINT_NAMES.index("lumbar_extension"), 1] < 0
 
 
-def test_smooth_moment_arms_are_the_gradient_of_one_length():
-    table, h = standard_muscles(), 1e-5
-    for q in random_angles(5) * 0.8:
-        gradient = [(table.lengths(q + h * e) - table.lengths(q - h * e)) / (2 * h) for e in np.eye(19)]
-        smooth = table.constant + np.einsum("mij,j->mi", table.slope, q)
-        np.testing.assert_allclose(-np.array(gradient), smooth.T, atol=1e-8)
-    assert np.abs(table.rest).max() < 3e-3  # what the length leaves over of the measured arms, m
+def test_moment_arms_are_the_gradient_of_the_length():
+    table, h = standard_muscles(), 1e-6
+    q = random_angles(20)[:, None] * 0.98
+    gradient = (table.lengths(q + h * np.eye(19)) - table.lengths(q - h * np.eye(19))) / (2 * h)
+    np.testing.assert_allclose(-gradient, table.moment_arms(q[:, 0]), atol=1e-8)
 
 
-def test_a_posture_beyond_the_measured_range_is_held_at_its_edge():
+@pytest.mark.parametrize("joint", KNOWN_DEG)
+def test_no_muscle_jumps_far_where_a_point_of_its_path_is_left_out(joint):
+    """A jump in length is force that works for nothing; of torque, a kick."""
     table = standard_muscles()
-    np.testing.assert_array_equal(table.moment_arms(table.upper + 1.0), table.moment_arms(table.upper))
+    q = np.zeros((501, len(JOINT_NAMES)))
+    q[:, JOINT_NAMES.index(f"right_{joint}")] = np.radians(np.linspace(*KNOWN_DEG[joint], 501))
+    step = np.abs(np.diff(table.lengths(q), axis=0)).max()
+    assert step < 2.5e-3  # of which 0.4 mm are the motion itself
+
+
+@pytest.mark.parametrize(
+    ("muscle", "joint", "sign"),
+    [
+        ("psoas", "hip_flexion", 1),
+        ("iliacus", "hip_flexion", 1),
+        ("rect_fem", "hip_flexion", 1),
+        ("glut_max3", "hip_flexion", -1),
+        ("bifemlh", "hip_flexion", -1),
+        ("semimem", "hip_flexion", -1),
+        ("bifemlh", "knee_flexion", 1),
+        ("semimem", "knee_flexion", 1),
+        ("med_gas", "knee_flexion", 1),
+        ("vas_lat", "knee_flexion", -1),
+        ("soleus", "ankle_dorsiflexion", -1),
+        ("tib_ant", "ankle_dorsiflexion", 1),
+        ("glut_med2", "hip_adduction", -1),
+        ("per_long", "ankle_inversion", -1),
+    ],
+)
+def test_a_muscle_pulls_its_anatomical_way_over_all_angles_that_are_known(muscle, joint, sign):
+    table, j = standard_muscles(), JOINT_NAMES.index(f"left_{joint}")
+    q = np.zeros((60, len(JOINT_NAMES)))
+    q[:, j] = np.radians(np.linspace(*KNOWN_DEG[joint], 60))
+    arms = sign * table.moment_arms(q)[:, j, table.names.index(f"left_{muscle}")]
+    assert arms.min() > 2e-3 and arms.max() < 0.1
+
+
+def test_known_angles_are_those_of_the_joint_or_less():
+    for joint, (low, high) in KNOWN_DEG.items():
+        limits = np.degrees(limits_of(f"left_{joint}"))
+        assert limits[0] - 1e-9 <= low < high <= limits[1] + 1e-9
+
+
+def test_a_posture_a_little_beyond_what_is_known_is_held_and_said_far_beyond_refused():
+    nerves = Nerves(["left_iliopsoas", "left_femoral"])
+    at = {f: nerves.torque_matrix({"left_hip_flexion": np.radians(f)}) for f in (80.0, 85.0, 94.0)}
+    np.testing.assert_array_equal(at[85.0], at[94.0])
+    assert not np.array_equal(at[80.0], at[85.0])
+    assert nerves.held({"left_hip_flexion": np.radians(85.0)}) == ()
+    (said,) = nerves.held({"left_hip_flexion": np.radians(94.0)})
+    assert "left hip flexion 94 degrees" in said and "85" in said
+    with pytest.raises(InputError, match=r"left_hip_flexion are known from -30 to 85 degrees.*100 is too far"):
+        nerves.torque_matrix({"left_hip_flexion": np.radians(100.0)})
+    with pytest.raises(InputError, match="right_knee_flexion"):
+        nerves.torque_matrix({"right_knee_flexion": np.radians(121.0)})
+    assert nerves.torque_matrix({"lumbar_bending": 3.0}).shape == (19, 2)  # constant levers hold anywhere
+    a = allocate({"left_knee_flexion": -20.0}, nerves, {"left_hip_flexion": np.radians(94.0)})
+    assert a.held == (said,) and said in str(a)
 
 
 def test_batch_equals_single_and_mapping_equals_array():
@@ -93,11 +150,25 @@ def test_force_velocity_is_one_at_rest_less_when_shortening_more_when_lengthenin
     assert nerves.torque_matrix(None, {"right_knee_flexion": -100.0})[j, 0] == 0.0
 
 
-def test_force_length_never_exceeds_the_upper_bound():
-    q = random_angles(50)
-    with_length = np.abs(Nerves.muscles(force_length=True).torque_matrix(q))
-    assert (with_length <= np.abs(Nerves.muscles().torque_matrix(q)) + 1e-12).all()
-    assert with_length.sum() < 0.98 * np.abs(Nerves.muscles().torque_matrix(q)).sum()
+def test_no_muscle_pulls_more_than_at_its_optimal_length():
+    table, q = standard_muscles(), random_angles(50)
+    fraction = table.isometric_fraction(q)
+    assert (fraction >= 0.0).all() and (fraction <= 1.0).all()
+    at_best = Nerves.muscles(force_length=False).torque_matrix(q)
+    assert np.abs(Nerves.muscles().torque_matrix(q)).sum() < 0.9 * np.abs(at_best).sum()
+
+
+def test_fibres_and_tendon_pull_alike():
+    table, q = standard_muscles(), random_angles(20)
+    along = table.isometric_fraction(q)
+    stretched = np.array([brentq(lambda e, f=f: tendon_force(np.array(e)) - f, 0.0, 0.1) for f in along.ravel()])
+    extent = table.lengths(q) - table.tendon * (1.0 + stretched.reshape(along.shape))
+    thickness = table.fibre * np.sin(table.pennation)
+    size = np.hypot(extent, thickness)
+    pulled = active_force(size / table.fibre) * extent / size
+    taut = extent > 1e-3
+    np.testing.assert_allclose(pulled[taut], along[taut], rtol=1e-6)
+    assert taut.mean() > 0.9
 
 
 def test_fatigue_strength_and_size_scale_the_columns():
@@ -107,6 +178,16 @@ def test_fatigue_strength_and_size_scale_the_columns():
     np.testing.assert_allclose(Nerves.of_subject(72.6 * 2, 0.9, names).torque_matrix(), fresh)
     low, high = Nerves(names).torque_band()
     assert (np.abs(low) <= np.abs(fresh)).all() and (np.abs(fresh) <= np.abs(high)).all()
+
+
+def test_strength_is_that_of_paralysed_muscle_unless_another_is_given():
+    names = ["left_femoral"]
+    assumed, healthy = Nerves(names), Nerves(names, strength=HEALTHY)
+    np.testing.assert_allclose(assumed.torque_matrix(), PARALYSED * healthy.torque_matrix())
+    for nerves, ends in ((assumed, PARALYSED_BAND), (healthy, (1 / 1.8, 1.8))):
+        for end, torque in zip(ends, nerves.torque_band(), strict=True):
+            np.testing.assert_allclose(torque, end * healthy.torque_matrix())
+    assert "paralysed muscle; 0.3 to 0.7" in str(assumed) and "as given" in str(healthy)
 
 
 def test_a_list_of_nerves_says_how_rough_the_trunk_is():
@@ -128,6 +209,8 @@ def test_a_nerve_is_the_sum_of_its_muscles():
         lambda: Nerves(["left_tibial", "left_tibial"]),
         lambda: Nerves(strength=-1.0),
         lambda: Nerves(strength=float("nan")),
+        lambda: Nerves(strength=1e300),
+        lambda: Nerves(length=1e9),
         lambda: Nerves(length=0.0),
         lambda: Nerves(["left_tibial"], fatigue={"left_tibial": 1.5}),
         lambda: Nerves(["left_tibial"], fatigue={"left_femoral": 0.5}),
@@ -158,8 +241,10 @@ def test_measured_postures_are_met_to_the_rounding_of_the_table():
         for joint in JOINT_NAMES[8:16]:
             name, sign = rename.get(joint.removeprefix("right_"), (joint.removeprefix("right_"), 1))
             q[joint], keys[joint] = sign * angles.get(f"{name}_r", 0.0), (f"r_{name}_r_m", sign)
-        arms = standard_muscles().moment_arms(q)
+        arms, lengths = standard_muscles().moment_arms(q), standard_muscles().lengths(q)
         for row in (r for r in rows if r["posture"] == label):
-            column = arms[:, standard_muscles().names.index(f"right_{row['muscle'].removesuffix('_r')}")]
+            i = standard_muscles().names.index(f"right_{row['muscle'].removesuffix('_r')}")
+            column = arms[:, i]
+            assert lengths[i] == pytest.approx(float(row["lmt_m"]), abs=2e-5)
             for joint, (key, sign) in keys.items():
-                assert column[JOINT_NAMES.index(joint)] == pytest.approx(sign * float(row.get(key, 0.0)), abs=1.2e-4)
+                assert column[JOINT_NAMES.index(joint)] == pytest.approx(sign * float(row.get(key, 0.0)), abs=5e-5)

@@ -1,0 +1,40 @@
+"""The table's greatest joint torques against those that healthy young men have been measured to make."""
+
+import numpy as np
+import pytest
+
+from fes_pin.muscles.muscles import standard_muscles
+from fes_pin.muscles.nerves import SUBJECT_HEIGHT, SUBJECT_MASS
+from fes_pin.muscles.published import ANDERSON_2007, SARABON_2021, greatest_torque_nm
+
+
+@pytest.mark.parametrize("action", ANDERSON_2007)
+def test_torque_over_angle_lies_where_people_lie(action):
+    """Within two standard deviations of people at every angle, within a fifth of the peak on the whole."""
+    curve = ANDERSON_2007[action]
+    angles = curve.angles_deg()
+    measured = curve.torque_nm(angles, SUBJECT_MASS, SUBJECT_HEIGHT)
+    ours = greatest_torque_nm(standard_muscles(), curve, angles)
+    assert np.abs(ours - measured).max() < 2 * curve.spread / curve.peak * measured.max()
+    assert np.sqrt(np.mean((ours - measured) ** 2)) < 0.2 * measured.max()
+
+
+@pytest.mark.parametrize(("action", "angle"), SARABON_2021)
+def test_knee_agrees_with_a_pool_of_studies_that_took_no_part_in_the_fit(action, angle):
+    low, high = (SUBJECT_MASS * value for value in SARABON_2021[action, angle])
+    ours = greatest_torque_nm(standard_muscles(), ANDERSON_2007[action], [angle])[0]
+    assert 0.85 * low < ours < 1.15 * high
+
+
+def test_the_knee_extends_most_where_it_is_bent_and_much_less_where_it_is_straight():
+    angles = np.linspace(-5.0, 105.0, 23)
+    torque = greatest_torque_nm(standard_muscles(), ANDERSON_2007["knee extension"], angles)
+    assert 35.0 < angles[np.argmax(torque)] < 75.0
+    assert torque[angles == 0.0] < 0.75 * torque.max()
+
+
+def test_the_calf_pushes_most_where_it_is_stretched():
+    angles = np.linspace(-40.0, 30.0, 15)
+    torque = greatest_torque_nm(standard_muscles(), ANDERSON_2007["plantarflexion"], angles)
+    assert 0.0 <= angles[np.argmax(torque)] <= 20.0
+    assert torque[0] < 0.4 * torque.max() and 90.0 < torque.max() < 170.0
