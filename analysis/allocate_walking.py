@@ -18,7 +18,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from fes_pin.allocate.allocate import Allocator, allocate
-from fes_pin.allocate.attainable import Attainable
+from fes_pin.allocate.attainable_torques import AttainableTorques
 from fes_pin.allocate.walk import allocate_walk, clipped, direction_error, rescaled
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.measured_walk import read_walk
@@ -142,17 +142,17 @@ for axis, joint, title in zip(axes[0], SAGITTAL[3:], titles, strict=True):
     axis.margins(x=0)
 axes[0, 0].set_ylim(-135, 45)
 axes[0, 0].legend(fontsize=8, loc="lower left")
-names = sagittal.allocator.names
+names = sagittal.problem.names
 right = [i for i, n in enumerate(names) if n.startswith("right_")]
 width = np.where(sagittal.pulse_width_us[:, right].T > 0, sagittal.pulse_width_us[:, right].T, np.nan)
 image = axes[1, 0].pcolormesh(walk.time, np.arange(len(right) + 1), width[:, :-1], cmap="viridis", vmin=180, vmax=1000)
 axes[1, 0].set(title="pulse widths (white: off)", xlabel="time (s)", yticks=np.arange(len(right)) + 0.5)
 axes[1, 0].set_yticklabels([names[i].removeprefix("right_").replace("_", "\n") for i in right], fontsize=8)
 figure.colorbar(image, ax=axes[1, 0], label="us")
-outline = Attainable(Nerves(both_sides(SETS[chosen])), walk.q[60]).outline(
+outline = AttainableTorques(Nerves(both_sides(SETS[chosen])), walk.q[60]).outline(
     "right_knee_flexion", "right_ankle_dorsiflexion"
 )
-wide = Attainable(Nerves(both_sides(SETS["every leg nerve"])), walk.q[60]).outline(
+wide = AttainableTorques(Nerves(both_sides(SETS["every leg nerve"])), walk.q[60]).outline(
     "right_knee_flexion", "right_ankle_dorsiflexion"
 )
 axes[1, 1].fill(*wide.T, color="tab:blue", alpha=0.15, label="every leg nerve")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ from fes_pin.allocate.allocator import Allocator
 __all__ = ["Allocator", "allocate"]
 
 
-def allocate(torque, nerves, q=None, previous=None, *, solver: str = "pivot", **options) -> Allocation:
+def allocate(torque, nerves, q=None, previous=None, *, solver: str = "daqp", **options) -> Allocation:
     """Pulse widths for a wanted joint torque.
 
     Parameters
@@ -22,10 +24,12 @@ def allocate(torque, nerves, q=None, previous=None, *, solver: str = "pivot", **
         Wanted joint torque, N m, by joint name (absent: 0) or (joints,).
     nerves, q
         `Nerves` and the posture, or an array (joints, n) of torque at full recruitment, N m.
-    previous, solver
+    previous
+        Recruitments in force until now, (n,), for `rate` and `change`; 0 by default.
+    solver
         See `Allocator.__call__`.
     options
-        See `Allocator`.
+        See `fes_pin.allocate.problem.Options`.
 
     Raises
     ------
@@ -41,21 +45,30 @@ def allocate(torque, nerves, q=None, previous=None, *, solver: str = "pivot", **
     return program(torque, program.at_rest if previous is None else previous, solver=solver)
 
 
-RECENT: dict[Any, Allocator] = {}
-"""The last programs that `allocate` made, so that the next torque of the same kind starts where the last one ended."""
-KEPT = 16
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Moment arms and options, told apart by their values."""
+
+    key: Any
+    nerves: Any = field(compare=False)
+    q: Any = field(compare=False)
+    options: Any = field(compare=False)
 
 
-def allocator_for(nerves, q, options: dict) -> Allocator:
+def allocator_for(nerves, q, options: Mapping[str, Any]) -> Allocator:
     """The program for these moment arms and options, made anew only if it is not among the recent ones."""
-    key = (frozen(nerves), frozen(q), frozen(options))
-    program = RECENT.get(key)
-    if program is None:
-        program = Allocator(nerves, q, **options)
-        while len(RECENT) >= KEPT:
-            del RECENT[next(iter(RECENT))]
-        RECENT[key] = program
-    return program
+    asked = Asked((frozen(nerves), frozen(q), frozen(options)), nerves, q, options)
+    try:
+        hash(asked)
+    except TypeError:
+        return Allocator(nerves, q, **options)
+    return recent(asked)
+
+
+@lru_cache(maxsize=16)
+def recent(asked: Asked) -> Allocator:
+    """The last programs, so that the next torque of the same kind starts where the last one ended."""
+    return Allocator(asked.nerves, asked.q, **asked.options)
 
 
 def frozen(value):
@@ -63,7 +76,9 @@ def frozen(value):
     if isinstance(value, np.ndarray):
         return value.shape, value.dtype.str, value.tobytes()
     if isinstance(value, Mapping):
-        return tuple((key, frozen(value[key])) for key in sorted(value))
+        return tuple((key, frozen(value[key])) for key in sorted(value, key=str))
     if isinstance(value, (list, tuple)):
         return tuple(frozen(item) for item in value)
+    if isinstance(value, Set):
+        return frozenset(value)
     return value

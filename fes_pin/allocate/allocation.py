@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fes_pin.allocate.certificate import Certificate
-
-if TYPE_CHECKING:
-    from fes_pin.allocate.allocator import Allocator
+from fes_pin.allocate.problem import Problem
 
 REPORTED_NM = 0.5
 """A shortfall is put in words from this size on, N m."""
@@ -40,8 +37,8 @@ class Allocation:
         Recomputed from the moment arms; None where the choice is not convex (then `gap` speaks).
     gap
         No choice costs less than this one minus `gap` (of the cost divided by the certificate's scale).
-    allocator
-        The program: names, moment arms, weights.
+    problem
+        Names, moment arms, weights, prices.
     """
 
     recruitment: np.ndarray
@@ -54,18 +51,18 @@ class Allocation:
     previous: np.ndarray
     certificate: Certificate
     gap: float
-    allocator: Allocator
+    problem: Problem
     note: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Channels."""
-        return self.allocator.names
+        return self.problem.names
 
     @property
     def joints(self) -> tuple[str, ...]:
         """Joints."""
-        return self.allocator.joints
+        return self.problem.joints
 
     @property
     def shortfall(self) -> np.ndarray:
@@ -75,12 +72,12 @@ class Allocation:
     @property
     def held(self) -> tuple[str, ...]:
         """One sentence per joint whose moment arms were taken at another angle than asked (`Nerves.held`)."""
-        return self.allocator.held
+        return self.problem.held
 
     @property
     def achieved_band(self) -> tuple[np.ndarray, np.ndarray]:
         """Torque of these pulse widths with the weakest and the strongest muscles that are likely, (joints,) N m."""
-        low, high = self.allocator.band
+        low, high = self.problem.band
         return low * self.achieved, high * self.achieved
 
     @property
@@ -102,21 +99,21 @@ class Allocation:
 
     def limit(self, i: int) -> str:
         """What holds channel i, empty if nothing does."""
-        r, program = self.recruitment[i], self.allocator
-        if program.upper[i] == 0.0 or not program.matrix[:, i].any():
+        r, problem = self.recruitment[i], self.problem
+        if problem.upper[i] == 0.0 or not problem.matrix[:, i].any():
             return "dead"
         if r >= self.upper[i]:
-            return "saturated" if r >= 1.0 else "limited" if r >= program.upper[i] else "rising"
-        if r <= self.lower[i] and r > program.lower[i]:
+            return "saturated" if r >= 1.0 else "limited" if r >= problem.upper[i] else "rising"
+        if r <= self.lower[i] and r > problem.lower[i]:
             return "falling"
         if r <= 0.0:
             return "off"
-        return "least" if program.least is not None and r <= program.least[i] else ""
+        return "least" if problem.least is not None and r <= problem.least[i] else ""
 
     @property
     def reasons(self) -> list[str]:
         """One sentence per joint whose torque misses by `REPORTED_NM` or more, the worst first."""
-        weighed = np.abs(self.shortfall) * (self.allocator.weights > 0.0)
+        weighed = np.abs(self.shortfall) * (self.problem.weights > 0.0)
         return [self.reason(int(j)) for j in np.argsort(-weighed) if weighed[j] >= REPORTED_NM]
 
     def reason(self, j: int) -> str:
@@ -128,12 +125,12 @@ class Allocation:
 
     def cause(self, j: int, direction: float) -> str:
         """What keeps joint j from more torque in a direction."""
-        program = self.allocator
-        help_ = program.nominal[j] * direction
+        problem = self.problem
+        help_ = problem.nominal[j] * direction
         by_name = [name.replace("_", " ") for name in self.names]
         words = [self.limit(i) for i in range(len(self.names))]
         if not help_.any():
-            weak = [name for name, column in zip(by_name, program.nominal.T, strict=True) if not column.any()]
+            weak = [name for name, column in zip(by_name, problem.nominal.T, strict=True) if not column.any()]
             return "no stimulated nerve turns it" + (f" ({', '.join(weak)} without strength)" if weak else "")
         stuck = {"saturated", "limited", "rising", "dead"}
         held = [int(i) for i in np.argsort(-help_) if help_[i] > 0.0 and words[i] in stuck]
@@ -148,12 +145,12 @@ class Allocation:
 
     def conflict(self, j: int, i: int, by_name: list[str]) -> str:
         """What a little more of channel i, which would help joint j, would spoil."""
-        program = self.allocator
-        if program.least is not None and self.recruitment[i] == 0.0:
+        problem = self.problem
+        if problem.least is not None and self.recruitment[i] == 0.0:
             return f"{by_name[i]} off: its least recruitment would be too much"
-        costs = -program.weights * self.shortfall * program.matrix[:, i] / program.scale
+        costs = -problem.weights * self.shortfall * problem.matrix[:, i] / problem.scale
         k = int(np.argmax(costs))
-        if k == j or costs[k] < float(program.prices[i] * self.recruitment[i]):
+        if k == j or costs[k] < float(problem.prices[i] * self.recruitment[i]):
             return f"more {by_name[i]} is not worth its effort"
         return f"more {by_name[i]} would spoil {self.joints[k].replace('_', ' ')}"
 
@@ -161,7 +158,7 @@ class Allocation:
         """What these pulse widths make of the wanted torques if the muscles are weaker or stronger than assumed."""
         low, high = self.achieved_band
         shown = [j for j in range(len(self.joints)) if self.wanted[j] and abs(self.achieved[j]) >= REPORTED_NM]
-        weak, strong = self.allocator.band
+        weak, strong = self.problem.band
         if weak == strong or not shown:
             return []
         parts = [f"{self.joints[j].replace('_', ' ')} {low[j]:.1f} to {high[j]:.1f} N m" for j in shown]
@@ -177,7 +174,7 @@ class Allocation:
         lines += [*self.band_lines(), *self.held]
         proof = (
             f"optimal to {max(self.certificate.residual, 0.0):.0e}"
-            if not self.allocator.choosy
+            if self.problem.least is None
             else f"gap {self.gap:.0e}"
         )
         return "\n".join([*lines, f"{proof}{'; ' + self.note if self.note else ''}"])
@@ -185,7 +182,7 @@ class Allocation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AllocationSequence:
-    """Allocations of a torque over time, as arrays; `at(k)` is one of them.
+    """Allocations of a torque over time, as arrays.
 
     Attributes
     ----------
@@ -202,7 +199,7 @@ class AllocationSequence:
     wanted: np.ndarray
     achieved: np.ndarray
     residual: np.ndarray
-    allocator: Any
+    problem: Problem
 
     @property
     def shortfall(self) -> np.ndarray:

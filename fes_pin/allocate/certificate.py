@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
-from fes_pin.allocate.native import Native, Reals, address
+from fes_pin.allocate.problem import EPSILON, Problem
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,18 +39,13 @@ class Certificate:
 
     @property
     def residual(self) -> float:
-        """Greatest of primal, dual and complementarity."""
-        return max(self.primal, self.dual, self.complementarity)
+        """Greatest of primal, dual and complementarity; not a number where one of them is none."""
+        parts = (self.primal, self.dual, self.complementarity)
+        return math.nan if any(math.isnan(part) for part in parts) else max(parts)
 
     def is_optimal(self, tolerance: float = 1e-9) -> bool:
-        """Whether no residual exceeds the tolerance."""
-        return self.residual <= tolerance
-
-
-def slopes(matrix, weights, scale, error, prices, r, keep, previous, cubes=False) -> np.ndarray:
-    """Gradient of the cost over recruitment: (..., n). `error` = achieved - wanted, (..., joints)."""
-    gradient = (error * weights) @ matrix / scale + (prices * r * r if cubes else prices * r)
-    return gradient + keep * (r - previous) if keep else gradient
+        """Whether no residual exceeds the tolerance, and the cost is a finite number."""
+        return self.residual <= tolerance and math.isfinite(self.cost) and math.isfinite(self.gap)
 
 
 def residuals(gradient, r, lower, upper):
@@ -63,92 +58,92 @@ def residuals(gradient, r, lower, upper):
     return np.maximum(primal, 0.0), dual, largest(products, -1), np.add.reduce(products, -1)
 
 
-def certify(
-    joints: int,
-    n: int,
-    matrix: Reals,
-    weights: Reals,
-    prices: Reals,
-    scale: float,
-    keep: float,
-    cubes: int,
-    previous: Reals,
-    wanted: Reals,
-    r: Reals,
-    lower: Reals,
-    upper: Reals,
-    achieved: Reals,
-    gradient: Reals,
-    out: Reals,
-):
-    """`slopes` and `residuals` of one sample in one pass; `out` gets primal, dual, complementarity, gap and cost."""
-    cost = 0.0
-    for i in range(n):
-        change = r[i] - previous[i]
-        effort = prices[i] * r[i] * r[i]
-        gradient[i] = (effort if cubes > 0 else prices[i] * r[i]) + keep * change
-        cost += (effort * r[i] / 3.0 if cubes > 0 else 0.5 * effort) + 0.5 * keep * change * change
-    for j in range(joints):
-        sum_ = 0.0
-        for i in range(n):
-            sum_ += matrix[j * n + i] * r[i]
-        achieved[j] = sum_
-        error = sum_ - wanted[j]
-        cost += 0.5 * weights[j] * error * error / scale
-        slope = weights[j] * error / scale
-        for i in range(n):
-            gradient[i] += slope * matrix[j * n + i]
-    for i in range(5):
-        out[i] = 0.0
-    for i in range(n):
-        below = r[i] - lower[i]
-        above = upper[i] - r[i]
-        g = gradient[i]
-        violation = -below if below < above else -above
-        step = -g if -g > -below else -below
-        step = step if step < above else above
-        product = g * below if g > 0.0 else -g * above
-        out[0] = violation if violation > out[0] else out[0]
-        out[1] = abs(step) if abs(step) > out[1] else out[1]
-        out[2] = product if product > out[2] else out[2]
-        out[3] += product
-    out[4] = cost
-    return 0
-
-
-@lru_cache(maxsize=1)
-def compiled() -> Native:
-    """`certify` as machine code."""
-    return Native(certify)
-
-
 class Certifier:
-    """Certificates of one program, one sample at a time.
+    """Certificates of a problem: slopes and costs from its definition alone.
+
+    Lexicographic problems are certified for the torque error alone, which comes first.
 
     Parameters
     ----------
-    matrix, weights, prices
-        (joints, n) N m, (joints,), (n,).
-    scale, keep
-        (N m)^2, and the price of change.
-    cubes
-        Whether effort is `prices r^3 / 3` instead of `prices r^2 / 2`.
+    problem
+        Nothing else is read.
     """
 
-    def __init__(self, matrix, weights, prices, scale: float, keep: float, cubes: bool = False) -> None:
-        joints, n = matrix.shape
-        self.fixed = [np.array(a, dtype=float, order="C") for a in (matrix, weights, prices)]
-        self.given = [np.zeros(k) for k in (n, joints, n, n, n)]
-        self.achieved, self.gradient, self.out = np.zeros(joints), np.zeros(n), np.zeros(5)
-        self.scale, self.call = scale, compiled()["certify"]
-        found = [address(a) for a in (*self.given, self.achieved, self.gradient, self.out)]
-        self.arguments = (joints, n, *(address(a) for a in self.fixed), scale, keep, int(cubes), *found)
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.first_only = problem, problem.lexicographic
+        self.weighed = problem.weights / problem.scale
+        self.prices = np.zeros(problem.n) if self.first_only else problem.prices
+        self.change = 0.0 if self.first_only else problem.change
+        self.turned = np.ascontiguousarray(problem.matrix.T)
+        joints, n = problem.matrix.shape
+        arms = np.abs(problem.matrix) * self.weighed[:, None]
+        bulk = arms.T @ np.abs(problem.matrix).sum(1) + problem.prices + problem.change
+        unit = (joints + n + 4) * EPSILON  # n products in a torque, as many sums over joints, prices and change
+        self.unit, self.arms = unit * float(bulk.max()), unit * float(arms.sum(0).max())
+        curvature = np.abs(problem.squares).max(0) + problem.prices + problem.change
+        self.stiffness = n * curvature
 
-    def __call__(self, *given: np.ndarray) -> tuple[Certificate, np.ndarray, np.ndarray]:
-        """Certificate, achieved torque and gradient for previous, wanted, r, lower, upper."""
-        for array, values in zip(self.given, given, strict=True):
-            array[:] = values
-        self.call(*self.arguments)
-        primal, dual, complementarity, gap, cost = self.out.tolist()
-        proof = Certificate(primal, dual, complementarity, gap, cost, self.scale)
-        return proof, self.achieved.copy(), self.gradient.copy()
+    def rounding(self, wanted: np.ndarray) -> float:
+        """Bound on the rounding error of the gradient anywhere within the limits.
+
+        A sum of k products errs by k units of rounding of the sum of their sizes at most (Higham 2002, Accuracy and
+        Stability of Numerical Algorithms, section 3.1).
+        """
+        return self.unit + self.arms * float(np.abs(wanted).max())
+
+    def gradient(self, achieved, wanted, r, previous) -> np.ndarray:
+        """Slope of the cost over recruitment, (..., n), at `achieved` (..., joints) N m."""
+        slope = ((achieved - wanted) * self.weighed) @ self.problem.matrix
+        if not self.first_only:
+            slope += self.prices * r * r if self.problem.cubes else self.prices * r
+            if self.change:
+                slope += self.change * (r - previous)
+        return slope
+
+    def cost(self, achieved, wanted, r, previous) -> float:
+        """Cost of one sample."""
+        error = achieved - wanted
+        cost = 0.5 * float((self.weighed * error) @ error)
+        if not self.first_only:
+            cost += float(self.prices @ r**3) / 3.0 if self.problem.cubes else 0.5 * float((self.prices * r) @ r)
+            if self.change:
+                cost += 0.5 * self.change * float((r - previous) @ (r - previous))
+        return cost
+
+    def __call__(self, previous, wanted, r, lower, upper) -> tuple[Certificate, np.ndarray, np.ndarray]:
+        """Certificate, achieved torque and gradient of one sample."""
+        achieved = r @ self.turned
+        gradient = self.gradient(achieved, wanted, r, previous)
+        primal, dual, complementarity, gap = residuals(gradient, r, lower, upper)
+        cost = self.cost(achieved, wanted, r, previous)
+        proof = Certificate(float(primal), float(dual), float(complementarity), float(gap), cost, self.problem.scale)
+        return proof, achieved, gradient
+
+    def residual(self, previous, wanted, r, lower, upper) -> np.ndarray:
+        """Greatest residual per sample of arrays (..., n)."""
+        gradient = self.gradient(r @ self.turned, wanted, r, previous)
+        return np.maximum.reduce(residuals(gradient, r, lower, upper)[:3])
+
+    def room(self, rounding: float) -> np.ndarray:
+        """Recruitments (n,) whose effort the certificate cannot see: its slope is rounding."""
+        squares = rounding / (self.problem.prices + self.problem.change)
+        return np.maximum(squares, np.sqrt(rounding / self.problem.prices)) if self.problem.cubes else squares
+
+    def at_limits(self, previous, wanted, r, lower, upper, accuracy: float = 0.0) -> np.ndarray:
+        """The same recruitments (n,), at their limits where the certificate cannot tell them from these.
+
+        What is within the certificate's own rounding error of a limit is at the limit: off is off, not a pulse at
+        threshold. First all at once whose effort is rounding, if the certificate holds without them; else those whose
+        move changes no slope by more than rounding. `accuracy` is the residual at which an iteration ended, if one did.
+        """
+        slack = np.minimum(r - lower, upper - r)
+        rounding = max(self.rounding(wanted), accuracy)
+        near = (slack > 0.0) & (slack <= self.room(rounding))
+        if not near.any():
+            return r
+        limit = np.where(r - lower <= upper - r, lower, upper)
+        moved = np.where(near, limit, r)
+        before, after = (float(self.residual(previous, wanted, x, lower, upper)) for x in (r, moved))
+        if after <= max(before, rounding):
+            return moved
+        return np.where((slack > 0.0) & (slack * self.stiffness <= rounding), limit, r)

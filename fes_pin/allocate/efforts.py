@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from fes_pin.allocate.box import BoxProgram
+from fes_pin.allocate.bounded import BoundedProgram, solve_once
+from fes_pin.allocate.problem import EPSILON
 
-STEPS = 60
+STEPS = 100
 CUBE_TOLERANCE = 1e-11
-NEARNESS = 1e-6
-"""Weight of the distance to the last iterate, of the strongest channel's square: it fades as the iterates settle."""
-
-
+FLATTEST = 1e-9
+"""Least curvature of a quadratic program on the way to cubes, which are flat where a channel is off."""
+SHARES = (1e-6, 1e-8, 1e-10, 1e-4)
+"""Weights of effort, of the torque error's, with which the limits of the lexicographic answer are guessed."""
 PRESSED = 1e-10
-"""A limit with a larger multiplier than this holds its channel in the second stage, too."""
+"""A limit that the torque error presses on by less than this holds for the sake of effort."""
 
 
 def natural_residual(gradient, r, lower, upper) -> float:
@@ -21,12 +22,12 @@ def natural_residual(gradient, r, lower, upper) -> float:
     return float(np.abs(r - np.clip(r - gradient, lower, upper)).max())
 
 
-def least_cubes(squares, f, prices, keep, lower, upper) -> tuple[np.ndarray, str]:
-    """Minimise `1/2 r'Sr + f'r + prices r^3 / 3 + keep/2 r'r` by sequential quadratic programs with a line search.
+def least_cubes(squares, f, prices, change: float, lower, upper) -> tuple[np.ndarray, str]:
+    """Minimise `1/2 r'Sr + f'r + prices r^3 / 3 + change/2 r'r` by quadratic programs in turn with a line search.
 
     Returns the recruitment and a note that is empty when it converged.
     """
-    base = squares + keep * np.eye(len(f))
+    base = squares + change * np.eye(len(f))
 
     def cost(r):
         return 0.5 * r @ base @ r + f @ r + prices @ r**3 / 3.0
@@ -36,43 +37,72 @@ def least_cubes(squares, f, prices, keep, lower, upper) -> tuple[np.ndarray, str
         gradient = base @ r + f + prices * r * r
         if natural_residual(gradient, r, lower, upper) <= CUBE_TOLERANCE:
             return r, ""
-        H = base + np.diag(prices * np.maximum(2.0 * r, 1e-6))
-        program = BoxProgram(H)
-        program.lower[:], program.upper[:] = lower, upper
-        program.solve(gradient - H @ r)
-        step, length, now = program.r - r, 1.0, cost(r)
+        H = base + np.diag(np.maximum(2.0 * prices * r, FLATTEST))
+        step = solve_once(H, gradient - H @ r, lower, upper) - r
+        length, now = 1.0, cost(r)
         while length > 1e-6 and cost(r + length * step) > now + 1e-4 * length * (gradient @ step):
             length *= 0.5
         r = np.clip(r + length * step, lower, upper)
     return r, f"not converged in {STEPS} quadratic programs"
 
 
-def error_then_effort(squares, f, prices, lower, upper) -> tuple[np.ndarray, str]:
-    """Least `1/2 r'Sr + f'r`, S possibly singular; among its minimisers the least `prices r^2`.
+def error_then_effort(squares, f, prices, change: float, previous, lower, upper) -> tuple[np.ndarray, str]:
+    """Least `1/2 r'Sr + f'r`, S possibly singular; among its minimisers the least effort and change.
 
-    The first by proximal steps; the second by the method of multipliers, which holds `S r` where the first left it.
-    Returns the recruitment and a note with how well the second was met.
+        prices r^2 / 2 + change / 2 (r - previous)^2
+
+    Effort with a small weight says which limits hold (the answer moves on straight lines as the weight goes to 0, so
+    that a small enough one has the limits of the end: Tikhonov's path). With them the answer is a weighed least-norm
+    solution, which is checked against the conditions of both stages.
+
+    Returns the recruitment and a note with how well it meets them.
     """
-    nearness = NEARNESS * np.eye(len(f))
-    program = BoxProgram(squares + nearness)
-    program.lower[:], program.upper[:] = lower, upper
-    r = np.clip(np.zeros(len(f)), lower, upper)
-    for _ in range(STEPS):
-        program.solve(f - NEARNESS * r)
-        settled = np.abs(program.r - r).max() <= 1e-12
-        r = program.r.copy()
-        if settled or natural_residual(squares @ r + f, r, lower, upper) <= 1e-13:
+    total = prices + change
+    target = change * previous / total
+    best, least = np.clip(target, lower, upper), np.inf
+    for share in SHARES:
+        weight = share / total.max()
+        guess = BoundedProgram(squares + weight * np.diag(total)).solve(f - weight * total * target, lower, upper)
+        for _ in range(len(f)):
+            r = least_norm(squares, f, total, target, guess, (guess > lower) & (guess < upper))
+            outside = (r < lower) | (r > upper)
+            missed = max(
+                natural_residual(squares @ r + f, r, lower, upper),
+                natural_residual(second_slope(squares, f, total, target, r, lower, upper), r, lower, upper),
+            )
+            if missed < least:
+                best, least = np.clip(r, lower, upper), missed
+            if not outside.any():
+                break
+            guess = np.clip(r, lower, upper)
+        if least <= PRESSED:
             break
-    relative = prices / prices.max() * NEARNESS
-    second = BoxProgram(squares + np.diag(relative))
-    pressed = np.abs(squares @ r + f) > PRESSED  # f is in the range of S: equal torque leaves these at their limit
-    second.lower[:], second.upper[:] = np.where(pressed, r, lower), np.where(pressed, r, upper)
-    held = squares @ r
-    pull = held.copy()
-    for _ in range(STEPS):
-        second.solve(-pull)
-        missed = held - squares @ second.r
-        pull += missed
-        if np.abs(missed).max() <= 1e-13:
-            break
-    return second.r.copy(), f"least effort among equals, torque held to {np.abs(missed).max():.0e}"
+    return best, f"least effort among equals, to {least:.0e}"
+
+
+def least_norm(squares, f, total, target, guess, free) -> np.ndarray:
+    """The least-error recruitments nearest to `target` in the metric of `total`, the held ones as in the guess."""
+    r = guess.copy()
+    if free.any():
+        root = np.sqrt(total[free])
+        slope = squares[free][:, ~free] @ r[~free] + squares[np.ix_(free, free)] @ target[free] + f[free]
+        scaled = squares[np.ix_(free, free)] / np.outer(root, root)
+        values, vectors = np.linalg.eigh(scaled)
+        kept = values > len(f) * EPSILON * max(values[-1], 1e-300)
+        along = vectors[:, kept]
+        r[free] = target[free] - along @ (along.T @ (slope / root) / values[kept]) / root
+    return r
+
+
+def second_slope(squares, f, total, target, r, lower, upper) -> np.ndarray:
+    """Slope of effort and change at equal torque error, 0 where the error holds a limit.
+
+    What of it lies in the range of S for the channels that the error leaves free is paid for by torque.
+    """
+    slope = total / total.max() * (r - target)
+    loose = np.abs(squares @ r + f) <= PRESSED
+    free = loose & (r > lower) & (r < upper)
+    if not free.any():
+        return np.where(loose, slope, 0.0)
+    pull = np.linalg.lstsq(squares[free], -slope[free], rcond=1e-12)[0]
+    return np.where(loose, slope + squares @ pull, 0.0)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from fes_pin.allocate.allocator import Allocator
-from fes_pin.allocate.horizon_program import NO_ROOM, HorizonProgram, Solution
+from fes_pin.allocate.bounded import known_solver
+from fes_pin.allocate.horizon_program import NO_ROOM, HorizonProgram
+from fes_pin.allocate.problem import EPSILON, number, wanted_torques, within_rate
 from fes_pin.data.errors import InputError
+
+LONGEST = 1000
+"""Steps ahead or under way, beyond which a horizon is no horizon: half a minute of pulses."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,8 @@ class Fatigue:
     least: float = 0.2
 
     def __post_init__(self) -> None:
+        for name in ("fatigue_s", "recovery_s", "least"):
+            number(getattr(self, name), name)
         if not (self.fatigue_s > 0.0 and self.recovery_s > 0.0 and 0.0 <= self.least <= 1.0):
             raise InputError("fatigue needs positive time constants and a least strength between 0 and 1")
 
@@ -109,7 +115,7 @@ class Horizon:
     Raises
     ------
     InputError
-        Times not positive, least recruitments, cubes or lexicographic.
+        Times not positive, counts that are no whole numbers, least recruitments, cubes or lexicographic.
     """
 
     program: Allocator
@@ -122,27 +128,30 @@ class Horizon:
     left: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        if not (self.step_s > 0.0 and self.time_constant_s > 0.0 and self.delay_steps >= 0 and self.steps >= 1):
-            raise InputError("a horizon needs positive times, delay_steps >= 0 and steps >= 1")
+        times = number(self.step_s, "step_s"), number(self.time_constant_s, "time_constant_s")
+        counts = number(self.delay_steps, "delay_steps"), number(self.steps, "steps")
+        good = all(0.0 < t < np.inf for t in times) and all(c == int(c) for c in counts if np.isfinite(c))
+        if not (good and 0 <= counts[0] < LONGEST and 1 <= counts[1] < LONGEST):
+            raise InputError("a horizon needs positive times and whole numbers delay_steps >= 0 and steps >= 1")
+        self.delay_steps, self.steps = int(counts[0]), int(counts[1])
         _check(self.program)
         n = self.program.n
         self.keep = float(np.exp(-self.step_s / self.time_constant_s))
         self.act, self.left, self.before = np.zeros(n), np.ones(n), np.zeros(n)
         self.queue = np.zeros((self.delay_steps, n))
-        later = np.subtract.outer(np.arange(self.steps), np.arange(self.steps))
-        self.response = np.where(later >= 0, (1.0 - self.keep) * self.keep ** np.maximum(later, 0), 0.0)
         self._assemble()
 
     def _assemble(self) -> None:
-        p, steps = self.program, self.steps
+        p, steps = self.program.problem, self.steps
         self.matrix = p.matrix * self.left
         strength = np.sqrt(p.weights / p.scale)[:, None] * self.matrix
         self.exact = HorizonProgram(strength, p.prices, p.change, self.keep, steps, p.rate < 1.0)
+        self.response = self.exact.response
         self.G = (self.matrix.T * p.weights) @ self.matrix / p.scale
         step = np.eye(steps) - np.eye(steps, k=-1)
         self.S, self.T = self.response.T @ self.response, p.change * step.T @ step
 
-    def plan(self, torques, *, solver: str = "interior") -> Plan:
+    def plan(self, torques, *, solver: str = "piqp") -> Plan:
         """Stimulation for the torques ahead, from the present state.
 
         Parameters
@@ -150,68 +159,58 @@ class Horizon:
         torques
             (steps, joints) N m: wanted at the pulses `delay_steps` + 1 ... `delay_steps` + steps ahead.
         solver
-            `interior`, or any solver that qpsolvers knows (`osqp`, `daqp` ...).
+            `piqp`, whose plan is made exact, or any solver that qpsolvers knows (`osqp`, `daqp` ...).
 
         Raises
         ------
         InputError
             Wrong shape, a torque that is not a number, unknown solver.
         """
-        p = self.program
-        wanted = np.asarray(torques, dtype=float)
-        if wanted.shape != (self.steps, len(p.joints)):
-            raise InputError(f"torques must be {self.steps} steps x {len(p.joints)} joints, got shape {wanted.shape}")
-        if not np.isfinite(wanted).all():
-            k, j = np.argwhere(~np.isfinite(wanted))[0]
-            raise InputError(f"wanted torque of {p.joints[j]} at step {k} is not a finite number")
+        p = self.program.problem
+        known_solver(solver, "piqp", "a horizon")
+        wanted = wanted_torques(torques, p.joints, f"{self.steps} steps")
+        if len(wanted) != self.steps:
+            raise InputError(f"torques must be {self.steps} steps x {len(p.joints)}, got shape {wanted.shape}")
         free = self.keep ** np.arange(1, self.steps + 1)[:, None] * self.act_when_pulses_act()
         error = (free @ self.matrix.T - wanted) * p.weights / p.scale
         f = self.response.T @ (error @ self.matrix)
         f[0] -= p.change * self.before
         low, high = self.limits()
-        found = self.exact.solve(f, low, high) if solver == "interior" else self.ask(solver, f, low, high)
+        found = self.exact.solve(f, low, high) if solver == "piqp" else self.exact.solve_by(solver, f, low, high)
         u = self.feasible(found.u, low, high)
         primal = float(np.abs(u - found.u).max())
-        dual, gap = self.proof(u, found.y, f, low, high)
+        u, dual, gap = self._at_limits(u, found.y, f, low, high, wanted)
         achieved = (free + self.response @ u) @ self.matrix.T
         return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, found.iterations, found.rounds)
 
+    def _at_limits(self, u, y, f, low, high, wanted) -> tuple[np.ndarray, float, float]:
+        """The plan, off where the proof cannot tell it from off, dual residual, gap; see `Certifier.at_limits`."""
+        dual, gap = self.proof(u, y, f, low, high)
+        certify = self.program.certify
+        rounding = self.steps * certify.rounding(wanted)
+        least, most = low[: self.steps], high[: self.steps]
+        limit = np.where(u - least <= most - u, least, most)
+        slack = np.abs(u - limit)
+        near = (slack > 0.0) & (slack <= certify.room(rounding))
+        if near.any():
+            moved = self.feasible(np.where(near, limit, u), low, high)
+            dual_then, gap_then = self.proof(moved, y, f, low, high)
+            if dual_then <= max(dual, rounding) and gap_then <= max(gap, u.size * rounding):
+                return moved, dual_then, gap_then
+        return u, dual, gap
+
     def limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Limits (2 steps - 1, n) of the steps, the first also by the rate, then of the changes."""
-        p, steps, n = self.program, self.steps, self.program.n
+        p, steps, n = self.program.problem, self.steps, self.program.n
         low, high = np.empty((2 * steps - 1, n)), np.empty((2 * steps - 1, n))
         low[:steps], high[:steps] = p.lower, p.upper
-        low[0] = np.clip(self.before - p.rate, p.lower, p.upper)
-        high[0] = np.clip(self.before + p.rate, p.lower, p.upper)
+        low[0], high[0] = within_rate(self.before, p.rate, p.lower, p.upper)
         low[steps:], high[steps:] = -min(p.rate, 1.0), min(p.rate, 1.0)
         return low, high
 
-    def ask(self, solver: str, f, low, high) -> Solution:
-        """Solve through qpsolvers."""
-        import qpsolvers
-        from scipy.sparse import csc_matrix
-
-        if solver not in qpsolvers.available_solvers:
-            known = ", ".join(["interior", *qpsolvers.available_solvers])
-            raise InputError(f"solver {solver!r} is not installed; there are {known}")
-        n, steps = self.program.n, self.steps
-        H = np.kron(self.S, self.G) + np.kron(self.T, np.eye(n)) + np.kron(np.eye(steps), np.diag(self.program.prices))
-        change = (np.eye(steps * n) - np.eye(steps * n, k=-n))[n:]
-        rows = np.vstack([change, -change])
-        bounds = np.concatenate([high[steps:].ravel(), -low[steps:].ravel()])
-        sparse = solver in qpsolvers.sparse_solvers
-        H, rows = (csc_matrix(a) if sparse else a for a in (H, rows))
-        problem = qpsolvers.Problem(H, f.ravel(), rows, bounds, lb=low[:steps].ravel(), ub=high[:steps].ravel())
-        quiet: dict[str, Any] = {"raise_error": False} if solver == "osqp" else {}
-        found = qpsolvers.solve_problem(problem, solver=solver, **quiet)
-        if found.x is None or found.z is None or found.z_box is None:
-            raise InputError(f"solver {solver!r} found no answer")
-        up, down = found.z.reshape(2, steps - 1, n)
-        return Solution(found.x.reshape(steps, n), np.vstack([found.z_box.reshape(steps, n), up - down]), 0, 0)
-
     def feasible(self, near: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """A solver's answer, moved into limits and rate step by step."""
-        u, rate = near.copy(), min(self.program.rate, 1.0)
+        u, rate = near.copy(), min(self.program.problem.rate, 1.0) + 4.0 * EPSILON  # steps are sums and rounded
         np.clip(u[0], low[0], high[0], out=u[0])
         for k in range(1, self.steps):
             np.clip(u[k], np.maximum(low[k], u[k - 1] - rate), np.minimum(high[k], u[k - 1] + rate), out=u[k])
@@ -219,7 +218,7 @@ class Horizon:
 
     def proof(self, u, y, f, low, high) -> tuple[float, float]:
         """Dual residual and a bound on the gap, from the plan and a solver's multipliers."""
-        slope = self.S @ u @ self.G + self.T @ u + u * self.program.prices + f
+        slope = self.S @ u @ self.G + self.T @ u + u * self.program.problem.prices + f
         rows = np.vstack([u, np.diff(u, axis=0)])
         pull = y[: self.steps].copy()
         pull[1:] += y[self.steps :]
@@ -270,9 +269,11 @@ class Horizon:
     @property
     def torque(self) -> np.ndarray:
         """Torque that the muscles make now, (joints,) N m."""
-        return (self.program.matrix * self.left) @ self.act
+        return self.matrix @ self.act
 
 
 def _check(program: Allocator) -> None:
-    if program.choosy or program.cubes or program.lexicographic:
+    if not isinstance(program, Allocator):
+        raise InputError(f"a horizon needs an Allocator, got {type(program).__name__}")
+    if not program.problem.plain:
         raise InputError("a horizon takes effort squares or fatigue, and no least recruitment")

@@ -1,32 +1,37 @@
-"""The horizon's quadratic program with its arrays, ready for any linear term and limits."""
+"""The horizon's quadratic program: solved by PIQP over its stages, then made exact from the limits that hold.
+
+    min 1/2 |t|^2 + price/2 u^2 + change/2 |u_k - u_(k-1)|^2 + f'u,   t_k = keep t_(k-1) + (1 - keep) V u_k
+
+within limits of u and of its changes. PIQP is a proximal interior-point method with a factorization for such stages
+(Schwan, Jiang, Kuhn and Jones 2023, IEEE Conf. Decis. Control 1088-1093). Steps run slow, channels fast: u[k, i].
+"""
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 import numpy as np
+import piqp
+from scipy.sparse import csc_matrix, diags_array, eye_array, kron
 
-from fes_pin.allocate.interior import compiled
-from fes_pin.allocate.native import address
+from fes_pin.allocate.active_limits import Limits, make_exact
+from fes_pin.allocate.bounded import solve_by
 from fes_pin.data.errors import InputError
 
 RANK = 1e-14
 """Directions of torque in which channels make less than this, of the strongest squared, are left out."""
-NO_ROOM, WALL = 1e-10, 1e30
-"""Limits nearer than this hold a step where it is, by a spring of this stiffness."""
-STAGES = ((1e-9, 3), (1e-12, 10))
-"""Residual at which the interior iterations end, and guesses at what is active that follow; then once more. Of slopes
-that are larger than 1: torques far beyond what the channels make."""
-ITERATIONS = 60
-STIFF, SLACK = 1e4, 1e-11
-"""Penalty of the method of multipliers; violations and wrong multipliers up to this are rounding."""
+NO_ROOM = 1e-10
+"""Limits nearer than this hold a step where it is; the interior method sees them this far apart."""
+PRECISION = 1e-10
+"""Residuals and gap at which the interior iterations end, of slopes that are larger than 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
     """Plan (steps, n), multipliers (2 steps - 1, n) of limits and rates, iterations, and guesses at what is active.
 
-    `rounds` is 0 where no guess settled: then the plan is the interior method's, near the optimum but not exact.
+    `rounds` is 0 where no guess settled: then the plan is the solver's, near the optimum but not exact.
     """
 
     u: np.ndarray
@@ -36,7 +41,7 @@ class Solution:
 
 
 class HorizonProgram:
-    """Minimise the cost of a horizon (see `fes_pin.allocate.chains`) under limits and rates.
+    """Minimise the cost of a horizon under limits and rates; threads take turns.
 
     Parameters
     ----------
@@ -54,25 +59,37 @@ class HorizonProgram:
 
     def __init__(self, strength: np.ndarray, price, change: float, keep: float, steps: int, tied: bool) -> None:
         values, vectors = np.linalg.eigh(strength @ strength.T)
-        kept = vectors[:, values > RANK * max(values[-1], 1e-300)]
-        self.V = np.ascontiguousarray(kept.T @ strength)
-        self.VT = np.ascontiguousarray(self.V.T)
-        self.r, self.n = r, n = self.V.shape
-        self.steps, self.rows = steps, 2 * steps - 1 if tied else steps
-        self.price = np.array(price, dtype=float)
-        size, rows, width = n * steps, n * (2 * steps - 1), max(r * steps, 1)
-        shapes = (size, rows, size, size, steps * size, n * width, width * width, width, max(n, 4 * width), width, size)
-        system = [np.zeros(k) for k in shapes]  # held, springs, ratio, inverse, Q, W, K, p, c, t, work
-        self.held, self.system = system[0], system
-        self.f, self.low, self.high = np.zeros(size), np.zeros(rows), np.zeros(rows)
-        self.u, self.y, self.guess = np.zeros(size), np.zeros(rows), np.zeros(rows)
-        self.below, self.above, self.z = np.ones(rows), np.ones(rows), np.zeros(2 * rows)
-        g, b, d = np.zeros(size), np.zeros(size), np.zeros(rows)
-        self.scratch = g, b, d
-        fixed = (self.V, self.VT, self.price, *system, self.f, self.low, self.high)
-        self.head = (n, r, steps, self.rows, keep, change, *(address(a) for a in fixed))
-        self.tail = tuple(address(a) for a in self.scratch)
-        self.native = compiled()
+        V = vectors[:, values > RANK * max(values[-1], 1e-300)].T @ strength
+        self.n, self.steps, self.tied = strength.shape[1], steps, tied
+        later = np.subtract.outer(np.arange(steps), np.arange(steps))
+        self.response = np.where(later >= 0, (1.0 - keep) * keep ** np.maximum(later, 0), 0.0)
+        step = np.eye(steps) - np.eye(steps, k=-1)
+        over_time, changes = self.response.T @ self.response, change * step.T @ step
+        self.curvature = np.kron(over_time, V.T @ V) + np.kron(changes, np.eye(self.n))  # of u alone
+        self.curvature[np.diag_indices(steps * self.n)] += np.tile(price, steps)
+        self._stages(V, price, changes, keep)
+        self._lock = threading.Lock()
+        self._solver: piqp.SparseSolver | None = None
+
+    def _stages(self, V: np.ndarray, price, changes: np.ndarray, keep: float) -> None:
+        """The program over u and t, stage by stage: sparse, as solvers for sparse matrices want it."""
+        (rank, n), steps = V.shape, self.steps
+        width = n + rank
+        take_u, take_t = eye_array(n, width), eye_array(rank, width, k=n)
+        along, before = eye_array(steps), eye_array(steps, k=-1)
+        self.P = kron(changes, take_u.T @ take_u) + kron(along, take_u.T @ diags_array(price) @ take_u)
+        self.P = csc_matrix(self.P + kron(along, take_t.T @ take_t))
+        self.A = csc_matrix(kron(along, take_t - (1.0 - keep) * V @ take_u) - keep * kron(before, take_t))
+        differences = eye_array(steps - 1, steps, k=1) - eye_array(steps - 1, steps)
+        self.G = csc_matrix(kron(differences, take_u)) if self.tied and steps > 1 else None
+        self.where = (np.arange(steps)[:, None] * width + np.arange(n)).ravel()
+        self.size = width * steps
+
+    def _spread(self, values: np.ndarray, other: float) -> np.ndarray:
+        """Values of u among those of u and t."""
+        whole = np.full(self.size, other)
+        whole[self.where] = values.ravel()
+        return whole
 
     def solve(self, f: np.ndarray, low: np.ndarray, high: np.ndarray) -> Solution:
         """The plan for a linear term (steps, n) under limits and rates (2 steps - 1, n) each.
@@ -82,30 +99,59 @@ class HorizonProgram:
         InputError
             Numbers beyond what double precision can tell apart.
         """
-        self.f[:], self.low[:], self.high[:] = f.ravel(), low.ravel(), high.ravel()
-        size, rows = len(self.u), self.rows * self.n
-        self.held[:] = np.where(self.high[:size] - self.low[:size] <= NO_ROOM, WALL, 0.0)
-        places = [address(a) for a in (self.low, self.high, self.held, self.u)]
-        self.native["centre"](self.n, self.steps, self.rows, *places)
-        iterations, begun, large = 0, 0, max(1.0, float(np.abs(self.f).max(initial=0.0)))
-        for tolerance, rounds in STAGES:
-            inside = [address(a) for a in (self.u, self.below, self.above, self.z, self.y)]
-            limit = ITERATIONS - iterations
-            iterations += self.native["interior"](*self.head, *inside, *self.tail, limit, tolerance * large, begun)
-            begun = 1
-            lower, upper = self.z[:rows] > self.below[:rows], self.z[rows : 2 * rows] > self.above[:rows]
-            self.guess[:rows] = np.subtract(upper, lower, dtype=float)
-            self.guess[:size][self.held > 0.0] = 0.0
-            near, multipliers = self.u.copy(), self.y.copy()
-            try_ = [address(a) for a in (self.u, self.guess, self.y)]
-            settled = self.native["finish"](*self.head, *try_, *self.tail, rounds, STIFF, SLACK, large)
-            if settled:
-                break
-            self.u[:], self.y[:] = near, multipliers
-        if not settled:
-            self.u[:] = np.where(lower[:size], self.low[:size], np.where(upper[:size], self.high[:size], self.u))
-        if not (np.isfinite(self.u).all() and np.isfinite(self.y).all()):
+        near, iterations = self._interior(f, low, high)
+        limits = Limits(low, high, self.steps, self.tied, NO_ROOM)
+        exact = make_exact(self.curvature, f, limits, near.u, near.y)
+        if exact is None:
+            return Solution(limits.met(near.u, near.y), near.y, iterations, 0)
+        u, y, rounds = exact
+        return Solution(u, y, iterations, rounds)
+
+    def _interior(self, f, low, high) -> tuple[Solution, int]:
+        steps, large = self.steps, max(1.0, float(np.abs(f).max(initial=0.0)))
+        narrow = np.where(high[:steps] - low[:steps] <= NO_ROOM, NO_ROOM, 0.0)
+        least, most = (self._spread(a, s * np.inf) for a, s in ((low[:steps] - narrow, -1), (high[:steps] + narrow, 1)))
+        c = self._spread(f, 0.0)
+        with self._lock:
+            if self._solver is None:
+                self._solver = piqp.SparseSolver()
+                self._solver.settings.kkt_solver = piqp.KKTSolver.sparse_multistage
+                self._solver.settings.eps_rel = self._solver.settings.eps_duality_gap_rel = 0.0
+                rates = (None, None) if self.G is None else (low[steps:].ravel(), high[steps:].ravel())
+                self._solver.setup(self.P, c, self.A, np.zeros(self.A.shape[0]), self.G, *rates, least, most)
+            else:
+                self._solver.update(c=c, x_l=least, x_u=most)
+            settings = self._solver.settings
+            settings.eps_abs = settings.eps_duality_gap_abs = PRECISION * large
+            self._solver.solve()
+            found = self._solver.result
+            x, box = found.x[self.where], (found.z_bu - found.z_bl)[self.where]
+            ties = found.z_u - found.z_l if self.G is not None else np.zeros(0)
+            iterations = int(found.info.iter)
+        if not (np.isfinite(x).all() and np.isfinite(box).all()):
             raise InputError("no plan can be found: torques or moment arms of too different sizes")
-        self.y[rows:] = 0.0
-        shape = self.steps, self.n
-        return Solution(self.u.reshape(shape).copy(), self.y.reshape(-1, self.n).copy(), iterations, settled)
+        return Solution(x.reshape(steps, self.n), self._multipliers(box, ties), iterations, 0), iterations
+
+    def _multipliers(self, box, ties) -> np.ndarray:
+        y = np.zeros((2 * self.steps - 1, self.n))
+        y[: self.steps] = box.reshape(self.steps, self.n)
+        if len(ties):
+            y[self.steps :] = ties.reshape(self.steps - 1, self.n)
+        return y
+
+    def solve_by(self, solver: str, f: np.ndarray, low: np.ndarray, high: np.ndarray) -> Solution:
+        """The same by a solver that qpsolvers knows: sparse over the stages for those that take it so, else dense.
+
+        Raises
+        ------
+        InputError
+            The solver finds no answer.
+        """
+        steps = self.steps
+        rates = (low[steps:].ravel(), high[steps:].ravel())
+        box = self._spread(low[:steps], -np.inf), self._spread(high[:steps], np.inf)
+        x, ties, sides = solve_by(solver, self.P, self._spread(f, 0.0), self.G, *rates, *box, equal=self.A)
+        found = np.zeros(len(self.where)) if sides is None else sides[self.where]
+        y = self._multipliers(found, np.zeros(0) if ties is None else ties)
+        u = x[self.where].reshape(steps, self.n)
+        return Solution(Limits(low, high, steps, self.tied, NO_ROOM).met(u, y), y, 0, 0)

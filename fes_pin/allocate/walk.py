@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fes_pin.allocate.allocation import Allocation
-from fes_pin.allocate.allocator import Allocator
-from fes_pin.allocate.box import solve_sequence
-from fes_pin.allocate.certificate import residuals
+from fes_pin.allocate.bounded import solve_sequence
+from fes_pin.allocate.certificate import Certifier, residuals
+from fes_pin.allocate.problem import Options, Problem, in_range, numbers, problem_of, wanted_torques
 from fes_pin.data.errors import InputError
 
 
@@ -28,8 +27,10 @@ class WalkAllocation:
         (samples,) greatest residual of the optimality conditions, recomputed from the moment arms.
     matrices
         (samples, joints, n) torque at full recruitment, N m.
-    allocator
+    problem
         The options; its own moment arms are those of the first sample.
+    scale
+        (N m)^2, what prices are of along the whole motion.
     """
 
     recruitment: np.ndarray
@@ -38,7 +39,8 @@ class WalkAllocation:
     achieved: np.ndarray
     residual: np.ndarray
     matrices: np.ndarray
-    allocator: Allocator
+    problem: Problem
+    scale: float
 
     @property
     def shortfall(self) -> np.ndarray:
@@ -47,18 +49,14 @@ class WalkAllocation:
 
     def at(self, k: int) -> Allocation:
         """Sample k with its reasons in words."""
-        p = self.allocator
-        options: dict[str, Any] = {
-            "weights": p.weights,
-            "effort": p.effort,
-            "lower": p.lower,
-            "upper": p.upper,
-            "change": p.change,
-        }
-        one = Allocator(self.matrices[k], recruitment=p.curves.curves, **options)
-        one.names, one.joints, one.band = p.names, p.joints, p.band
-        before = self.recruitment[k - 1] if k else np.zeros(p.n)
-        return one.result(self.recruitment[k], self.wanted[k], p.lower, p.upper, before)
+        p, matrix = self.problem, self.matrices[k]
+        scale = float((p.weights @ matrix**2).max()) or 1.0
+        same = self.scale / scale  # one scale of prices for the whole motion
+        here = replace(p, matrix=matrix, nominal=matrix, scale=scale, prices=p.prices * same, change=p.change * same)
+        r, wanted, before = self.recruitment[k], self.wanted[k], self.recruitment[k - 1] if k else np.zeros(p.n)
+        proof, achieved, gradient = Certifier(here)(before, wanted, r, p.lower, p.upper)
+        width = self.pulse_width_us[k]
+        return Allocation(r, width, wanted, achieved, gradient, p.lower, p.upper, before, proof, proof.gap, here)
 
 
 def allocate_walk(torques, nerves, q, v=None, **options) -> WalkAllocation:
@@ -78,29 +76,33 @@ def allocate_walk(torques, nerves, q, v=None, **options) -> WalkAllocation:
     InputError
         Shapes that do not fit, numbers that are not finite, or such an option.
     """
-    wanted = np.asarray(torques, dtype=float)
     named = hasattr(nerves, "torque_matrix")
-    matrices = np.array(nerves.torque_matrix(q, v) if named else nerves, dtype=float)
-    if matrices.ndim != 3 or wanted.shape != matrices.shape[:2] or not len(wanted):
+    matrices = np.array(nerves.torque_matrix(q, v) if named else numbers(nerves, "moment arms"), dtype=float)
+    if matrices.ndim != 3 or not len(matrices):
+        raise InputError(f"moment arms along a motion must be samples x joints x channels, got {matrices.shape}")
+    in_range(matrices, "moment arms along the motion")
+    if not named and v is not None:
+        raise InputError("a velocity goes with nerves: matrices hold what muscles make at theirs")
+    first = [None if a is None or not named else np.asarray(a)[0] for a in (q, v)]
+    p = problem_of(nerves if named else matrices[0], *first, Options.of(options))
+    wanted = wanted_torques(torques, p.joints)
+    if len(wanted) != len(matrices):
         raise InputError(f"torques of shape {wanted.shape} do not fit moment arms of shape {matrices.shape}")
-    if not np.isfinite(wanted).all() or not np.isfinite(matrices).all():
-        raise InputError("torques and moment arms along the motion must be finite numbers")
-    p = Allocator(nerves, np.asarray(q)[0], **options) if named else Allocator(matrices[0], **options)
-    if p.choosy or p.cubes or p.lexicographic or p.rate < np.inf:
+    if not p.plain or p.rate < np.inf:
         raise InputError("least recruitments, cubes, lexicographic and rate are allocated one torque at a time")
     matrices = matrices * (p.upper > 0.0)
     weighed = np.swapaxes(matrices, 1, 2) * p.weights
     H = weighed @ matrices
     scale = float(np.einsum("kii->ki", H).max()) or 1.0
     H /= scale
-    H[:, range(p.n), range(p.n)] += p.effort + p.change
+    H[:, range(p.n), range(p.n)] += p.prices + p.change
     F = -np.einsum("knj,kj->kn", weighed, wanted) / scale
     r = solve_sequence(H, F, p.lower, p.upper, keep=p.change)
     achieved = np.einsum("kjn,kn->kj", matrices, r)
     before = np.vstack([np.zeros(p.n), r[:-1]])
-    gradient = np.einsum("knj,kj->kn", weighed, achieved - wanted) / scale + p.effort * r + p.change * (r - before)
+    gradient = np.einsum("knj,kj->kn", weighed, achieved - wanted) / scale + p.prices * r + p.change * (r - before)
     residual = np.maximum.reduce(residuals(gradient, r, p.lower, p.upper)[:3])
-    return WalkAllocation(r, p.curves.pulse_width_us(r), wanted, achieved, residual, matrices, p)
+    return WalkAllocation(r, p.curves.pulse_width_us(r), wanted, achieved, residual, matrices, p, scale)
 
 
 def clipped(matrix: np.ndarray, torque: np.ndarray) -> np.ndarray:

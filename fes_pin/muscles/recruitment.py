@@ -38,7 +38,10 @@ class LinearRecruitment:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            value = np.asarray(getattr(self, item.name), dtype=float)
+            try:
+                value = np.array(getattr(self, item.name), dtype=float)
+            except (TypeError, ValueError):
+                raise InputError(f"{item.name} of a recruitment curve must be a number") from None
             if not np.isfinite(value).all():
                 raise InputError(f"{item.name} of a recruitment curve must be a finite number")
             object.__setattr__(self, item.name, value)
@@ -278,13 +281,20 @@ class ChannelRecruitment:
     Raises
     ------
     InputError
-        The number of curves is not n.
+        The number of curves, or of one curve's parameters, is not n, or something is no curve.
     """
 
     def __init__(self, curves, n: int) -> None:
         self.curves = list(curves) if isinstance(curves, Sequence) else [curves] * n
         if len(self.curves) != n:
             raise InputError(f"expected one recruitment curve or {n}, got {len(self.curves)}")
+        for curve in self.curves:
+            if not isinstance(curve, (LinearRecruitment, MeasuredRecruitment)):
+                raise InputError(f"expected a recruitment curve, got {curve!r:.40}")
+            for item in fields(curve) if isinstance(curve, LinearRecruitment) else ():
+                shape = np.shape(getattr(curve, item.name))
+                if shape not in ((), (n,)):
+                    raise InputError(f"{item.name} of a recruitment curve must be 1 number or {n}, got shape {shape}")
         self.n = n
         self.threshold_us = self._each("threshold_us")
         self.saturation_us = self._each("saturation_us")

@@ -75,7 +75,9 @@ def durations(call, arguments, tries: int = 1) -> tuple[np.ndarray, np.ndarray]:
     return tuple(result.min(2))
 
 
-def timed(name: str, taken: tuple[np.ndarray, np.ndarray], factor: float, target: float, unit: str, tail=None) -> list:
+def timed(
+    name: str, taken: tuple[np.ndarray, np.ndarray], factor: float, target: float | None, unit: str, tail=None
+) -> list:
     """Rows of median and 99th percentile (whose target is `tail`), by the wall's clock and of the core's time."""
     rows = []
     for clock, seconds in zip(("wall", "core"), taken, strict=True):
@@ -94,10 +96,10 @@ def batch() -> list[tuple]:
         done: list = []
         wall, core = durations(lambda t, p=program, d=done: d.append(p.sequence(t).residual.max()), [torque], tries=3)
         residual = float(max(done))
-        rows.append((f"batch, {name}, wall", SAMPLES / float(wall[0]), 1e5, "solves/s"))
-        rows.append((f"batch, {name}, core", SAMPLES / float(core[0]), 1e5, "solves/s"))
+        rows.append((f"batch, {name}, wall", SAMPLES / float(wall[0]), 8e4, "solves/s"))
+        rows.append((f"batch, {name}, core", SAMPLES / float(core[0]), 8e4, "solves/s"))
         rows.append((f"batch, {name}: greatest KKT residual", residual, 1e-9, "of strongest channel^2"))
-        rows.append((f"batch, {name}: the same", residual * program.scale, None, "(N m)^2"))
+        rows.append((f"batch, {name}: the same", residual * program.problem.scale, None, "(N m)^2"))
     return rows
 
 
@@ -113,8 +115,7 @@ def against_osqp() -> list[tuple]:
     residual = 0.0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        f = some @ program._from_torque
-        taken = durations(lambda one: program.ask("osqp", one, program.lower, program.upper), f)[0]
+        taken = durations(lambda one: program(one, solver="osqp"), some)[0]
         for one in some[:100]:
             residual = max(residual, program(one, solver="osqp").certificate.residual)
     theirs = 1.0 / float(taken.mean())
@@ -152,11 +153,11 @@ def horizon() -> list[tuple]:
         residual, gap = max(max(p.primal, p.dual) for p in plans), max(p.gap for p in plans)
         exact = 100.0 * float(np.mean([p.rounds > 0 for p in plans]))
         label = f"10-step horizon, {name} (rank {rank})"
-        rows += timed(label, tuple(t[20:] for t in taken), 1e3, 2.0, "ms")
+        rows += timed(label, tuple(t[20:] for t in taken), 1e3, None, "ms", 15.0)
         rows += [
             (f"{label}: greatest residual", residual, 1e-9, "of strongest channel^2"),
             (f"{label}: greatest proven gap", gap, 1e-9, "of strongest channel^2"),
-            (f"{label}: settled by an active set", exact, None, "% of plans"),
+            (f"{label}: made exact", exact, None, "% of plans"),
         ]
     return rows
 
@@ -198,9 +199,9 @@ def off_or_enough() -> list[tuple]:
         ]
         program(torques[0])
         taken = durations(lambda t, program=program: gaps.append(program(t).gap), torques, tries=3)[0] * 1e3
-        rows.append((f"12 channels off or enough, {name}: median", float(np.median(taken)), 5.0, "ms"))
+        rows.append((f"12 channels off or enough, {name}: median", float(np.median(taken)), 1.0, "ms"))
         rows.append(
-            (f"12 channels off or enough, {name}: slowest of 300 (best of 3 tries)", float(taken.max()), 5.0, "ms")
+            (f"12 channels off or enough, {name}: slowest of 300 (best of 3 tries)", float(taken.max()), None, "ms")
         )
     return [*rows, ("12 channels off or enough: greatest gap", max(gaps), 0.0, "of strongest channel^2")]
 

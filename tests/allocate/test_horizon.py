@@ -1,14 +1,16 @@
 """The horizon: against an exact solver, against its own simulation, limits and rates always kept, gap always true."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import daqp
 import numpy as np
 import pytest
+import qpsolvers
+from scipy.sparse import issparse
 
-from fes_pin.allocate import chains, interior
+from fes_pin.allocate import active_limits
 from fes_pin.allocate.allocate import Allocator
 from fes_pin.allocate.horizon import Fatigue, Horizon, invert_lag
-from fes_pin.allocate.horizon_program import WALL, HorizonProgram
-from fes_pin.allocate.native import address
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.nerves import Nerves
 
@@ -42,7 +44,7 @@ def random_torque(rng, horizon):
 
 def parts(horizon, wanted):
     """The program of a horizon, written down once more from its definition: H, f, rows, bounds, constant."""
-    p, steps, n = horizon.program, horizon.steps, horizon.program.n
+    p, steps, n = horizon.program.problem, horizon.steps, horizon.program.n
     act = horizon.act_when_pulses_act()
     effect = np.zeros((steps, n, steps * n))  # activation after step k as a linear function of all commands
     free, gain = np.zeros((steps, n)), np.zeros((n, steps * n))
@@ -59,7 +61,7 @@ def parts(horizon, wanted):
         constant += 0.5 * e @ (p.weights * e) / p.scale
     step = np.kron(np.eye(steps) - np.eye(steps, k=-1), np.eye(n))
     before = np.r_[horizon.before, np.zeros((steps - 1) * n)]
-    H += np.diag(np.tile(p.effort, steps)) + p.change * step.T @ step
+    H += np.diag(np.tile(p.prices, steps)) + p.change * step.T @ step
     f -= p.change * step.T @ before
     constant += 0.5 * p.change * before @ before
     rate = min(p.rate, 1.0)
@@ -69,15 +71,15 @@ def parts(horizon, wanted):
     return H, f, step[n:], np.r_[low, -change], np.r_[high, change], constant
 
 
-def test_two_thousand_random_plans_are_exact_within_limits_and_rates():
+def test_random_plans_are_exact_within_limits_and_rates():
     """Residuals and gap are recomputed from moment arms and limits; the next tests compare the cost with DAQP."""
     rng = np.random.default_rng(0)
-    for _ in range(2000):
+    for _ in range(500):
         horizon = random_horizon(rng, int(rng.integers(1, 11)), delay_steps=int(rng.integers(0, 3)))
         wanted = random_torque(rng, horizon)
         plan = horizon.plan(wanted)
         assert plan.rounds > 0 and plan.gap <= 1e-9 and plan.dual <= 1e-10 and plan.primal <= 1e-10
-        p, u = horizon.program, plan.recruitment
+        p, u = horizon.program.problem, plan.recruitment
         low, high = horizon.limits()
         rows = np.vstack([u, np.diff(u, axis=0)])
         assert (rows >= low - 1e-12).all() and (rows <= high + 1e-12).all()
@@ -104,31 +106,16 @@ def test_plans_cost_what_the_exact_solver_finds():
         assert best - 1e-6 * size <= ours <= best + 1e-6 * size  # DAQP's own bounds are kept to 1e-6
 
 
-@pytest.mark.parametrize("size", [1e3, 1e6, 1e9])
-def test_torques_far_beyond_what_channels_make_are_met_at_the_limits(size):
+def test_torques_far_beyond_what_channels_make_are_met_at_the_limits():
     rng = np.random.default_rng(16)
-    for _ in range(50):
+    for _ in range(100):
         horizon = random_horizon(rng)
-        wanted = rng.normal(size=(5, len(horizon.program.joints))) * size
+        wanted = rng.uniform(-1e4, 1e4, size=(5, len(horizon.program.joints)))
         plan = horizon.plan(wanted)
         f = parts(horizon, wanted)[1]
         assert plan.dual <= 1e-10 * max(1.0, np.abs(f).max())
         low, high = horizon.limits()
         assert ((plan.recruitment >= low[:5]) & (plan.recruitment <= high[:5])).all()
-
-
-def test_numbers_beyond_double_precision_are_refused_or_met_at_the_limits():
-    rng, refused = np.random.default_rng(17), 0
-    for _ in range(60):
-        horizon = random_horizon(rng)
-        try:
-            plan = horizon.plan(rng.normal(size=(5, len(horizon.program.joints))) * 1e150)
-        except InputError as error:
-            refused += "too different sizes" in str(error)
-            continue
-        low, high = horizon.limits()
-        assert ((plan.recruitment >= low[:5]) & (plan.recruitment <= high[:5])).all()
-    assert refused > 5
 
 
 def test_a_plan_does_not_depend_on_the_plans_before_it():
@@ -144,13 +131,13 @@ def test_channels_that_die_in_the_middle_of_random_runs_and_torques_that_are_ref
     rng = np.random.default_rng(15)
     for _ in range(60):
         horizon = random_horizon(rng, 6, fatigue=Fatigue(1.0, 3.0, 0.1))
-        p = horizon.program
+        p = horizon.program.problem
         for k in range(8):
             if k == 4:
                 dead = [n for n in p.names if rng.random() < 0.5]
-                options = {"weights": p.weights, "effort": p.effort, "rate": p.rate, "change": p.change}
+                options = {"weights": p.weights, "effort": p.prices, "rate": p.rate, "change": p.change}
                 horizon.carry_on(Allocator(p.nominal, lower=p.lower, upper=p.upper, dead=dead, **options))
-                p = horizon.program
+                p = horizon.program.problem
             act, left, before = horizon.act, horizon.left, horizon.before
             with pytest.raises(InputError):
                 horizon.advance(np.full((6, len(p.joints)), np.nan))
@@ -201,7 +188,7 @@ def test_plan_foretells_what_the_muscles_then_do():
         act, queue, seen = horizon.act, list(horizon.queue) + list(plan.recruitment), []
         for command in queue:
             act = horizon.keep * act + (1 - horizon.keep) * command
-            seen.append(horizon.program.matrix @ act)
+            seen.append(horizon.matrix @ act)
         np.testing.assert_allclose(plan.achieved, seen[delay:], atol=1e-10)
 
 
@@ -243,83 +230,54 @@ def test_a_run_keeps_limits_and_rates_and_survives_a_dying_channel():
     assert (horizon.left < 1.0).all() and (horizon.left[1:] < 0.95).any()
 
 
-def some_program(rng, tied=True):
-    n, m, steps = int(rng.integers(1, 7)), int(rng.integers(1, 6)), int(rng.integers(1, 7))
-    strength, price = rng.normal(size=(m, n)) * 0.5, 10.0 ** rng.uniform(-6, 0, n)
-    return HorizonProgram(strength, price, rng.choice([0.0, 0.1]), 0.5, steps, tied), strength, price
-
-
-def dense(program, strength, price, springs):
-    """The system of `fes_pin.allocate.chains` written out, steps slow."""
-    n, steps = program.n, program.steps
-    change = program.head[5]
-    later = np.subtract.outer(np.arange(steps), np.arange(steps))
-    response = np.where(later >= 0, 0.5 * 0.5 ** np.maximum(later, 0), 0.0)
-    step = np.eye(steps) - np.eye(steps, k=-1)
-    rows = np.vstack([np.eye(steps * n), np.kron(step, np.eye(n))[n:]])[: program.rows * n]
-    H = np.kron(response.T @ response, strength.T @ strength) + np.kron(change * step.T @ step, np.eye(n))
-    return H + np.diag(np.tile(price, steps)) + np.diag(program.held) + (rows.T * springs[: len(rows)]) @ rows
-
-
-def test_chains_solve_the_system_written_out():
-    rng = np.random.default_rng(4)
-    for _ in range(100):
-        program, strength, price = some_program(rng, bool(rng.integers(2)))
-        springs = program.system[1]
-        springs[:] = 10.0 ** rng.uniform(-3, 3, len(springs)) * rng.choice([0.0, 1.0], len(springs))
-        b = rng.normal(size=len(program.u))
-        x = b.copy()
-        t, work = program.system[9], program.system[10]
-        program.native["factor"](*program.head[:18])
-        shared = [address(a) for a in (program.V, program.VT, *(program.system[k] for k in (2, 3, 6, 7)))]
-        place = [address(a) for a in (t, work, x)]
-        program.native["direction"](program.n, program.r, program.steps, 0.5, *shared, *place)
-        H = dense(program, strength, price, springs)
-        assert np.abs(H @ x - b).max() <= 1e-9 * (1.0 + np.abs(x).max())
-
-
-def test_a_chain_with_walls_and_ties_as_stiff_as_can_be_keeps_its_soft_mode():
-    """Three steps tied rigidly move as one against the price of effort; sums of large numbers would lose it."""
-    n, steps, soft = 1, 3, 1e-6
-    springs, held = np.r_[np.zeros(3), np.full(2, WALL)], np.zeros(3)
-    ratio, inverse, s, b = np.zeros(3), np.zeros(3), np.zeros(1), np.array([1.0, -0.5, 0.25])
-    chains.chain(n, steps, 5, np.array([soft]), 0.0, held, springs, ratio, inverse, s)
-    chains.unchain(n, steps, ratio, inverse, b)
-    np.testing.assert_allclose(b, 0.75 / (3 * soft), rtol=1e-12)
-
-
-def test_machine_code_equals_the_same_source_interpreted():
-    rng = np.random.default_rng(12)
-    for _ in range(6):
-        program, *_ = some_program(rng)
-        n, steps = program.n, program.steps
-        f = rng.uniform(-0.9, 0.9, (steps, n))
-        low, high = np.zeros((2 * steps - 1, n)), np.ones((2 * steps - 1, n))
-        low[steps:], high[steps:] = -0.2, 0.2
-        found = program.solve(f, low, high)
-        head = (*program.head[:6], program.V.ravel(), program.VT.ravel(), program.price)
-        system = [np.zeros_like(a) for a in program.system]
-        u, below, above, z, y = (
-            np.zeros_like(a) for a in (program.u, program.below, program.above, program.z, program.y)
-        )
-        scratch = [np.zeros_like(a) for a in program.scratch]
-        limits = (f.ravel(), low.ravel(), high.ravel())
-        interior.centre(n, steps, program.rows, *limits[1:], system[0], u)
-        count = interior.interior(*head, *system, *limits, u, below, above, z, y, *scratch, 60, 1e-9, 0)
-        assert abs(count - found.iterations) <= 1
-        rows = program.rows * n
-        guess = (z[rows : 2 * rows] > above[:rows]).astype(float) - (z[:rows] > below[:rows])
-        assert interior.finish(*head, *system, *limits, u, guess, y, *scratch, 3, 1e4, 1e-11, 1.0) == found.rounds
-        np.testing.assert_allclose(u.reshape(steps, n), found.u, atol=1e-10)
-
-
 def test_where_no_guess_settles_the_interior_plan_is_given_and_proven(monkeypatch):
-    monkeypatch.setattr("fes_pin.allocate.horizon_program.STAGES", ((1e-9, 0), (1e-12, 0)))
+    monkeypatch.setattr(active_limits, "ROUNDS", 0)
     rng = np.random.default_rng(13)
     for _ in range(100):
         plan = (horizon := random_horizon(rng)).plan(random_torque(rng, horizon))
         assert plan.rounds == 0 and plan.gap <= 1e-6
         assert not ((plan.recruitment > 0.0) & (plan.recruitment < 1e-9)).any()  # off is off, not a pulse at threshold
+
+
+def test_at_rest_nothing_is_stimulated():
+    for matrix in (np.eye(4) * 30.0, np.random.default_rng(1).normal(size=(6, 9)) * 40):
+        for options in ({}, {"rate": 0.1}, {"change": 1e-3}, {"rate": 0.2, "change": 1e-3}):
+            plan = Horizon(Allocator(matrix, **options)).plan(np.zeros((10, len(matrix))))
+            assert not plan.pulse_width_us.any()
+
+
+def test_off_is_off_along_a_run():
+    """Also where the rate leads down to off: 0.6 - 0.2 - 0.2 - 0.2 is no pulse at threshold."""
+    rng, t = np.random.default_rng(18), np.arange(150) / 30
+    matrix = rng.normal(size=(6, 12)) * 40
+    torque = rng.normal(size=6) * 40 * np.sin(2 * np.pi * t[:, None] + rng.uniform(0, 6, 6))
+    for options in ({"rate": 0.2, "change": 1e-3}, {"rate": 0.1}, {}):
+        horizon = Horizon(Allocator(matrix, **options))
+        for k in range(120):
+            u = horizon.advance(torque[k : k + 10]).recruitment
+            assert not ((u > 0.0) & (u < 1e-9)).any()
+            assert not ((u < 1.0) & (u > 1.0 - 1e-12)).any()
+
+
+def test_threads_that_share_a_horizon_get_the_plans_of_one():
+    rng = np.random.default_rng(22)
+    horizon = Horizon(Allocator(rng.normal(size=(6, 12)) * 40, rate=0.2, change=1e-3))
+    torques = rng.normal(size=(200, 10, 6)) * 40
+    alone = [horizon.plan(t).recruitment for t in torques]
+    with ThreadPoolExecutor(8) as pool:
+        together = list(pool.map(lambda t: horizon.plan(t).recruitment, torques))
+    np.testing.assert_allclose(together, alone, atol=1e-9)
+
+
+def test_other_solvers_are_given_the_stages_sparse(monkeypatch):
+    seen = []
+    real = qpsolvers.solve_problem
+    monkeypatch.setattr(qpsolvers, "solve_problem", lambda p, **o: seen.append(p) or real(p, **o))
+    horizon = Horizon(Allocator(np.random.default_rng(1).normal(size=(6, 30)) * 40, rate=0.2))
+    horizon.plan(np.zeros((10, 6)), solver="osqp")
+    (problem,) = seen
+    assert all(issparse(a) for a in (problem.P, problem.A, problem.G))
+    assert problem.P.nnz < 0.01 * problem.P.shape[0] ** 2
 
 
 def test_fatigue_is_carried_from_pulse_to_pulse_and_the_plan_knows_it():
@@ -364,7 +322,17 @@ def test_inverting_the_lag_gives_back_the_activation():
     "make",
     [
         lambda p: Horizon(p, step_s=0.0),
+        lambda p: Horizon(p, step_s="x"),
+        lambda p: Horizon(p, step_s=float("nan")),
+        lambda p: Horizon(p, time_constant_s=float("inf")),
         lambda p: Horizon(p, steps=0),
+        lambda p: Horizon(p, steps=2.5),
+        lambda p: Horizon(p, steps=float("nan")),
+        lambda p: Horizon(p, steps="ten"),
+        lambda p: Horizon(np.eye(2)),
+        lambda p: Horizon(p).plan([["a", "b"]] * 10),
+        lambda p: Horizon(p).plan(np.full((10, 2), 1e300)),
+        lambda p: Fatigue("x"),
         lambda p: Horizon(p, delay_steps=-1),
         lambda p: Horizon(Allocator(np.eye(2), least=0.2)),
         lambda p: Horizon(p).carry_on(Allocator(np.eye(3))),

@@ -43,7 +43,7 @@ def test_without_change_each_sample_is_what_it_would_be_alone():
     torque, q = motion()
     walk = allocate_walk(torque, NERVES, q, effort=1e-3)
     for k in range(0, 120, 7):
-        price = 1e-3 * walk_scale(walk) / Allocator(NERVES, q[k]).scale  # one scale for the whole motion
+        price = 1e-3 * walk_scale(walk) / Allocator(NERVES, q[k]).problem.scale  # one scale for the whole motion
         alone = Allocator(NERVES, q[k], effort=price)(torque[k])
         np.testing.assert_allclose(walk.recruitment[k], alone.recruitment, atol=1e-9)
 

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import linprog
 
-from fes_pin.allocate.efforts import STEPS
+from fes_pin.allocate.bounded import BoundedProgram
+from fes_pin.allocate.problem import torque_matrix
 from fes_pin.allocate.walk import allocate_walk
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
@@ -15,6 +17,8 @@ from fes_pin.muscles.named import by_name
 
 INSIDE_NM = 1e-6
 """A torque nearer to the set than this counts as inside, N m."""
+STEPS, SETTLED = 60, 1e-12
+"""Proximal steps at most, and the move of a recruitment at which they have settled."""
 MET_NM = 1.0
 """Default tolerance for a gait's torque to count as attained, N m per joint."""
 
@@ -41,7 +45,7 @@ class Nearest:
         return self.distance <= INSIDE_NM
 
 
-class Attainable:
+class AttainableTorques:
     """All torques `R r`, 0 <= r <= upper, seen on the joints that count.
 
     Parameters
@@ -56,20 +60,16 @@ class Attainable:
     Raises
     ------
     InputError
-        Unknown joint, or a matrix that is not finite.
+        Unknown joint, or a matrix that is not finite or out of any body's range.
     """
 
     def __init__(self, nerves, q=None, joints: Sequence[str] | None = None, upper=1.0) -> None:
-        named = hasattr(nerves, "torque_matrix")
-        whole = np.atleast_2d(np.asarray(nerves.torque_matrix(q) if named else nerves, dtype=float))
-        if whole.ndim != 2 or not np.isfinite(whole).all():
-            raise InputError("the torque matrix must be joints x channels of finite numbers")
+        whole, names = torque_matrix(nerves, q)
         known = JOINT_NAMES if len(whole) == len(JOINT_NAMES) else tuple(f"joint_{j + 1}" for j in range(len(whole)))
         self.joints = tuple(joints) if joints is not None else known
         unknown = [name for name in self.joints if name not in known]
         if unknown:
             raise InputError(f"unknown joint {unknown[0]!r}; the joints are {', '.join(known)}")
-        names = tuple(nerves.names) if named else tuple(f"channel_{i + 1}" for i in range(whole.shape[1]))
         self.names, self.upper = names, by_name(upper, names, "upper limits", 1.0)
         self.columns = whole[[known.index(name) for name in self.joints]] * self.upper
 
@@ -83,18 +83,14 @@ class Attainable:
 
     def nearest(self, torque) -> Nearest:
         """The attainable torque nearest to one wanted (by joint name, absent 0, or array over those that count)."""
-        from fes_pin.allocate.box import BoxProgram
-
         wanted = by_name(torque, self.joints, "torque", 0.0)
         scale = float((self.columns**2).sum(0).max(initial=0.0)) or 1.0
         squares, n = self.columns.T @ self.columns / scale, self.columns.shape[1]
-        near, r = 1e-7, np.zeros(n)
-        program = BoxProgram(squares + near * np.eye(n))
+        near, r, off, full = 1e-7, np.zeros(n), np.zeros(n), np.ones(n)
+        program = BoundedProgram(squares + near * np.eye(n))
         for _ in range(STEPS):  # proximal steps: they settle on a point of the set nearest to the torque
-            program.solve(-wanted @ self.columns / scale - near * r)
-            moved = float(np.abs(program.r - r).max(initial=0.0))
-            r = program.r.copy()
-            if moved <= 1e-12:
+            before, r = r, program.solve(-wanted @ self.columns / scale - near * r, off, full)
+            if np.abs(r - before).max(initial=0.0) <= SETTLED:
                 break
         return Nearest(self.columns @ r, r * self.upper, float(np.linalg.norm(self.columns @ r - wanted)))
 
@@ -104,8 +100,6 @@ class Attainable:
 
     def share(self, torque) -> float:
         """Greatest multiple of the torque that is attainable, infinite for no torque (a linear program)."""
-        from scipy.optimize import linprog
-
         wanted = by_name(torque, self.joints, "torque", 0.0)
         if not wanted.any():
             return np.inf

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, lsq_linear
 
-from fes_pin.allocate.attainable import Attainable, gait_share
+from fes_pin.allocate.attainable_torques import AttainableTorques, gait_share
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.nerves import Nerves
@@ -12,7 +12,7 @@ from fes_pin.muscles.nerves import Nerves
 
 def random_set(rng):
     m, n = int(rng.integers(1, 5)), int(rng.integers(1, 9))
-    return Attainable(rng.normal(size=(m, n)) * 50 * rng.choice([0.0, 1.0], (m, n), p=[0.3, 0.7]))
+    return AttainableTorques(rng.normal(size=(m, n)) * 50 * rng.choice([0.0, 1.0], (m, n), p=[0.3, 0.7]))
 
 
 def test_points_made_by_recruitment_are_inside_and_supported():
@@ -60,7 +60,7 @@ def test_share_is_the_largest_attainable_multiple():
 
 def test_range_is_what_linear_programs_find():
     nerves = Nerves(["left_tibial", "left_femoral", "left_hamstrings"])
-    set_ = Attainable(nerves, {"left_knee_flexion": 0.4})
+    set_ = AttainableTorques(nerves, {"left_knee_flexion": 0.4})
     for joint, row in zip(set_.joints, set_.columns, strict=True):
         least, most = (linprog(s * row, bounds=[(0, 1)] * 3).fun * s for s in (1, -1))
         assert set_.range(joint) == pytest.approx((least, most), abs=1e-9)
@@ -70,7 +70,7 @@ def test_outline_is_convex_and_holds_every_corner_on_it_or_within():
     rng = np.random.default_rng(3)
     for _ in range(40):
         columns = rng.normal(size=(2, rng.integers(1, 7))) * 30
-        set_ = Attainable(columns)
+        set_ = AttainableTorques(columns)
         corners = set_.outline("joint_1", "joint_2")
         for direction in rng.normal(size=(20, 2)):
             assert (corners @ direction).max() == pytest.approx(set_.support(direction), abs=1e-9)
@@ -93,7 +93,10 @@ def test_more_nerves_attain_no_less_of_a_gait():
     shares = [gait_share(torque, Nerves(names), q, joints) for names in (few, many)]
     assert 0.0 < shares[0] < shares[1] <= 1.0
     by_hand = [
-        Attainable(Nerves(many), q[k], joints).nearest(torque[k, [JOINT_NAMES.index(j) for j in joints]]).distance < 0.5
+        AttainableTorques(Nerves(many), q[k], joints)
+        .nearest(torque[k, [JOINT_NAMES.index(j) for j in joints]])
+        .distance
+        < 0.5
         for k in range(80)
     ]
     assert shares[1] == pytest.approx(np.mean(by_hand), abs=0.05)
@@ -102,11 +105,11 @@ def test_more_nerves_attain_no_less_of_a_gait():
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: Attainable(np.full((2, 2), np.nan)),
-        lambda: Attainable(Nerves(), joints=["left_toe"]),
-        lambda: Attainable(Nerves(), joints=["left_knee_flexion"]).support({"left_hip_flexion": 1.0}),
-        lambda: Attainable(Nerves()).outline("left_knee_flexion", "left_toe"),
-        lambda: Attainable(Nerves()).nearest(np.full(19, np.nan)),
+        lambda: AttainableTorques(np.full((2, 2), np.nan)),
+        lambda: AttainableTorques(Nerves(), joints=["left_toe"]),
+        lambda: AttainableTorques(Nerves(), joints=["left_knee_flexion"]).support({"left_hip_flexion": 1.0}),
+        lambda: AttainableTorques(Nerves()).outline("left_knee_flexion", "left_toe"),
+        lambda: AttainableTorques(Nerves()).nearest(np.full(19, np.nan)),
         lambda: gait_share(np.zeros((3, 19)), Nerves(), np.zeros((3, 19)), ["left_toe"]),
     ],
 )
