@@ -242,7 +242,7 @@ def problem_of(nerves, q, v, options: Options) -> Problem:
 
 
 def torque_matrix(nerves, q, v=None) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Torque at full recruitment, (joints, n) N m, of `Nerves` at a posture and its rates or as given, and the channels' names.
+    """Torque at full recruitment, (joints, n) N m, of `Nerves` (posture, rates) or as given, and the channels' names.
 
     Raises
     ------

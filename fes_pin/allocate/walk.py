@@ -83,8 +83,8 @@ def allocate_walk(torques, nerves, q, v=None, **options) -> WalkAllocation:
     in_range(matrices, "moment arms along the motion")
     if not named and v is not None:
         raise InputError("a velocity goes with nerves: matrices hold what muscles make at theirs")
-    first = [None if a is None or not named else np.asarray(a)[0] for a in (q, v)]
-    p = problem_of(nerves if named else matrices[0], *first, Options.of(options))
+    q0, v0 = (None if a is None or not named else np.asarray(a)[0] for a in (q, v))
+    p = problem_of(nerves if named else matrices[0], q0, v0, Options.of(options))
     wanted = wanted_torques(torques, p.joints)
     if len(wanted) != len(matrices):
         raise InputError(f"torques of shape {wanted.shape} do not fit moment arms of shape {matrices.shape}")

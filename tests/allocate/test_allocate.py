@@ -478,5 +478,5 @@ def test_a_muscle_that_shortens_needs_more_recruitment():
 
 @pytest.mark.parametrize("options", [{"least": 0.2}, {"effort_kind": "cubes"}, {"lexicographic": True}])
 def test_a_solver_that_an_option_does_not_ask_is_refused(options):
-    with pytest.raises(InputError, match="daqp"):
-        Allocator([[2.0, 1.0]], **options)([1.0], solver="daqp")
+    with pytest.raises(InputError, match="osqp"):
+        Allocator([[2.0, 1.0]], **options)([1.0], solver="osqp")
