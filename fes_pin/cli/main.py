@@ -105,16 +105,19 @@ def _settings(pairs: list[str]) -> tuple[str | None, dict[str, float]]:
     """`--set` options as the kind of trial and its numbers."""
     from fes_pin.data.errors import InputError
 
-    kind, numbers = None, {}
+    kind: str | None = None
+    numbers: dict[str, float] = {}
     for pair in pairs:
         name, equals, value = pair.partition("=")
         if not equals or not name:
             raise InputError(f"expected --set NAME=VALUE, found {pair!r}")
+        if name in numbers or (name == "kind" and kind is not None):
+            raise InputError(f"expected --set {name} once, found it again as {pair!r}")
         if name == "kind":
             kind = value
             continue
         try:
-            numbers[name] = float(value)
+            numbers[name] = float("" if "_" in value else value)
         except ValueError:
             raise InputError(f"expected a number for --set {name}, found {value!r}") from None
     return kind, numbers

@@ -23,10 +23,16 @@ class InputError(ValueError):
         super().__init__(str(self))
 
     def __str__(self) -> str:
-        place = [str(self.file)] if self.file is not None else []
+        place = [_short(str(self.file))] if self.file is not None else []
         if self.row is not None:
             place.append(f"row {self.row}")
         if self.column is not None:
-            place.append(f"column {self.column}" if self.row is not None else str(self.column))
+            column = _short(str(self.column))
+            place.append(f"column {column}" if self.row is not None else column)
         line = f"{', '.join(place)}: {self.message}" if place else self.message
         return line if line.isprintable() else "".join(each if each.isprintable() else " " for each in line)
+
+
+def _short(name: str, most: int = 500) -> str:
+    """A name without its middle, if it is longer than a line can hold."""
+    return name if len(name) <= most else f"{name[: most // 2]}...{name[-most // 2 :]}"

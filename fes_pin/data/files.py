@@ -57,6 +57,16 @@ def read_text(path: str | Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
+def what_is_at(path: Path) -> str:
+    """ "a file", "a folder", "a special file", "nothing", or "a name that no file can have"."""
+    try:
+        if not path.exists():
+            return "nothing"
+        return "a file" if path.is_file() else ("a folder" if path.is_dir() else "a special file")
+    except (OSError, ValueError):
+        return "a name that no file can have"
+
+
 def inside(folder: Path, relative: object) -> Path:
     """Resolved path of a file named relative to `folder`.
 

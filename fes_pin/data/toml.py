@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import inside, read_text
+from fes_pin.data.files import inside, read_text, what_is_at
 from fes_pin.data.schema import Number, unknown
 
 _TABLE = re.compile(r"^\s*(\[\[?)\s*([^\]#]+?)\s*\]\]?\s*(?:#.*)?$")
@@ -93,9 +93,9 @@ class Document:
             path = inside(self.path.parent, value)
         except ValueError as problem:
             raise self.error(key, str(problem)) from None
-        if not path.is_file():
-            found = "a folder" if path.is_dir() else ("a special file" if path.exists() else "nothing")
-            raise self.error(key, f"expected a file at {value!r}, found {found}")
+        found = what_is_at(path)
+        if found != "a file":
+            raise self.error(key, f"expected a file at {str(value)[:80]!r}, found {found}")
         return self.path.parent / str(value)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from xml.etree.ElementTree import Element, ParseError
+from xml.etree.ElementTree import Element, ParseError, SubElement, tostring
 
 import numpy as np
 from defusedxml import ElementTree
@@ -15,6 +16,19 @@ from fes_pin.data.files import read_bytes
 
 MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
 ONE_JOINT = ("revolute", "continuous", "prismatic")
+SMALLEST, LARGEST = 1e-9, 1e6
+"""Round figures far outside any rig, in SI units: masses and lengths of directions lie between, all else below."""
+LINK_NUMBERS = {
+    "origin": {"xyz": 3, "rpy": 3},
+    "mass": {"value": 1},
+    "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
+}
+JOINT_NUMBERS = {
+    "origin": {"xyz": 3, "rpy": 3},
+    "axis": {"xyz": 3},
+    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
+}
+"""Elements that bear on the motion, and how many numbers each of their attributes holds."""
 
 
 def moving_joints(path: str | Path) -> list[tuple[str, str]]:
@@ -43,7 +57,8 @@ def check_one_joint(path: str | Path) -> tuple[str, str]:
     Raises
     ------
     InputError
-        No or several moving joints, one that has more than one degree of freedom, or nothing heavy that it moves.
+        No or several moving joints, one that has more than one degree of freedom, nothing heavy that it moves, or
+        something heavy that moves along by a joint that mimics it.
     """
     joints = moving_joints(path)
     if len(joints) != 1:
@@ -56,7 +71,24 @@ def check_one_joint(path: str | Path) -> tuple[str, str]:
     urdf = _Urdf(Path(path))
     if not urdf.moved_mass(name) > 0:
         raise InputError("expected a link with mass beyond this joint", file=path, column=name)
+    for joint in urdf.joints:
+        if joint.find("mimic") is not None and urdf.moved_mass(joint.get("name", "")) > 0:
+            raise urdf.error("expected no mass that moves along with another joint (<mimic>)", joint.get("name", ""))
     return name, kind
+
+
+def mechanics(path: str | Path) -> str:
+    """URDF text of a file's links and joints alone, every number checked: no parser has cause to refuse it.
+
+    Shapes, materials and whatever else a URDF may hold do not bear on how it moves, and are left out. Joints that mimic
+    another are fixed: `check_one_joint` accepts them only where they move no mass.
+
+    Raises
+    ------
+    InputError
+        As `moving_joints`.
+    """
+    return _Urdf(Path(path)).mechanics()
 
 
 class _Urdf:
@@ -114,6 +146,8 @@ class _Urdf:
         value = math.nan if mass is None else self._numbers(mass, "value", 1, name)[0]
         if not value > 0:
             raise self.error(f"expected a mass above 0 kg, found {'none' if mass is None else f'{value:g}'}", name)
+        if not SMALLEST <= value <= LARGEST:
+            raise self.error(f"expected a mass between {SMALLEST:g} and {LARGEST:g} kg, found {value:g}", name)
         self._origin(inertial, name)
         self._check_inertia(inertial, name)
         return value
@@ -144,8 +178,69 @@ class _Urdf:
         self.parent[ends[1]] = ends[0]
         self._origin(joint, name)
         axis = joint.find("axis")
-        if kind in ONE_JOINT and axis is not None and not any(self._numbers(axis, "xyz", 3, name)):
+        if kind in (*ONE_JOINT, "planar") and axis is not None:
+            self._check_axis(self._numbers(axis, "xyz", 3, name), name)
+        self._check_limits(joint, name)
+        self._check_mimic(joint, name)
+
+    def _check_axis(self, xyz: tuple[float, ...], name: str) -> None:
+        if not any(xyz):
             raise self.error("expected an <axis> that is not zero", name)
+        if not SMALLEST <= math.hypot(*xyz) <= LARGEST:
+            raise self.error(f"expected an <axis> of length 1, found {math.hypot(*xyz):g}", name)
+
+    def _check_limits(self, joint: Element, name: str) -> None:
+        limit, needed = joint.find("limit"), joint.get("type") in ("revolute", "prismatic")
+        if limit is None:
+            if needed:
+                raise self.error(f"expected a <limit>, as this joint is {joint.get('type')}", name)
+            return
+        for key in ("lower", "upper"):
+            self._numbers(limit, key, 1, name, 0.0)
+        for key in ("effort", "velocity"):
+            self._numbers(limit, key, 1, name)
+
+    def _check_mimic(self, joint: Element, name: str) -> None:
+        mimic = joint.find("mimic")
+        if mimic is None:
+            return
+        leader = mimic.get("joint", "")
+        if leader == name or not any(other.get("name") == leader for other in self.joints):
+            raise self.error(f"expected a <mimic> of another joint of this file, found {leader[:40]!r}", name)
+        self._numbers(mimic, "multiplier", 1, name, 1.0)
+        self._numbers(mimic, "offset", 1, name, 0.0)
+
+    def mechanics(self) -> str:
+        """Links and joints as text; see the function of this name."""
+        robot = Element("robot", name=self.root.get("name") or "robot")
+        for name, link in self.links.items():
+            self._write_link(SubElement(robot, "link", name=name), link, name)
+        for joint in self.joints:
+            name = joint.get("name", "")
+            kind = "fixed" if joint.find("mimic") is not None else joint.get("type", "")
+            one = SubElement(robot, "joint", name=name, type=kind)
+            for tag in ("parent", "child"):
+                end = joint.find(tag)
+                SubElement(one, tag, link="" if end is None else end.get("link", ""))
+            for tag, keys in JOINT_NUMBERS.items():
+                self._write_numbers(one, joint, tag, keys, name)
+        return tostring(robot, encoding="unicode")
+
+    def _write_link(self, one: Element, link: Element, name: str) -> None:
+        inertial = link.find("inertial")
+        if inertial is not None:
+            kept = SubElement(one, "inertial")
+            for tag, keys in LINK_NUMBERS.items():
+                self._write_numbers(kept, inertial, tag, keys, name)
+
+    def _write_numbers(self, parent: Element, source: Element, tag: str, keys: Mapping[str, int], name: str) -> None:
+        element = source.find(tag)
+        if element is None:
+            return
+        kept = SubElement(parent, tag)
+        for key, count in keys.items():
+            if element.get(key) is not None or tag == "inertia":
+                kept.set(key, " ".join(map(repr, self._numbers(element, key, count, name, 0.0))))
 
     def _origin(self, element: Element, name: str) -> None:
         origin = element.find("origin")
@@ -185,11 +280,15 @@ class _Urdf:
         if text is None and default is not None:
             return (default,) * count
         try:
-            values = tuple(float(part) for part in (text or "").split())
+            values = () if "_" in (text or "") else tuple(float(part) for part in (text or "").split())
         except ValueError:
             values = ()
         if len(values) != count or not all(map(math.isfinite, values)):
             found = "nothing" if text is None else repr(text[:40])
             wanted = "a finite number" if count == 1 else f"{count} finite numbers"
             raise self.error(f"expected {wanted} as {key} of <{element.tag}>, found {found}", name)
+        if element.tag != "limit" and max(map(abs, values)) > LARGEST:
+            raise self.error(
+                f"expected {key} of <{element.tag}> below {LARGEST:g} in SI units, found {text!r:.40}", name
+            )
         return values

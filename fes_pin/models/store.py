@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import tomli_w
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
+from fes_pin.data.schema import SCHEMAS, Number, one_of
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.models.effects import effect
 from fes_pin.models.model import Model
@@ -50,18 +52,22 @@ def load_model(path: str | Path) -> Model:
     """
     document = read_toml(path)
     kinds = {rig.name: rig for rig in RIGS}
-    if document.data.get("format") != FORMAT:
+    found = document.data.get("format")
+    if found != FORMAT or isinstance(found, bool):
         raise document.error("format", f"expected format = {FORMAT}: a model that fes-pin saved")
-    if document.data.get("rig") not in kinds:
-        raise document.error("rig", f"expected one of {', '.join(kinds)}")
-    kind = kinds[document.data["rig"]]
+    try:
+        kind = kinds[one_of(document.data.get("rig"), tuple(kinds))]
+    except ValueError as problem:
+        raise document.error("rig", str(problem)) from None
     fitted = document.data.get("fitted")
-    if not isinstance(fitted, list) or not set(map(str, fitted)) <= set(kind.parameters()):
-        raise document.error("fitted", f"expected names among {', '.join(kind.parameters())}")
-    nominal = _numbers(document, "nominal", set(kind.parameters()))
+    names = list(kind.parameters())
+    if not isinstance(fitted, list) or not all(f in names for f in fitted) or len(set(fitted)) < len(fitted):
+        raise document.error("fitted", f"expected names among {', '.join(names)}, each once")
+    nominal = _numbers(document, "nominal", set(names))
     constants = _numbers(document, "constants", None)
     if missing := set(kind.needed) - set(constants):
         raise document.error("constants", f"expected {', '.join(sorted(missing))} as well")
+    _check_possible(document, kind.name, {"nominal": nominal, "constants": constants})
     model = Model(kind(**nominal, constants=constants, fitted=tuple(fitted)))
     listed = document.table("effects")
     for name in listed:
@@ -74,6 +80,21 @@ def load_model(path: str | Path) -> Model:
         except ValueError as error:
             raise document.error(f"effects.{name}", str(error)) from None
     return model
+
+
+def _check_possible(document: Document, rig: str, tables: Mapping[str, Mapping[str, float]]) -> None:
+    """Refuse what a study of this rig could not hold either: a mass below zero, a saturation below the threshold."""
+    schema = SCHEMAS[rig]
+    known = {**schema.constants, **(schema.passive or {}), **schema.start}
+    for key, table in tables.items():
+        for name in table.keys() & known.keys():
+            try:
+                known[name].check(table[name])
+            except ValueError as problem:
+                raise document.error(f"{key}.{name}", str(problem)) from None
+    constants = tables["constants"]
+    if "threshold_us" in constants and constants.get("saturation_us", math.inf) <= constants["threshold_us"]:
+        raise document.error("constants.saturation_us", f"expected more than {constants['threshold_us']:g}")
 
 
 def _effect_table(one: Effect) -> dict[str, Any]:
@@ -93,11 +114,9 @@ def _numbers(
     document: Document, key: str, known: set[str] | None, inside: dict[str, Any] | None = None
 ) -> dict[str, float]:
     values = document.table(key, inside)
-    for name, value in values.items():
+    for name in values:
         if known is not None and name not in known:
             raise document.error(f"{key}.{name}", f"unknown; expected one of {', '.join(sorted(known))}")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise document.error(f"{key}.{name}", f"expected a finite number, found {value!r}")
     if known is not None and (missing := known - set(values)):
         raise document.error(key, f"expected {', '.join(sorted(missing))} as well")
-    return {n: float(v) for n, v in values.items()}
+    return document.numbers(key, values, dict.fromkeys(values, Number("")))

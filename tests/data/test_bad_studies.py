@@ -11,6 +11,11 @@ from fes_pin.data.study import read_study
 
 HUGE = "1" + "0" * 400
 DIGITS = "1" + "0" * 5000
+LONG = "a" * 300
+MIMIC = (
+    studies.URDF[studies.URDF.index('  <link name="arm">') : studies.URDF.index("  <joint")].replace("arm", "toe")
+    + '<joint name="toe_joint" type="continuous"><parent link="arm"/><child link="toe"/><mimic joint="pivot"/></joint></robot>'
+)
 
 TOML = {  # old text, new text, row, key, words
     "not_toml": ("[rig]\n", "[rig\n", 5, None, "not TOML"),
@@ -50,6 +55,9 @@ TOML = {  # old text, new text, row, key, words
     "trial_is_a_table": (studies.ANKLE[studies.ANKLE.index("[[trial]]") :], '[trial]\nfile = "trials/00.csv"', 24, "trial", r"[[trial]]"),
     "no_file": ('file = "trials/00.csv"\n', "", 24, "trial[0].file", "missing"),
     "file_not_there": ("trials/10.csv", "trials/11.csv", 31, "trial[1].file", "nothing"),
+    "file_of_a_long_name": ("trials/10.csv", LONG, 31, "trial[1].file", "no file can have"),
+    "path_of_a_long_name": ("trials/10.csv", "a/" * 3000, 31, "trial[1].file", "no file can have"),
+    "rig_is_a_table": ('"ankle"', "{}", 3, "study.rig", "found a table"),
     "file_is_a_folder": ("trials/10.csv", "trials", 31, "trial[1].file", "a folder"),
     "file_is_a_number": ('"trials/10.csv"', "10", 31, "trial[1].file", "as text"),
     "file_twice": ("trials/10.csv", "trials/00.csv", 31, "trial[1].file", "same file as trial[0].file"),
@@ -191,12 +199,24 @@ JOINT = {  # file, old text, new text, blamed file, row, key, words
     "inertia_off_diagonal": ("rig.urdf", 'ixy="0"', 'ixy="5e-4"', "rig.urdf", 4, "arm", "positive"),
     "nothing_to_move": ("rig.urdf", studies.URDF[studies.URDF.index("    <inertial>") : studies.URDF.index("  </link>")], "", "rig.urdf", None, "pivot", "mass"),
     "no_axis": ("rig.urdf", "0 1 0", "0 0 0", "rig.urdf", 11, "pivot", "axis"),
+    "axis_of_no_length": ("rig.urdf", "0 1 0", "0 1e-200 0", "rig.urdf", 11, "pivot", "<axis> of length 1"),
+    "axis_without_end": ("rig.urdf", "0 1 0", "0 1e200 0", "rig.urdf", 11, "pivot", "xyz of <axis> below"),
+    "number_with_an_underscore": ("rig.urdf", "0 1 0", "0 1_0 0", "rig.urdf", 11, "pivot", "3 finite numbers"),
+    "no_limit": ("rig.urdf", "continuous", "revolute", "rig.urdf", 11, "pivot", "expected a <limit>"),
+    "limit_is_text": ("rig.urdf", "</joint>", '<limit lower="low" effort="1" velocity="1"/></joint>', "rig.urdf", 11, "pivot", "lower of <limit>"),
+    "limit_without_effort": ("rig.urdf", "</joint>", '<limit velocity="1"/></joint>', "rig.urdf", 11, "pivot", "effort of <limit>"),
+    "mass_that_mimics": ("rig.urdf", "</robot>", MIMIC, "rig.urdf", 21, "toe_joint", "<mimic>"),
+    "mimics_nothing": ("rig.urdf", "</joint>", '<mimic joint="no"/></joint>', "rig.urdf", 11, "pivot", "found 'no'"),
+    "mass_of_a_star": ("rig.urdf", '<mass value="0.15"/>', '<mass value="2e30"/>', "rig.urdf", 4, "arm", "below 1e+06"),
+    "mass_of_an_atom": ("rig.urdf", '<mass value="0.15"/>', '<mass value="2e-26"/>', "rig.urdf", 4, "arm", "between 1e-09"),
+    "urdf_is_a_table": ("study.toml", '"rig.urdf"', "{}", "study.toml", 5, "rig.urdf", "as text"),
+    "urdf_of_a_long_name": ("study.toml", '"rig.urdf"', f'"{LONG}"', "study.toml", 5, "rig.urdf", "no file can have"),
     "short_axis": ("rig.urdf", "0 1 0", "0 1", "rig.urdf", 11, "pivot", "3 finite numbers"),
     "unknown_link": ("rig.urdf", 'child link="arm"', 'child link="leg"', "rig.urdf", 11, "pivot", "'leg'"),
     "link_twice": ("rig.urdf", '<link name="base"/>', '<link name="base"/><link name="base"/>', "rig.urdf", 3, "base", "twice"),
     "two_roots": ("rig.urdf", '<link name="base"/>', '<link name="base"/><link name="loose"/>', "rig.urdf", None, "link", "one root"),
     "loop": ("rig.urdf", 'parent link="base"', 'parent link="arm"', "rig.urdf", 11, "pivot", "tree"),
-    "two_joints": ("rig.urdf", "</robot>", '<link name="toe"/><joint name="mtp" type="prismatic"><parent link="arm"/><child link="toe"/></joint></robot>', "rig.urdf", None, "joint", "found 2: pivot, mtp"),
+    "two_joints": ("rig.urdf", "</robot>", '<link name="toe"/><joint name="mtp" type="continuous"><parent link="arm"/><child link="toe"/></joint></robot>', "rig.urdf", None, "joint", "found 2: pivot, mtp"),
     "entities": ("rig.urdf", "<robot", '<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;&a;">]><robot', "rig.urdf", None, None, "entities"),
     "external_entity": ("rig.urdf", "<robot", '<!DOCTYPE r SYSTEM "file:///etc/passwd"><robot', "rig.urdf", None, None, "document type"),
 }  # fmt: skip

@@ -1,5 +1,7 @@
 """Whatever stands in a study's files, reading gives a study or one line of error."""
 
+import re
+
 import pytest
 from data import studies
 from hypothesis import HealthCheck, given, settings
@@ -8,6 +10,10 @@ from hypothesis import strategies as st
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
 from fes_pin.data.study import read_study
+from fes_pin.models.effects import effects_for
+from fes_pin.models.nominal import nominal_model
+from fes_pin.models.rigs.rigid import load_urdf
+from fes_pin.models.store import load_model, model_toml
 
 FILES = [
     (studies.ankle, "study.toml"),
@@ -50,18 +56,60 @@ PIECES += [
 ]
 
 
+EDITS = st.lists(
+    st.tuples(st.floats(0, 1), st.integers(0, 12), st.sampled_from(PIECES) | st.binary(max_size=5)), max_size=4
+)
+
+
 @settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(
     which=st.sampled_from(FILES),
-    edits=st.lists(
-        st.tuples(st.floats(0, 1), st.integers(0, 12), st.sampled_from(PIECES) | st.binary(max_size=5)), max_size=4
-    ),
+    edits=EDITS,
 )
 def test_spoilt_studies(tmp_path_factory, which, edits):
     make, file = which
     folder = make(tmp_path_factory.mktemp("fuzz"))
     (folder / file).write_bytes(spoilt((folder / file).read_bytes(), edits))
     one_line_or_none(lambda: read_study(folder))
+
+
+NUMBERS = ["1e-200", "1e200", "-1", "0", "1_0", "inf", "1e400", "9" * 400, "", "0x10", "1 2", "{}", '""', "true"]
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(edits=EDITS, number=st.sampled_from(NUMBERS), at=st.integers(0, 30))
+def test_spoilt_urdfs_are_refused_in_our_words_alone(tmp_path, capfd, edits, number, at):
+    """The parser behind Pinocchio prints lines of its own on what it refuses: it must get nothing to refuse."""
+    whole = studies.URDF.replace("</inertial>", '</inertial><visual><geometry><box size="1 1 1"/></geometry></visual>')
+    path = tmp_path / "rig.urdf"
+    for text in (spoilt(whole.encode(), edits), with_number(whole, r'(?<=")[-0-9. e]+(?=")', number, at).encode()):
+        path.write_bytes(text)
+        one_line_or_none(lambda: load_urdf(path))
+    assert capfd.readouterr().err == ""
+
+
+@pytest.fixture(scope="module")
+def model_text(tmp_path_factory):
+    model = nominal_model(read_study(studies.ankle(tmp_path_factory.mktemp("model"))))
+    for effect in effects_for("ankle")[:4]:
+        model = model + effect()
+    return model_toml(model)
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(edits=EDITS, number=st.sampled_from(NUMBERS), at=st.integers(0, 40))
+def test_spoilt_models(model_text, tmp_path, edits, number, at):
+    path = tmp_path / "model.toml"
+    for text in (spoilt(model_text.encode(), edits), with_number(model_text, "(?<== ).+", number, at).encode()):
+        path.write_bytes(text)
+        one_line_or_none(lambda: load_model(path))
+
+
+def with_number(text, pattern, number, at):
+    """The text with one of its numbers replaced."""
+    found = list(re.finditer(pattern, text))
+    one = found[at % len(found)]
+    return text[: one.start()] + number + text[one.end() :]
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study, read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
+from fes_pin.models.rigs.rigid import load_urdf
 
 numbers = st.floats(-1e6, 1e6)
 names = st.text(string.ascii_lowercase + string.digits + "_-", min_size=1, max_size=12)
@@ -58,10 +59,11 @@ def test_joint_start_values_in_rig_are_known(tmp_path):
 
 def test_joint_mimic_is_not_moving(tmp_path):
     folder = studies.joint(tmp_path)
-    more = '<link name="toe"/><joint name="mtp" type="revolute"><parent link="arm"/><child link="toe"/>'
+    more = '<link name="toe"/><joint name="mtp" type="continuous"><parent link="arm"/><child link="toe"/>'
     urdf = studies.URDF.replace("</robot>", more + '<mimic joint="pivot"/></joint></robot>')
     (folder / "rig.urdf").write_text(urdf)
     assert read_study(folder).rig == "joint"
+    assert load_urdf(folder / "rig.urdf").nv == 1
 
 
 def test_inputs_only(tmp_path):

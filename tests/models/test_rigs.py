@@ -1,6 +1,7 @@
 """The rigs' equations against Pinocchio: inverse dynamics of the URDF minus the force terms must vanish."""
 
 import math
+import re
 
 import numpy as np
 import pinocchio as pin
@@ -208,13 +209,26 @@ def test_known_values_of_a_joint_are_not_fitted(tmp_path):
     assert (rig.inertia_scale, rig.damping, rig.gravity_scale) == (0.9, 0.1, 1.2)
 
 
-def test_a_urdf_that_pinocchio_refuses_is_an_input_error(tmp_path):
-    path = tmp_path / "bad.urdf"
-    path.write_text(
-        robot(tmp_path).read_text().replace('link="base"/><child link="arm"', 'link="base"/><child link="no"')
-    )
+def test_a_urdf_that_pinocchio_refuses_is_an_input_error(tmp_path, monkeypatch):
+    path = robot(tmp_path)
+    text = path.read_text()
+    path.write_text(text.replace('link="base"/><child link="arm"', 'link="base"/><child link="no"'))
+    with pytest.raises(InputError, match="expected a <child> that is a link of this file, found 'no'"):
+        load_urdf(path)
+    path.write_text(text)
+    monkeypatch.setattr("fes_pin.models.rigs.rigid.mechanics", lambda _: "<robot/>")
     with pytest.raises(InputError, match="Pinocchio cannot read"):
         load_urdf(path)
+
+
+def test_what_does_not_bear_on_the_motion_is_not_read(tmp_path):
+    """Shapes that no parser accepts, or a robot without a name, are no matter of mass and gravity."""
+    path = robot(tmp_path)
+    expected = load_urdf(path)
+    spoilt = path.read_text().replace("</inertial>", '</inertial><visual><geometry><box size="x"/></geometry></visual>')
+    path.write_text(re.sub('<robot name="[^"]*"', "<robot", spoilt))
+    found = load_urdf(path)
+    assert found.inertias[1] == expected.inertias[1] and found.jointPlacements[1] == expected.jointPlacements[1]
 
 
 @pytest.mark.parametrize("base", ["0 0 0", "0.4 -1.1 2.0"])

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.urdf import mechanics
 
 URDF_FOLDERS = (Path(__file__).parents[2] / "urdf", Path(__file__).parents[3] / "urdf")
 
@@ -29,10 +30,12 @@ def load_urdf(path: Path) -> pin.Model:
     Raises
     ------
     InputError
-        If Pinocchio cannot read it.
+        As `fes_pin.data.urdf.moving_joints`, or if Pinocchio cannot read it.
     """
     try:
-        model = pin.buildModelFromXML(Path(path).read_text(encoding="utf-8"))
+        model = pin.buildModelFromXML(mechanics(path))
+    except InputError:
+        raise
     except (ValueError, RuntimeError) as error:
         raise InputError(f"Pinocchio cannot read this URDF: {' '.join(str(error).split())}", file=path) from None
     model.gravity.linear = np.array([0.0, 0.0, -9.81])
