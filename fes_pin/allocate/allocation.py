@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -153,6 +154,27 @@ class Allocation:
         if k == j or costs[k] < float(problem.prices[i] * self.recruitment[i]):
             return f"more {by_name[i]} is not worth its effort"
         return f"more {by_name[i]} would spoil {self.joints[k].replace('_', ' ')}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """The answer in plain types, by name: pulse widths us, recruitments, torques N m with their band, reasons."""
+        low, high = self.achieved_band
+        return {
+            "pulse_width_us": self.pulse_widths_us,
+            "recruitment": dict(zip(self.names, self.recruitment.tolist(), strict=True)),
+            "torque_nm": {
+                joint: {
+                    "wanted": float(self.wanted[j]),
+                    "achieved": float(self.achieved[j]),
+                    "band": sorted((float(low[j]), float(high[j]))),
+                }
+                for j, joint in enumerate(self.joints)
+                if self.wanted[j] or self.achieved[j]
+            },
+            "reasons": self.reasons,
+            "held": list(self.held),
+            "residual": float(self.certificate.residual),
+            "gap": float(self.gap),
+        }
 
     def band_lines(self) -> list[str]:
         """What these pulse widths make of the wanted torques if the muscles are weaker or stronger than assumed."""

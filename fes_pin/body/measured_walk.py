@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +11,15 @@ import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.passive import Passive
+from fes_pin.data.datasets import VARIABLE, WALKING
 from fes_pin.data.errors import InputError
+from fes_pin.data.files import read_text
+from fes_pin.data.table import check_time, parse_rows
+
+ANGLES, TORQUES = "coords_mtpfree.csv", "reference/grf_id_mtpfree.csv"
+"""The two files of the walk that are read."""
+SAME_TIME = 1e-6
+"""Times that differ by no more are the same, s."""
 
 REFERENCE = {
     "hip_flexion": ("hip_flexion", 1.0),
@@ -48,6 +56,11 @@ class MeasuredWalk:
         """Names of the joints whose torque is known."""
         return tuple(name for name, known in zip(JOINT_NAMES, self.known, strict=True) if known)
 
+    @property
+    def rates(self) -> np.ndarray:
+        """Joint rates, (samples, 19) rad/s."""
+        return np.gradient(self.q, self.time, axis=0)
+
     def active(self, passive: Passive) -> MeasuredWalk:
         """The same walk with the torque that muscles must make: what inverse dynamics gives less the passive torque.
 
@@ -58,8 +71,7 @@ class MeasuredWalk:
             known stay at 0.
         """
         order = list(JOINT_NAMES)
-        rates = np.gradient(self.q, self.time, axis=0)
-        given = np.array([passive.torque(q, order) for q in self.q]) - rates @ passive.damping(order)
+        given = np.array([passive.torque(q, order) for q in self.q]) - self.rates @ passive.damping(order)
         return replace(self, torque=np.where(self.known, self.torque - given, 0.0))
 
 
@@ -69,28 +81,43 @@ def data_folder() -> Path:
     Raises
     ------
     InputError
-        It is in neither.
+        It is in neither; the message says where the data come from.
     """
-    root = Path(os.environ.get("FES_PIN_DATA", Path(__file__).parents[2].parent / "shared"))
-    for folder in (root / "walking_subject01", root / "data" / "walking_subject01", root):
-        if (folder / "coords_mtpfree.csv").is_file():
+    root = Path(os.environ.get(VARIABLE, Path(__file__).parents[2].parent / "shared"))
+    for folder in (root / WALKING.name, root / "data" / WALKING.name, root):
+        if (folder / ANGLES).is_file():
             return folder
-    raise InputError("no walking_subject01 there; set FES_PIN_DATA to the folder that holds it", file=root)
+    raise InputError(
+        f"no {WALKING.name}/{ANGLES} there; set {VARIABLE} to the folder that holds it: joint angles and inverse "
+        f"dynamics by OpenSim of {WALKING.origin} ({WALKING.licence})",
+        file=root,
+    )
 
 
-def columns(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a table of numbers by name; words become NaN."""
-    with path.open(newline="") as file:
-        rows = list(csv.reader(file))
+def numbers(path: Path, wanted: Sequence[str]) -> dict[str, np.ndarray]:
+    """Columns of a table of numbers by name, `time` first; columns that are not wanted may hold anything.
 
-    def number(text: str) -> float:
-        try:
-            return float(text)
-        except ValueError:
-            return np.nan
-
-    values = np.array([[number(cell) for cell in row] for row in rows[1:]])
-    return dict(zip(rows[0], values.T, strict=True))
+    Raises
+    ------
+    InputError
+        The file cannot be read, a column is missing, a row is ragged, a number is none, time does not rise evenly:
+        with row and column.
+    """
+    lines = read_text(path).rstrip("\n").split("\n")
+    names = [name.strip() for name in lines[0].split(",")]
+    for name in wanted:
+        if name not in names:
+            raise InputError("missing", file=path, row=1, column=name)
+    places, kept = [names.index(name) for name in wanted], []
+    for row, line in enumerate(lines[1:], 2):
+        fields = line.split(",")
+        if len(fields) != len(names):
+            message = f"expected {len(names)} values as in the header, found {len(fields)}"
+            raise InputError(message, file=path, row=row, column=names[min(len(fields), len(names) - 1)])
+        kept.append(",".join(fields[place] for place in places))
+    table = parse_rows(path, tuple(wanted), kept, header_row=1, delimiter=",")
+    check_time(table)
+    return {name: table.column(name) for name in wanted}
 
 
 def read_walk(folder: str | Path | None = None) -> MeasuredWalk:
@@ -99,30 +126,24 @@ def read_walk(folder: str | Path | None = None) -> MeasuredWalk:
     Raises
     ------
     InputError
-        The folder or a column is missing.
+        A file or a column is missing or cannot be read (`numbers`), or the two files are of other times.
     """
     folder = Path(folder) if folder is not None else data_folder()
-    paths = folder / "coords_mtpfree.csv", folder / "reference" / "grf_id_mtpfree.csv"
-    for path in paths:
-        if not path.is_file():
-            raise InputError("no such file", file=path)
-    angles, torques = (columns(path) for path in paths)
-    count = len(angles["time"])
-    q, torque, known = (
-        np.zeros((count, len(JOINT_NAMES))),
-        np.zeros((count, len(JOINT_NAMES))),
-        np.zeros(len(JOINT_NAMES), dtype=bool),
-    )
+    sources: dict[int, tuple[str, float]] = {}
     for i, joint in enumerate(JOINT_NAMES):
         side, _, name = joint.partition("_")
         if side == "lumbar":
-            coordinate, sign = joint, 1.0
+            sources[i] = joint, 1.0
         elif name in REFERENCE:
-            coordinate, sign = f"{REFERENCE[name][0]}_{side[0]}", REFERENCE[name][1]
-        else:
-            continue
-        if f"q_{coordinate}" not in angles or f"ID_{coordinate}_moment" not in torques:
-            raise InputError(f"no column for {coordinate}", file=folder)
+            coordinate, sign = REFERENCE[name]
+            sources[i] = f"{coordinate}_{side[0]}", sign
+    angles = numbers(folder / ANGLES, ["time", *(f"q_{name}" for name, _ in sources.values())])
+    torques = numbers(folder / TORQUES, ["time", *(f"ID_{name}_moment" for name, _ in sources.values())])
+    time = angles["time"]
+    if len(time) != len(torques["time"]) or np.abs(time - torques["time"]).max() > SAME_TIME:
+        raise InputError(f"expected the times of {ANGLES}", file=folder / TORQUES, column="time")
+    q, torque, known = (np.zeros((len(time), len(JOINT_NAMES))) for _ in range(3))
+    for i, (coordinate, sign) in sources.items():
         q[:, i], torque[:, i] = sign * angles[f"q_{coordinate}"], sign * torques[f"ID_{coordinate}_moment"]
-        known[i] = name != "mtp_extension"
-    return MeasuredWalk(angles["time"], q, np.where(known, torque, 0.0), known)
+        known[:, i] = not JOINT_NAMES[i].endswith("mtp_extension")
+    return MeasuredWalk(time, q, torque * known, known[0].astype(bool))

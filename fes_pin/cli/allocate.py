@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -9,25 +10,50 @@ import typer
 
 from fes_pin.data.errors import InputError
 
+MOST_NM, MOST_DEG_S = 1e5, 1e4
+"""No body's joint has more torque, N m, nor turns faster, degrees per second."""
+MOST_US = 1e5
+"""No stimulator's pulse is longer, us."""
 
-def pairs(values: list[str], what: str) -> dict[str, float]:
+
+def pairs(values: list[str], what: str, most: float) -> dict[str, float]:
     """Numbers by name from `name=number`.
 
     Raises
     ------
     InputError
-        Not of that form.
+        Not of that form, a joint that is none or is named twice, a number that is not finite or larger than `most`.
     """
-    result = {}
+    from fes_pin.body.joints import known_joint
+
+    result: dict[str, float] = {}
     for value in values:
-        name, equal, number = value.partition("=")
+        name, equal, text = (part.strip() for part in value.partition("="))
         try:
-            result[name.strip()] = float(number)
+            number = float(text)
         except ValueError:
             equal = ""
         if not equal:
-            raise InputError(f"{what} must read name=number, got {value!r}")
+            raise InputError(f"{what} must read joint=number, got {value!r}")
+        if known_joint(name) in result:
+            raise InputError(f"{what} names {name} twice: {result[name]:g} and {number:g}")
+        if not abs(number) <= most:
+            raise InputError(f"{what} of {name} must lie within {most:g} either way, got {text}")
+        result[name] = number
     return result
+
+
+def within(value: float, low: float, high: float, option: str) -> float:
+    """The value of an option, if it lies in its range.
+
+    Raises
+    ------
+    InputError
+        It does not.
+    """
+    if not low <= value <= high:
+        raise InputError(f"{option} must lie between {low:g} and {high:g}, got {value:g}")
+    return value
 
 
 def allocate(
@@ -36,43 +62,72 @@ def allocate(
     ] = None,
     nerve: Annotated[list[str] | None, typer.Option(help="A nerve to stimulate, repeatable; all by default.")] = None,
     angle: Annotated[list[str] | None, typer.Option(help="Posture, joint=degrees, repeatable.")] = None,
+    rate: Annotated[list[str] | None, typer.Option(help="Its rates, joint=degrees per second, repeatable.")] = None,
     least: Annotated[float | None, typer.Option(help="Least reliable recruitment: off, or at least this.")] = None,
-    strength: Annotated[float, typer.Option(help="Strength, 1 is the healthy adult of the table.")] = 1.0,
+    strength: Annotated[
+        float | None, typer.Option(help="Strength, 1 is a healthy adult's; paralysed muscle (0.5) by default.")
+    ] = None,
     threshold_us: Annotated[float, typer.Option(help="Threshold of the recruitment curve, us.")] = 180.0,
     saturation_us: Annotated[float, typer.Option(help="Saturation of the recruitment curve, us.")] = 1000.0,
     walk: Annotated[
         Path | None, typer.Option(help="Instead of a torque: the folder of the measured walk; how much is attained.")
     ] = None,
     passive: Annotated[
-        float,
-        typer.Option(help="With --walk: what joints give by themselves, 1 for healthy legs."),
-    ] = 0.0,
+        float | None,
+        typer.Option(help="With --walk: what joints give by themselves, 1 for healthy legs; 0 by default."),
+    ] = None,
     nerves: Annotated[bool, typer.Option(help="List the nerves and what they turn, and end.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="The answer to a torque as JSON.")] = False,
 ) -> None:
     """Pulse widths for wanted joint torques, what is short, and why."""
     from math import degrees, radians
 
     from fes_pin.allocate.allocate import allocate as solve
-    from fes_pin.body.joints import known_joint, limits_of
-    from fes_pin.muscles.nerves import Nerves
+    from fes_pin.body.joints import limits_of
+    from fes_pin.muscles.nerves import STRONGEST, Nerves
     from fes_pin.muscles.recruitment import LinearRecruitment
 
+    _alone(walk=walk is not None, nerves=nerves, torques=bool(torque))
+    only_torque = {"--angle": angle, "--rate": rate, "--least": least, "--json": as_json or None}
+    for option, given in only_torque.items():
+        if given and not torque:
+            raise InputError(f"{option} goes with a wanted torque")
+    if passive is not None and walk is None:
+        raise InputError("--passive goes with --walk")
+    if strength is not None:
+        within(strength, 0.0, STRONGEST, "--strength")
+    if least is not None:
+        within(least, 0.0, 1.0, "--least")
+    within(threshold_us, 0.0, MOST_US, "--threshold-us")
+    within(saturation_us, 0.0, MOST_US, "--saturation-us")
+    if threshold_us >= saturation_us:
+        raise InputError(f"--threshold-us must lie below --saturation-us, got {threshold_us:g} and {saturation_us:g}")
     channels = Nerves(tuple(nerve or ()), strength=strength)
     if nerves:
         typer.echo(str(channels))
         return
     if walk is not None:
-        typer.echo(walk_table(walk, channels, passive))
+        typer.echo(walk_table(walk, channels, 0.0 if passive is None else within(passive, 0.0, 10.0, "--passive")))
         return
-    if not torque:
-        raise InputError("no torque is wanted: give joint=N m, or --walk, or --nerves")
-    posture = {name: radians(value) for name, value in pairs(angle or [], "--angle").items()}
+    wanted = pairs(torque or [], "a torque", MOST_NM)
+    posture = {name: radians(value) for name, value in pairs(angle or [], "--angle", 360.0).items()}
     for name, value in posture.items():
-        low, high = limits_of(known_joint(name))
+        low, high = limits_of(name)
         if not low <= value <= high:
-            raise InputError(f"{name} must lie within {degrees(low):.0f} to {degrees(high):.0f} degrees")
+            raise InputError(f"--angle: {name} must lie within {degrees(low):.0f} to {degrees(high):.0f} degrees")
+    rates = {name: radians(value) for name, value in pairs(rate or [], "--rate", MOST_DEG_S).items()}
     curve = LinearRecruitment(threshold_us, saturation_us)
-    typer.echo(str(solve(pairs(torque, "a torque"), channels, posture, least=least, recruitment=curve)))
+    answer = solve(wanted, channels, posture, least=least, recruitment=curve, v=rates or None)
+    typer.echo(json.dumps(answer.as_dict(), indent=1) if as_json else str(answer))
+
+
+def _alone(walk: bool, nerves: bool, torques: bool) -> None:
+    """One question at a time: a torque, --walk or --nerves."""
+    asked = [word for word, given in (("a torque", torques), ("--walk", walk), ("--nerves", nerves)) if given]
+    if not asked:
+        raise InputError("no torque is wanted: give joint=N m, or --walk, or --nerves")
+    if len(asked) > 1:
+        raise InputError(f"choose one of {' and '.join(asked)}")
 
 
 def walk_table(folder: Path, nerves, passive: float = 0.0) -> str:
@@ -84,11 +139,14 @@ def walk_table(folder: Path, nerves, passive: float = 0.0) -> str:
     from fes_pin.body.measured_walk import read_walk
     from fes_pin.body.passive import PassiveLegs
 
-    if not 0.0 <= passive <= 10.0:
-        raise InputError(f"--passive must lie between 0 and 10, got {passive}")
     walk = read_walk(folder).active(PassiveLegs(passive))
-    result = allocate_walk(walk.torque, nerves, walk.q, weights=walk.known.astype(float))
-    lines = [f"{len(walk.time)} samples, {nerves.n} channels, optimal to {result.residual.max():.0e}"]
+    result = allocate_walk(walk.torque, nerves, walk.q, walk.rates, weights=walk.known.astype(float))
+    low, high = (nerves.assumed_strength * factor for factor in nerves.strength_band)
+    lines = [
+        f"{len(walk.time)} samples, {nerves.n} channels, optimal to {result.residual.max():.0e}; "
+        f"{nerves.assumed_strength:g} of a healthy adult's strength ({low:.2g} to {high:.2g})",
+        *nerves.held(walk.q),
+    ]
     lines.append(f"{'joint':28s}{'peak':>9s}{'short, rms':>12s}{'within 10 %':>13s}")
     for j in np.flatnonzero(walk.known):
         peak, short = np.abs(walk.torque[:, j]).max(), result.shortfall[:, j]

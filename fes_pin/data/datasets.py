@@ -72,6 +72,17 @@ DATASETS: Mapping[str, Dataset] = {
 }
 
 
+WALKING = Dataset(
+    name="walking_subject01",
+    what="two strides of one adult on a treadmill: joint angles, ground reaction, inverse dynamics",
+    repository="opensim-org/opensim-models",
+    commit="20a888b9655e73fb84963d6e03eee3752cf6074b",
+    file="Pipelines/Gait2354_Simbody",
+    licence="CC-BY-3.0",
+)
+"""Not a study: tables of its own (`fes_pin.body.measured_walk.read_walk`)."""
+
+
 def fetch(name: str) -> Path:
     """Folder of a public data set, as a study that `read_study` reads.
 
