@@ -1,5 +1,10 @@
 """The table's greatest joint torques against those that healthy young men have been measured to make."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -38,3 +43,17 @@ def test_the_calf_pushes_most_where_it_is_stretched():
     torque = greatest_torque_nm(standard_muscles(), ANDERSON_2007["plantarflexion"], angles)
     assert 0.0 <= angles[np.argmax(torque)] <= 20.0
     assert torque[0] < 0.4 * torque.max() and 90.0 < torque.max() < 170.0
+
+
+def test_the_story_prints_the_table_and_draws_it(tmp_path):
+    root = Path(__file__).parents[2]
+    (tmp_path / "analysis").mkdir()
+    copy = tmp_path / "analysis" / "joint_torques.py"
+    copy.write_text((root / "analysis/joint_torques.py").read_text())  # it draws beside itself
+    environment = {**os.environ, "PYTHONPATH": str(root)}
+    result = subprocess.run(
+        [sys.executable, str(copy)], env=environment, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.count("\n") == 2 + 6 * 6 + len(SARABON_2021) + 1
+    assert (tmp_path / "out/joint_torques.png").stat().st_size > 10_000
