@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.decide.doubts import doubts, with_error
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.experiment import SEPARABLE, NextExperiment, next_experiment
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.open_set import Remainder, remainder
 from fes_pin.diagnose.search.promise import best_by_effect
-from fes_pin.diagnose.search.search import Search, Searched
+from fes_pin.diagnose.search.search import Search, Searched, Unfit
 from fes_pin.diagnose.search.unfinished import alike
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.fit import Fit, rough_noise
 from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
 from fes_pin.identify.own import amplitude
 from fes_pin.models.model import Model
@@ -94,6 +98,9 @@ class Diagnosis:
         Samples taken for spikes, by trial and column; in `study` they hold what their neighbours say.
     warnings
         What is odd about the study, and what could not be done, one line each.
+    reason
+        Why something is unexplained, where it is no test of the remainder that says so: nothing could be fitted, or an
+        error stays that is no noise.
     """
 
     study: Study
@@ -112,11 +119,24 @@ class Diagnosis:
     left_out: dict[str, dict[str, tuple[int, ...]]]
     wall_s: float = field(compare=False)
     warnings: tuple[str, ...] = ()
+    reason: str | None = None
 
     @property
     def model(self) -> Model:
         """The extended model."""
         return self.extended.model
+
+    def explained_percent(self) -> float:
+        """Share of the nominal model's squared error above the noise that all causes together remove, 0 to 100.
+
+        On trials that took no part, where there are such.
+        """
+        outside = self.nominal_error[1] is not None and self.extended_error[1] is not None
+        before, after = (e[1] if outside else e[0] for e in (self.nominal_error, self.extended_error))
+        assert before is not None
+        assert after is not None
+        excess = max(before - self.ceiling_percent, before - after, 1e-300)
+        return float(np.clip(100.0 * (before - after) / excess, 0.0, 100.0))
 
     def __str__(self) -> str:
         from fes_pin.diagnose.text import verdict_text  # noqa: PLC0415
@@ -158,10 +178,17 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
     with one_thread_each():
         recorded = [t for t in study.trials if t.role != "held_out"]
         search = Search(nominal_model(study), train, recorded, seed, tell)
-        searched = search.run()
-        tell(0.88, "held-out gain")
-        diagnosis = _judge(study, search, searched, test, seed)
+        try:
+            searched = search.run()
+            tell(0.88, "held-out gain")
+            diagnosis = _judge(study, search, searched, test, seed)
+        except Unfit as problem:
+            diagnosis = _unfitted(study, problem.nominal, str(problem), test)
+        except (ArithmeticError, np.linalg.LinAlgError) as problem:
+            reason = f"the search met numbers that cannot be calculated with ({problem})"
+            diagnosis = _unfitted(study, search.nominal(), reason, test)
     tell(1.0, "done")
+    warnings += diagnosis.warnings
     return replace(diagnosis, left_out=left_out, warnings=tuple(warnings), wall_s=time.perf_counter() - began)
 
 
@@ -213,8 +240,11 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
         left = remainder(searched.best, seed)
         causes, held = _causes(searched, left, test, seed)
-    left = _with_refused(left, refused)
     causes.sort(key=lambda c: -c.gain_held_out.percent)
+    left, reason = with_error(_with_refused(left, refused), searched)
+    if not causes and not searched.complete:
+        searched = search.for_prediction(searched)
+        held = _held_out(searched, test)
     nominal, best = searched.nominal, searched.best
     verdict = "causes_found" if causes else ("unexplained" if left.unexplained else "adequate")
     in_sample = errors_of(best.model, best.trials, searched.floor)
@@ -228,12 +258,39 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         extended=best,
         nominal_error=(_error(nominal, searched.floor), held.nominal.error_percent() if held else None),
         extended_error=(in_sample.error_percent(), held.chosen.error_percent() if held else None),
-        ceiling_percent=100.0 * float(in_sample.counts.sum() / max(in_sample.spread.sum(), 1e-300)),
+        ceiling_percent=in_sample.ceiling_percent(),
         next_experiment=_experiment(searched, causes, study),
         ranking=_ranking(searched),
         held_out_by="the study's held-out trials" if test else "cross-validation over trials",
         left_out={},
         wall_s=0.0,
+        warnings=tuple(doubts(searched, len(causes))),
+        reason=reason,
+    )
+
+
+def _unfitted(study: Study, nominal: Fit, reason: str, test: Sequence[Trial]) -> Diagnosis:
+    """What is said where no fit carries a verdict: that something is unexplained, and why."""
+    floor = rough_noise(Model(nominal.model.rig), nominal.trials)
+    inside = errors_of(nominal.model, nominal.trials, floor)
+    outside = errors_of(nominal.model, test, floor).error_percent() if test else None
+    return Diagnosis(
+        study=study,
+        verdict="unexplained",
+        causes=(),
+        remainder=Remainder(True, math.nan, None),
+        absorbed=(),
+        nominal=nominal,
+        extended=nominal,
+        nominal_error=(inside.error_percent(), outside),
+        extended_error=(inside.error_percent(), outside),
+        ceiling_percent=inside.ceiling_percent(),
+        next_experiment=None,
+        ranking={},
+        held_out_by="the study's held-out trials" if test else "cross-validation over trials",
+        left_out={},
+        wall_s=0.0,
+        reason=reason,
     )
 
 

@@ -43,6 +43,7 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
         "ceiling_percent": shown(diagnosis.ceiling_percent),
         "next_experiment": _experiment(diagnosis),
         **_left_out(diagnosis),
+        **({"reason": diagnosis.reason} if diagnosis.reason else {}),
         "warnings": list(diagnosis.warnings),
         "wall_s": round(diagnosis.wall_s, 2),
     }

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.decide.held_out import RUNAWAY, within
 from fes_pin.diagnose.diagnosis import Diagnosis
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.own import predictions
@@ -53,8 +54,14 @@ def _predicted(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> list
     out = []
     for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
         names = model.rig.outputs(trial.kind)
-        out.append(trial.with_columns(**{n: readings[:, k] for k, n in enumerate(names)}))
+        out.append(trial.with_columns(**{n: _shown(readings[:, k], trial, n) for k, n in enumerate(names)}))
     return out
+
+
+def _shown(readings: np.ndarray, trial: Trial, name: str) -> np.ndarray:
+    """A prediction that runs away stays where it counts as lost; see `held_out.RUNAWAY`."""
+    most = RUNAWAY * float(np.abs(trial[name]).max()) if name in trial else np.inf
+    return within(readings, most if most > 0.0 else 1.0)
 
 
 def error_percent(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> float:

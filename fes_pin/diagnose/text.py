@@ -19,12 +19,14 @@ EACH_TRIAL = (
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """The verdict in one sentence."""
+    """The verdict in one sentence, with how much is explained and how much is not."""
     count = len(diagnosis.causes)
     if not count:
-        return HEADLINES[diagnosis.verdict]
+        return HEADLINES[diagnosis.verdict].removesuffix(".") + (f": {diagnosis.reason}." if diagnosis.reason else ".")
+    share = diagnosis.explained_percent()
+    named = "one cause explains" if count == 1 else f"{count} causes explain"
     rest = ", and something is left" if diagnosis.remainder.unexplained else ""
-    return f"{'one cause explains' if count == 1 else f'{count} causes explain'} what the model gets wrong{rest}."
+    return f"{named} {share:.0f} % of what the model gets wrong, {100.0 - share:.0f} % stays{rest}."
 
 
 def quantity(value: float, std: float, unit: str) -> str:
@@ -58,9 +60,11 @@ def footnotes(diagnosis: Diagnosis) -> list[str]:
     lines = [f"error E {', '.join(shown)}; noise floor {diagnosis.ceiling_percent:.2f} %"]
     left = diagnosis.remainder
     where = f", most on {left.where}" if left.where else ""
-    lines.append(
-        f"{'something is' if left.unexplained else 'nothing'} left unexplained (p = {left.p_value:.2g}{where})"
-    )
+    if diagnosis.reason is None:
+        state = "something is" if left.unexplained else "nothing"
+        lines.append(f"{state} left unexplained (p = {left.p_value:.2g}{where})")
+    elif diagnosis.causes:
+        lines.append(f"something is left unexplained: {diagnosis.reason}")
     if diagnosis.left_out:
         lines.append(f"left out as spikes: {left_out_text(diagnosis)}")
     own = [e.name for e in diagnosis.model.effects if e.each_trial]

@@ -241,6 +241,8 @@ def fit(
     with _linear_algebra().limit(limits=1):  # products this small are slower on several threads
         if noise is None:
             first = fit_anyhow(Problem(model, trials, rough_noise(model, trials)), model.parameters())
+            if not math.isfinite(first.sse):  # the simulation runs away wherever the fit began
+                return first
             model, noise = first.model, noise_of(first)
             return fit_problem(Problem(model, trials, noise), first.values, first.unknowns, max_iterations)
         return fit_anyhow(Problem(model, trials, noise), model.parameters(), max_iterations=max_iterations)

@@ -107,8 +107,12 @@ def estimate_noise(
     orders = [p for p in possible if p >= least] or possible[-1:]
     order_limit = orders[-1]
     lagged = [_lags(r, order_limit) for r in residuals if len(r) > 2 * order_limit + 2]
+    if not lagged:  # trials so short have no other order than 0
+        lagged = [_lags(r, 0) for r in residuals]
     gram = np.sum([m.T @ m for m in lagged], axis=0)
-    count = sum(len(m) for m in lagged)
+    count = max(sum(len(m) for m in lagged), 1)
+    if not gram[0, 0] > 0.0:  # a channel that is met exactly
+        orders = [0]
     best: tuple[float, int, np.ndarray, float] | None = None
     for p in orders:
         ar = (

@@ -16,6 +16,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations
+from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulated, Simulator
 from fes_pin.models.stage import Effect
@@ -82,10 +83,7 @@ def _estimated(
 
 
 def _moved(part: Linearized, rows: np.ndarray, names: Sequence[str], now: dict[str, float]) -> dict[str, float]:
-    columns = part.local[rows]
-    norms = np.linalg.norm(columns, axis=0)
-    scale = np.where(norms > 0, norms, 1.0)
-    step = np.linalg.lstsq(columns / scale, part.residual[rows], rcond=1e-6)[0] / scale
+    step = least_squares(part.local[rows], part.residual[rows], rcond=1e-6)
     return {**now, **{n: now[n] + float(d) for n, d in zip(names, step, strict=True)}}
 
 
@@ -105,7 +103,7 @@ def amplitude(fitted: Fit, effect: Effect) -> tuple[float, float]:
             continue
         kind = trial.kind
         value = np.array([unknowns[names[k]] for k in own])
-        variance = np.linalg.inv(part.local[:, felt].T @ part.local[:, felt])
+        variance = np.linalg.pinv(part.local[:, felt].T @ part.local[:, felt], hermitian=True)
         mine = np.searchsorted(felt, own)
         free = np.isfinite(np.diag(fitted.covariance))
         shared = slope[np.ix_(own, free)] @ fitted.covariance[np.ix_(free, free)] @ slope[np.ix_(own, free)].T

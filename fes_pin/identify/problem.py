@@ -10,6 +10,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.noise import NoiseModel, thinning
+from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Abreast, Simulated, Simulator
 
@@ -94,13 +95,13 @@ class Problem:
         for trial, simulated in zip(self.trials, self.simulator.run(values, unknowns), strict=True):
             left = self._left(trial, simulated)
             own = [self.simulator.columns.index(n) for n in rig.unknowns(trial.kind)]
-            if own and np.isfinite(simulated.sensitivities).all():
+            if own:
                 scale = {n: self.noise[n].std if n in self.noise else math.inf for n in left}
                 outputs = rig.outputs(trial.kind)
                 moved = {n: simulated.sensitivities[:, outputs.index(n), own] for n in left}
                 joined = np.concatenate([moved[n] / scale[n] for n in left])
-                step = np.linalg.lstsq(joined, np.concatenate([left[n] / scale[n] for n in left]), rcond=1e-9)[0]
-                left = {n: left[n] - moved[n] @ step for n in left}
+                step = least_squares(joined, np.concatenate([left[n] / scale[n] for n in left]))
+                left = {n: left[n] - moved[n] @ step for n in left} if step.any() else left
             out.append(left)
         return out
 

@@ -12,6 +12,7 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.compile.program import Program, program
+from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 
 MAX_STEP_S = 2.5e-3
@@ -199,9 +200,7 @@ def _first_motion(
             reading = base[i].readings[:, 0]
             slopes = np.stack([(m[i].readings[:, 0] - reading) / NUDGE for m in moved], axis=1)
             missed = trial[rig.output(trial.kind)] - reading
-            if not (np.isfinite(slopes).all() and np.isfinite(missed).all()):
-                continue
-            for name, step in zip(names, np.linalg.lstsq(slopes, missed, rcond=1e-9)[0], strict=True):
+            for name, step in zip(names, least_squares(slopes, missed), strict=True):
                 guess[i][name] += float(step)
     return guess
 

@@ -119,6 +119,8 @@ def unit_text(unit: str) -> str:
 
 def probability(value: float) -> str:
     """A p-value as printed."""
+    if math.isnan(value):
+        return "not tested"
     return "p < 1e-12" if value < 1e-12 else f"p = {value:.2g}"
 
 

@@ -24,7 +24,8 @@ PROMISING = 25.0
 """Linear promise of a further cause, in twice the log-likelihood, that keeps a set from being complete: 5 sigma."""
 SLOWEST_NOISE = 10.0
 """Standard deviation of a residual over that of its sample-to-sample part beyond which it counts as misfit. First-order
-autoregressive noise has 3.8 at a coefficient of 0.9, 5.5 at 0.95, 12 at 0.99."""
+autoregressive noise has 3.8 at a coefficient of 0.9, 5.5 at 0.95, 12 at 0.99; what studies without a cause have is
+printed by `scripts/benchmarks/adequate.py`."""
 REFINE_LEVEL = 1e-3
 """Level at which a refinement of an effect's form is adopted."""
 
@@ -118,8 +119,13 @@ class Claims:
 
 def slow_misfit(fitted: Fit) -> bool:
     """True if a residual is so much slower than the sample-to-sample noise that it cannot be told from misfit."""
+    return slowness(fitted) > SLOWEST_NOISE
+
+
+def slowness(fitted: Fit) -> float:
+    """Largest ratio of a channel's residual to the noise from sample to sample of its reading."""
     rough, own = rough_noise(Model(fitted.model.rig), fitted.trials), noise_of(fitted)
-    return any(own[n].std > SLOWEST_NOISE * rough[n].std for n in own)
+    return max((own[n].std / rough[n].std for n in own), default=0.0)
 
 
 def _again(fitted: Fit, noise_from: Fit) -> Fit:

@@ -55,6 +55,10 @@ class Errors:
         """E of eq. (2), pooled."""
         return 100.0 * float(self.squares.sum() / max(self.spread.sum(), 1e-300))
 
+    def ceiling_percent(self) -> float:
+        """E of a model that leaves the noise alone."""
+        return 100.0 * float(self.counts.sum() / max(self.spread.sum(), 1e-300))
+
 
 def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
     """Open-loop errors of a model that starts each trial as a prediction does.
@@ -70,7 +74,7 @@ def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Error
         for k, name in enumerate(model.rig.outputs(trial.kind)):
             if name in trial.columns and name in noise:
                 variance = noise[name].std ** 2
-                total += _within(trial[name] - readings[:, k], most[name]) ** 2 / variance
+                total += within(trial[name] - readings[:, k], most[name]) ** 2 / variance
                 around += (trial[name] - trial[name].mean()) ** 2 / variance
                 channels += 1
         for a, b in zip(np.array_split(total, pieces), np.array_split(around, pieces), strict=True):
@@ -225,12 +229,13 @@ def foretold(own: Fit) -> np.ndarray:
     return np.concatenate(out)
 
 
-def _within(errors: np.ndarray, most: float) -> np.ndarray:
+def within(errors: np.ndarray, most: float) -> np.ndarray:
+    """Errors, or readings, no larger than `most`; what is no number is as large."""
     return np.clip(np.nan_to_num(errors, nan=most, posinf=most, neginf=-most), -most, most)
 
 
 def _evidence(without: np.ndarray, extended: np.ndarray) -> Evidence:
-    without, extended = _within(without, FAR), _within(extended, FAR)
+    without, extended = within(without, FAR), within(extended, FAR)
     difference = without - extended
     return Evidence(float(without @ without - extended @ extended), float(difference @ difference))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -32,6 +33,22 @@ HOPELESS = 1e3
 every cause is then fitted from afar."""
 
 Progress = Callable[[float, str], None]
+
+
+class Unfit(Exception):
+    """A study to which not even the nominal model can be fitted.
+
+    Parameters
+    ----------
+    why
+        One line.
+    nominal
+        As far as its fit came.
+    """
+
+    def __init__(self, why: str, nominal: Fit) -> None:
+        super().__init__(why)
+        self.nominal = nominal
 
 
 @dataclass
@@ -111,18 +128,24 @@ class Search:
         self.sets.refit([(), best, *self._beside(best), *subsets(best)], best)
         return self.settle(best)
 
+    def nominal(self) -> Fit:
+        """The nominal model as far as it has been fitted."""
+        return self.sets.fits.get((), self._begun)
+
     def settle(self, names: Names) -> Searched:
         """Everything that is to be said of a set of causes: its rivals, and each cause's part in it."""
         searched = self._finish(names)
         if self.claims.complete(names):
             return searched
         floor = rough_noise(self.sets.model, self.sets.trials)
-        return replace(self._for_prediction(searched) if names else searched, floor=floor, complete=False)
+        return replace(self.for_prediction(searched) if names else searched, floor=floor, complete=False)
 
-    def _for_prediction(self, searched: Searched) -> Searched:
+    def for_prediction(self, searched: Searched) -> Searched:
         """Fit for least open-loop error, to the trials as recorded; rivals stay as they were judged."""
         many = [searched.best, searched.nominal, *searched.without.values()]
-        best, nominal, *rest = fit_for_prediction(many, self.recorded)
+        best, nominal, *rest = fitted = fit_for_prediction(many, self.recorded)
+        if not all(math.isfinite(f.sse) for f in fitted):
+            return searched
         return replace(searched, nominal=nominal, best=best, without=dict(zip(searched.without, rest, strict=True)))
 
     def _by_prediction(self, names: Names) -> Names:
@@ -140,6 +163,11 @@ class Search:
         self.progress(0.02, "nominal model")
         sets.set_noise(rough_noise(sets.model, sets.trials))
         first = fit_anyhow(sets.problem(sets.model), sets.model.parameters(), None, LOOK)
+        self._begun = first
+        if not math.isfinite(first.sse):
+            raise Unfit(
+                "the nominal model's simulation leaves the floating-point numbers from its start values on", first
+            )
         self._hopeless = first.reduced > HOPELESS
         sets.first_noise(first)
         sets.fits[()] = sets.fit_from([first.model], first.unknowns)
@@ -256,4 +284,4 @@ class Search:
         return [k for k in self.sets.fits if len(k) == len(names) and rest <= set(k) and name not in k]
 
 
-__all__ = ["Search", "Searched"]
+__all__ = ["Search", "Searched", "Unfit"]

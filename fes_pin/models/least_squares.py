@@ -1,0 +1,38 @@
+"""Linear least squares that ends with an answer, whatever the columns' sizes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def least_squares(columns: np.ndarray, wanted: np.ndarray, rcond: float = 1e-9) -> np.ndarray:
+    """The shortest x, in units of the columns' sizes, with the least squares of `columns @ x - wanted`.
+
+    Columns are scaled to a largest entry of 1 first: squares of huge sensitivities, as of a joint that falls, would
+    leave the floating-point numbers, and the singular value decomposition with them.
+
+    Parameters
+    ----------
+    columns
+        Shape (m, k).
+    wanted
+        Shape (m,).
+    rcond
+        Singular values below this share of the largest count as zero.
+
+    Returns
+    -------
+    ndarray
+        Shape (k,); zero for a column that is zero or not finite, and all zero where `wanted` is not finite.
+    """
+    out = np.zeros(columns.shape[1])
+    size = np.abs(columns).max(axis=0, initial=0.0)
+    good = np.isfinite(size) & (size > 0.0)
+    most = float(np.abs(wanted).max(initial=0.0))
+    if not good.any() or not np.isfinite(most) or not most > 0.0:
+        return out
+    solved = np.linalg.lstsq(columns[:, good] / size[good], wanted / most, rcond=rcond)[0]
+    with np.errstate(over="ignore"):
+        step = solved * (most / size[good])
+    out[good] = np.where(np.isfinite(step), step, 0.0)
+    return out

@@ -1,0 +1,63 @@
+"""What is said where nothing can be fitted, where an error is no noise, and where names rest on little."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnose.hidden import diagnosed, study_of
+
+from fes_pin.data.study import read_study
+from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.record import diagnosis_files, diagnosis_record
+from fes_pin.models.least_squares import least_squares
+from fes_pin.view.report import report_html
+
+
+def test_a_model_that_cannot_be_simulated_is_unexplained_with_the_reason():
+    study = study_of("ankle", n_motion=1, n_isometric=0, duration_s=1.0)
+    diagnosis = diagnose(replace(study, start={**study.start, "inertia_kgm2": 1e-9, "damping_nms": 1e2}))
+    assert diagnosis.verdict == "unexplained" and diagnosis.remainder.unexplained
+    assert "leaves the floating-point numbers" in diagnosis.reason
+    assert diagnosis.reason in str(diagnosis).splitlines()[0]
+    assert diagnosis_record(diagnosis)["reason"] == diagnosis.reason
+    assert "floating-point numbers from its start values on" in report_html(diagnosis) and diagnosis_files(diagnosis)
+
+
+def test_a_missing_input_does_not_end_as_noise():
+    """A driven joint whose effort was not recorded: a long autoregression calls its motion noise."""
+    study = study_of("joint", seed=2)
+    lost = tuple(t.with_columns(effort=np.zeros(len(t))) for t in study.trials)
+    diagnosis = diagnose(replace(study, trials=lost))
+    assert diagnosis.extended_error[0] > 20.0
+    assert diagnosis.verdict != "adequate" and diagnosis.remainder.unexplained
+
+
+def test_the_headline_says_how_much_is_explained():
+    first = str(diagnosed("joint", ("coulomb_friction",), "white", 1)).splitlines()[0]
+    assert "one cause explains 100 % of what the model gets wrong, 0 % stays" in first
+
+
+@pytest.mark.parametrize(("count", "most"), [(2, 20.0), (3, 30.0)])
+def test_two_and_three_real_trials_end_near_the_least_error(shared, count, most):
+    """The biceps' force is smooth: its noise from sample to sample is nothing, and the likelihood led elsewhere."""
+    study = read_study(shared / "data/biceps_fes")
+    diagnosis = diagnose(replace(study, trials=study.trials[:count]))
+    assert diagnosis.nominal_error[0] < most
+    assert diagnosis.verdict == "unexplained"
+
+
+def test_names_from_few_trials_are_doubted():
+    study = study_of("joint", ("coulomb_friction",), seed=1)
+    assert any("rest on 4 trials" in w for w in diagnose(study).warnings)
+
+
+def test_least_squares_of_huge_columns():
+    """Their squares leave the floating-point numbers, and the singular value decomposition would not converge."""
+    rng = np.random.default_rng(0)
+    columns, x = rng.standard_normal((50, 3)), np.array([1.0, -2.0, 3.0])
+    for size in (1.0, 1e200, 1e-200):
+        assert np.allclose(least_squares(columns * size, columns @ x) * size, x)
+    columns[0, 1] = np.inf
+    found = least_squares(columns, columns[:, [0, 2]] @ x[[0, 2]])
+    assert np.allclose(found, [1.0, 0.0, 3.0])
+    assert not least_squares(columns, np.full(50, np.nan)).any()
