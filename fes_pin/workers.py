@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -15,11 +16,42 @@ In = TypeVar("In")
 Out = TypeVar("Out")
 
 
+class _Limit:
+    """The limit on the threads of linear algebra, which is one for the whole process, while somebody needs it."""
+
+    def __init__(self) -> None:
+        self._lock, self._users = threading.Lock(), 0
+        self._limits: threadpool_limits | None = None
+
+    def take(self) -> None:
+        """Linear algebra on one thread from the first user on."""
+        with self._lock:
+            if self._users == 0:
+                self._limits = threadpool_limits(1)
+            self._users += 1
+
+    def give_back(self) -> None:
+        """As it was before the first user, after the last."""
+        with self._lock:
+            self._users -= 1
+            if self._users == 0 and self._limits is not None:
+                self._limits.restore_original_limits()
+
+
+_LIMIT = _Limit()
+
+
 @contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Linear algebra on one thread: the fits are what runs in parallel, and sums keep their order."""
-    with threadpool_limits(1):
+    """Linear algebra on one thread: the fits are what runs in parallel, and sums keep their order.
+
+    Where several threads ask for it, it holds until the last has ended.
+    """
+    _LIMIT.take()
+    try:
         yield
+    finally:
+        _LIMIT.give_back()
 
 
 def in_parallel(function: Callable[[In], Out], items: Iterable[In]) -> list[Out]:

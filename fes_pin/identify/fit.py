@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.descent import UNIDENTIFIED, Descent
@@ -16,6 +15,7 @@ from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
+from fes_pin.workers import one_thread_each
 
 MAX_ITERATIONS = 60
 CONFIDENCE_95 = normal_quantile(0.975)
@@ -238,7 +238,7 @@ def fit(
     -------
     Fit
     """
-    with _linear_algebra().limit(limits=1):  # products this small are slower on several threads
+    with one_thread_each():  # products this small are slower on several threads
         if noise is None:
             first = fit_anyhow(Problem(model, trials, rough_noise(model, trials)), model.parameters())
             if not math.isfinite(first.sse):  # the simulation runs away wherever the fit began
@@ -246,11 +246,6 @@ def fit(
             model, noise = first.model, noise_of(first)
             return fit_problem(Problem(model, trials, noise), first.values, first.unknowns, max_iterations)
         return fit_anyhow(Problem(model, trials, noise), model.parameters(), max_iterations=max_iterations)
-
-
-@cache
-def _linear_algebra() -> ThreadpoolController:
-    return ThreadpoolController()
 
 
 def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:

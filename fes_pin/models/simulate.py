@@ -229,19 +229,23 @@ class _Block:
         constants = [{**rig.trial_constants(t), **_timing(t, self.substeps)} for t in padded]
         self.constants = np.array([[c[n] for c in constants] for n in self.layout.constants]).reshape(-1, WIDTH)
         self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
-        self._shifted: dict[tuple[int, ...], np.ndarray] = {}
+        self._shifted: tuple[tuple[int, ...] | None, np.ndarray] = None, np.empty(0)
 
     def _driven(self, shift: tuple[int, ...]) -> np.ndarray:
-        """Inputs of all lanes, later by whole samples; before the trial begins they are as at rest: zero."""
-        if shift not in self._shifted:
-            self._shifted.clear()
-            u = np.zeros((self.count, len(self.inputs), WIDTH))
-            for lane, trial in enumerate(self.trials):
-                for j, name in enumerate(self.inputs):
-                    late = min(shift[lane], len(trial))
-                    u[late : len(trial), j, lane] = trial[name][: len(trial) - late]
-            self._shifted[shift] = u
-        return self._shifted[shift]
+        """Inputs of all lanes, later by whole samples; before the trial begins they are as at rest: zero.
+
+        The last ones are kept, in one piece with what they are for: another thread may ask for others meanwhile.
+        """
+        known, u = self._shifted
+        if known == shift:
+            return u
+        u = np.zeros((self.count, len(self.inputs), WIDTH))
+        for lane, trial in enumerate(self.trials):
+            for j, name in enumerate(self.inputs):
+                late = min(shift[lane], len(trial))
+                u[late : len(trial), j, lane] = trial[name][: len(trial) - late]
+        self._shifted = shift, u
+        return u
 
     def run(self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]], delay: float) -> Abreast:
         p = np.empty((len(self.layout.values), WIDTH))

@@ -1,0 +1,132 @@
+"""Called from many threads at once, the library answers what it answers one: no state that they share changes."""
+
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from models.cases import RIGS, trial
+from threadpoolctl import threadpool_info
+
+from fes_pin.body.build import Body
+from fes_pin.body.linearize import linearize
+from fes_pin.identify.fit import fit
+from fes_pin.models.compile import program
+from fes_pin.models.effects.electromechanical_delay import ElectromechanicalDelay
+from fes_pin.models.effects.sensor_offset import SensorOffset
+from fes_pin.models.model import Model
+from fes_pin.models.simulate import Simulator, simulate
+from fes_pin.muscles.nerves import Nerves
+from fes_pin.workers import one_thread_each
+
+THREADS = 8
+
+
+def elsewhere_at_every_line(frame, event, _):
+    """A trace that lets other threads run before every line of the package's own code."""
+    if "fes_pin" not in frame.f_code.co_filename:
+        return None
+    if event == "line":
+        time.sleep(0.0)
+    return elsewhere_at_every_line
+
+
+def alone_and_together(function, items, same=np.testing.assert_array_equal):
+    """Every item by one thread, then all of them by eight that start at once."""
+    alone, gate = [function(item) for item in items], threading.Barrier(THREADS)
+
+    def wait_and_do(share):
+        gate.wait()
+        sys.settrace(elsewhere_at_every_line)
+        try:
+            return [function(item) for item in share]
+        finally:
+            sys.settrace(None)
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        shares = list(pool.map(wait_and_do, [items[k::THREADS] for k in range(THREADS)]))
+    for k, share in enumerate(shares):
+        for one, other in zip(alone[k::THREADS], share, strict=True):
+            same(one, other)
+
+
+def test_a_simulator_that_delays_the_stimulus_is_shared():
+    """Every delay shifts the inputs by other samples; the last shifted ones are kept."""
+    rng = np.random.default_rng(0)
+    model = Model(RIGS["muscle"]) + ElectromechanicalDelay(delay_s=0.01)
+    simulator = Simulator(model, [trial("muscle", "isometric", rng, 200) for _ in range(2)])
+
+    def run(delay_s):
+        values = {**model.parameters(), "electromechanical_delay.delay_s": delay_s}
+        return np.array([s.readings for s in simulator.run(values)])
+
+    alone_and_together(run, list(rng.choice([0.005, 0.010, 0.015, 0.020, 0.025], 400)))
+
+
+@pytest.mark.parametrize("engine", program.settings.ENGINES)
+def test_models_are_compiled_and_run_side_by_side(engine, monkeypatch):
+    """From an empty memory: threads meet while a program is made."""
+    monkeypatch.setenv("FES_PIN_ENGINE", engine)
+    rng = np.random.default_rng(1)
+    models = [Model(rig) + SensorOffset() for rig in RIGS.values()]
+    models += [Model(rig) for rig in RIGS.values()]
+    kinds = {"ankle": "motion", "joint": "motion", "muscle": "isometric"}
+    cases = [(m, trial(m.rig.name, kinds[m.rig.name], rng, 40)) for m in models for _ in range(4)]
+
+    def run(case):
+        model, one = case
+        simulated = simulate(model, one)
+        return np.column_stack([simulated[n] for n in model.rig.outputs(one.kind)])
+
+    alone = [run(case) for case in cases]
+    program._PROGRAMS.clear()
+    with ThreadPoolExecutor(THREADS) as pool:
+        together = list(pool.map(run, cases))
+    for one, other in zip(alone, together, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_fits_side_by_side():
+    rng = np.random.default_rng(2)
+    model = Model(RIGS["muscle"])
+    trials = []
+    for _ in range(8):
+        bare = trial("muscle", "isometric", rng, 200)
+        trials.append(bare.with_columns(force_n=simulate(model, bare)["force_n"] + 0.2 * rng.standard_normal(200)))
+    start = model.with_parameters({n: 1.2 * model.parameters()[n] for n in model.fitted_parameters()})
+    names = model.fitted_parameters()
+
+    def fitted(one):
+        values = fit(start, [one]).values
+        return np.array([values[n] for n in names])
+
+    alone_and_together(fitted, trials)
+
+
+def test_a_body_and_its_nerves_are_shared():
+    body = Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
+    nerves, rng = Nerves(["left_femoral", "left_tibial", "right_hamstrings"]), np.random.default_rng(3)
+    postures = [{"left_knee_flexion": a, "right_hip_flexion": b} for a, b in rng.uniform(0.0, 0.5, (24, 2))]
+
+    def seen(posture):
+        linear = linearize(body, posture)
+        return np.concatenate([linear.A.ravel(), linear.B.ravel(), nerves.torque_matrix(posture).ravel()])
+
+    alone_and_together(seen, postures)
+
+
+def linear_algebra_threads():
+    return [one["num_threads"] for one in threadpool_info()]
+
+
+def test_the_limit_on_linear_algebra_ends_with_its_last_user():
+    before = linear_algebra_threads()
+    first, second = one_thread_each(), one_thread_each()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    assert set(linear_algebra_threads()) <= {1}  # the second still counts on it
+    second.__exit__(None, None, None)
+    assert linear_algebra_threads() == before
