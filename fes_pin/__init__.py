@@ -3,7 +3,35 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # the same names for type checkers; a test holds the two together
+    from fes_pin.allocate.allocate import allocate as allocate
+    from fes_pin.body.build import Body as Body
+    from fes_pin.body.linearize import linearize as linearize
+    from fes_pin.body.minimal_sets import minimal_sets as minimal_sets
+    from fes_pin.data.errors import InputError as InputError
+    from fes_pin.data.study import Study as Study
+    from fes_pin.data.study import read_study as read_study
+    from fes_pin.data.study import write_study as write_study
+    from fes_pin.data.trial import Trial as Trial
+    from fes_pin.data.trial import read_trial as read_trial
+    from fes_pin.data.trial import write_trial as write_trial
+    from fes_pin.diagnose.diagnosis import Diagnosis as Diagnosis
+    from fes_pin.diagnose.diagnosis import diagnose as diagnose
+    from fes_pin.identify.fit import Fit as Fit
+    from fes_pin.identify.fit import fit as fit
+    from fes_pin.models import effects as effects
+    from fes_pin.models import rigs as rigs
+    from fes_pin.models.model import Model as Model
+    from fes_pin.models.nominal import nominal_model as nominal_model
+    from fes_pin.models.predict import predict as predict
+    from fes_pin.models.simulate import simulate as simulate
+    from fes_pin.models.store import load_model as load_model
+    from fes_pin.models.store import save_model as save_model
+    from fes_pin.muscles.nerve_inputs import controllability as controllability
+    from fes_pin.muscles.nerves import Nerves as Nerves
+    from fes_pin.view.report import report as report
 
 __version__ = "0.1.0"
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Any
 
 from fes_pin.models.stage import Effect, Stage
 
@@ -28,7 +29,7 @@ EFFECTS = catalogue()
 """Every effect, in the order of the signal path."""
 
 
-def __getattr__(name: str) -> type[Effect]:
+def __getattr__(name: str) -> Any:  # each has parameters of its own, which no type of all effects names
     """An effect by the name of its class: `effects.CoulombFriction`."""
     for one in EFFECTS:
         if one.__name__ == name:

@@ -1,0 +1,39 @@
+"""What a user writes, in types that `mypy --strict` accepts; `.ci/run` checks them, a test runs it."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fes_pin as fp
+
+
+def with_friction(study: fp.Study) -> fp.Model:
+    """The believed model with a cause added."""
+    extended: fp.Model = fp.nominal_model(study) + fp.effects.CoulombFriction(torque_nm=0.04)
+    return extended
+
+
+def residual(model: fp.Model, trial: fp.Trial, column: str) -> NDArray[np.float64]:
+    """Measured minus simulated."""
+    simulated: fp.Trial = fp.simulate(model, trial)
+    return np.asarray(trial[column] - simulated[column], dtype=np.float64)
+
+
+def gains(diagnosis: fp.Diagnosis) -> dict[str, float]:
+    """Held-out gain by cause, percent."""
+    return {cause.name: cause.gain_held_out.percent for cause in diagnosis.causes}
+
+
+def refitted(study: fp.Study, folder: Path) -> fp.Fit:
+    """The fit of the model that was saved."""
+    fp.save_model(with_friction(study), folder / "model.toml")
+    return fp.fit(fp.load_model(folder / "model.toml"), study.trials)
+
+
+def one_line(folder: Path) -> str:
+    """What is wrong with a study that cannot be read."""
+    try:
+        return repr(fp.read_study(folder))
+    except fp.InputError as error:
+        return f"{error.file}: {error.message}"
