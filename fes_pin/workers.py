@@ -1,11 +1,14 @@
-"""Two threads for independent fits: machine code and linear algebra release the interpreter lock."""
+"""Two threads for independent fits (machine code and linear algebra release the interpreter lock), and their time."""
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import ContextVar, copy_context
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -59,5 +62,35 @@ def in_parallel(function: Callable[[In], Out], items: Iterable[In]) -> list[Out]
     work = list(items)
     if threads() == 1 or len(work) < 2:
         return [function(item) for item in work]
+    contexts = [copy_context() for _ in work]  # the limit of time holds in every thread
     with ThreadPoolExecutor(threads()) as pool:
-        return list(pool.map(function, work))
+        return list(pool.map(lambda context, item: context.run(function, item), contexts, work))
+
+
+class OutOfTime(Exception):
+    """Raised by work that was begun within a limit of time, once that has passed."""
+
+
+_END: ContextVar[float] = ContextVar("end", default=math.inf)
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Let what calls `check_time` go on for so long; infinity for as long as it takes."""
+    token = _END.set(time.monotonic() + seconds)
+    try:
+        yield
+    finally:
+        _END.reset(token)
+
+
+def check_time() -> None:
+    """End the work here if its time is over.
+
+    Raises
+    ------
+    OutOfTime
+        Past the end of the innermost `time_limit`.
+    """
+    if time.monotonic() > _END.get():
+        raise OutOfTime

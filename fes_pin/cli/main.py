@@ -50,6 +50,9 @@ def diagnose(
     study: Annotated[Path, typer.Argument(help="Folder of a study, or its study.toml.")],
     out: Annotated[Path, typer.Option(help="Folder for diagnosis.json, model.toml and report.html.")],
     seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values and bootstrap intervals.")] = 0,
+    limit: Annotated[
+        float | None, typer.Option(min=0.0, help="Seconds of search; then the best set of causes so far is told.")
+    ] = None,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
     from fes_pin.data.files import check_folder, write_files
@@ -62,7 +65,9 @@ def diagnose(
     from fes_pin.view.report import report_html
 
     with _progress() as tell:
-        diagnosis = find(measured, seed=seed, progress=lambda share, words: tell(DIAGNOSING * share, words))
+        diagnosis = find(
+            measured, seed=seed, limit=limit, progress=lambda share, words: tell(DIAGNOSING * share, words)
+        )
         tell(DIAGNOSING, "report")
         files = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
         tell(1.0, "done")

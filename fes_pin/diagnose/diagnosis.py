@@ -26,7 +26,7 @@ from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
 from fes_pin.identify.own import amplitude
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
-from fes_pin.workers import one_thread_each
+from fes_pin.workers import one_thread_each, time_limit
 
 ABSORBED_BELOW = 0.04
 """Share of its norm that an effect's sensitivity must keep beside the nominal parameters to be testable."""
@@ -147,7 +147,7 @@ class Diagnosis:
 Progress = Callable[[float, str], None]
 
 
-def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -> Diagnosis:
+def diagnose(study: Study, *, seed: int = 0, limit: float | None = None, progress: Progress | None = None) -> Diagnosis:
     """Find out what the nominal model of a study gets wrong.
 
     Parameters
@@ -157,6 +157,9 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
         the gain is cross-validated over all trials.
     seed
         Of what is simulated: critical values and bootstrap intervals.
+    limit
+        Seconds that the search may take; then it stops at the best set so far, and says so. What is done with that set,
+        and the first fit of the nominal model, come on top.
     progress
         Called with a share done and a few words.
 
@@ -179,7 +182,8 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
         recorded = [t for t in study.trials if t.role != "held_out"]
         search = Search(nominal_model(study), train, recorded, seed, tell)
         try:
-            searched = search.run()
+            with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
+                searched = search.run()
             tell(0.88, "held-out gain")
             diagnosis = _judge(study, search, searched, test, seed)
         except Unfit as problem:
@@ -189,6 +193,8 @@ def diagnose(study: Study, *, seed: int = 0, progress: Progress | None = None) -
             diagnosis = _unfitted(study, search.nominal(), reason, test)
     tell(1.0, "done")
     warnings += diagnosis.warnings
+    if limit is not None and search.was_stopped:
+        warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
     return replace(diagnosis, left_out=left_out, warnings=tuple(warnings), wall_s=time.perf_counter() - began)
 
 
@@ -234,7 +240,11 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
     left = remainder(searched.best, seed)
     causes, held = _causes(searched, left, test, seed)
     refused: list[Cause] = []
-    while weak := [c for c in causes if not c.helps(searched.complete, len(causes) == 1)]:
+    if searched.stopped and not all(c.helps(False, True) for c in causes):
+        searched = search.stopped(())
+        left = remainder(searched.best, seed)
+        causes, held = [], None
+    while not searched.stopped and (weak := [c for c in causes if not c.helps(searched.complete, len(causes) == 1)]):
         weakest = min(weak, key=lambda c: c.gain_held_out.low)
         refused.append(weakest)
         searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
@@ -242,7 +252,9 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         causes, held = _causes(searched, left, test, seed)
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     left, reason = with_error(_with_refused(left, refused), searched)
-    if not causes and not searched.complete:
+    if searched.stopped and not causes:
+        left, reason = replace(left, unexplained=True), "the search was stopped before a cause earned its place"
+    if not causes and not searched.complete and not searched.stopped:
         searched = search.for_prediction(searched)
         held = _held_out(searched, test)
     nominal, best = searched.nominal, searched.best
@@ -310,7 +322,7 @@ def _error(fitted: Fit, floor: NoiseModel) -> float:
 def _held_out(searched: Searched, test: Sequence[Trial]) -> HeldOut | None:
     if test:
         return separate(searched.nominal, searched.best, searched.without, test, searched.floor)
-    if len(searched.nominal.trials) < 2:
+    if len(searched.nominal.trials) < 2 or searched.stopped:
         return None
     contenders = sorted((f for fits in searched.rivals.values() for f in fits), key=lambda f: f.sse)[:CONTENDERS]
     if not searched.complete:

@@ -33,7 +33,7 @@ def test_a_missing_input_does_not_end_as_noise():
     lost = [t.with_columns(effort=np.zeros(len(t))) for t in study.trials]
     for trials, told in ((study.trials, False), (lost, True)):
         fitted = fit(nominal_model(study), trials)
-        searched = Searched(fitted, fitted, {}, {}, fitted, {}, None, [], fitted.noise)
+        searched = Searched(fitted, fitted, {}, {}, fitted, {}, [], fitted.noise)
         left, reason = with_error(silent, searched)
         assert left.unexplained == told
         assert (left == silent and reason is None) if not told else "is no noise of a reading" in reason

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.claims import Claims
-from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.search.joint_fits import LOOK, PURSUED, JointFits, Names, subsets
 from fes_pin.diagnose.search.promise import Scored, best_by_effect, best_pairs
 from fes_pin.diagnose.search.unfinished import choose_by_prediction, fit_for_prediction
 from fes_pin.identify.fit import Fit, fit_anyhow, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
+from fes_pin.workers import OutOfTime, time_limit
 
 MOST_CAUSES = 3
 BEAM = 3
@@ -74,6 +74,9 @@ class Searched:
         noise of the measurement.
     complete
         Whether the best set leaves only noise.
+    stopped
+        Whether the search ended at its limit of time: then rivals are those that were fitted by chance, and nothing was
+        tried on trials left out.
     """
 
     nominal: Fit
@@ -82,10 +85,10 @@ class Searched:
     rivals: dict[str, list[Fit]]
     judged: Fit
     without: dict[str, Fit]
-    family: Family
     scored: list[Scored]
     floor: NoiseModel
     complete: bool = True
+    stopped: bool = False
 
 
 class Search:
@@ -96,11 +99,22 @@ class Search:
     ) -> None:
         self.sets, self.seed, self.progress = JointFits(model, trials), seed, progress
         self.recorded, self.library = tuple(recorded), self.sets.library
+        self._scored: list[Scored] = []
+        self.was_stopped = False
 
     def run(self) -> Searched:
-        """Search."""
-        self._nominal()
-        self._singles()
+        """Search, as long as the limit of time lets it; the nominal model is fitted anyway."""
+        try:
+            self._nominal()
+            self._singles()
+            return self._best_set()
+        except OutOfTime:
+            self.was_stopped = True
+            with time_limit(math.inf):
+                return self.stopped(self._reached[0])
+
+    def _best_set(self) -> Searched:
+        """The best set of causes, and everything that is to be said of it."""
         best: Names = ()
         for size in range(1, MOST_CAUSES + 1):
             self.progress(0.35 + 0.12 * size, f"sets of {size}")
@@ -115,6 +129,7 @@ class Search:
             if self.claims.better(first, best):
                 self._refine(first)
                 best = first
+            self._reach(best)
             if best == first and self.claims.complete(best):
                 ranked = self.sets.ranked
                 self.sets.refit([(), best, *ranked(1)[:6], *ranked(size)[:6], *subsets(best)], best)
@@ -127,6 +142,25 @@ class Search:
             self._refine(best)
         self.sets.refit([(), best, *self._beside(best), *subsets(best)], best)
         return self.settle(best)
+
+    def _reach(self, best: Names) -> None:
+        """Keep what a search that is stopped falls back on."""
+        self._reached = (best, self.sets.noise, dict(self.sets.fits))
+
+    def stopped(self, names: Names) -> Searched:
+        """What is known of a set of causes where the search was stopped, without another search for its rivals."""
+        sets = self.sets
+        _, noise, fits = self._reached
+        sets.set_noise(noise)
+        sets.fits = dict(fits)
+        without = {n: sets.base(tuple(m for m in names if m != n), names) for n in names}
+        rivals = {
+            n: sorted((sets.fits[k] for k in self._siblings(names, n) if k != names), key=lambda f: f.sse)
+            for n in names
+        }
+        p_values = {n: self.claims.p_value(sets.fits[names], without[n]) for n in names}
+        best, floor = sets.fits[names], rough_noise(sets.model, sets.trials)
+        return Searched(sets.fits[()], best, p_values, rivals, best, without, self._scored, floor, False, True)
 
     def nominal(self) -> Fit:
         """The nominal model as far as it has been fitted."""
@@ -162,8 +196,10 @@ class Search:
         sets = self.sets
         self.progress(0.02, "nominal model")
         sets.set_noise(rough_noise(sets.model, sets.trials))
-        first = fit_anyhow(sets.problem(sets.model), sets.model.parameters(), None, LOOK)
+        with time_limit(math.inf):
+            first = fit_anyhow(sets.problem(sets.model), sets.model.parameters(), None, LOOK)
         self._begun = first
+        self._reached = ((), first.noise, {(): first})
         if not math.isfinite(first.sse):
             raise Unfit(
                 "the nominal model's simulation leaves the floating-point numbers from its start values on", first
@@ -172,12 +208,13 @@ class Search:
         sets.first_noise(first)
         sets.fits[()] = sets.fit_from([first.model], first.unknowns)
         sets.finish(())
+        self._reach(())
 
     def _singles(self) -> None:
         sets, base = self.sets, self.sets.fits[()]
         self.progress(0.08, "screening")
         scores = sets.scores(base)
-        self.claims = Claims(sets, scores, self.seed)
+        self.claims, self._scored = Claims(sets, scores, self.seed), scores.scored
         self._seeds = best_pairs(scores, SEEDS)
         self.progress(0.12, "every cause, fitted jointly")
         by_effect = best_by_effect(scores.scored)
@@ -276,7 +313,7 @@ class Search:
             p_values[name] = self.claims.p_value(sets.fits[names], without[name])
         none, best = sets.fits[()], sets.fits[names]
         scored = sets.scores(none).scored + (sets.scores(best).scored if names else [])
-        return Searched(none, best, p_values, rivals, best, without, self.claims.family, scored, best.noise)
+        return Searched(none, best, p_values, rivals, best, without, scored, best.noise)
 
     def _siblings(self, names: Names, name: str) -> list[Names]:
         """Sets fitted already that differ from `names` in `name` alone."""
