@@ -154,10 +154,8 @@ class Search:
         sets.set_noise(noise)
         sets.fits = dict(fits)
         without = {n: sets.base(tuple(m for m in names if m != n), names) for n in names}
-        rivals = {
-            n: sorted((sets.fits[k] for k in self._siblings(names, n) if k != names), key=lambda f: f.sse)
-            for n in names
-        }
+        beside = {n: [sets.fits[k] for k in self._siblings(names, n) if k != names] for n in names}
+        rivals = {n: sorted(fits, key=lambda f: f.sse) for n, fits in beside.items()}
         p_values = {n: self.claims.p_value(sets.fits[names], without[n]) for n in names}
         best, floor = sets.fits[names], rough_noise(sets.model, sets.trials)
         return Searched(sets.fits[()], best, p_values, rivals, best, without, self._scored, floor, False, True)
