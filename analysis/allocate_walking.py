@@ -1,13 +1,15 @@
 """Which part of walking can stimulated nerves make, which pulse widths do it, and what is short, and why?
 
 Measured walking (two strides, one adult) gives the joint torques; what ligaments and resting muscle give by themselves
-(Riener and Edrich 1999, healthy legs) is taken off; four sets of nerves are asked for the rest. Levers of the trunk's
-muscles are round figures of the size that imaging gives (Jorgensen et al. 2001, McGill et al. 1993), constant over
-posture: read "legs and trunk" as a sign and a size, no more (fes_pin/muscles/tables/SOURCE.md).
+(Riener and Edrich 1999, healthy legs) is taken off; four sets of nerves are asked for the rest, with the strength of
+paralysed muscle, weaker and stronger ones beside it, and with forces that fall off over length and speed. Levers of
+the trunk's muscles are round figures of the size that imaging gives (Jorgensen et al. 2001, McGill et al. 1993),
+constant over posture: read "legs and trunk" as a sign and a size, no more (fes_pin/muscles/tables/SOURCE.md).
 Run the cells, or `python analysis/allocate_walking.py`; the picture goes to out/allocate_walking.png.
 """
 
 # %% The torques of a measured walk
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -23,10 +25,15 @@ from fes_pin.allocate.walk import allocate_walk, clipped, direction_error, resca
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.measured_walk import read_walk
 from fes_pin.body.passive import PassiveLegs
-from fes_pin.muscles.nerves import Nerves
+from fes_pin.data.errors import InputError
+from fes_pin.muscles.nerves import HEALTHY, PARALYSED, PARALYSED_BAND, Nerves
 from fes_pin.muscles.recruitment import LinearRecruitment
 
-measured = read_walk()
+try:
+    measured = read_walk()
+except InputError as error:
+    print(f"allocate_walking: {error}", file=sys.stderr)
+    raise SystemExit(2) from None
 walk = measured.active(PassiveLegs())
 weights = walk.known.astype(float)
 LEG = [n.removeprefix("left_") for n in Nerves().names if n.startswith("left_")]
@@ -40,13 +47,15 @@ SETS = {
 SAGITTAL = [
     f"{side}_{joint}" for side in ("left", "right") for joint in ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 ]
+sagittal_only = np.isin(JOINT_NAMES, SAGITTAL).astype(float)
+STRENGTHS = (PARALYSED_BAND[0], PARALYSED, PARALYSED_BAND[1], HEALTHY)
 
 
 def both_sides(names):
     return [f"{side}_{name}" for side in ("left", "right") for name in names]
 
 
-# %% Attained: every joint that counts within 10 % of its peak torque; strengths are known to a factor of 1.8
+# %% Attained: every joint that counts within 10 % of its peak torque; forces over length and speed
 def attained(result, joints):
     index = [JOINT_NAMES.index(j) for j in joints]
     met = np.abs(result.shortfall[:, index]) <= np.maximum(0.1 * np.abs(result.wanted[:, index]).max(0), 1.0)
@@ -58,29 +67,47 @@ for joint in SAGITTAL[3:]:
     j = JOINT_NAMES.index(joint)
     print(f"{joint:28s} by itself {given[:, j].min():+6.1f} to {given[:, j].max():+6.1f} N m")
 print(f"{len(walk.time)} samples, {walk.time[-1] - walk.time[0]:.2f} s; joints within 10 % of their peak torque")
-print(f"{'nerves':22s} {'all sagittal':>24s} {'all in 3-D':>20s} {'joint samples':>16s}   (weak, table, strong)")
+columns = "strength " + " - ".join(f"{x:g}" for x in STRENGTHS) + " of a healthy adult's"
+print(f"{'nerves':22s} {'all sagittal':>28s} {'all in 3-D':>28s}   ({columns})")
 results = {}
 for name, nerves in SETS.items():
     row = []
-    for strength in (1 / 1.8, 1.0, 1.8):
+    for strength in STRENGTHS:
         channels = Nerves(both_sides(nerves), strength=strength)
-        sagittal = allocate_walk(walk.torque, channels, walk.q, weights=np.isin(JOINT_NAMES, SAGITTAL).astype(float))
-        full = allocate_walk(walk.torque, channels, walk.q, weights=weights)
+        sagittal = allocate_walk(walk.torque, channels, walk.q, walk.rates, weights=sagittal_only)
+        full = allocate_walk(walk.torque, channels, walk.q, walk.rates, weights=weights)
         assert max(sagittal.residual.max(), full.residual.max()) < 1e-9
-        row.append((attained(sagittal, SAGITTAL)[0], *attained(full, walk.known_joints)))
-        if strength == 1.0:
+        row.append((attained(sagittal, SAGITTAL)[0], attained(full, walk.known_joints)[0]))
+        if strength == PARALYSED:
             results[name] = (sagittal, full)
-    cells = [" - ".join(f"{100 * r[k]:3.0f}" for r in row) + " %" for k in range(3)]
-    print(f"{name:22s} {cells[0]:>24s} {cells[1]:>20s} {cells[2]:>16s}")
+    cells = [" - ".join(f"{100 * r[k]:3.0f}" for r in row) + " %" for k in range(2)]
+    print(f"{name:22s} {cells[0]:>28s} {cells[1]:>28s}")
+
+# %% What the strength assumed and the forces' fall over length and speed do to it
+chosen = "four a leg"
+FORCES = {
+    "as at the best length, at rest": (False, False),
+    "over length": (True, False),
+    "over speed": (False, True),
+    "over length and speed": (True, True),
+}
+share = {}
+print(f"{chosen}, all sagittal; columns: {columns}")
+for forces, (over_length, over_speed) in FORCES.items():
+    for strength in STRENGTHS:
+        channels = Nerves(both_sides(SETS[chosen]), strength=strength, force_length=over_length)
+        rates = walk.rates if over_speed else None
+        found = allocate_walk(walk.torque, channels, walk.q, rates, weights=sagittal_only)
+        share[forces, strength] = attained(found, SAGITTAL)[0]
+    print(f"{forces:32s}" + "".join(f"{100 * share[forces, strength]:6.0f} %" for strength in STRENGTHS))
 
 # %% What it changes that joints give torque by themselves; paralysed legs may give less, or with contractures more
 alone = {}
-sagittal_only = np.isin(JOINT_NAMES, SAGITTAL).astype(float)
 for name, nerves in SETS.items():
     cells = []
     for factor in (0.0, 0.5, 1.0, 2.0):
         wanted = measured.active(PassiveLegs(factor)).torque
-        found = allocate_walk(wanted, Nerves(both_sides(nerves)), walk.q, weights=sagittal_only)
+        found = allocate_walk(wanted, Nerves(both_sides(nerves)), walk.q, walk.rates, weights=sagittal_only)
         cells.append(f"{factor:g}: {100 * attained(found, SAGITTAL)[0]:3.0f} %")
         if factor == 0.0:
             alone[name] = attained(found, SAGITTAL)[0]
@@ -121,7 +148,6 @@ for torque in (0.0, 0.5, 1.5, 2.5):
     print(f"ankle rig, {torque} N m wanted:", str(rig([torque])).replace("\n", "; "))
 
 # %% The picture
-chosen = "four a leg"
 sagittal, _ = results[chosen]
 figure, axes = plt.subplots(2, 3, figsize=(13, 7.2), constrained_layout=True)
 titles = ("right hip, flexion +", "right knee, flexion +", "right ankle, dorsiflexion +")
@@ -133,7 +159,7 @@ for axis, joint, title in zip(axes[0], SAGITTAL[3:], titles, strict=True):
         sagittal.achieved[:, j],
         color="tab:orange",
         lw=1.5,
-        label="stimulated: femoral, hamstrings,\ntibial, deep peroneal",
+        label="stimulated, paralysed: femoral,\nhamstrings, tibial, deep peroneal",
     )
     axis.fill_between(
         walk.time, walk.torque[:, j], sagittal.achieved[:, j], color="tab:red", alpha=0.25, lw=0, label="short"
@@ -162,7 +188,7 @@ axes[1, 1].plot(knee, ankle, color="0.25", lw=1.5, label="measured walking")
 axes[1, 1].set(
     title="attainable torque, knee and ankle", xlabel="knee flexion (N m)", ylabel="ankle dorsiflexion (N m)"
 )
-axes[1, 1].set_ylim(-480, 100)
+axes[1, 1].set_ylim(-130, 60)
 axes[1, 1].legend(fontsize=8, loc="lower left")
 place = np.arange(len(errors))
 for k, (rule, colour) in enumerate({"this": "tab:orange", "clip": "tab:blue", "rescale": "tab:green"}.items()):
@@ -178,12 +204,12 @@ out.mkdir(exist_ok=True)
 figure.savefig(out / "allocate_walking.png", dpi=110)
 
 # %% The number
-share = {name: attained(sagittal, SAGITTAL)[0] for name, (sagittal, _) in results.items()}
+weak, usual, strong, healthy = (100 * share["over length and speed", strength] for strength in STRENGTHS)
 print(
-    f"Four nerves a leg make {100 * alone[chosen]:.0f} % of the samples of walking (sagittal hip, knee and ankle) "
-    f"if joints give nothing by themselves, {100 * share[chosen]:.0f} % with the passive torque of healthy legs."
+    f"Four nerves a leg make {usual:.0f} % of the samples of walking (sagittal hip, knee and ankle) with half a "
+    f"healthy adult's strength, {weak:.0f} to {strong:.0f} % with what paralysed muscle has, "
+    f"{healthy:.0f} % with a healthy adult's; {100 * alone[chosen]:.0f} % if joints give nothing by themselves."
 )
-example = allocate(
-    dict(zip(JOINT_NAMES, walk.torque[60], strict=True)), Nerves(both_sides(SETS[chosen])), walk.q[60], weights=weights
-)
-print(example)
+nerves = Nerves(both_sides(SETS[chosen]))
+wanted = dict(zip(JOINT_NAMES, walk.torque[60], strict=True))
+print(allocate(wanted, nerves, walk.q[60], v=walk.rates[60], weights=weights))

@@ -103,7 +103,13 @@ class LegPaths:
             if COORDINATES[j] == "knee_flexion":
                 change += self._sliding(angles[:, j], turns, carrier, pull)
             arms[:, j] = -np.add.reduceat(change, self.first, axis=1)
-        return arms
+        return np.where(self.crossed, arms, 0.0)
+
+    @property
+    def crossed(self) -> np.ndarray:
+        """Which of the coordinates each muscle crosses, (7, muscles): about the others it has no arm."""
+        inner, outer = (f.reduceat(self.body, self.first) for f in (np.minimum, np.maximum))
+        return (inner < MOVED_FROM[:, None]) & (outer >= MOVED_FROM[:, None])
 
     def _sliding(self, flexion, turns, carrier, pull) -> np.ndarray:
         """Change of length at each point because the tibia and the kneecap's points slide as the knee bends."""

@@ -72,6 +72,14 @@ def test_moment_arms_are_the_gradient_of_the_length():
     np.testing.assert_allclose(-gradient, table.moment_arms(q[:, 0]), atol=1e-8)
 
 
+def test_a_nerve_has_no_torque_about_a_joint_that_it_does_not_cross():
+    torque = Nerves(["left_tibial", "left_femoral"]).torque_matrix(random_angles(5))
+    turned = {JOINT_NAMES[j] for j in range(19) if torque[:, j, 0].any()}
+    assert turned == {f"left_{j}" for j in ("knee_flexion", "ankle_dorsiflexion", "ankle_inversion", "mtp_extension")}
+    reasons = allocate({"left_hip_adduction": 20.0}, Nerves(["left_tibial"])).reasons
+    assert reasons == ["left hip adduction 20.0 N m short: no stimulated nerve turns it"]
+
+
 @pytest.mark.parametrize("joint", KNOWN_DEG)
 def test_no_muscle_jumps_far_where_a_point_of_its_path_is_left_out(joint):
     """A jump in length is force that works for nothing; of torque, a kick."""
