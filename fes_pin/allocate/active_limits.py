@@ -60,7 +60,9 @@ class Limits:
         """The limits that a guess means."""
         return np.where(at > 0.0, self.high, self.low)
 
-    def exchanged(self, u, y, z, at, tie, slope: float) -> tuple[np.ndarray, np.ndarray]:
+    def exchanged(
+        self, u: np.ndarray, y: np.ndarray, z: np.ndarray, at: np.ndarray, tie: np.ndarray, slope: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The next guess: wrong limits let go (`slope` is rounding of multipliers), violated ones taken up."""
         at, tie = np.where(at * y < -slope, 0.0, at), np.where(tie * z < -slope, 0.0, tie)
         at = np.where(np.abs(u - self.at(at)) > SLACK, 0.0, at)
@@ -73,7 +75,9 @@ class Limits:
         return at, tie
 
 
-def make_exact(curvature, f, limits: Limits, near, y) -> tuple[np.ndarray, np.ndarray, int] | None:
+def make_exact(
+    curvature: np.ndarray, f: np.ndarray, limits: Limits, near: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, int] | None:
     """Plan (steps, n), multipliers (2 steps - 1, n) and guesses that it took; None if no guess settled.
 
     Parameters
@@ -103,7 +107,9 @@ def make_exact(curvature, f, limits: Limits, near, y) -> tuple[np.ndarray, np.nd
     return None
 
 
-def solve_with(H, f, limits: Limits, at, tie, box) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def solve_with(
+    H: np.ndarray, f: np.ndarray, limits: Limits, at: np.ndarray, tie: np.ndarray, box: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Plan and multipliers of limits and rates, (n, steps) each, if these limits hold and no others.
 
     `box` are multipliers of limits for those that do not follow.

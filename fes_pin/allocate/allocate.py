@@ -15,7 +15,9 @@ from fes_pin.allocate.allocator import Allocator
 __all__ = ["Allocator", "allocate"]
 
 
-def allocate(torque, nerves, q=None, previous=None, *, solver: str = "daqp", **options) -> Allocation:
+def allocate(
+    torque: Any, nerves: Any, q: Any = None, previous: Any = None, *, solver: str = "daqp", **options: Any
+) -> Allocation:
     """Pulse widths for a wanted joint torque.
 
     Parameters
@@ -55,7 +57,7 @@ class Asked:
     options: Any = field(compare=False)
 
 
-def allocator_for(nerves, q, options: Mapping[str, Any]) -> Allocator:
+def allocator_for(nerves: Any, q: Any, options: Mapping[str, Any]) -> Allocator:
     """The program for these moment arms and options, made anew only if it is not among the recent ones."""
     asked = Asked((frozen(nerves), frozen(q), frozen(options)), nerves, q, options)
     try:
@@ -71,7 +73,7 @@ def recent(asked: Asked) -> Allocator:
     return Allocator(asked.nerves, asked.q, **asked.options)
 
 
-def frozen(value):
+def frozen(value: Any) -> Any:
     """What tells two arguments apart, hashable: equal values, equal keys."""
     if isinstance(value, np.ndarray):
         return value.shape, value.dtype.str, value.tobytes()

@@ -10,8 +10,9 @@ from fes_pin.allocate.allocation import Allocation, AllocationSequence
 from fes_pin.allocate.bounded import BoundedProgram, known_solver, solve_by, solve_sequence
 from fes_pin.allocate.certificate import Certifier
 from fes_pin.allocate.efforts import CUBE_TOLERANCE, error_then_effort, least_cubes
+from fes_pin.allocate.inputs import wanted_torque, wanted_torques
 from fes_pin.allocate.off_or_enough import best_choice, rounded
-from fes_pin.allocate.problem import Options, Problem, problem_of, wanted_torque, wanted_torques
+from fes_pin.allocate.problem import Options, Problem, problem_of
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.named import by_name
 
@@ -40,7 +41,7 @@ class Allocator:
         Anything that is not as it is said there.
     """
 
-    def __init__(self, nerves, q=None, *, v=None, **options: Any) -> None:
+    def __init__(self, nerves: Any, q: Any = None, *, v: Any = None, **options: Any) -> None:
         self.problem: Problem = problem_of(nerves, q, v, Options.of(options))
         p = self.problem
         self.certify = Certifier(p)
@@ -65,7 +66,7 @@ class Allocator:
         """Number of channels."""
         return len(self.problem.names)
 
-    def __call__(self, torque, previous=None, *, solver: str = "daqp") -> Allocation:
+    def __call__(self, torque: Any, previous: Any = None, *, solver: str = "daqp") -> Allocation:
         """Allocate one torque.
 
         Parameters
@@ -107,7 +108,16 @@ class Allocator:
             return self.result(self.program.solve(f, lower, upper), wanted, lower, upper, before)
         return self.result(self._ask(solver, f, lower, upper), wanted, lower, upper, before)
 
-    def result(self, r, wanted, lower, upper, before, note: str = "", accuracy: float = 0.0) -> Allocation:
+    def result(
+        self,
+        r: np.ndarray,
+        wanted: np.ndarray,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        before: np.ndarray,
+        note: str = "",
+        accuracy: float = 0.0,
+    ) -> Allocation:
         """The allocation with its certificate, recomputed from the moment arms."""
         r = self.certify.at_limits(before, wanted, r, lower, upper, accuracy)
         certificate, achieved, gradient = self.certify(before, wanted, r, lower, upper)
@@ -128,13 +138,15 @@ class Allocator:
             note,
         )
 
-    def _ask(self, solver: str, f, lower, upper) -> np.ndarray:
+    def _ask(self, solver: str, f: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
         """Solve through qpsolvers; a limit that a step down the slope would reach holds."""
         r = np.clip(solve_by(solver, self.H, f, lower=lower, upper=upper)[0], lower, upper)
         step = r - (self.H @ r + f)
         return np.where(step <= lower, lower, np.where(step >= upper, upper, r))
 
-    def _choose(self, f, wanted, lower, upper, before) -> Allocation:
+    def _choose(
+        self, f: np.ndarray, wanted: np.ndarray, lower: np.ndarray, upper: np.ndarray, before: np.ndarray
+    ) -> Allocation:
         """Solve with channels that are off or at least at their least; the certificate is of the choice made."""
         p = self.problem
         assert p.least is not None
@@ -151,7 +163,7 @@ class Allocator:
             choice.r, width, wanted, achieved, gradient, lower, upper, before, certificate, choice.gap, p, note
         )
 
-    def sequence(self, torques, previous=None) -> AllocationSequence:
+    def sequence(self, torques: Any, previous: Any = None) -> AllocationSequence:
         """Allocate a torque over time, samples in order, each starting from the last.
 
         Parameters
@@ -175,7 +187,7 @@ class Allocator:
         r = solve_sequence(self.H, F, p.lower, p.upper, keep=p.change, rate=p.rate, previous=start)
         return self._certified(r, wanted, start)
 
-    def _certified(self, r, wanted, start) -> AllocationSequence:
+    def _certified(self, r: np.ndarray, wanted: np.ndarray, start: np.ndarray) -> AllocationSequence:
         """Arrays of results with residuals recomputed from the moment arms."""
         p = self.problem
         before: Any = np.vstack([start, r[:-1]]) if p.change or p.rate < np.inf else start

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
 
 from fes_pin.allocate.bounded import BoundedProgram
-from fes_pin.allocate.problem import torque_matrix
+from fes_pin.allocate.inputs import torque_matrix
 from fes_pin.allocate.walk import allocate_walk
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
@@ -63,7 +64,7 @@ class AttainableTorques:
         Unknown joint, or a matrix that is not finite or out of any body's range.
     """
 
-    def __init__(self, nerves, q=None, joints: Sequence[str] | None = None, upper=1.0) -> None:
+    def __init__(self, nerves: Any, q: Any = None, joints: Sequence[str] | None = None, upper: Any = 1.0) -> None:
         whole, names = torque_matrix(nerves, q)
         known = JOINT_NAMES if len(whole) == len(JOINT_NAMES) else tuple(f"joint_{j + 1}" for j in range(len(whole)))
         self.joints = tuple(joints) if joints is not None else known
@@ -73,7 +74,7 @@ class AttainableTorques:
         self.names, self.upper = names, by_name(upper, names, "upper limits", 1.0)
         self.columns = whole[[known.index(name) for name in self.joints]] * self.upper
 
-    def support(self, direction) -> float:
+    def support(self, direction: Any) -> float:
         """Greatest component of attainable torque along a direction (by joint name or array), times its length, N m."""
         return float(np.maximum(by_name(direction, self.joints, "direction", 0.0) @ self.columns, 0.0).sum())
 
@@ -81,7 +82,7 @@ class AttainableTorques:
         """Least and greatest torque of one joint, whatever the others do, N m."""
         return -self.support({joint: -1.0}), self.support({joint: 1.0})
 
-    def nearest(self, torque) -> Nearest:
+    def nearest(self, torque: Any) -> Nearest:
         """The attainable torque nearest to one wanted (by joint name, absent 0, or array over those that count)."""
         wanted = by_name(torque, self.joints, "torque", 0.0)
         scale = float((self.columns**2).sum(0).max(initial=0.0)) or 1.0
@@ -94,11 +95,11 @@ class AttainableTorques:
                 break
         return Nearest(self.columns @ r, r * self.upper, float(np.linalg.norm(self.columns @ r - wanted)))
 
-    def contains(self, torque) -> bool:
+    def contains(self, torque: Any) -> bool:
         """Whether the torque is attainable, to 1e-6 N m."""
         return self.nearest(torque).inside
 
-    def share(self, torque) -> float:
+    def share(self, torque: Any) -> float:
         """Greatest multiple of the torque that is attainable, infinite for no torque (a linear program)."""
         wanted = by_name(torque, self.joints, "torque", 0.0)
         if not wanted.any():
@@ -127,7 +128,7 @@ class AttainableTorques:
         return np.vstack([path, path[-1] + lowest - path[1:-1]])
 
 
-def gait_share(torques, nerves, q, joints: Sequence[str], tolerance_nm: float = MET_NM) -> float:
+def gait_share(torques: Any, nerves: Any, q: Any, joints: Sequence[str], tolerance_nm: float = MET_NM) -> float:
     """Fraction of a gait's samples whose torque is attained on all the given joints within a tolerance.
 
     Each sample is allocated with the error of these joints only; attained means that none misses by more.

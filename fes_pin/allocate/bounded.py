@@ -22,7 +22,7 @@ TOLERANCE = 1e-11
 UNSOLVED = "no solver finds the allocation: torques or moment arms of too different sizes"
 
 
-def held(r, multipliers, lower, upper) -> np.ndarray:
+def held(r: np.ndarray, multipliers: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Answers (..., n) of DAQP, exactly at the limits that have a multiplier: positive for upper ones."""
     inside = np.minimum(np.maximum(r, lower), upper)
     return np.where(multipliers > 0.0, upper, np.where(multipliers < 0.0, lower, inside))
@@ -85,7 +85,16 @@ class BoundedProgram:
         return held(r, info["lam"], lower, upper)
 
 
-def solve_sequence(H, F, lower, upper, *, keep: float = 0.0, rate: float = np.inf, previous=None) -> np.ndarray:
+def solve_sequence(
+    H: Any,
+    F: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    *,
+    keep: float = 0.0,
+    rate: float = np.inf,
+    previous: np.ndarray | None = None,
+) -> np.ndarray:
     """Solutions (count, n) of samples in order, each warm-started from the last.
 
     Parameters
@@ -140,7 +149,15 @@ def known_solver(solver: Any, own: str, has: str) -> str:
 
 
 def solve_by(
-    solver: str, H, f, rows=None, least=None, most=None, lower=None, upper=None, equal=None
+    solver: str,
+    H: Any,
+    f: np.ndarray,
+    rows: Any = None,
+    least: np.ndarray | None = None,
+    most: np.ndarray | None = None,
+    lower: np.ndarray | None = None,
+    upper: np.ndarray | None = None,
+    equal: Any = None,
 ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
     """`min 1/2 x'Hx + f'x, least <= rows x <= most, lower <= x <= upper, equal x = 0` through qpsolvers.
 
@@ -153,13 +170,13 @@ def solve_by(
         The solver finds no answer.
     """
 
-    def matrix(a) -> Any:
+    def matrix(a: Any) -> Any:
         if solver in qpsolvers.sparse_solvers:
             return csc_matrix(a)
         return a.toarray() if issparse(a) else a
 
     G, h, A, b = None, None, None, None
-    if rows is not None:
+    if rows is not None and least is not None and most is not None:
         G, h = matrix(vstack([csc_matrix(rows), -csc_matrix(rows)])), np.concatenate([most, -least])
     if equal is not None:
         A, b = matrix(equal), np.zeros(equal.shape[0])

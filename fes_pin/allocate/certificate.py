@@ -48,7 +48,9 @@ class Certificate:
         return self.residual <= tolerance and math.isfinite(self.cost) and math.isfinite(self.gap)
 
 
-def residuals(gradient, r, lower, upper):
+def residuals(
+    gradient: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Primal, dual, complementarity and gap per sample, over the last axis."""
     below, above = r - lower, upper - r
     largest = np.maximum.reduce
@@ -91,7 +93,7 @@ class Certifier:
         """
         return self.unit + self.arms * float(np.abs(wanted).max())
 
-    def gradient(self, achieved, wanted, r, previous) -> np.ndarray:
+    def gradient(self, achieved: np.ndarray, wanted: np.ndarray, r: np.ndarray, previous: np.ndarray) -> np.ndarray:
         """Slope of the cost over recruitment, (..., n), at `achieved` (..., joints) N m."""
         slope = ((achieved - wanted) * self.weighed) @ self.problem.matrix
         if not self.first_only:
@@ -100,7 +102,7 @@ class Certifier:
                 slope += self.change * (r - previous)
         return slope
 
-    def cost(self, achieved, wanted, r, previous) -> float:
+    def cost(self, achieved: np.ndarray, wanted: np.ndarray, r: np.ndarray, previous: np.ndarray) -> float:
         """Cost of one sample."""
         error = achieved - wanted
         cost = 0.5 * float((self.weighed * error) @ error)
@@ -110,7 +112,9 @@ class Certifier:
                 cost += 0.5 * self.change * float((r - previous) @ (r - previous))
         return cost
 
-    def __call__(self, previous, wanted, r, lower, upper) -> tuple[Certificate, np.ndarray, np.ndarray]:
+    def __call__(
+        self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    ) -> tuple[Certificate, np.ndarray, np.ndarray]:
         """Certificate, achieved torque and gradient of one sample."""
         achieved = r @ self.turned
         gradient = self.gradient(achieved, wanted, r, previous)
@@ -119,7 +123,9 @@ class Certifier:
         proof = Certificate(float(primal), float(dual), float(complementarity), float(gap), cost, self.problem.scale)
         return proof, achieved, gradient
 
-    def residual(self, previous, wanted, r, lower, upper) -> np.ndarray:
+    def residual(
+        self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    ) -> np.ndarray:
         """Greatest residual per sample of arrays (..., n)."""
         gradient = self.gradient(r @ self.turned, wanted, r, previous)
         return np.maximum.reduce(residuals(gradient, r, lower, upper)[:3])
@@ -129,7 +135,15 @@ class Certifier:
         squares = rounding / (self.problem.prices + self.problem.change)
         return np.maximum(squares, np.sqrt(rounding / self.problem.prices)) if self.problem.cubes else squares
 
-    def at_limits(self, previous, wanted, r, lower, upper, accuracy: float = 0.0) -> np.ndarray:
+    def at_limits(
+        self,
+        previous: np.ndarray,
+        wanted: np.ndarray,
+        r: np.ndarray,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        accuracy: float = 0.0,
+    ) -> np.ndarray:
         """The same recruitments (n,), at their limits where the certificate cannot tell them from these.
 
         What is within the certificate's own rounding error of a limit is at the limit: off is off, not a pulse at

@@ -17,19 +17,21 @@ PRESSED = 1e-10
 """A limit that the torque error presses on by less than this holds for the sake of effort."""
 
 
-def natural_residual(gradient, r, lower, upper) -> float:
+def natural_residual(gradient: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
     """Greatest `|r - clip(r - gradient)|`."""
     return float(np.abs(r - np.clip(r - gradient, lower, upper)).max())
 
 
-def least_cubes(squares, f, prices, change: float, lower, upper) -> tuple[np.ndarray, str]:
+def least_cubes(
+    squares: np.ndarray, f: np.ndarray, prices: np.ndarray, change: float, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray, str]:
     """Minimise `1/2 r'Sr + f'r + prices r^3 / 3 + change/2 r'r` by quadratic programs in turn with a line search.
 
     Returns the recruitment and a note that is empty when it converged.
     """
     base = squares + change * np.eye(len(f))
 
-    def cost(r):
+    def cost(r: np.ndarray) -> float:
         return 0.5 * r @ base @ r + f @ r + prices @ r**3 / 3.0
 
     r = np.clip(np.full(len(f), 0.5), lower, upper)
@@ -46,7 +48,15 @@ def least_cubes(squares, f, prices, change: float, lower, upper) -> tuple[np.nda
     return r, f"not converged in {STEPS} quadratic programs"
 
 
-def error_then_effort(squares, f, prices, change: float, previous, lower, upper) -> tuple[np.ndarray, str]:
+def error_then_effort(
+    squares: np.ndarray,
+    f: np.ndarray,
+    prices: np.ndarray,
+    change: float,
+    previous: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> tuple[np.ndarray, str]:
     """Least `1/2 r'Sr + f'r`, S possibly singular; among its minimisers the least effort and change.
 
         prices r^2 / 2 + change / 2 (r - previous)^2
@@ -80,7 +90,9 @@ def error_then_effort(squares, f, prices, change: float, previous, lower, upper)
     return best, f"least effort among equals, to {least:.0e}"
 
 
-def least_norm(squares, f, total, target, guess, free) -> np.ndarray:
+def least_norm(
+    squares: np.ndarray, f: np.ndarray, total: np.ndarray, target: np.ndarray, guess: np.ndarray, free: np.ndarray
+) -> np.ndarray:
     """The least-error recruitments nearest to `target` in the metric of `total`, the held ones as in the guess."""
     r = guess.copy()
     if free.any():
@@ -94,7 +106,15 @@ def least_norm(squares, f, total, target, guess, free) -> np.ndarray:
     return r
 
 
-def second_slope(squares, f, total, target, r, lower, upper) -> np.ndarray:
+def second_slope(
+    squares: np.ndarray,
+    f: np.ndarray,
+    total: np.ndarray,
+    target: np.ndarray,
+    r: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> np.ndarray:
     """Slope of effort and change at equal torque error, 0 where the error holds a limit.
 
     What of it lies in the range of S for the channels that the error leaves free is paid for by torque.

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from fes_pin.allocate.allocator import Allocator
 from fes_pin.allocate.bounded import known_solver
 from fes_pin.allocate.horizon_program import NO_ROOM, HorizonProgram
-from fes_pin.allocate.problem import EPSILON, number, wanted_torques, within_rate
+from fes_pin.allocate.inputs import number, wanted_torques
+from fes_pin.allocate.problem import EPSILON, within_rate
 from fes_pin.data.errors import InputError
 
 LONGEST = 1000
@@ -42,7 +44,9 @@ class Fatigue:
         return settled + (left - settled) * np.exp(-(down + up) * step_s)
 
 
-def invert_lag(recruitment: np.ndarray, step_s: float, time_constant_s: float, start=None) -> np.ndarray:
+def invert_lag(
+    recruitment: np.ndarray, step_s: float, time_constant_s: float, start: np.ndarray | None = None
+) -> np.ndarray:
     """Commands that make a first-order lag follow recruitments as far as commands within 0 and 1 can.
 
     Parameters
@@ -151,7 +155,7 @@ class Horizon:
         step = np.eye(steps) - np.eye(steps, k=-1)
         self.S, self.T = self.response.T @ self.response, p.change * step.T @ step
 
-    def plan(self, torques, *, solver: str = "piqp") -> Plan:
+    def plan(self, torques: Any, *, solver: str = "piqp") -> Plan:
         """Stimulation for the torques ahead, from the present state.
 
         Parameters
@@ -183,7 +187,9 @@ class Horizon:
         achieved = (free + self.response @ u) @ self.matrix.T
         return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, found.iterations, found.rounds)
 
-    def _at_limits(self, u, y, f, low, high, wanted) -> tuple[np.ndarray, float, float]:
+    def _at_limits(
+        self, u: np.ndarray, y: np.ndarray, f: np.ndarray, low: np.ndarray, high: np.ndarray, wanted: np.ndarray
+    ) -> tuple[np.ndarray, float, float]:
         """The plan, off where the proof cannot tell it from off, dual residual, gap; see `Certifier.at_limits`."""
         dual, gap = self.proof(u, y, f, low, high)
         certify = self.program.certify
@@ -216,7 +222,9 @@ class Horizon:
             np.clip(u[k], np.maximum(low[k], u[k - 1] - rate), np.minimum(high[k], u[k - 1] + rate), out=u[k])
         return u
 
-    def proof(self, u, y, f, low, high) -> tuple[float, float]:
+    def proof(
+        self, u: np.ndarray, y: np.ndarray, f: np.ndarray, low: np.ndarray, high: np.ndarray
+    ) -> tuple[float, float]:
         """Dual residual and a bound on the gap, from the plan and a solver's multipliers."""
         slope = self.S @ u @ self.G + self.T @ u + u * self.program.problem.prices + f
         rows = np.vstack([u, np.diff(u, axis=0)])
@@ -238,7 +246,7 @@ class Horizon:
             act = self.keep * act + (1.0 - self.keep) * command
         return act
 
-    def advance(self, torques) -> Plan:
+    def advance(self, torques: Any) -> Plan:
         """Plan, apply the first step, and carry activation, fatigue and the pulses under way on to the next pulse."""
         plan = self.plan(torques)
         command = plan.recruitment[0]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import piqp
-from scipy.sparse import csc_matrix, diags_array, eye_array, kron
+from scipy.sparse import csc_matrix
 
 from fes_pin.allocate.active_limits import Limits, make_exact
 from fes_pin.allocate.bounded import solve_by
@@ -57,7 +57,9 @@ class HorizonProgram:
         Whether changes are limited.
     """
 
-    def __init__(self, strength: np.ndarray, price, change: float, keep: float, steps: int, tied: bool) -> None:
+    def __init__(
+        self, strength: np.ndarray, price: np.ndarray, change: float, keep: float, steps: int, tied: bool
+    ) -> None:
         values, vectors = np.linalg.eigh(strength @ strength.T)
         V = vectors[:, values > RANK * max(values[-1], 1e-300)].T @ strength
         self.n, self.steps, self.tied = strength.shape[1], steps, tied
@@ -71,17 +73,18 @@ class HorizonProgram:
         self._lock = threading.Lock()
         self._solver: piqp.SparseSolver | None = None
 
-    def _stages(self, V: np.ndarray, price, changes: np.ndarray, keep: float) -> None:
+    def _stages(self, V: np.ndarray, price: np.ndarray, changes: np.ndarray, keep: float) -> None:
         """The program over u and t, stage by stage: sparse, as solvers for sparse matrices want it."""
         (rank, n), steps = V.shape, self.steps
-        width = n + rank
-        take_u, take_t = eye_array(n, width), eye_array(rank, width, k=n)
-        along, before = eye_array(steps), eye_array(steps, k=-1)
-        self.P = kron(changes, take_u.T @ take_u) + kron(along, take_u.T @ diags_array(price) @ take_u)
-        self.P = csc_matrix(self.P + kron(along, take_t.T @ take_t))
-        self.A = csc_matrix(kron(along, take_t - (1.0 - keep) * V @ take_u) - keep * kron(before, take_t))
-        differences = eye_array(steps - 1, steps, k=1) - eye_array(steps - 1, steps)
-        self.G = csc_matrix(kron(differences, take_u)) if self.tied and steps > 1 else None
+        width, channels, torques = n + rank, np.arange(n), np.arange(rank)
+        P, A, G = (np.zeros((k, m, steps, width)) for k, m in ((steps, width), (steps, rank), (steps - 1, n)))
+        P[:, channels, :, channels] = changes + np.multiply.outer(price, np.eye(steps))
+        P[:, n + torques, :, n + torques] = np.eye(steps)
+        A[:, torques, :, n + torques] = np.eye(steps) - keep * np.eye(steps, k=-1)
+        A[np.arange(steps), :, np.arange(steps), :n] = -(1.0 - keep) * V
+        G[:, channels, :, channels] = np.diff(np.eye(steps), axis=0)
+        self.P, self.A, G = (csc_matrix(a.reshape(-1, steps * width)) for a in (P, A, G))
+        self.G = G if self.tied and steps > 1 else None
         self.where = (np.arange(steps)[:, None] * width + np.arange(n)).ravel()
         self.size = width * steps
 
@@ -107,7 +110,7 @@ class HorizonProgram:
         u, y, rounds = exact
         return Solution(u, y, iterations, rounds)
 
-    def _interior(self, f, low, high) -> tuple[Solution, int]:
+    def _interior(self, f: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[Solution, int]:
         steps, large = self.steps, max(1.0, float(np.abs(f).max(initial=0.0)))
         narrow = np.where(high[:steps] - low[:steps] <= NO_ROOM, NO_ROOM, 0.0)
         least, most = (self._spread(a, s * np.inf) for a, s in ((low[:steps] - narrow, -1), (high[:steps] + narrow, 1)))
@@ -132,7 +135,7 @@ class HorizonProgram:
             raise InputError("no plan can be found: torques or moment arms of too different sizes")
         return Solution(x.reshape(steps, self.n), self._multipliers(box, ties), iterations, 0), iterations
 
-    def _multipliers(self, box, ties) -> np.ndarray:
+    def _multipliers(self, box: np.ndarray, ties: np.ndarray) -> np.ndarray:
         y = np.zeros((2 * self.steps - 1, self.n))
         y[: self.steps] = box.reshape(self.steps, self.n)
         if len(ties):

@@ -49,13 +49,15 @@ def cost_of(H: np.ndarray, f: np.ndarray, r: np.ndarray) -> float:
     return float(0.5 * r @ H @ r + f @ r)
 
 
-def settled(H, f, lower, upper, least, on) -> np.ndarray:
+def settled(
+    H: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray, least: np.ndarray, on: np.ndarray
+) -> np.ndarray:
     """The best recruitments with these channels on and the others off."""
     low, high = np.where(on, np.maximum(lower, least), 0.0), np.where(on, upper, 0.0)
     return solve_once(H, f, low, high)
 
 
-def rounded(H, f, lower, upper, least) -> Choice:
+def rounded(H: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray, least: np.ndarray) -> Choice:
     """The cheap choice: solve without least recruitments, round what lies below to off or to its least, solve again.
 
     The gap is measured against the problem without least recruitments: true, but not tight.
@@ -67,7 +69,9 @@ def rounded(H, f, lower, upper, least) -> Choice:
     return Choice(r, cost, max(cost - cost_of(H, f, relaxed), 0.0), 2)
 
 
-def best_choice(H, f, lower, upper, least, *, seconds: float) -> Choice:
+def best_choice(
+    H: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray, least: np.ndarray, *, seconds: float
+) -> Choice:
     """The choice r in {0} or [least, upper] of least cost `1/2 r'Hr + f'r`.
 
     Parameters

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from fes_pin.allocate.allocation import Allocation
 from fes_pin.allocate.bounded import solve_sequence
 from fes_pin.allocate.certificate import Certifier, residuals
-from fes_pin.allocate.problem import Options, Problem, in_range, numbers, problem_of, wanted_torques
+from fes_pin.allocate.inputs import in_range, numbers, wanted_torques
+from fes_pin.allocate.problem import Options, Problem, problem_of
 from fes_pin.data.errors import InputError
 
 
@@ -59,7 +61,7 @@ class WalkAllocation:
         return Allocation(r, width, wanted, achieved, gradient, p.lower, p.upper, before, proof, proof.gap, here)
 
 
-def allocate_walk(torques, nerves, q, v=None, **options) -> WalkAllocation:
+def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: Any) -> WalkAllocation:
     """Allocate torques along a motion, each sample starting from the last.
 
     Parameters

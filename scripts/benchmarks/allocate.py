@@ -7,6 +7,7 @@ does when run alone).
 
 from __future__ import annotations
 
+import itertools
 import os
 import time
 import warnings
@@ -18,7 +19,7 @@ if __name__ == "__main__":
 import numpy as np
 
 from fes_pin.allocate.allocate import Allocator, allocate
-from fes_pin.allocate.horizon import Horizon
+from fes_pin.allocate.horizon import Fatigue, Horizon
 from fes_pin.allocate.walk import allocate_walk, clipped, direction_error, rescaled
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.measured_walk import read_walk
@@ -142,17 +143,20 @@ def single_call() -> list[tuple]:
 
 
 def horizon() -> list[tuple]:
-    """Ten steps of 30 channels at 30 Hz with lag, rate limit and price of change, along a smooth torque."""
+    """Ten steps of 30 channels at 30 Hz with lag, rate limit and price of change, along a smooth torque.
+
+    With fatigue the program is made anew at every pulse.
+    """
     torque = smooth_torque(420, 14.0)
     rows = []
-    for name, matrix in matrices().items():
+    for (name, matrix), fatigue in itertools.product(matrices().items(), (None, Fatigue())):
         plans: list = []
-        ahead = Horizon(Allocator(matrix, change=1e-3, rate=0.2))
+        ahead = Horizon(Allocator(matrix, change=1e-3, rate=0.2), fatigue=fatigue)
         rank = np.linalg.matrix_rank(matrix)
         taken = durations(lambda k, a=ahead, p=plans: p.append(a.advance(torque[k : k + 10])), range(400))
         residual, gap = max(max(p.primal, p.dual) for p in plans), max(p.gap for p in plans)
         exact = 100.0 * float(np.mean([p.rounds > 0 for p in plans]))
-        label = f"10-step horizon, {name} (rank {rank})"
+        label = f"10-step horizon{', fatigue' if fatigue else ''}, {name} (rank {rank})"
         rows += timed(label, tuple(t[20:] for t in taken), 1e3, None, "ms", 15.0)
         rows += [
             (f"{label}: greatest residual", residual, 1e-9, "of strongest channel^2"),

@@ -1,0 +1,113 @@
+"""Torques and torque matrices as people give them: checked, and refused where no body makes such numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.muscles.named import by_name
+
+LARGEST_NM, SMALLEST_NM = 1e4, 1e-6
+"""No joint of any body makes more: the strongest people's hips extend with some hundred N m (Anderson, Madigan and
+Nussbaum 2007, J. Biomech. 40:3105-3113). Where the strongest channel makes less, units are mistaken."""
+
+
+def torque_matrix(nerves: Any, q: Any, v: Any = None) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Torque at full recruitment, (joints, n) N m, of `Nerves` (posture, rates) or as given, and the channels' names.
+
+    Raises
+    ------
+    InputError
+        Not such a matrix of finite numbers, or numbers out of any body's range.
+    """
+    if hasattr(nerves, "torque_matrix"):
+        names, matrix = tuple(nerves.names), np.array(nerves.torque_matrix(q, v), dtype=float)
+    else:
+        if v is not None:
+            raise InputError("a velocity goes with nerves: a torque matrix holds what muscles make at theirs")
+        matrix = np.atleast_2d(numbers(nerves, "the torque matrix"))
+        names = tuple(f"channel_{i + 1}" for i in range(matrix.shape[-1]))
+    if matrix.ndim != 2 or 0 in matrix.shape:
+        raise InputError(f"the torque matrix must be joints x channels, got shape {matrix.shape}")
+    in_range(matrix, "the torque matrix")
+    return matrix, names
+
+
+def in_range(matrix: np.ndarray, what: str) -> None:
+    """Refuse torques at full recruitment, N m, that no body makes.
+
+    Raises
+    ------
+    InputError
+        Not finite, beyond 1e4 N m, or all below 1e-6 N m but not zero.
+    """
+    if not np.isfinite(matrix).all():
+        raise InputError(f"{what} holds a number that is not finite")
+    most = float(np.abs(matrix).max(initial=0.0))
+    if most > LARGEST_NM:
+        raise InputError(f"{what} holds {most:g} N m; no muscle of any body makes more than {LARGEST_NM:g}")
+    if 0.0 < most < SMALLEST_NM:
+        raise InputError(f"the strongest channel of {what} makes {most:g} N m, less than {SMALLEST_NM:g}: wrong units?")
+
+
+def wanted_torque(torque: Any, joints: tuple[str, ...]) -> np.ndarray:
+    """A wanted torque, by name (absent joints: 0) or (joints,), as an array, N m.
+
+    Raises
+    ------
+    InputError
+        Not such numbers, or beyond any body's range.
+    """
+    wanted = by_name(torque, joints, "wanted torque", 0.0)
+    worst = int(np.abs(wanted).argmax())
+    if abs(wanted[worst]) > LARGEST_NM:
+        raise InputError(f"wanted torque of {joints[worst]} is {wanted[worst]:g} N m, beyond {LARGEST_NM:g}")
+    return wanted
+
+
+def wanted_torques(torques: Any, joints: tuple[str, ...], what: str = "samples") -> np.ndarray:
+    """Wanted torques over time, (samples, joints) N m.
+
+    Raises
+    ------
+    InputError
+        Not such numbers, or beyond any body's range.
+    """
+    wanted = numbers(torques, "wanted torques")
+    if wanted.ndim != 2 or wanted.shape[1] != len(joints):
+        raise InputError(f"torques must be {what} x {len(joints)}, got shape {wanted.shape}")
+    if not np.abs(wanted).max(initial=0.0) <= LARGEST_NM:
+        k, j = np.argwhere(~(np.abs(wanted) <= LARGEST_NM))[0]
+        must = f"not a finite number within {LARGEST_NM:g} N m"
+        raise InputError(f"wanted torque of {joints[j]} at sample {k} is {wanted[k, j]:g}, {must}")
+    return wanted
+
+
+def numbers(values: Any, what: str) -> np.ndarray:
+    """Values as an array of numbers.
+
+    Raises
+    ------
+    InputError
+        Text, or lists of different lengths.
+    """
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} must be numbers in rows of one length") from None
+
+
+def number(value: Any, what: str) -> float:
+    """One number.
+
+    Raises
+    ------
+    InputError
+        Text, nothing, several numbers, or not a number.
+    """
+    array = numbers(value, what)
+    if array.ndim or np.isnan(array):
+        raise InputError(f"{what} must be a number, got {value!r:.40}")
+    return float(array)
