@@ -1,8 +1,9 @@
 """Do the muscles of the table make the joint torques that people make, at every angle?
 
 Each joint's greatest isometric torque, all muscles that help fully active, is held against what healthy young men have
-been measured to make (Anderson, Madigan and Nussbaum 2007) and, at the knee, against a pool of 411 studies that took no
-part in fitting the strengths (Sarabon, Kozinc and Perman 2021). The source model's own strengths stand beside, and
+been measured to make (Anderson, Madigan and Nussbaum 2007) and, at the knee, against a pool of 411 studies (Sarabon,
+Kozinc and Perman 2021), at the hip's abductors against sportsmen (Sugimoto et al. 2014): these took no part in fitting
+the strengths. The source model's own strengths stand beside, and
 what paralysed muscle is taken to have. Run the cells, or `python analysis/joint_torques.py`; the picture goes to
 out/joint_torques.png.
 """
@@ -17,10 +18,11 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.muscles.muscles import KNOWN_DEG, standard_muscles
-from fes_pin.muscles.nerves import PARALYSED, PARALYSED_BAND, SUBJECT_HEIGHT, SUBJECT_MASS
+from fes_pin.muscles.nerves import HEALTHY, PARALYSED, PARALYSED_BAND, SUBJECT_HEIGHT, SUBJECT_MASS, Nerves
 from fes_pin.muscles.paths import read_table
-from fes_pin.muscles.published import ANDERSON_2007, SARABON_2021, greatest_torque_nm
+from fes_pin.muscles.published import ANDERSON_2007, SARABON_2021, SUGIMOTO_2014, greatest_torque_nm
 
 table = standard_muscles()
 source = replace(table, strength=np.tile([float(row["strength_N"]) for row in read_table("muscles.csv")], 2))
@@ -45,6 +47,18 @@ for (action, angle), interval in SARABON_2021.items():
     low, high = (SUBJECT_MASS * value for value in interval)
     ours, before = (greatest_torque_nm(each, ANDERSON_2007[action], [angle])[0] for each in (table, source))
     print(f"{action:16s}{angle:7.0f}  pool of studies {low:.0f} to {high:.0f}; here {ours:.0f}, source {before:.0f}")
+per_kg, spread, speed = SUGIMOTO_2014
+muscles = Nerves.muscles(*(n for n in Nerves().names if n.startswith("left_")), strength=HEALTHY)
+moving = muscles.torque_matrix(None, {"left_hip_adduction": -np.radians(speed)})[
+    JOINT_NAMES.index("left_hip_adduction")
+]
+print(
+    f"hip abduction at {speed:.0f} degrees per second: sportsmen {SUBJECT_MASS * per_kg:.0f} (2 sd "
+    f"{2 * SUBJECT_MASS * spread:.0f}); here {-np.minimum(moving, 0.0).sum():.0f}"
+)
+foot = muscles.torque_matrix()[JOINT_NAMES.index("left_ankle_inversion")]
+inversion, eversion = np.maximum(foot, 0.0).sum(), -np.minimum(foot, 0.0).sum()
+print(f"held against nothing: inversion {inversion:.0f}, eversion {eversion:.0f} of the neutral foot")
 
 # %% The picture
 figure, axes = plt.subplots(2, 3, figsize=(13, 7.2), constrained_layout=True)

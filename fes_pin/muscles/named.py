@@ -9,6 +9,23 @@ import numpy as np
 from fes_pin.data.errors import InputError
 
 
+def number(value, low: float, high: float, what: str) -> float:
+    """A number between two others.
+
+    Raises
+    ------
+    InputError
+        It is none, or not between them.
+    """
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} must be a number, got {str(value)[:40]!r}") from None
+    if not low <= result <= high:
+        raise InputError(f"{what} must lie between {low:g} and {high:g}, got {result:g}")
+    return result
+
+
 def by_name(values, names: Sequence[str], what: str, default: float) -> np.ndarray:
     """Numbers per name, from a mapping (absent names get the default), one number for all, or an array.
 

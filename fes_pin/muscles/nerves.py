@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.muscles import MuscleTable, standard_muscles
+from fes_pin.muscles.muscles import MuscleTable, angles_of, standard_muscles
+from fes_pin.muscles.named import number
 
 STRENGTH_FACTOR = 1.8
 """A given strength is known to this factor: two standard deviations between healthy people either way (a coefficient of
@@ -20,8 +21,8 @@ PARALYSED_BAND = 0.3, 0.7
 """Strength of paralysed muscle that is stimulated: 0.34 in the quadriceps of trained people (Neuromodulation 13:50-57,
 2010, doi 10.1111/j.1525-1403.2009.00245.x); cross-sections of leg muscles are 0.45 to 0.8 of other people's half a year
 after the injury (Castro et al. 1999, Eur. J. Appl. Physiol. 80:373-378), less later."""
-STRONGEST, LONGEST = 10.0, 3.0
-"""No body's muscles are stronger, and no body is longer, than this many times the table's."""
+STRONGEST, SHORTEST, LONGEST = 10.0, 0.1, 3.0
+"""No body's muscles are stronger, and no body is shorter or longer, than this many times the table's."""
 SUBJECT_MASS, SUBJECT_HEIGHT = 72.6, 1.80
 """The adult whose legs the table describes, kg and m."""
 
@@ -66,21 +67,20 @@ class Nerves:
     def __post_init__(self) -> None:
         table = standard_muscles()
         known = tuple(dict.fromkeys(table.nerves))
+        if not isinstance(self.names, Iterable) or not isinstance(self.fatigue, Mapping):
+            raise InputError("nerves are given by their names, and fatigue by what is left of each by name")
         names = (self.names,) if isinstance(self.names, str) else tuple(self.names) or known
         for name in names:
             if name not in known and name not in table.names:
                 raise InputError(f"unknown nerve {name!r}; the nerves are {', '.join(known)}")
         if len(set(names)) < len(names):
             raise InputError("a nerve is named twice")
-        if not 0.0 <= self.assumed_strength <= STRONGEST:
-            raise InputError(f"strength must lie between 0 and {STRONGEST:g} (1: a healthy adult), got {self.strength}")
-        if not 0.0 < self.length <= LONGEST:
-            raise InputError(f"length must be more than 0 and at most {LONGEST:g}, got {self.length}")
+        number(self.assumed_strength, 0.0, STRONGEST, "strength (1: a healthy adult)")
+        number(self.length, SHORTEST, LONGEST, "length (1: the table's adult)")
         for name, left in self.fatigue.items():
             if name not in names:
                 raise InputError(f"fatigue names {name!r}, which is not among the nerves")
-            if not 0.0 <= left <= 1.0:
-                raise InputError(f"fatigue of {name} must lie between 0 (nothing left) and 1 (fresh), got {left}")
+            number(left, 0.0, 1.0, f"fatigue of {name} (0: nothing left, 1: fresh)")
         members = np.array(
             [[n in (nerve, m) for n in names] for nerve, m in zip(table.nerves, table.names, strict=True)]
         )
@@ -108,13 +108,11 @@ class Nerves:
         Raises
         ------
         InputError
-            Mass or height is not positive.
+            Mass, height or strength of no body.
         """
-        if not (mass_kg > 0.0 and height_m > 0.0):
-            raise InputError(f"mass and height must be positive, got {mass_kg} kg and {height_m} m")
-        return cls(
-            tuple(names), strength=strength * mass_kg / SUBJECT_MASS, length=height_m / SUBJECT_HEIGHT, **options
-        )
+        size = number(mass_kg, 0.0, STRONGEST * SUBJECT_MASS, "mass_kg") / SUBJECT_MASS
+        length = number(height_m, SHORTEST * SUBJECT_HEIGHT, LONGEST * SUBJECT_HEIGHT, "height_m") / SUBJECT_HEIGHT
+        return cls(tuple(names), strength=number(strength, 0.0, STRONGEST, "strength") * size, length=length, **options)
 
     @classmethod
     def muscles(cls, *nerves: str, **options) -> Nerves:
@@ -201,6 +199,10 @@ class Nerves:
         InputError
             Unknown joint, wrong shape, or an angle that is not a number.
         """
+        if v is not None:
+            shapes = angles_of(q).shape, angles_of(v).shape
+            if shapes[0][:-1] != shapes[1][:-1] and min(map(len, shapes)) > 1:
+                raise InputError(f"rates of shape {shapes[1]} do not go with angles of shape {shapes[0]}")
         torque = self.table.moment_arms(q) * (self.length * self.muscle_forces(q, v))[..., None, :]
         return torque @ self.members * self.left_over
 

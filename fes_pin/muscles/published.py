@@ -84,6 +84,11 @@ flexed knee (the angles here are ours): N. Sarabon, Z. Kozinc, M. Perman, "Estab
 knee extension and flexion strength", Front. Physiol. 12:767941, 2021 (its abstract).
 """
 
+SUGIMOTO_2014 = (1.29, 0.24, 60.0)
+"""Hip abduction of men who play sports, standing: N m per kg, its standard deviation between people, and the speed,
+degrees per second: D. Sugimoto et al., "Comparison of isokinetic hip abduction and adduction peak torques and ratio
+between sexes", Clin. J. Sport Med. 24:422-428, 2014 (its abstract)."""
+
 
 def muscle_torques(table: MuscleTable, curve: StrengthCurve, angle_deg) -> np.ndarray:
     """What each muscle of a left leg makes at rest, fully active, in the curve's direction: (angles, m) N m.

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.muscles.named import number
 
 STRAIGHT_BELOW = 1e-6
 """Fraction of the way below which a Hill curve is straight, as in the model of the same name."""
@@ -45,6 +46,8 @@ class LinearRecruitment:
             if not np.isfinite(value).all():
                 raise InputError(f"{item.name} of a recruitment curve must be a finite number")
             object.__setattr__(self, item.name, value)
+        if len({getattr(self, item.name).shape for item in fields(self)} - {()}) > 1:
+            raise InputError("arrays of a recruitment curve must have one number per channel each")
         if (self.threshold_us < 0.0).any() or (self.saturation_us <= self.threshold_us).any():
             raise InputError("a recruitment curve needs 0 <= threshold_us < saturation_us")
 
@@ -201,13 +204,12 @@ class Hysteresis:
     Raises
     ------
     InputError
-        Negative half width.
+        Negative width, or none.
     """
 
     def __init__(self, curve: LinearRecruitment, half_width_us: float, acting_us: float = 0.0) -> None:
-        if not half_width_us >= 0.0:
-            raise InputError(f"half_width_us must be 0 or more, got {half_width_us}")
-        self.curve, self.half_width_us, self.acting_us = curve, float(half_width_us), float(acting_us)
+        self.curve, self.half_width_us = curve, number(half_width_us, 0.0, np.inf, "half_width_us")
+        self.acting_us = number(acting_us, 0.0, np.inf, "acting_us")
 
     def recruitment(self, pulse_width_us: float) -> float:
         """Recruitment by the next pulse, which moves the play."""
@@ -251,7 +253,10 @@ class MeasuredRecruitment:
     """
 
     def __init__(self, pulse_widths_us: Sequence[float], recruitments: Sequence[float]) -> None:
-        self.widths_us, self.values = np.array(pulse_widths_us, dtype=float), np.array(recruitments, dtype=float)
+        try:
+            self.widths_us, self.values = np.array(pulse_widths_us, dtype=float), np.array(recruitments, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError("a measured recruitment curve needs numbers in both columns") from None
         good = self.widths_us.shape == self.values.shape and self.widths_us.ndim == 1 and len(self.values) >= 2
         if not good or not (np.diff(self.widths_us) > 0).all() or not (np.diff(self.values) > 0).all():
             raise InputError("a measured recruitment curve needs two or more points that rise in both columns")

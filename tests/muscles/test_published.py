@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.muscles.muscles import standard_muscles
-from fes_pin.muscles.nerves import SUBJECT_HEIGHT, SUBJECT_MASS
-from fes_pin.muscles.published import ANDERSON_2007, SARABON_2021, greatest_torque_nm
+from fes_pin.muscles.nerves import HEALTHY, SUBJECT_HEIGHT, SUBJECT_MASS, Nerves
+from fes_pin.muscles.published import ANDERSON_2007, SARABON_2021, SUGIMOTO_2014, greatest_torque_nm
 
 
 @pytest.mark.parametrize("action", ANDERSON_2007)
@@ -45,6 +46,24 @@ def test_the_calf_pushes_most_where_it_is_stretched():
     assert torque[0] < 0.4 * torque.max() and 90.0 < torque.max() < 170.0
 
 
+def test_hip_abductors_make_what_sportsmen_make_at_speed():
+    per_kg, spread, speed = SUGIMOTO_2014
+    nerves = Nerves.muscles(*(n for n in Nerves().names if n.startswith("left_")), strength=HEALTHY)
+    torque = nerves.torque_matrix(None, {"left_hip_adduction": -np.radians(speed)})
+    ours = -np.minimum(torque[JOINT_NAMES.index("left_hip_adduction")], 0.0).sum()
+    assert abs(ours / SUBJECT_MASS - per_kg) < 2 * spread
+
+
+def test_supinators_weaken_from_the_everted_to_the_inverted_foot():
+    """As measured: M. Hagen et al., J. Foot Ankle Res. 8:64, 2015."""
+    q = np.zeros((7, len(JOINT_NAMES)))
+    j = JOINT_NAMES.index("left_ankle_inversion")
+    q[:, j] = np.radians(np.linspace(-20.0, 25.0, 7))
+    muscles = Nerves.muscles("left_tibial", "left_deep_peroneal", strength=HEALTHY)
+    torque = np.maximum(muscles.torque_matrix(q)[:, j], 0.0).sum(axis=-1)
+    assert (np.diff(torque) < 0.0).all() and torque.max() < 50.0
+
+
 def test_the_story_prints_the_table_and_draws_it(tmp_path):
     root = Path(__file__).parents[2]
     (tmp_path / "analysis").mkdir()
@@ -55,5 +74,5 @@ def test_the_story_prints_the_table_and_draws_it(tmp_path):
         [sys.executable, str(copy)], env=environment, capture_output=True, text=True, check=False, timeout=120
     )
     assert result.returncode == 0, result.stderr
-    assert result.stdout.count("\n") == 2 + 6 * 6 + len(SARABON_2021) + 1
+    assert result.stdout.count("\n") == 2 + 6 * 6 + len(SARABON_2021) + 3
     assert (tmp_path / "out/joint_torques.png").stat().st_size > 10_000

@@ -126,3 +126,19 @@ def test_hysteresis_is_undone_wherever_it_can_be(curve):
                 assert got == pytest.approx(low if r < low else high, abs=1e-12)
                 cut += 1
     assert exact > 3000 and cut > 100
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: LinearRecruitment([180.0, 190.0], [900.0, 1000.0, 1100.0]),
+        lambda: MeasuredRecruitment("a", "b"),
+        lambda: MeasuredRecruitment([100.0, 200.0], [0.0, "x"]),
+        lambda: Hysteresis(LinearRecruitment(), "wide"),
+        lambda: Hysteresis(LinearRecruitment(), 20.0, acting_us=float("nan")),
+    ],
+)
+def test_what_is_no_number_is_one_line(make):
+    with pytest.raises(InputError) as caught:
+        make()
+    assert "\n" not in str(caught.value)
