@@ -33,6 +33,8 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.muscles.nerves import Nerves as Nerves
     from fes_pin.view.report import report as report
 
+from fes_pin.data.schema import rigs_from
+
 __version__ = "0.1.0"
 
 _WHERE = {
@@ -45,6 +47,8 @@ _WHERE = {
     "InputError": "fes_pin.data.errors",
     "Model": "fes_pin.models.model",
     "nominal_model": "fes_pin.models.nominal",
+    "Catalogue": "fes_pin.models.catalogue",
+    "load_library": "fes_pin.models.catalogue",
     "load_model": "fes_pin.models.store",
     "save_model": "fes_pin.models.store",
     "simulate": "fes_pin.models.simulate",
@@ -62,6 +66,13 @@ _WHERE = {
     "Nerves": "fes_pin.muscles.nerves",
 }
 _CHAPTERS = {"effects": "fes_pin.models.effects", "rigs": "fes_pin.models.rigs"}
+
+
+def _rigs() -> Any:
+    return import_module("fes_pin.models.catalogue").known_schemas()
+
+
+rigs_from(_rigs)  # whoever reads a study asks for the rigs that the models bring; `data` itself imports no models
 
 __all__ = ["__version__", *_WHERE, *_CHAPTERS]  # noqa: PLE0604
 

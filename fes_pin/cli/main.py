@@ -16,10 +16,16 @@ from fes_pin.cli.group import Commands
 
 if TYPE_CHECKING:
     from fes_pin.diagnose.diagnosis import Diagnosis
+    from fes_pin.models.catalogue import Catalogue
 
 app = typer.Typer(cls=Commands, pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
 app.command()(allocate)
+
+Libraries = Annotated[
+    list[str] | None,
+    typer.Option("--library", help="A Python file, or the name of a module, with causes or rigs. Its code is run."),
+]
 
 DIAGNOSING = 0.8
 """Share of the time of `diagnose` before the report is drawn, about."""
@@ -53,21 +59,28 @@ def diagnose(
     limit: Annotated[
         float | None, typer.Option(min=0.0, help="Seconds of search; then the best set of causes so far is told.")
     ] = None,
+    library: Libraries = None,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
     from fes_pin.data.files import check_folder, write_files
     from fes_pin.data.study import read_study
 
-    measured = read_study(study)  # what cannot be read or written is said before anything else is even imported
-    check_folder(out)
+    catalogue = _catalogue(library)
+    measured = read_study(study, rigs=catalogue.schemas())
+    check_folder(out)  # what cannot be read or written is said before any work
     from fes_pin.diagnose.diagnosis import diagnose as find
     from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files
     from fes_pin.view.report import report_html
 
     with _progress() as tell:
-        diagnosis = find(
-            measured, seed=seed, limit=limit, progress=lambda share, words: tell(DIAGNOSING * share, words)
-        )
+        to_be_said = [catalogue]
+
+        def told(share: float, words: str) -> None:
+            while to_be_said:  # now that the study is accepted: nothing stands before the line of an input error
+                _say_whose_code(to_be_said.pop())
+            tell(DIAGNOSING * share, words)
+
+        diagnosis = find(measured, library=catalogue, seed=seed, limit=limit, progress=told)
         tell(DIAGNOSING, "report")
         files = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
         tell(1.0, "done")
@@ -84,26 +97,42 @@ def predict(
     setting: Annotated[
         list[str] | None, typer.Option("--set", help="A condition of the trial: load_kg=1.5, kind=isometric ...")
     ] = None,
+    library: Libraries = None,
 ) -> None:
     """Predict a trial from its inputs with a saved model."""
     from fes_pin.data.trial import read_trial, write_trial
     from fes_pin.models.predict import predict as run
     from fes_pin.models.store import load_model
 
-    loaded = load_model(model)
+    catalogue = _catalogue(library)
+    loaded = load_model(model, library=catalogue)
     kind, conditions = _settings(setting or [])
-    given = read_trial(trial, rig=loaded.rig.name, kind=kind, conditions=conditions, inputs_only=True)
+    given = read_trial(trial, rig=loaded.rig.described(), kind=kind, conditions=conditions, inputs_only=True)
     write_trial(run(loaded, given), out)
+    _say_whose_code(catalogue)
 
 
 @app.command()
-def effects() -> None:
+def effects(library: Libraries = None) -> None:
     """List the causes it knows, with stage, equation and parameters."""
     from fes_pin.models.describe import describe
-    from fes_pin.models.effects import EFFECTS
 
-    for one in EFFECTS:
+    catalogue = _catalogue(library)
+    _say_whose_code(catalogue)
+    for one in catalogue.effects:
         typer.echo(describe(one))
+
+
+def _catalogue(library: list[str] | None) -> Catalogue:
+    from fes_pin.models.catalogue import load_library
+
+    return load_library(*(library or []))
+
+
+def _say_whose_code(catalogue: Catalogue) -> None:
+    """Say on standard error whose code runs beside that of fes-pin, a line for each file or module."""
+    for where, names in catalogue.origins().items():
+        typer.echo(f"fes-pin: runs the code of {where}: {', '.join(names)}", err=True)
 
 
 def _settings(pairs: list[str]) -> tuple[str | None, dict[str, float]]:

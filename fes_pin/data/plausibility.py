@@ -13,7 +13,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.schema import SCHEMAS
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 
@@ -21,6 +20,8 @@ SAMPLES_EACH = 10
 """Samples for each value that is fitted, at least: a standard deviation that is estimated from fewer is itself
 uncertain by more than a quarter (one over the root of twice their number)."""
 TURN = 2.0 * math.pi
+PULSES = ("pulse_width_us", "stim")
+"""Inputs without which nothing happens: a muscle contracts where it is stimulated."""
 FEW = 16
 """Samples of a trial below which it can hardly show a motion: a warning."""
 STRONGEST_N = 1e4
@@ -49,8 +50,8 @@ def implausible(study: Study) -> list[str]:
     """
     _check_rows(study)
     warnings = [*_inputs(study), *_units(study)]
-    outputs = tuple(dict.fromkeys((*SCHEMAS[study.rig].outputs.values(), "velocity")))
-    measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in _driving(t)]
+    outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
+    measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in _driving(study, t)]
     constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
     if len(constant) == len(measured):
         raise InputError("no output changes in any trial; there is nothing to compare a model with", file=study.folder)
@@ -62,9 +63,9 @@ def implausible(study: Study) -> list[str]:
     return [*warnings, *_rates(study.trials)]
 
 
-def _driving(trial: Trial) -> tuple[str, ...]:
+def _driving(study: Study, trial: Trial) -> tuple[str, ...]:
     """Columns that a trial has as inputs."""
-    return tuple(n for n in ("pulse_width_us", "stim", "effort") if n in trial)
+    return tuple(n for n in study.schema.inputs if n in trial)
 
 
 def _told(what: str, found: Sequence[tuple[Trial, str]]) -> list[str]:
@@ -96,17 +97,18 @@ def _inputs(study: Study) -> Iterable[str]:
     short = [t.name for t in study.trials if len(t) < FEW]
     if short:
         yield f"fewer than {FEW} samples in {_trials(short)}"
-    names = dict.fromkeys(n for t in study.trials for n in _driving(t))
+    names = dict.fromkeys(n for t in study.trials for n in _driving(study, t))
     if not names:
-        yield "no trial is driven: there is no column effort, and the motion is taken for free"
+        column = " or ".join(study.schema.inputs)
+        yield f"no trial is driven: there is no column {column}, and the motion is taken for free"
     for name in names:
         threshold = study.constants.get("threshold_us", 0.0) if name == "pulse_width_us" else 0.0
         silent = [t.name for t in study.trials if name in t and not (np.abs(t[name]) > threshold).any()]
         told = f"{name} is never above the threshold of {threshold:g} us" if threshold else f"{name} is zero throughout"
         if len(silent) < len(study.trials):
-            if silent and name != "effort":  # a joint may swing free between driven trials
+            if silent and name in PULSES:  # a joint may swing free between driven trials
                 yield f"{told} in {_trials(silent)}"
-        elif name == "effort":
+        elif name not in PULSES:
             yield f"no trial is driven: {told}"
         else:
             raise InputError(

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
+from typing import Any
 
-RIGS = ("ankle", "muscle", "joint", "body")
-KINDS = ("motion", "isometric")
 ROLES = ("fit", "held_out")
 UNITS = (
     *("per_rad", "per_deg", "kgm2", "gm2", "nms", "nmm", "nm", "mps", "kmh", "rad", "deg", "degrees", "degree"),
@@ -85,15 +84,18 @@ class Number:
         return f" in {self.unit}" if self.unit else ""
 
 
-def _positive(unit: str, required: bool = True) -> Number:
+def positive(unit: str, required: bool = True) -> Number:
+    """A number above 0."""
     return Number(unit, 0.0, True, required)
 
 
-def _not_negative(unit: str, required: bool = True) -> Number:
+def not_negative(unit: str, required: bool = True) -> Number:
+    """A number of at least 0."""
     return Number(unit, 0.0, False, required)
 
 
-def _any(unit: str, required: bool = True) -> Number:
+def any_number(unit: str, required: bool = True) -> Number:
+    """A finite number."""
     return Number(unit, required=required)
 
 
@@ -117,6 +119,22 @@ class RigSchema:
         Columns of which a trial holds one; for a joint none is needed.
     optional
         Other columns that have a meaning. A column that has none is refused.
+    either
+        Constants that must all be there if no file is.
+    start_may_be_known
+        True if a value of `[start]` may stand in `[rig]` instead: it is known then, and not fitted.
+    needed
+        By kind of trial the conditions that it must state, each with what is expected, in words.
+    only
+        Conditions that one kind of trial alone states, with that kind.
+    recordings
+        Keys of a `[[trial]]` that name its files.
+    check_files
+        Raises `InputError` for files, by their keys, that are not what this rig needs.
+    name
+        Of the rig.
+    owner
+        The class that models it, which this chapter only carries; None if there is no model of a single trial.
     """
 
     constants: Mapping[str, Number]
@@ -127,8 +145,16 @@ class RigSchema:
     inputs: tuple[str, ...] = ()
     inputs_required: bool = True
     optional: tuple[str, ...] = ()
-    passive: Mapping[str, Number] | None = None
-    files: Mapping[str, bool] | None = None
+    passive: Mapping[str, Number] = field(default_factory=dict)
+    files: Mapping[str, bool] = field(default_factory=dict)
+    either: tuple[str, ...] = ()
+    start_may_be_known: bool = False
+    needed: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    only: Mapping[str, str] = field(default_factory=dict)
+    recordings: tuple[str, ...] = ("file",)
+    check_files: Callable[[Mapping[str, Any]], object] | None = None
+    name: str = ""
+    owner: Any = None
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -136,74 +162,63 @@ class RigSchema:
         return ("time_s", *self.inputs, *dict.fromkeys(self.outputs.values()), *self.optional)
 
 
-_START_S = {"start_s": _any("s", required=False)}
+START_S = {"start_s": any_number("s", required=False)}
+"""A condition of any rig: when a trial began in the session."""
 
-SCHEMAS: Mapping[str, RigSchema] = {
-    "ankle": RigSchema(
-        constants={
-            "foot_mass_kg": _positive("kg"),
-            "com_distance_m": _positive("m"),
-            "moment_arm_m": _positive("m"),
-            "force_scale_n": _positive("N"),
-            "threshold_us": _not_negative("us"),
-            "saturation_us": _positive("us"),
-        },
-        passive={"f0_n": _not_negative("N"), "f1_per_rad": _not_negative("1/rad"), "theta_r_rad": _any("rad")},
-        start={
-            "gain": _positive(""),
-            "time_constant_s": _positive("s"),
-            "inertia_kgm2": _positive("kg m2"),
-            "damping_nms": _not_negative("N m s"),
-        },
-        conditions={"load_kg": _not_negative("kg", False), "angle_rad": _any("rad", False), **_START_S},
-        default_kind="motion",
-        outputs={"motion": "angle_rad", "isometric": "force_n"},
-        inputs=("pulse_width_us",),
-    ),
-    "muscle": RigSchema(
-        constants={"threshold_us": _not_negative("us", False), "saturation_us": _positive("us", False)},
-        start={"gain": _positive(""), "time_constant_s": _positive("s")},
-        conditions=_START_S,
-        default_kind="isometric",
-        outputs={"isometric": "force_n"},
-        inputs=("pulse_width_us", "stim"),
-    ),
-    "joint": RigSchema(
-        constants={},
-        files={"urdf": True},
-        start={
-            "inertia_scale": _positive(""),
-            "damping": _not_negative("N m s/rad or N s/m"),
-            "gravity_scale": _not_negative("", False),
-        },
-        conditions={"position0": _any("rad or m", False), "velocity0": _any("rad/s or m/s", False), **_START_S},
-        default_kind="motion",
-        outputs={"motion": "position"},
-        inputs=("effort",),
-        inputs_required=False,
-        optional=("velocity",),
-    ),
-    "body": RigSchema(
-        constants={"mass_kg": _positive("kg", False), "height_m": _positive("m", False)},
-        files={"segments": False, "urdf": False},
-        start={},
-        conditions={"belt_speed_mps": _any("m/s", False), **_START_S},
-        default_kind="motion",
-        outputs={"motion": "ground_reaction"},
-        inputs=("coordinates",),
-    ),
-}
+BODY = RigSchema(
+    name="body",
+    constants={"mass_kg": positive("kg", False), "height_m": positive("m", False)},
+    files={"segments": False, "urdf": False},
+    either=("mass_kg", "height_m"),
+    start={},
+    conditions={"belt_speed_mps": any_number("m/s", False), **START_S},
+    default_kind="motion",
+    outputs={"motion": "ground_reaction"},
+    inputs=("coordinates",),
+    recordings=("coordinates", "ground_reaction"),
+)
+"""The walking body: two recordings a trial, at rates of their own, and no model of a single trial."""
+
+Rigs = Mapping[str, RigSchema]
+"""What a study of each rig must and may hold, by the rig's name."""
+
+_FINDERS: list[Callable[[], Rigs]] = []
+
+
+def rigs_from(finder: Callable[[], Rigs]) -> None:
+    """Have rigs found by a function, when they are first asked for: this chapter knows no model, models know it."""
+    _FINDERS.append(finder)
+
+
+def known_rigs(more: Rigs | None = None) -> dict[str, RigSchema]:
+    """Every rig that there is, and `more`."""
+    found = {name: schema for finder in _FINDERS for name, schema in finder().items()}
+    return {**found, **(more or {}), BODY.name: BODY}
+
+
+def schema_of(rig: str | RigSchema) -> RigSchema:
+    """What a study of a rig must and may hold.
+
+    Raises
+    ------
+    ValueError
+        If there is no rig of that name.
+    """
+    if isinstance(rig, RigSchema):
+        return rig
+    known = known_rigs()
+    return known[one_of(rig, tuple(known))]
 
 
 def check_conditions(
-    rig: str, kind: str, conditions: Mapping[str, object], error: Callable[[str, str], Exception]
+    schema: RigSchema, kind: str, conditions: Mapping[str, object], error: Callable[[str, str], Exception]
 ) -> dict[str, float]:
     """Conditions of one trial as numbers.
 
     Parameters
     ----------
-    rig, kind
-        Of the trial.
+    schema, kind
+        Of the rig, and of the trial.
     conditions
         Values by key.
     error
@@ -214,7 +229,7 @@ def check_conditions(
     Exception
         What `error` makes, for an unknown key, a key that is missing, or a value that is not the number it must be.
     """
-    known = SCHEMAS[rig].conditions
+    known = schema.conditions
     numbers = {}
     for key, value in conditions.items():
         if key not in known:
@@ -223,18 +238,13 @@ def check_conditions(
             numbers[key] = known[key].check(value)
         except ValueError as problem:
             raise error(key, str(problem)) from None
-    if rig == "ankle":
-        _check_ankle(kind, numbers, error)
+    for key, words in schema.needed.get(kind, {}).items():
+        if key not in numbers:
+            raise error(key, f"missing; expected {words}")
+    for key, one in schema.only.items():
+        if key in numbers and kind != one:
+            raise error(key, f"expected in {one} trials only, and this is a {kind} trial")
     return numbers
-
-
-def _check_ankle(kind: str, conditions: Mapping[str, float], error: Callable[[str, str], Exception]) -> None:
-    if kind == "motion" and "load_kg" not in conditions:
-        raise error("load_kg", "missing; expected the load in kg, as this is a motion trial")
-    if kind == "isometric" and "angle_rad" not in conditions:
-        raise error("angle_rad", "missing; expected the angle in rad that this isometric trial is held at")
-    if kind == "motion" and "angle_rad" in conditions:
-        raise error("angle_rad", "expected in isometric trials only, and this is a motion trial")
 
 
 def unknown(name: str, known: Iterable[str]) -> str:

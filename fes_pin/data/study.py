@@ -15,12 +15,21 @@ import tomli_w
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes, read_text, write_files
 from fes_pin.data.motion import GROUND_REACTION
-from fes_pin.data.schema import RIGS, ROLES, SCHEMAS, Number, check_conditions, one_of, unknown
+from fes_pin.data.schema import (
+    ROLES,
+    Number,
+    Rigs,
+    RigSchema,
+    check_conditions,
+    known_rigs,
+    one_of,
+    schema_of,
+    unknown,
+)
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.data.trial import Trial, checked_kind, read_body_trial, read_trial, trial_csv
-from fes_pin.data.urdf import check_one_joint, moving_joints
+from fes_pin.data.urdf import moving_joints
 
-BODY_FILES = ("coordinates", "ground_reaction")
 NOTES = ("description", "subject", "source", "licence", "license", "date", "notes")
 
 
@@ -33,7 +42,7 @@ class Study:
     name
         Of the study.
     rig
-        "ankle", "muscle", "joint" or "body".
+        Its name: "ankle", "muscle", "joint", "body", or one of anybody's own.
     constants
         Numbers of `[rig]` and `[rig.passive]`, by key: known, never fitted.
     start
@@ -45,6 +54,8 @@ class Study:
     files
         Other files of the study by key: `urdf`, `segments`; for a body also `<trial>.coordinates` and
         `<trial>.ground_reaction`, which hold the recordings at their own sample rates.
+    described
+        What studies of the rig must and may hold, if it is not one that is written here or installed.
     """
 
     name: str
@@ -54,6 +65,7 @@ class Study:
     trials: tuple[Trial, ...]
     folder: Path = Path()
     files: Mapping[str, Path] = field(default_factory=dict)
+    described: RigSchema | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "trials", tuple(self.trials))
@@ -62,7 +74,12 @@ class Study:
 
     def __reduce__(self) -> tuple[Any, ...]:
         tables = (dict(self.constants), dict(self.start))
-        return Study, (self.name, self.rig, *tables, self.trials, self.folder, dict(self.files))
+        return Study, (self.name, self.rig, *tables, self.trials, self.folder, dict(self.files), self.described)
+
+    @property
+    def schema(self) -> RigSchema:
+        """What studies of this rig must and may hold."""
+        return self.described or schema_of(self.rig)
 
     @property
     def urdf(self) -> Path | None:
@@ -89,13 +106,15 @@ class Study:
         return f"Study {self.name} ({self.rig}): {counts} trials, {seconds:.4g} s"
 
 
-def read_study(path: str | Path) -> Study:
+def read_study(path: str | Path, *, rigs: Rigs | None = None) -> Study:
     """Read a study with all its trials.
 
     Parameters
     ----------
     path
         Its folder, or the `study.toml` in it.
+    rigs
+        What studies of other rigs than those written here or installed must and may hold; see `Catalogue.schemas`.
 
     Raises
     ------
@@ -109,21 +128,21 @@ def read_study(path: str | Path) -> Study:
         folder = path.is_dir()
     except (OSError, ValueError) as error:
         raise error if isinstance(error, InputError) else InputError(f"cannot be read: {error}", file=path) from error
-    return _Reader(read_toml(path / "study.toml" if folder else path)).study()
+    return _Reader(read_toml(path / "study.toml" if folder else path), known_rigs(rigs)).study()
 
 
 class _Reader:
     """One reading of a study.toml; every error that it raises names the line and the key."""
 
-    def __init__(self, document: Document) -> None:
-        self.document = document
+    def __init__(self, document: Document, rigs: Rigs) -> None:
+        self.document, self.rigs = document, rigs
         self.folder = document.path.parent
         self.error = document.error
         for key in document.data:
             if key not in (known := ("study", "rig", "start", "trial")):
                 raise self.error(key, unknown(key, known))
         self.name, self.rig = self._study_table()
-        self.schema = SCHEMAS[self.rig]
+        self.schema = rigs[self.rig]
 
     def study(self) -> Study:
         constants, files = self._rig_table()
@@ -133,7 +152,7 @@ class _Reader:
         for index, table in enumerate(self._trial_tables()):
             trials.append(self._trial(f"trial[{index}]", table, names[index], files))
         self._check_together(trials, constants)
-        return Study(self.name, self.rig, constants, start, tuple(trials), self.folder, files)
+        return Study(self.name, self.rig, constants, start, tuple(trials), self.folder, files, self.schema)
 
     def _study_table(self) -> tuple[str, str]:
         if "study" not in self.document.data:
@@ -149,7 +168,7 @@ class _Reader:
         if not isinstance(name, str) or not name.strip() or not name.isprintable():
             raise self.error("study.name", "expected a name, one line of text")
         try:
-            return name, one_of(table["rig"], RIGS)
+            return name, one_of(table["rig"], tuple(self.rigs))
         except ValueError as problem:
             raise self.error("study.rig", str(problem)) from None
 
@@ -158,13 +177,13 @@ class _Reader:
         passive = self.document.table("rig.passive", table) if self.schema.passive else {}
         if self.schema.passive:
             table.pop("passive", None)
-        paths = {key: table.pop(key) for key in self.schema.files or {} if key in table}
+        paths = {key: table.pop(key) for key in self.schema.files if key in table}
         known = dict(self.schema.constants)
-        if self.rig == "joint":
+        if self.schema.start_may_be_known:
             known |= {key: Number(n.unit, n.lower, n.strict, False) for key, n in self.schema.start.items()}
-        constants = self.document.numbers("rig", table, known, also=(*(self.schema.files or {}),))
-        constants |= self.document.numbers("rig.passive", passive, self.schema.passive or {})
-        for key, required in (self.schema.files or {}).items():
+        constants = self.document.numbers("rig", table, known, also=(*self.schema.files,))
+        constants |= self.document.numbers("rig.passive", passive, self.schema.passive)
+        for key, required in self.schema.files.items():
             if required and key not in paths:
                 raise self.error(f"rig.{key}", "missing; expected the path of a file inside the study")
         self._check_constants(constants, paths)
@@ -180,13 +199,14 @@ class _Reader:
         if threshold is not None and saturation is not None and saturation <= threshold:
             message = f"expected a saturation above the threshold of {threshold:g} us, found {saturation:g}"
             raise self.error("rig.saturation_us", message)
-        if self.rig == "body" and not paths and not {"mass_kg", "height_m"} <= set(constants):
-            key = "height_m" if "mass_kg" in constants else "mass_kg"
-            raise self.error(f"rig.{key}", "missing; expected mass_kg and height_m, or segments, or urdf")
+        either = self.schema.either
+        if absent := [key for key in either if key not in constants and not paths]:
+            expected = ", or ".join((" and ".join(either), *self.schema.files))
+            raise self.error(f"rig.{absent[0]}", f"missing; expected {expected}")
 
     def _check_files(self, files: Mapping[str, Path]) -> None:
-        if self.rig == "joint":
-            check_one_joint(files["urdf"])
+        if self.schema.check_files is not None:
+            self.schema.check_files(files)
         elif "urdf" in files:
             moving_joints(files["urdf"])
         if "segments" in files:
@@ -217,7 +237,7 @@ class _Reader:
 
     def _trial_names(self) -> list[str]:
         """Stems of the trials' files; their paths without the suffix where stems are the same."""
-        main = BODY_FILES[0] if self.rig == "body" else "file"
+        main = self.schema.recordings[0]
         paths: list[PurePosixPath] = []
         seen: dict[Path, str] = {}
         for index, table in enumerate(self._trial_tables()):
@@ -236,8 +256,8 @@ class _Reader:
         def error(key: str, message: str) -> InputError:
             return self.error(f"{where}.{key}", message)
 
-        named = BODY_FILES if self.rig == "body" else ("file",)
-        kind = checked_kind(self.rig, table.get("kind"), error)
+        named = self.schema.recordings
+        kind = checked_kind(self.schema, table.get("kind"), error)
         role = table.get("role")
         if role is not None:
             try:
@@ -245,21 +265,21 @@ class _Reader:
             except ValueError as problem:
                 raise error("role", str(problem)) from None
         rest = {key: value for key, value in table.items() if key not in (*named, "kind", "role")}
-        numbers = check_conditions(self.rig, kind, rest, error)
-        if self.rig != "body":
-            path = self.document.path_of(f"{where}.file", table["file"])
-            return read_trial(path, rig=self.rig, kind=kind, conditions=numbers, role=role, name=name)
-        for key in BODY_FILES:
+        numbers = check_conditions(self.schema, kind, rest, error)
+        if len(named) == 1:
+            path = self.document.path_of(f"{where}.{named[0]}", table[named[0]])
+            return read_trial(path, rig=self.schema, kind=kind, conditions=numbers, role=role, name=name)
+        for key in named:
             if key not in table:
                 raise error(key, "missing; expected the path of a file inside the study")
             files[f"{name}.{key}"] = self.document.path_of(f"{where}.{key}", table[key])
-        moves, pushes = (files[f"{name}.{key}"] for key in BODY_FILES)
+        moves, pushes = (files[f"{name}.{key}"] for key in named)
         return read_body_trial(moves, pushes, name=name, conditions=numbers, role=role)
 
     def _check_together(self, trials: list[Trial], constants: Mapping[str, float]) -> None:
         """What only all trials together show: the same inputs in each, and a recruitment curve for pulse widths."""
         for index, trial in enumerate(trials):
-            for column in self.schema.inputs if self.rig != "body" else ():
+            for column in self.schema.inputs if len(self.schema.recordings) == 1 else ():
                 if (column in trial) != (column in trials[0]):
                     there, first = ("has", "has not") if column in trial else ("lacks", "has it")
                     message = f"this trial {there} the column {column} and the first {first}; expected all or none"
@@ -287,28 +307,27 @@ def write_study(study: Study, folder: str | Path) -> None:
     """
     contents: dict[str, str | bytes] = {}
     rig: dict[str, Any] = {}
-    passive = SCHEMAS[study.rig].passive or {}
+    schema = study.schema
     for key, value in study.constants.items():
-        (rig.setdefault("passive", {}) if key in passive else rig)[key] = float(value)
+        (rig.setdefault("passive", {}) if key in schema.passive else rig)[key] = float(value)
     for key, path in study.files.items():
-        if key in (SCHEMAS[study.rig].files or {}):
+        if key in schema.files:
             rig[key] = f"{key}{path.suffix}"
             contents[rig[key]] = read_bytes(path)
     tables = []
     for trial in study.trials:
-        named = _trial_files(study.rig, trial)
+        named = _trial_files(schema, trial)
         contents |= named
-        keys = BODY_FILES if study.rig == "body" else ("file",)
         role = {"role": trial.role} if trial.role else {}
         conditions = {key: float(value) for key, value in trial.conditions.items()}
-        tables.append({**dict(zip(keys, named, strict=True)), "kind": trial.kind, **conditions, **role})
+        tables.append({**dict(zip(schema.recordings, named, strict=True)), "kind": trial.kind, **conditions, **role})
     document = {"study": {"name": study.name, "rig": study.rig}, "rig": rig, "start": dict(study.start)}
     contents["study.toml"] = tomli_w.dumps({**document, "trial": tables})
     write_files(folder, contents)
 
 
-def _trial_files(rig: str, trial: Trial) -> dict[str, str | bytes]:
-    if rig != "body":
+def _trial_files(schema: RigSchema, trial: Trial) -> dict[str, str | bytes]:
+    if len(schema.recordings) == 1:
         return {f"trials/{trial.name}.csv": trial_csv(trial)}
     moves = tuple(name for name in trial.columns if name not in GROUND_REACTION)
     return {

@@ -15,14 +15,12 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
 from fes_pin.data.schema import (
-    KINDS,
-    RIGS,
     ROLES,
-    SCHEMAS,
     RigSchema,
     check_conditions,
     is_like,
     one_of,
+    schema_of,
     unknown,
     unread,
 )
@@ -154,7 +152,7 @@ def _frozen(values: Any) -> np.ndarray:
 def read_trial(
     path: str | Path,
     *,
-    rig: str,
+    rig: str | RigSchema,
     kind: str | None = None,
     conditions: Mapping[str, float] | None = None,
     role: str | None = None,
@@ -168,9 +166,9 @@ def read_trial(
     path
         The file; for a body one that holds the coordinates and the ground reaction, or a .mot or .sto file.
     rig
-        "ankle", "muscle", "joint" or "body".
+        Its name ("ankle", "muscle", "joint", "body" ...), or what its studies must and may hold.
     kind
-        "motion" or "isometric"; without it "isometric" for a muscle, else "motion".
+        Of those that the rig has, "motion" or "isometric"; without it the rig's default.
     conditions, role
         As a `[[trial]]` table gives them.
     inputs_only
@@ -188,28 +186,34 @@ def read_trial(
     def error(key: str, message: str) -> InputError:
         return InputError(message, file=path, column=key)
 
-    kind = checked_kind(_checked("rig", rig, RIGS, error), kind, error)
+    try:
+        schema = schema_of(rig)
+    except ValueError as problem:
+        raise error("rig", str(problem)) from None
+    kind = checked_kind(schema, kind, error)
     if role is not None:
         _checked("role", role, ROLES, error)
-    numbers = check_conditions(rig, kind, conditions or {}, error)
-    columns, time = _body_columns(path, inputs_only) if rig == "body" else _columns(path, rig, kind, inputs_only)
+    numbers = check_conditions(schema, kind, conditions or {}, error)
+    whole = len(schema.recordings) == 1
+    columns, time = _columns(path, schema, kind, inputs_only) if whole else _body_columns(path, inputs_only)
     return Trial(name or path.stem, kind, columns, time, numbers, role)
 
 
-def checked_kind(rig: str, kind: object, error: Callable[[str, str], InputError]) -> str:
+def checked_kind(schema: RigSchema, kind: object, error: Callable[[str, str], InputError]) -> str:
     """The kind of a trial of this rig; the rig's default if it names none.
 
     Raises
     ------
     InputError
-        Made by `error` from the key and a message, for a kind that does not exist, or not for this rig.
+        Made by `error` from the key and a message, for a kind that the rig does not have.
     """
     if kind is None:
-        return SCHEMAS[rig].default_kind
-    known = _checked("kind", kind, KINDS, error)
-    if known not in SCHEMAS[rig].outputs:
-        raise error("kind", f"expected {' or '.join(SCHEMAS[rig].outputs)} for rig {rig}, found {known}")
-    return known
+        return schema.default_kind
+    if not isinstance(kind, str) or kind not in schema.outputs:
+        found = f"{kind[:40]!r}" if isinstance(kind, str) else f"a {type(kind).__name__}"
+        expected = f"{'one of ' if len(schema.outputs) > 1 else ''}{', '.join(schema.outputs)}"
+        raise error("kind", f"expected {expected} for rig {schema.name}, found {found}")
+    return kind
 
 
 def _checked(key: str, value: object, known: tuple[str, ...], error: Callable[[str, str], InputError]) -> str:
@@ -219,8 +223,8 @@ def _checked(key: str, value: object, known: tuple[str, ...], error: Callable[[s
         raise error(key, str(problem)) from None
 
 
-def _columns(path: Path, rig: str, kind: str, inputs_only: bool) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    table, schema = read_csv(path), SCHEMAS[rig]
+def _columns(path: Path, schema: RigSchema, kind: str, inputs_only: bool) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    table = read_csv(path)
     _check_columns(table, schema, kind, inputs_only)
     check_time(table)
     _check_stimulus(table)

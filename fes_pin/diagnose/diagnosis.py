@@ -24,6 +24,7 @@ from fes_pin.diagnose.search.unfinished import alike
 from fes_pin.identify.fit import Fit, rough_noise
 from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
 from fes_pin.identify.own import amplitude
+from fes_pin.models.catalogue import Catalogue, Source, catalogue_of, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.workers import one_thread_each, time_limit
@@ -101,6 +102,8 @@ class Diagnosis:
     reason
         Why something is unexplained, where it is no test of the remainder that says so: nothing could be fitted, or an
         error stays that is no noise.
+    catalogue
+        The causes that were looked for, of which the rig can have some.
     """
 
     study: Study
@@ -120,6 +123,7 @@ class Diagnosis:
     wall_s: float = field(compare=False)
     warnings: tuple[str, ...] = ()
     reason: str | None = None
+    catalogue: Catalogue = field(default_factory=installed, compare=False)
 
     @property
     def model(self) -> Model:
@@ -147,7 +151,14 @@ class Diagnosis:
 Progress = Callable[[float, str], None]
 
 
-def diagnose(study: Study, *, seed: int = 0, limit: float | None = None, progress: Progress | None = None) -> Diagnosis:
+def diagnose(
+    study: Study,
+    *,
+    library: Source | Sequence[Source] | None = None,
+    seed: int = 0,
+    limit: float | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
     """Find out what the nominal model of a study gets wrong.
 
     Parameters
@@ -155,6 +166,8 @@ def diagnose(study: Study, *, seed: int = 0, limit: float | None = None, progres
     study
         Rig, start values and trials. Trials with the role "held_out" take no part but in the gain; without such roles
         the gain is cross-validated over all trials.
+    library
+        Causes beside those written here and installed: files, modules, classes or what `load_library` made of them.
     seed
         Of what is simulated: critical values and bootstrap intervals.
     limit
@@ -175,12 +188,14 @@ def diagnose(study: Study, *, seed: int = 0, limit: float | None = None, progres
     """
     began = time.perf_counter()
     tell = progress or (lambda _share, _words: None)
+    catalogue = catalogue_of(library)
     study, left_out = despiked_study(study)
-    warnings = check_study(study, nominal_model(study))
+    nominal = nominal_model(study)
+    warnings = check_study(study, nominal)
     train, test = split(study)
     with one_thread_each():
         recorded = [t for t in study.trials if t.role != "held_out"]
-        search = Search(nominal_model(study), train, recorded, seed, tell)
+        search = Search(nominal, train, recorded, seed, tell, catalogue.effects_for(nominal.rig))
         try:
             with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
                 searched = search.run()
@@ -195,7 +210,8 @@ def diagnose(study: Study, *, seed: int = 0, limit: float | None = None, progres
     warnings += diagnosis.warnings
     if limit is not None and search.was_stopped:
         warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
-    return replace(diagnosis, left_out=left_out, warnings=tuple(warnings), wall_s=time.perf_counter() - began)
+    found = replace(diagnosis, left_out=left_out, warnings=tuple(warnings), catalogue=catalogue)
+    return replace(found, wall_s=time.perf_counter() - began)
 
 
 def despiked_study(study: Study) -> tuple[Study, dict[str, dict[str, tuple[int, ...]]]]:
@@ -220,9 +236,7 @@ def split(study: Study) -> tuple[list[Trial], list[Trial]]:
     """
     test = [t for t in study.trials if t.role == "held_out"]
     train = [
-        t if {"pulse_width_us", "stim", "effort"} & set(t.columns) else thinned(t)
-        for t in study.trials
-        if t.role != "held_out"
+        t if set(study.schema.inputs) & set(t.columns) else thinned(t) for t in study.trials if t.role != "held_out"
     ]
     if not train:
         raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)

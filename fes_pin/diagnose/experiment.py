@@ -11,6 +11,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.problem import Linearized, NormalEquations, Problem, measured_columns, normal_equations
+from fes_pin.models.nominal import rig_of
 
 SEPARABLE = 2.71
 """Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: 1.645 squared (DESIGN 6.5)."""
@@ -202,7 +203,7 @@ def _worth(found: Found) -> float:
 def _refined(best: Fit, rivals: Mapping[str, Fit], found: Found, study: Study) -> Found:
     """The trial with stretches of its stimulus held at other levels, where that separates better."""
     rng = np.random.default_rng(7)
-    column = next((n for n in ("pulse_width_us", "effort") if n in found[1].columns), None)
+    column = rig_of(study).steered(study)
     if column is None:
         return found
     for _ in range(ROUNDS):
@@ -219,64 +220,19 @@ def _changed(trial: Trial, column: str, study: Study, rng: np.random.Generator) 
     begin = rng.uniform(QUIET_S, time[-1] - QUIET_S)
     length = np.exp(rng.uniform(np.log(0.1), np.log(2.0)))
     stretch = (time >= begin) & (time < min(begin + length, time[-1] - QUIET_S))
-    values[stretch] = _driven(study, column, np.full(int(stretch.sum()), rng.choice([0.0, rng.random(), 1.0])))
+    values[stretch] = rig_of(study).driven(study, np.full(int(stretch.sum()), rng.choice([0.0, rng.random(), 1.0])))
     return trial.with_columns(**{column: values})
 
 
 def candidates(study: Study) -> Iterator[Trial]:
-    """Trials that the rig can run as it is: its loads and held angles, with a dozen stimuli."""
-    dt = study.trials[0].dt
-    time = np.arange(0.0, SECONDS, dt)
-    for kind, conditions in sorted(_conditions(study)):
-        for column, values in _stimuli(study, time):
-            yield Trial("next", kind, {column: values} if column else {}, time, dict(conditions))
-
-
-def _conditions(study: Study) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
-    """The conditions of a study, half and once and a half its loads, and angles held where it has moved."""
-    if study.rig == "joint":
-        starts = [float(t["position"][0]) for t in study.trials]
-        released = np.quantile(starts, (0.0, 0.25, 0.5, 0.75, 1.0))
-        return {("motion", (("position0", round(float(p), 4)), ("velocity0", 0.0))) for p in released}
-    seen = {(t.kind, tuple(sorted((n, v) for n, v in t.conditions.items() if n != "start_s"))) for t in study.trials}
-    moved = np.concatenate([[], *(t["angle_rad"] for t in study.trials if t.kind == "motion" and "angle_rad" in t)])
-    out = set(seen)
-    for kind, conditions in seen:
-        others = {}
-        values = dict(conditions)
-        if "load_kg" in values:
-            others["load_kg"] = [factor * values["load_kg"] for factor in (0.5, 1.5)]
-        elif "angle_rad" in values and moved.size:
-            others["angle_rad"] = list(np.quantile(moved, (0.05, 0.95)))
-        for name, many in others.items():
-            out |= {(kind, tuple(sorted({**values, name: round(float(v), 3)}.items()))) for v in many}
-    return out
-
-
-def _driven(study: Study, column: str, shape: np.ndarray) -> np.ndarray:
-    """A stimulus of a shape from 0 (off) to 1: pulse widths from threshold to saturation, efforts of both signs."""
-    if column == "effort":
-        size = max(float(np.abs(t["effort"]).max()) for t in study.trials if "effort" in t)
-        return np.where(shape > 0, size * (2.0 * shape - 1.0), 0.0)
-    low = float(study.constants.get("threshold_us", 180.0))
-    high = float(study.constants.get("saturation_us", 1000.0))
-    return np.where(shape > 0, np.round(low + (high - low) * shape), 0.0)
-
-
-def _stimuli(study: Study, time: np.ndarray) -> Iterator[tuple[str | None, np.ndarray]]:
-    first = study.trials[0].columns
-    column = next((n for n in ("pulse_width_us", "effort") if n in first), None)
-    if column is not None:
-        for shape in _shapes(time):
-            yield column, _driven(study, column, shape)
-    elif "stim" in first:
-        for rate_hz in (8.0, 15.0, 31.0, 45.0):
-            pulse = np.diff(np.floor(time * rate_hz), prepend=-1.0) > 0
-            for on_s, pause_s in ((7.0, 1.0), (1.0, 1.0), (0.3, 0.7)):
-                on = (time % (on_s + pause_s) < on_s) & (time < SECONDS - 0.8)
-                yield "stim", np.where(pulse & on, 1.0, 0.0)
-    else:
-        yield None, time
+    """Trials that the rig can run as it is: under each of its conditions a dozen stimuli."""
+    rig, time = rig_of(study), np.arange(0.0, SECONDS, study.trials[0].dt)
+    column = rig.steered(study)
+    shaped = ({column: rig.driven(study, shape)} for shape in _shapes(time)) if column else None
+    inputs = list(shaped or rig.other_stimuli(study, time))
+    for kind, conditions in sorted(rig.conditions_to_try(study)):
+        for columns in inputs:
+            yield Trial("next", kind, columns, time, dict(conditions))
 
 
 def _shapes(time: np.ndarray) -> Sequence[np.ndarray]:

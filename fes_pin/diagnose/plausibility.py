@@ -11,14 +11,13 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.plausibility import implausible
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
+from fes_pin.models.rigs.base import RUN_OUT
 
 COARSE = 5.0
 """Time constants that a sample step may be long: a first-order lag has then settled to less than a hundredth, and
 nothing of it is seen, were the start value wrong by half. Milliseconds under `time_s` make hundreds."""
 SLOWEST_S = 1.0
 """Time step in s that is refused anyway: pulses come 20 to 50 times a second, and a limb swings about once."""
-RUN_OUT = "inertia over damping"
-"""What a joint without gravity has for a time constant; lightly damped, it outlasts any trial."""
 TURNS = 4.0
 """Turns from zero beyond which an angle is likelier in degrees: 4 turns are 25 rad, and 25 degrees a small swing."""
 LONGEST_M = 10.0
@@ -37,25 +36,13 @@ def check_study(study: Study, model: Model) -> list[str]:
     return [*implausible(study), *_steps(study, model), *_range(study, model)]
 
 
-def time_constants(model: Model) -> dict[str, float]:
-    """Times in s that a model's answer takes at its own parameters, by what they are; only those that there are."""
-    values, known = model.parameters(), model.rig.constants
-    if "time_constant_s" in values:
-        return {"the muscle's time constant": values["time_constant_s"]}
-    inertia = values["inertia_scale"] * known["inertia"]
-    stiffness = abs(values["gravity_scale"]) * math.hypot(known["gravity_cos"], known["gravity_sin"])
-    if known["revolute"] and stiffness > 0.0:
-        return {"the swing's period over a turn": math.sqrt(inertia / stiffness)}
-    return {RUN_OUT: inertia / values["damping"]} if values["damping"] > 0.0 else {}
-
-
 def _steps(study: Study, model: Model) -> Iterable[str]:
     slowest = max(study.trials, key=lambda t: t.dt)
     longest = max(t.duration for t in study.trials)
     if slowest.dt > SLOWEST_S:
         message = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s; expected at most {SLOWEST_S:g} s"
         raise InputError(f"{message}: is time_s in ms?", file=study.folder, column="time_s")
-    for name, constant in time_constants(model).items():
+    for name, constant in model.rig.time_constants().items():
         told = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s, and {name} {constant:.4g} s"
         if slowest.dt > COARSE * constant:
             raise InputError(
@@ -68,7 +55,7 @@ def _steps(study: Study, model: Model) -> Iterable[str]:
 
 
 def _range(study: Study, model: Model) -> Iterable[str]:
-    if study.rig != "joint":
+    if "revolute" not in model.rig.constants:
         return
     most = max((float(np.abs(t["position"]).max()) for t in study.trials if "position" in t), default=0.0)
     if model.rig.constants["revolute"] and most > TURNS * 2.0 * math.pi:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 from fes_pin.data.trial import trial_csv
@@ -44,6 +45,7 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": _experiment(diagnosis),
         **_left_out(diagnosis),
         **({"reason": diagnosis.reason} if diagnosis.reason else {}),
+        **_library(diagnosis),
         "warnings": list(diagnosis.warnings),
         "wall_s": round(diagnosis.wall_s, 2),
     }
@@ -80,6 +82,12 @@ def _left_out(diagnosis: Diagnosis) -> dict[str, Any]:
     """Samples left out as spikes by trial and column; no key where there are none."""
     found = {t: {n: len(k) for n, k in columns.items()} for t, columns in diagnosis.left_out.items()}
     return {"left_out_samples": found} if found else {}
+
+
+def _library(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Causes and rigs that are not written here, by the file or module that holds them; no key where there are none."""
+    found = {Path(where).name: names for where, names in diagnosis.catalogue.origins().items()}
+    return {"library": found} if found else {}
 
 
 def _parameters(fitted: Fit) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 from fes_pin.diagnose.diagnosis import Cause, Diagnosis
 
@@ -70,6 +71,8 @@ def footnotes(diagnosis: Diagnosis) -> list[str]:
     own = [e.name for e in diagnosis.model.effects if e.each_trial]
     if own:
         lines.append(f"{', '.join(own)}: {EACH_TRIAL}")
+    for where, names in diagnosis.catalogue.origins().items():
+        lines.append(f"looked for as well: {', '.join(names)}, code of {Path(where).name}")
     if diagnosis.absorbed:
         lines.append(f"not testable here: {', '.join(diagnosis.absorbed)}")
     if diagnosis.next_experiment:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 
+from fes_pin.models.outside import origin
 from fes_pin.models.parameters import ROTARY
 from fes_pin.models.stage import Effect
 
@@ -34,7 +35,8 @@ def remark(effect: type[Effect], label: str) -> str:
 
 def describe(effect: type[Effect]) -> str:
     """Name, stage, sentence, equation, tell-tale and parameters."""
-    lines = [f"{effect.name} ({effect.stage}; rigs: {', '.join(effect.rigs)})", f"  {sentence(effect)}"]
+    whose = f"; code of {where}" if (where := origin(effect)) else ""
+    lines = [f"{effect.name} ({effect.stage}; rigs: {', '.join(effect.rigs)}{whose})", f"  {sentence(effect)}"]
     lines += [f"      {line}" for line in equation(effect).split("\n")]
     lines.append(f"  Tell-tale: {remark(effect, 'Tell-tale:')}")
     for name, info in effect.parameters().items():

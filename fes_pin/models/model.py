@@ -10,7 +10,7 @@ from typing import Any
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import Parameter
 from fes_pin.models.rigs.base import Rig
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Effect, in_order
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,9 @@ class Model:
     def __add__(self, effect: Effect) -> Model:
         if any(e.name == effect.name for e in self.effects):
             raise ValueError(f"the model has {effect.name} already")
-        if self.rig.name not in effect.rigs:
+        if not self.rig.takes(effect):
             raise ValueError(f"{effect.name} is not for the rig {self.rig.name}")
-        ordered = sorted((*self.effects, effect), key=lambda e: (list(Stage).index(e.stage), e.name))
-        return Model(self.rig, tuple(ordered))
+        return Model(self.rig, in_order((*self.effects, effect)))
 
     def __sub__(self, name: str) -> Model:
         return Model(self.rig, tuple(e for e in self.effects if e.name != name))

@@ -34,9 +34,7 @@ def predict(model: Model, trial: Trial) -> Trial:
 
 
 def _check(model: Model, trial: Trial) -> None:
-    needed = {"joint": (), "muscle": (), "ankle": ("load_kg",) if trial.kind == "motion" else ("angle_rad",)}
-    for name in needed.get(model.rig.name, ()):
+    for name in model.rig.schema.needed.get(trial.kind, ()):
         if name not in trial.conditions:
             raise InputError(f"expected --set {name}=... for a {trial.kind} trial of this rig")
-    if model.rig.name == "joint" and "position" not in trial.columns and "position0" not in trial.conditions:
-        raise InputError("expected a column position (its first sample) or --set position0=...")
+    model.rig.check_prediction(trial)

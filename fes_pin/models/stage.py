@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -157,6 +157,14 @@ class Effect:
         """The effect at its null."""
         nulls: dict[str, Any] = {n: i.null for n, i in cls.parameters().items() if i.null is not None}
         return cls(**nulls)
+
+
+Named = TypeVar("Named", Effect, type[Effect])
+
+
+def in_order(effects: Iterable[Named]) -> tuple[Named, ...]:
+    """Effects in the order of the signal path, by name at each stage."""
+    return tuple(sorted(effects, key=lambda e: (list(Stage).index(e.stage), e.name)))
 
 
 class Signals(SimpleNamespace):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,17 @@ import tomli_w
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
-from fes_pin.data.schema import SCHEMAS, Number, one_of
+from fes_pin.data.schema import Number, RigSchema, one_of
 from fes_pin.data.toml import Document, read_toml
-from fes_pin.models.effects import effect
+from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
-from fes_pin.models.rigs import RIGS
+from fes_pin.models.outside import origin
+from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
 
 FORMAT = 1
+NEEDS = "needs"
+"""Key of a table: the file or module of each cause or rig that is not written here."""
 EACH_TRIAL = "each_trial"
 """Key of an effect whose amplitudes are each trial's own."""
 
@@ -34,7 +37,9 @@ def model_toml(model: Model) -> str:
         "nominal": {n: float(getattr(rig, n)) for n in rig.parameters()},
         "effects": {e.name: _effect_table(e) for e in model.effects},
     }
-    return tomli_w.dumps(tables)
+    parts: tuple[Rig | Effect, ...] = (rig, *model.effects)
+    foreign = {one.name: Path(where).name for one in parts if (where := origin(type(one)))}
+    return tomli_w.dumps({**tables, NEEDS: foreign} if foreign else tables)
 
 
 def save_model(model: Model, path: str | Path) -> None:
@@ -42,23 +47,29 @@ def save_model(model: Model, path: str | Path) -> None:
     write_text(path, model_toml(model))
 
 
-def load_model(path: str | Path) -> Model:
+def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = None) -> Model:
     """Read a model that `save_model` wrote.
+
+    Parameters
+    ----------
+    library
+        Where causes and rigs come from that are not written here or installed: see `load_library`.
 
     Raises
     ------
     InputError
-        Not such a file: names the row, the key and what was expected.
+        Not such a file, or one that needs a library that was not given: names the row, the key and what was expected.
     """
-    document = read_toml(path)
-    kinds = {rig.name: rig for rig in RIGS}
+    document, catalogue = read_toml(path), catalogue_of(library)
+    kinds = {rig.name: rig for rig in catalogue.rigs}
     found = document.data.get("format")
     if found != FORMAT or isinstance(found, bool):
         raise document.error("format", f"expected format = {FORMAT}: a model that fes-pin saved")
+    name = document.data.get("rig")
     try:
-        kind = kinds[one_of(document.data.get("rig"), tuple(kinds))]
+        kind = kinds[one_of(name, tuple(kinds))]
     except ValueError as problem:
-        raise document.error("rig", str(problem)) from None
+        raise document.error("rig", _missing(document, name, str(problem))) from None
     fitted = document.data.get("fitted")
     names = list(kind.parameters())
     if not isinstance(fitted, list) or not all(f in names for f in fitted) or len(set(fitted)) < len(fitted):
@@ -67,14 +78,14 @@ def load_model(path: str | Path) -> Model:
     constants = _numbers(document, "constants", None)
     if missing := set(kind.needed) - set(constants):
         raise document.error("constants", f"expected {', '.join(sorted(missing))} as well")
-    _check_possible(document, kind.name, {"nominal": nominal, "constants": constants})
+    _check_possible(document, kind.schema, {"nominal": nominal, "constants": constants})
     model = Model(kind(**nominal, constants=constants, fitted=tuple(fitted)))
     listed = document.table("effects")
     for name in listed:
         try:
-            model = model + _effect(document, name, listed)
+            model = model + _effect(document, catalogue, name, listed)
         except KeyError as error:
-            raise document.error(f"effects.{name}", str(error.args[0])) from None
+            raise document.error(f"effects.{name}", _missing(document, name, str(error.args[0]))) from None
         except InputError:
             raise
         except ValueError as error:
@@ -82,10 +93,9 @@ def load_model(path: str | Path) -> Model:
     return model
 
 
-def _check_possible(document: Document, rig: str, tables: Mapping[str, Mapping[str, float]]) -> None:
+def _check_possible(document: Document, schema: RigSchema, tables: Mapping[str, Mapping[str, float]]) -> None:
     """Refuse what a study of this rig could not hold either: a mass below zero, a saturation below the threshold."""
-    schema = SCHEMAS[rig]
-    known = {**schema.constants, **(schema.passive or {}), **schema.start}
+    known = {**schema.constants, **schema.passive, **schema.start}
     for key, table in tables.items():
         for name in table.keys() & known.keys():
             try:
@@ -102,8 +112,17 @@ def _effect_table(one: Effect) -> dict[str, Any]:
     return {**own, **{n: float(getattr(one, n)) for n in one.parameters()}}
 
 
-def _effect(document: Document, name: str, listed: dict[str, Any]) -> Effect:
-    kind, key = effect(name), f"effects.{name}"
+def _missing(document: Document, name: object, otherwise: str) -> str:
+    """What to say of an unknown cause or rig: the library that the model says it comes from."""
+    where = document.table(NEEDS).get(name) if isinstance(name, str) else None
+    if not isinstance(where, str) or not where:
+        return otherwise
+    given = f"--library {'PATH/' if where.endswith('.py') else ''}{where}, or library= in Python"
+    return f"{name} is of the library {where}; expected {given}"
+
+
+def _effect(document: Document, catalogue: Catalogue, name: str, listed: dict[str, Any]) -> Effect:
+    kind, key = catalogue.effect(name), f"effects.{name}"
     each_trial = document.table(key, listed).pop(EACH_TRIAL, False)
     if not isinstance(each_trial, bool) or (each_trial and not kind.varies):
         raise document.error(f"{key}.{EACH_TRIAL}", f"expected {'true or false' if kind.varies else 'none'}")

@@ -74,7 +74,7 @@ class RatioProblem:
     """
 
     def __init__(self, model: Model, trials: Sequence[Trial], known_gain: float | None = None) -> None:
-        if model.rig.name != "ankle":
+        if not isinstance(model.rig, Ankle):
             raise InputError(f"k1, k2 and k3 belong to the rig ankle, found {model.rig.name}")
         if not trials or any(t.kind != "motion" for t in trials):
             raise InputError("expected one or more motion trials to find k1, k2 and k3 from")

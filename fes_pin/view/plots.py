@@ -40,7 +40,6 @@ DOTS = 500
 """Dots of one panel."""
 PULSES = 400
 """Single pulses that are drawn; more of them become a grey band."""
-INPUTS = ("pulse_width_us", "stim", "effort")
 
 
 def trial_figure(
@@ -63,7 +62,7 @@ def trial_figure(
     legend
         False where the page has one.
     """
-    stimulus = [n for n in INPUTS if n in one.measured.columns]
+    stimulus = [n for n in one.measured.columns if n not in one.outputs]
     heights = [h for _ in one.outputs for h in (2.0, 1.2)] + [0.42] * len(stimulus)
     with styled():
         figure = Figure(figsize=(WIDTH, 0.65 + 0.3 * legend + 0.78 * sum(heights)))
@@ -230,7 +229,7 @@ def _medians(x: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def stimulus_figure(trial: Trial, position_unit: str = "rad") -> Figure:
     """The inputs of a trial that is still to be run."""
-    names = [n for n in INPUTS if n in trial.columns]
+    names = list(trial.columns)
     with styled():
         figure = Figure(figsize=(WIDTH, 0.6 + 1.0 * len(names)))
         for k, name in enumerate(names):

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from fes_pin.diagnose.diagnosis import Cause, Diagnosis
 from fes_pin.diagnose.experiment import SEPARABLE
-from fes_pin.models.effects import effect
+from fes_pin.models.catalogue import Catalogue
 from fes_pin.view.style import BAND, FAINT, INK, PANEL, STAGES, styled
 
 RIVALS = 7
@@ -47,7 +47,7 @@ def rivals_figure(diagnosis: Diagnosis, cause: Cause) -> Figure:
     with styled():
         values = np.maximum([v for _, v in rivals], LEAST)
         names = [n for n, _ in rivals]
-        colours = [_colour(n) for n in names]
+        colours = [_colour(diagnosis.catalogue, n) for n in names]
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}" if x < 2e3 else f"{x:.0e}".replace("e+0", "e"))
         axes.minorticks_off()
@@ -81,8 +81,8 @@ def shown_rivals(diagnosis: Diagnosis, cause: Cause) -> list[tuple[str, float]]:
     return sorted(found.items(), key=lambda pair: pair[1])[:RIVALS]
 
 
-def _colour(names: str) -> str:
-    return STAGES.get(str(effect(names.split(" + ", maxsplit=1)[0]).stage), INK)
+def _colour(catalogue: Catalogue, names: str) -> str:
+    return STAGES.get(str(catalogue.effect(names.split(" + ", maxsplit=1)[0]).stage), INK)
 
 
 def _rows(axes: Axes, names: Sequence[str], colours: Sequence[str]) -> None:

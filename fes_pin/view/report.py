@@ -11,7 +11,7 @@ from fes_pin.diagnose.record import NEXT_FILE
 from fes_pin.diagnose.replay import replay
 from fes_pin.diagnose.text import headline, left_out_text
 from fes_pin.models.describe import sentence
-from fes_pin.models.effects import effect
+from fes_pin.models.outside import origin
 from fes_pin.view.page import (
     Content,
     Markup,
@@ -95,6 +95,8 @@ def _facts(diagnosis: Diagnosis) -> Markup:
         rows.append(("left out as spikes", f"{count} samples", left_out_text(diagnosis)))
     state = "something" if left.unexplained else "nothing"
     rows.append(("left unexplained", state, probability(left.p_value)))
+    for where, names in diagnosis.catalogue.origins().items():
+        rows.append(("looked for as well", ", ".join(names), f"code of {Path(where).name}"))
     cells = [element("div", element("dt", t), element("dd", v, element("small", note))) for t, v, note in rows]
     return element("dl", joined(cells), class_="facts")
 
@@ -114,9 +116,8 @@ def _left(diagnosis: Diagnosis) -> list[Markup]:
     if diagnosis.absorbed:
         why = "what the nominal parameters take up, or no input of these trials drives"
         out.append(element("p", f"Not testable here, which is not the same as absent: {why}"))
-        rows: list[list[Content]] = [
-            [element("code", n), stage_mark(str(effect(n).stage)), sentence(effect(n))] for n in diagnosis.absorbed
-        ]
+        unseen = [diagnosis.catalogue.effect(n) for n in diagnosis.absorbed]
+        rows: list[list[Content]] = [[element("code", e.name), stage_mark(str(e.stage)), sentence(e)] for e in unseen]
         out.append(table(("cause", "stage", "what it is"), rows, prose=True))
     else:
         out.append(element("p", "Every other cause in the library could have been seen by these data.", class_="soft"))
@@ -164,16 +165,20 @@ def _parameters(diagnosis: Diagnosis) -> list[Markup]:
 
 def _use(diagnosis: Diagnosis) -> list[Markup]:
     rig = diagnosis.model.rig
-    settings = {
-        "ankle": ("--set load_kg=1.5", "--set kind=isometric --set angle_rad=1.9"),
-        "joint": ("--set position0=0.5 --set velocity0=0",),
-    }.get(rig.name, ("",))
-    lines = [f"fes-pin predict model.toml TRIAL.csv {one} --out PREDICTED.csv".replace("  ", " ") for one in settings]
+    libraries = sorted({Path(where).name for one in (rig, *diagnosis.model.effects) if (where := origin(type(one)))})
+    options = "".join(f" --library {name}" for name in libraries)
+    lines = [
+        f"fes-pin predict model.toml TRIAL.csv {one}{options} --out PREDICTED.csv".replace("  ", " ")
+        for one in rig.settings
+    ]
     columns = " and ".join(("time_s", *rig.input_columns(diagnosis.study.trials[0])))
-    first = " A column position gives the initial state by its first sample." if rig.name == "joint" else ""
+    first = f" {rig.begins}" if rig.begins else ""
     which = "extended" if diagnosis.causes else "fitted nominal"
     words = f" beside this page is the {which} model, whole. TRIAL.csv needs {columns}.{first}"
-    python = 'import fes_pin as fp\n\nmodel = fp.load_model("model.toml")\npredicted = fp.predict(model, trial)'
+    library = f", library={libraries}".replace("'", '"') if libraries else ""
+    python = (
+        f'import fes_pin as fp\n\nmodel = fp.load_model("model.toml"{library})\npredicted = fp.predict(model, trial)'
+    )
     return [
         element("p", "The file ", element("code", "model.toml"), words),
         element("pre", "\n".join(lines)),

@@ -6,7 +6,6 @@ from fes_pin.diagnose.diagnosis import Cause, Diagnosis
 from fes_pin.diagnose.text import EACH_TRIAL
 from fes_pin.identify.fit import CONFIDENCE_95, Fit
 from fes_pin.models.describe import equation, remark, sentence
-from fes_pin.models.effects import effect
 from fes_pin.view.page import Content, Markup, element, figure, probability, rounded, table, unit_text
 from fes_pin.view.ranking import gain_figure, rivals_figure, shown_rivals
 from fes_pin.view.svg import inline_svg
@@ -59,7 +58,7 @@ def _gain_text(cause: Cause) -> str:
 
 
 def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
-    kind = effect(cause.name)
+    kind = diagnosis.catalogue.effect(cause.name)
     told = (
         f"These data cannot tell it from {', '.join(cause.equivalents)}: read them as one set."
         if cause.equivalents

@@ -24,7 +24,7 @@ TOML = {  # old text, new text, row, key, words
     "no_name": ('name = "small"\n', "", 1, "study.name", "missing"),
     "name_of_two_lines": ('"small"', '"a\\nb"', 2, "study.name", "one line"),
     "no_rig_name": ('rig = "ankle"\n', "", 1, "study.rig", "missing"),
-    "unknown_rig": ('"ankle"', '"knee"', 3, "study.rig", "ankle, muscle, joint, body"),
+    "unknown_rig": ('"ankle"', '"knee"', 3, "study.rig", "ankle, joint, muscle, body"),
     "rig_is_a_number": ('"ankle"', "3", 3, "study.rig", "expected one of"),
     "unknown_key": ("foot_mass_kg = 0.1", "foot_mass_kg = 0.1\nfoot_mas_kg = 1", 7, "rig.foot_mas_kg", "foot_mass_kg"),
     "unknown_table": ("[start]", "[strat]", 18, "strat", "start"),

@@ -13,8 +13,8 @@ from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import make_layout
 from fes_pin.models.effects import effect
 from fes_pin.models.model import Model
-from fes_pin.models.nominal import joint_model
 from fes_pin.models.rigs import Ankle, Muscle
+from fes_pin.models.rigs.joint import joint_model
 from fes_pin.models.rigs.rigid import (
     configuration,
     gravity_coefficients,

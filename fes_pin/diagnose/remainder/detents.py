@@ -53,7 +53,6 @@ class Ripple(Effect):
     name: ClassVar[str] = "ripple"
     stage: ClassVar[Stage] = Stage.JOINT
     signal: ClassVar[str] = "torque"
-    rigs: ClassVar[tuple[str, ...]] = ("ankle", "joint")
 
     def apply(self, value: Any, s: Any) -> Any:
         for j in range(AT_ONCE):
@@ -68,15 +67,15 @@ def detent_p_value(fitted: Fit, projection: Projection) -> float:
     Each wave number has a chi-square of two degrees beside what the fit takes up. All of them are divided by
     what half of them stay below, since noise that is not quite whitened raises them all.
     """
-    rig = Model(fitted.model.rig)
-    moving = [rig.rig.name in Ripple.rigs and "torque" in rig.rig.signals(t.kind) for t in fitted.trials]
+    rig = fitted.model.rig
+    moving = ["torque" in rig.signals(t.kind) for t in fitted.trials]
     if not any(moving):
         return 1.0
     low, high = _range(fitted, moving)
     if not high > low:
         return 1.0
     unit = TURN / (high - low)
-    model = rig + Ripple(step=STEP * unit, origin=0.5 * (low + high))
+    model = Model(rig, (Ripple(step=STEP * unit, origin=0.5 * (low + high)),))
     problem = Problem(model, fitted.trials, fitted.noise, tuple(f"{Ripple.name}.{n}" for n in Ripple.amplitudes()))
     values = {n: fitted.values.get(n, v) for n, v in model.parameters().items()}
     scores: list[float] = []

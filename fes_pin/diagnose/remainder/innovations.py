@@ -30,11 +30,14 @@ class Innovations:
         Shape (n,), of unit variance.
     dt
         Their time step, s.
+    inputs
+        The trial's columns that drive the rig.
     """
 
     trial: Trial
     values: np.ndarray
     dt: float
+    inputs: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -85,14 +88,15 @@ def channels(fitted: Fit) -> list[tuple[Noise, list[Innovations]]]:
     values = np.concatenate([p.residual for p in fitted.parts])
     found: dict[tuple[str, float], list[Innovations]] = {}
     for one in stretches(fitted):
-        found.setdefault((one.channel, one.dt), []).append(Innovations(one.trial, values[one.rows], one.dt))
+        inputs = fitted.model.rig.input_columns(one.trial)
+        found.setdefault((one.channel, one.dt), []).append(Innovations(one.trial, values[one.rows], one.dt, inputs))
     return [(fitted.noise[name], pieces) for (name, _), pieces in found.items()]
 
 
 def driven(one: Innovations) -> np.ndarray:
     """Roughly how active the muscle (or the motor, with its sign) is, shape (n,); zero without a stimulus."""
     trial, count = one.trial, max(1, round(one.dt / one.trial.dt))
-    drive = next((trial[n] for n in ("pulse_width_us", "stim", "effort") if n in trial.columns), np.zeros(len(trial)))
+    drive = trial[one.inputs[0]] if one.inputs else np.zeros(len(trial))
     pole = float(np.exp(-trial.dt / ACTIVATION_S))
     act = thin(low_pass(drive / max(float(np.abs(drive).max()), 1e-300), pole), count)
     return act[len(act) - len(one.values) :]

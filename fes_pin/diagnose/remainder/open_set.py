@@ -82,12 +82,12 @@ def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Featur
     """
     simulated = Simulator(model, trials).run(model.parameters())
     seen = [
-        (trial, one.readings[:, k], output)
+        (trial, model.rig.input_columns(trial), one.readings[:, k], output)
         for trial, one in zip(trials, simulated, strict=True)
         for k, output in enumerate(model.rig.outputs(trial.kind))
         if output in trial.columns and output in noise
     ]
-    blocks = in_parallel(lambda channel: _whitened(*channel, noise[channel[2]]), seen)
+    blocks = in_parallel(lambda channel: _whitened(*channel, noise[channel[3]]), seen)
     keys = list(dict.fromkeys(n for names, _ in blocks for n in names))
     rows = [np.zeros((len(columns), len(keys))) for _, columns in blocks]
     for row, (names, columns) in zip(rows, blocks, strict=True):
@@ -95,13 +95,15 @@ def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Featur
     return Features(tuple(n.split()[1].split(":")[0] for n in keys), np.concatenate(rows))
 
 
-def _whitened(trial: Trial, reading: np.ndarray, output: str, noise: Noise) -> tuple[list[str], np.ndarray]:
+def _whitened(
+    trial: Trial, inputs: Sequence[str], reading: np.ndarray, output: str, noise: Noise
+) -> tuple[list[str], np.ndarray]:
     """Names and whitened features of one channel of one trial."""
-    made = _of_trial(trial, reading, output)
+    made = _of_trial(trial, inputs, reading, output)
     return [f"{output} {n}" for n in made], noise.whiten(np.stack(list(made.values()), axis=1), trial.dt)
 
 
-def _of_trial(trial: Trial, reading: np.ndarray, output: str) -> dict[str, np.ndarray]:
+def _of_trial(trial: Trial, inputs: Sequence[str], reading: np.ndarray, output: str) -> dict[str, np.ndarray]:
     """Features of one channel of one trial by "variable: function", each scaled to about 1."""
     dt = trial.dt
     time = (trial.time - trial.time[0]) / max(trial.duration, dt)
@@ -131,24 +133,23 @@ def _of_trial(trial: Trial, reading: np.ndarray, output: str) -> dict[str, np.nd
         base[f"time: sin {cycles}"] = np.sin(2 * np.pi * cycles * time)
         base[f"time: cos {cycles}"] = np.cos(2 * np.pi * cycles * time)
     driven = {}
-    for name in ("pulse_width_us", "stim", "effort"):
-        if name in trial.columns:
-            u = trial[name] / max(float(np.abs(trial[name]).max()), 1e-12)
-            act, slow = _low_pass(u, 0.05, dt), _low_pass(u, 0.5, dt)
-            used = np.cumsum(act) * dt / max(trial.duration, dt)
-            driven = {
-                "stimulus: u": u,
-                "activation: act": act,
-                "activation: act2": act**2,
-                "activation: act3": act**3,
-                "activation: act q": act * q,
-                "activation: act v": act * v,
-                "activation: slow": slow,
-                "history: used": used,
-                "history: act used": act * used,
-                "history: act t": act * time,
-                "history: act slow": act * slow,
-            }
+    for name in inputs[:1]:
+        u = trial[name] / max(float(np.abs(trial[name]).max()), 1e-12)
+        act, slow = _low_pass(u, 0.05, dt), _low_pass(u, 0.5, dt)
+        used = np.cumsum(act) * dt / max(trial.duration, dt)
+        driven = {
+            "stimulus: u": u,
+            "activation: act": act,
+            "activation: act2": act**2,
+            "activation: act3": act**3,
+            "activation: act q": act * q,
+            "activation: act v": act * v,
+            "activation: slow": slow,
+            "history: used": used,
+            "history: act used": act * used,
+            "history: act t": act * time,
+            "history: act slow": act * slow,
+        }
     plain = {**base, **driven}
     lagged = _low_pass(_low_pass(np.stack(list(plain.values()), axis=1), 0.05, dt), 0.05, dt)
     through = dict(zip((f"{n} filtered" for n in plain), lagged.T, strict=True))

@@ -55,9 +55,9 @@ class JointFits:
         By names in alphabetical order; `()` is the nominal model.
     """
 
-    def __init__(self, model: Model, trials: Sequence[Trial]) -> None:
+    def __init__(self, model: Model, trials: Sequence[Trial], effects: Sequence[type[Effect]] | None = None) -> None:
         self.model, self.trials = Model(model.rig), tuple(trials)
-        self.library = Library(self.model, trials)
+        self.library = Library(self.model, trials, effects)
         self.noise: NoiseModel = {}
         self.fits: dict[Names, Fit] = {}
         self._problems: dict[tuple, Problem] = {}
@@ -277,7 +277,7 @@ def _refined(model: Model, effect: Effect) -> list[list[Model]]:
         return []
     out, info = [], effect.parameters()
     for names in effect.refinements():
-        if model.rig.name not in (info[names[0]].rigs or effect.rigs):
+        if (only := info[names[0]].rigs) and {model.rig.name, *model.rig.like}.isdisjoint(only):
             continue
         paths = [f"{effect.name}.{n}" for n in names]
         choices = itertools.product(*(info[n].grid for n in names))

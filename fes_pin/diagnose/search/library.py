@@ -13,7 +13,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.problem import Problem, measured_columns
-from fes_pin.models.effects import effects_for
+from fes_pin.models.catalogue import installed
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
@@ -46,8 +46,8 @@ class Probe:
 class Library:
     """The causes that a rig can have, ready to be linearized on trials."""
 
-    def __init__(self, model: Model, trials: Sequence[Trial]) -> None:
-        self.effects = effects_for(model.rig.name)
+    def __init__(self, model: Model, trials: Sequence[Trial], effects: Sequence[type[Effect]] | None = None) -> None:
+        self.effects = tuple(installed().effects_for(model.rig) if effects is None else effects)
         self.model, self.trials = Model(model.rig), tuple(trials)
         self.measured = measured_columns(model, trials)
         self._problems: dict[str, Problem] = {}

@@ -14,6 +14,7 @@ from fes_pin.diagnose.search.unfinished import choose_by_prediction, fit_for_pre
 from fes_pin.identify.fit import Fit, fit_anyhow, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
 from fes_pin.workers import OutOfTime, time_limit
 
 MOST_CAUSES = 3
@@ -92,12 +93,21 @@ class Searched:
 
 
 class Search:
-    """One search on one set of trials; `recorded` are the same trials before any thinning."""
+    """One search on one set of trials; `recorded` are the same trials before any thinning.
+
+    Among `effects`; by default those that are written here or installed, of the rig.
+    """
 
     def __init__(
-        self, model: Model, trials: Sequence[Trial], recorded: Sequence[Trial], seed: int, progress: Progress
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        recorded: Sequence[Trial],
+        seed: int,
+        progress: Progress,
+        effects: Sequence[type[Effect]] | None = None,
     ) -> None:
-        self.sets, self.seed, self.progress = JointFits(model, trials), seed, progress
+        self.sets, self.seed, self.progress = JointFits(model, trials, effects), seed, progress
         self.recorded, self.library = tuple(recorded), self.sets.library
         self._scored: list[Scored] = []
         self.was_stopped = False

@@ -10,12 +10,12 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
 
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Effect, in_order
 
 
 def catalogue() -> tuple[type[Effect], ...]:
     """The effects of this folder's files, in the order of the signal path, by name at each stage."""
-    return tuple(sorted(_written_here(), key=lambda e: (list(Stage).index(e.stage), e.name)))
+    return in_order(_written_here())
 
 
 def _written_here() -> Iterator[type[Effect]]:

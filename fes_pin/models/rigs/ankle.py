@@ -6,11 +6,16 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import numpy as np
+
+from fes_pin.data.schema import START_S, RigSchema, any_number, not_negative, positive
+from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.maths import clip, cos, exp, ramp, sin, where
 from fes_pin.models.parameters import parameter
 from fes_pin.models.rigs.base import GRAVITY, Rig
 from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
+from fes_pin.models.rigs.stimuli import pulse_widths
 from fes_pin.models.stage import Signals
 
 CONSTANTS = (
@@ -46,6 +51,53 @@ class Ankle(Rig):
     damping_nms: float = parameter(0.06, unit="N m s", lower=0.0, upper=100.0, scale=0.01)
 
     name, needed = "ankle", CONSTANTS
+    settings = ("--set load_kg=1.5", "--set kind=isometric --set angle_rad=1.9")
+    schema = RigSchema(
+        constants={
+            "foot_mass_kg": positive("kg"),
+            "com_distance_m": positive("m"),
+            "moment_arm_m": positive("m"),
+            "force_scale_n": positive("N"),
+            "threshold_us": not_negative("us"),
+            "saturation_us": positive("us"),
+        },
+        passive={"f0_n": not_negative("N"), "f1_per_rad": not_negative("1/rad"), "theta_r_rad": any_number("rad")},
+        start={
+            "gain": positive(""),
+            "time_constant_s": positive("s"),
+            "inertia_kgm2": positive("kg m2"),
+            "damping_nms": not_negative("N m s"),
+        },
+        conditions={"load_kg": not_negative("kg", False), "angle_rad": any_number("rad", False), **START_S},
+        needed={
+            "motion": {"load_kg": "the load in kg, as this is a motion trial"},
+            "isometric": {"angle_rad": "the angle in rad that this isometric trial is held at"},
+        },
+        only={"angle_rad": "isometric"},
+        default_kind="motion",
+        outputs={"motion": "angle_rad", "isometric": "force_n"},
+        inputs=("pulse_width_us",),
+    )
+
+    @classmethod
+    def conditions_to_try(cls, study: Study) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
+        """Those of the study, half and once and a half its loads, and angles held where it has moved."""
+        seen = super().conditions_to_try(study)
+        moved = np.concatenate([[], *(t["angle_rad"] for t in study.trials if t.kind == "motion" and "angle_rad" in t)])
+        out = set(seen)
+        for kind, conditions in seen:
+            values, others = dict(conditions), {}
+            if "load_kg" in values:
+                others["load_kg"] = [factor * values["load_kg"] for factor in (0.5, 1.5)]
+            elif "angle_rad" in values and moved.size:
+                others["angle_rad"] = list(np.quantile(moved, (0.05, 0.95)))
+            for name, many in others.items():
+                out |= {(kind, tuple(sorted({**values, name: round(float(v), 3)}.items()))) for v in many}
+        return out
+
+    @classmethod
+    def driven(cls, study: Study, shape: np.ndarray) -> np.ndarray:
+        return pulse_widths(study, shape)
 
     def signals(self, kind: str) -> tuple[str, ...]:
         muscle = ("pulse_width", "recruitment", "delay", "time_constant", "activation", "force")

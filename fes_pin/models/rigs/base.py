@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
+from fes_pin.data.schema import START_S, RigSchema
+from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import ROTARY, Parameter, parameters_of
-from fes_pin.models.stage import Signals
+from fes_pin.models.rigs.stimuli import both_signs
+from fes_pin.models.stage import Effect, Signals
 
 GRAVITY = 9.81
 """Standard gravity as the paper rounds it, m/s2 (eq. 7)."""
+
+RUN_OUT = "inertia over damping"
+"""What a joint without gravity has for a time constant; lightly damped, it outlasts any trial."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,11 +36,77 @@ class Rig:
     fitted: tuple[str, ...] | None = dataclasses.field(default=None, kw_only=True)
 
     name: ClassVar[str]
-    inputs: ClassVar[Mapping[str, str]]
+    schema: ClassVar[RigSchema]
+    """What a study of it must and may hold: keys, columns, units."""
+    like: ClassVar[tuple[str, ...]] = ()
+    """Names of other rigs whose effects it can have as well."""
     needed: ClassVar[tuple[str, ...]] = ()
     """Constants without which there are no equations."""
     elsewhere: ClassVar[str] = "turn the rig's base, or add a sensor on the other side of the joint or frame"
     """What tells causes apart that no input does."""
+    settings: ClassVar[tuple[str, ...]] = ("",)
+    """Examples of `fes-pin predict`'s options for its kinds of trial."""
+    begins: ClassVar[str] = ""
+    """Where a prediction of it begins, one sentence, if that is to be told."""
+
+    @classmethod
+    def described(cls) -> RigSchema:
+        """What a study of it must and may hold, with its name and this class."""
+        return dataclasses.replace(cls.schema, name=cls.name, owner=cls)
+
+    @classmethod
+    def of_study(cls, study: Study) -> Rig:
+        """The nominal model that a study believes, with its start values.
+
+        Raises
+        ------
+        InputError
+            If a file of the study cannot be read.
+        """
+        start: dict[str, Any] = dict(study.start)
+        return cls(constants=dict(study.constants), **start)
+
+    @classmethod
+    def takes(cls, effect: type[Effect] | Effect) -> bool:
+        """True if the effect can be part of it."""
+        return not {cls.name, *cls.like}.isdisjoint(effect.rigs)
+
+    def time_constants(self) -> dict[str, float]:
+        """Times in s that its answer takes at its own parameters, by what they are; only those that there are."""
+        muscle = getattr(self, "time_constant_s", None)
+        return {} if muscle is None else {"the muscle's time constant": muscle}
+
+    def check_prediction(self, trial: Trial) -> None:
+        """Make sure that a trial holds what a prediction begins with.
+
+        Raises
+        ------
+        InputError
+            If not, with what was expected.
+        """
+
+    @classmethod
+    def conditions_to_try(cls, study: Study) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
+        """Kinds and conditions under which a trial may be proposed: those that the study has been run under."""
+        run = ((t.kind, {n: v for n, v in t.conditions.items() if n not in START_S}) for t in study.trials)
+        return {(kind, tuple(sorted(conditions.items()))) for kind, conditions in run}
+
+    @classmethod
+    def steered(cls, study: Study) -> str | None:
+        """The input column of a study that `driven` can give any shape; None if there is none."""
+        return next((n for n in cls.schema.inputs if n in study.trials[0]), None)
+
+    @classmethod
+    def driven(cls, study: Study, shape: np.ndarray) -> np.ndarray:
+        """Values of the steered column of a shape from 0 (off) to 1, shape (n,)."""
+        column = cls.steered(study)
+        assert column is not None
+        return both_signs(study, column, shape)
+
+    @classmethod
+    def other_stimuli(cls, study: Study, time: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+        """Input columns of trials of a study that steers none: one without inputs by default."""
+        yield {}
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:

@@ -5,16 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.schema import START_S, RigSchema, any_number, not_negative, positive
+from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.data.urdf import check_one_joint
 from fes_pin.models.maths import cos, sin, sqrt, where
 from fes_pin.models.parameters import ROTARY, SLIDING, parameter
-from fes_pin.models.rigs.base import Rig, first_rate
+from fes_pin.models.rigs.base import RUN_OUT, Rig, first_rate
+from fes_pin.models.rigs.rigid import gravity_coefficients, is_revolute, joint_inertia, load_urdf
 from fes_pin.models.stage import Signals
 
 WEIGHTLESS = 1e-6
 """Gravity's torque over inertia below which a joint counts as balanced, 1/s2: a period above an hour and a half."""
+
+
+def _check_urdf(files: Mapping[str, Path]) -> None:
+    check_one_joint(files["urdf"])
 
 
 @dataclass(frozen=True)
@@ -39,6 +51,54 @@ class Joint(Rig):
     gravity_scale: float = parameter(1.0, lower=-10.0, upper=10.0, scale=0.1)
 
     name, needed = "joint", ("inertia", "gravity_cos", "gravity_sin", "revolute")
+    settings = ("--set position0=0.5 --set velocity0=0",)
+    begins = "A column position gives the initial state by its first sample."
+    schema = RigSchema(
+        constants={},
+        files={"urdf": True},
+        start={
+            "inertia_scale": positive(""),
+            "damping": not_negative("N m s/rad or N s/m"),
+            "gravity_scale": not_negative("", False),
+        },
+        start_may_be_known=True,
+        conditions={
+            "position0": any_number("rad or m", False),
+            "velocity0": any_number("rad/s or m/s", False),
+            **START_S,
+        },
+        default_kind="motion",
+        outputs={"motion": "position"},
+        inputs=("effort",),
+        inputs_required=False,
+        optional=("velocity",),
+        check_files=_check_urdf,
+    )
+
+    @classmethod
+    def of_study(cls, study: Study) -> Joint:
+        assert study.urdf is not None
+        driven = any("effort" in t.columns for t in study.trials)
+        return joint_model(study.urdf, study.constants, study.start, driven)
+
+    def time_constants(self) -> dict[str, float]:
+        inertia = self.inertia_scale * self.constants["inertia"]
+        weight = math.hypot(self.constants["gravity_cos"], self.constants["gravity_sin"])
+        stiffness = abs(self.gravity_scale) * weight
+        if self.constants["revolute"] and stiffness > 0.0:
+            return {"the swing's period over a turn": math.sqrt(inertia / stiffness)}
+        return {RUN_OUT: inertia / self.damping} if self.damping > 0.0 else {}
+
+    def check_prediction(self, trial: Trial) -> None:
+        if "position" not in trial.columns and "position0" not in trial.conditions:
+            raise InputError("expected a column position (its first sample) or --set position0=...")
+
+    @classmethod
+    def conditions_to_try(cls, study: Study) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
+        """Released at rest, from positions that trials began at."""
+        starts = [float(t["position"][0]) for t in study.trials]
+        released = np.quantile(starts, (0.0, 0.25, 0.5, 0.75, 1.0))
+        return {("motion", (("position0", round(float(p), 4)), ("velocity0", 0.0))) for p in released}
 
     def units(self) -> Mapping[str, str]:
         return ROTARY if self.constants.get("revolute", 1.0) else SLIDING
@@ -119,3 +179,31 @@ class Joint(Rig):
     def readings(self, s: Signals) -> tuple[Any, ...]:
         s.rest_reading, s.idle_reading, s.sensed = s.m.rest, s.c.idle, s.x.q
         return s.through("reading", s.x.q), s.x.v
+
+
+def joint_model(urdf: Path, constants: Mapping[str, Any], start: Mapping[str, Any], driven: bool = True) -> Joint:
+    """A one-joint rig from its URDF.
+
+    Parameters
+    ----------
+    constants
+        Parameters of the nominal model that are known.
+    start
+        Those that are fitted, with their start values.
+    driven
+        False for free motion, without an effort.
+
+    Raises
+    ------
+    InputError
+        If Pinocchio cannot read the URDF.
+    """
+    body = load_urdf(urdf)
+    cosine, sine = gravity_coefficients(body)
+    known = {n: constants[n] for n in Joint.parameters() if n in constants}
+    read = {"inertia": joint_inertia(body), "gravity_cos": cosine, "gravity_sin": sine}
+    read["revolute"] = float(is_revolute(body))
+    fitted = tuple(n for n in Joint.parameters() if n in start)
+    if not driven and "gravity_scale" in fitted:  # free motion shows only ratios: the URDF's inertia holds
+        fitted = tuple(n for n in fitted if n != "inertia_scale")
+    return Joint(constants=read, fitted=fitted, **{**known, **start})

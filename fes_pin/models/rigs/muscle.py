@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from fes_pin.data.schema import START_S, RigSchema, not_negative, positive
+from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.maths import clip
 from fes_pin.models.parameters import HELD, parameter
 from fes_pin.models.rigs.base import Rig
+from fes_pin.models.rigs.stimuli import pulse_widths, trains
 from fes_pin.models.stage import Signals
 
 
@@ -31,7 +34,34 @@ class Muscle(Rig):
     time_constant_s: float = parameter(0.05, unit="s", lower=2e-3, upper=2.0, scale=0.01)
 
     name = "muscle"
+    schema = RigSchema(
+        constants={"threshold_us": not_negative("us", False), "saturation_us": positive("us", False)},
+        start={"gain": positive(""), "time_constant_s": positive("s")},
+        conditions=START_S,
+        default_kind="isometric",
+        outputs={"isometric": "force_n"},
+        inputs=("pulse_width_us", "stim"),
+    )
     elsewhere = "record the same force with another sensor, or let the muscle move a joint"
+
+    @classmethod
+    def of_study(cls, study: Study) -> Muscle:
+        pulsed = [t for t in study.trials if "stim" in t.columns]
+        period = {"pulse_period_s": pulse_period(pulsed)} if pulsed else {}
+        start: dict[str, Any] = dict(study.start)
+        return cls(constants={**study.constants, **period}, **start)
+
+    @classmethod
+    def steered(cls, study: Study) -> str | None:
+        return "pulse_width_us" if "pulse_width_us" in study.trials[0] else None
+
+    @classmethod
+    def driven(cls, study: Study, shape: np.ndarray) -> np.ndarray:
+        return pulse_widths(study, shape)
+
+    @classmethod
+    def other_stimuli(cls, study: Study, time: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+        yield from ({"stim": train} for train in trains(time))
 
     def units(self) -> Mapping[str, str]:
         return HELD

@@ -1,0 +1,177 @@
+"""Causes and rigs of anybody's own file or module: loaded, checked, and told from those written here."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+import traceback
+from collections.abc import Iterable
+from pathlib import Path
+from types import ModuleType
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.schema import RigSchema
+from fes_pin.models.rigs.base import Rig
+from fes_pin.models.stage import Effect, Stage
+
+OF_A_FILE = "fes_pin_library_"
+"""How the names of modules begin that are made of files."""
+PACKAGE = "fes_pin."
+FROZEN = "expected @dataclass(frozen=True) above it"
+STAGES = ", ".join(f"Stage.{stage.name}" for stage in Stage)
+
+
+def load_module(source: str | Path) -> ModuleType:
+    """Run a Python file, or import a module by its name.
+
+    Raises
+    ------
+    InputError
+        If there is none, or its code ends in an error.
+    """
+    path = Path(source)
+    if path.suffix == ".py" or path.exists():
+        return _run_file(path)
+    try:
+        return importlib.import_module(str(source))
+    except ModuleNotFoundError as error:
+        if error.name is None or not str(source).startswith(error.name):
+            raise InputError(f"the module {source} cannot be run: {_told(error)}") from error
+        raise InputError(f"no module {source}; expected the name of a module, or a file that ends in .py") from None
+    except (Exception, SystemExit) as error:
+        raise InputError(f"the module {source} cannot be run: {_told(error)}") from error
+
+
+def _run_file(path: Path) -> ModuleType:
+    if not path.is_file():
+        raise InputError("no such file; expected a Python file with causes or rigs", file=path)
+    whole = path.resolve()
+    name = f"{OF_A_FILE}{whole.stem}_{hashlib.sha256(str(whole).encode()).hexdigest()[:8]}"
+    spec = importlib.util.spec_from_file_location(name, whole)
+    if spec is None or spec.loader is None:
+        raise InputError("expected a Python file, whose name ends in .py", file=path)
+    module = importlib.util.module_from_spec(spec)
+    before = sys.modules.get(name)
+    sys.modules[name] = module  # dataclasses look their module up
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        if before is not None:
+            sys.modules[name] = before
+        raise InputError(f"cannot be run: {_told(error)}", file=path, row=_row(error, whole)) from error
+    return module
+
+
+def _told(error: BaseException) -> str:
+    words = error.msg if isinstance(error, SyntaxError) else str(error)
+    return f"{type(error).__name__}: {words}".rstrip(": ")
+
+
+def _row(error: BaseException, path: Path) -> int | None:
+    if isinstance(error, SyntaxError):
+        return error.lineno
+    rows = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
+    return rows[-1] if rows else None
+
+
+def classes_of(module: ModuleType) -> tuple[type[Effect] | type[Rig], ...]:
+    """The causes and rigs that a module, or a module inside it, defines; names that begin with _ are its own.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    inside = (module.__name__, f"{module.__name__}.")
+    found = [
+        one
+        for one in vars(module).values()
+        if isinstance(one, type)
+        and issubclass(one, Effect | Rig)
+        and (one.__module__ == inside[0] or one.__module__.startswith(inside[1]))
+        and not one.__name__.startswith("_")
+    ]
+    if not found:
+        raise InputError("holds no cause and no rig; expected a class of Effect or Rig", file=_where(module.__name__))
+    return tuple(dict.fromkeys(found))
+
+
+def check_effect(one: type[Effect], rigs: Iterable[type[Rig]]) -> None:
+    """Make sure that a class is a whole cause.
+
+    Parameters
+    ----------
+    one
+        Of anybody's.
+    rigs
+        Every rig that there is, to look the effect's signal up.
+
+    Raises
+    ------
+    InputError
+        With the class and what was expected.
+    """
+    signals = _signals(one, rigs) if not (problem := _form_lacks(one)) else set()
+    if not problem and not signals:
+        problem = f"expected a rig that there is, found {', '.join(map(repr, one.rigs))}"
+    elif not problem and one.signal not in signals:
+        problem = f"expected a signal of its rigs, {', '.join(sorted(signals))}; found {one.signal!r}"
+    if problem:
+        raise InputError(f"class {one.__name__}: {problem}", file=_where(one.__module__))
+
+
+def check_rig(one: type[Rig]) -> None:
+    """Make sure that a class is a whole rig.
+
+    Raises
+    ------
+    InputError
+        With the class and what was expected.
+    """
+    problem = ""
+    if "__dataclass_fields__" not in vars(one):
+        problem = FROZEN
+    elif not isinstance(getattr(one, "name", None), str) or not one.name.isidentifier():
+        problem = "expected a name of letters, digits and _"
+    elif not isinstance(getattr(one, "schema", None), RigSchema):
+        problem = "expected schema, a RigSchema: the keys and columns of its studies"
+    if problem:
+        raise InputError(f"class {one.__name__}: {problem}", file=_where(one.__module__))
+
+
+def _form_lacks(one: type[Effect]) -> str:
+    """What the class of an effect lacks whatever its rigs are; "" if it is whole."""
+    lacking = [n for n in ("name", "stage", "signal", "rigs") if not hasattr(one, n)]
+    problems = {
+        FROZEN: "__dataclass_fields__" not in vars(one),
+        f"expected {', '.join(lacking)}": bool(lacking),
+        "expected a name of letters, digits and _": not str(getattr(one, "name", "")).isidentifier(),
+        f"expected a stage, one of {STAGES}": not isinstance(getattr(one, "stage", None), Stage),
+        'expected rigs, a tuple of names as in ("joint",)': not isinstance(getattr(one, "rigs", None), tuple),
+        "expected a method apply(self, value, s)": one.apply is Effect.apply,
+        "expected a parameter with a null, which switches it off": not one.amplitudes(),
+    }
+    for name, info in one.parameters().items():
+        inside = info.lower <= getattr(one, name) <= info.upper
+        problems[f"expected {name} from {info.lower:g} to {info.upper:g}, as its bounds are"] = not inside
+    return next((told for told, is_so in problems.items() if is_so), "")
+
+
+def _signals(one: type[Effect], rigs: Iterable[type[Rig]]) -> set[str]:
+    """The signals of every rig that can have an effect."""
+    return {s for rig in rigs if rig.takes(one) for kind in rig.schema.outputs for s in rig().signals(kind)}
+
+
+def origin(one: type) -> str:
+    """Whose code a cause or a rig is: the path of a file, or the name of a module; "" for what is written here."""
+    return "" if one.__module__.startswith(PACKAGE) else _where(one.__module__)
+
+
+def _where(module: str) -> str:
+    """The file that a module was made of, or its name."""
+    if module.startswith(OF_A_FILE) or module == "__main__":
+        return str(getattr(sys.modules.get(module), "__file__", None) or module)
+    return module

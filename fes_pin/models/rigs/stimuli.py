@@ -1,0 +1,39 @@
+"""Stimuli of a shape from 0 (off) to 1, and trains of pulses: what a rig may be driven with in a proposed trial."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fes_pin.data.study import Study
+
+RATES_HZ = (8.0, 15.0, 31.0, 45.0)
+"""Pulse rates that are proposed, from single twitches to a fused contraction."""
+ON_AND_PAUSE_S = ((7.0, 1.0), (1.0, 1.0), (0.3, 0.7))
+"""Of trains: how long each lasts, and the pause after it."""
+LAST_S = 0.8
+"""A proposed train ends so long before the trial does: the muscle's relaxation is seen."""
+
+
+def pulse_widths(study: Study, shape: np.ndarray) -> np.ndarray:
+    """Pulse widths from threshold to saturation, 0 where the shape is, shape (n,), us."""
+    low = float(study.constants.get("threshold_us", 180.0))
+    high = float(study.constants.get("saturation_us", 1000.0))
+    return np.where(shape > 0, np.round(low + (high - low) * shape), 0.0)
+
+
+def both_signs(study: Study, column: str, shape: np.ndarray) -> np.ndarray:
+    """Values of both signs up to the largest that the study has used, 0 where the shape is, shape (n,)."""
+    size = max(float(np.abs(t[column]).max()) for t in study.trials if column in t)
+    return np.where(shape > 0, size * (2.0 * shape - 1.0), 0.0)
+
+
+def trains(time: np.ndarray) -> Iterator[np.ndarray]:
+    """Trains of pulses, 1 in the sample of each, shape (n,)."""
+    end = 2.0 * time[-1] - time[-2]
+    for rate_hz in RATES_HZ:
+        pulse = np.diff(np.floor(time * rate_hz), prepend=-1.0) > 0
+        for on_s, pause_s in ON_AND_PAUSE_S:
+            on = (time % (on_s + pause_s) < on_s) & (time < end - LAST_S)
+            yield np.where(pulse & on, 1.0, 0.0)
