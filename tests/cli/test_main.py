@@ -102,7 +102,7 @@ def test_the_record_is_as_the_contract_says(made):
     found = json.loads((made / "one/diagnosis.json").read_text())
     assert list(found) == [
         *("study", "verdict", "causes", "remainder", "absorbed", "nominal", "extended", "noise"),
-        *("ceiling_percent", "next_experiment", "wall_s"),
+        *("ceiling_percent", "next_experiment", "warnings", "wall_s"),
     ]
     (cause,) = found["causes"]
     assert list(cause) == ["name", "stage", "parameters", "equivalents", "p_value", "gain_percent"]
