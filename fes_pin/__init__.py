@@ -5,6 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from fes_pin.data.schema import rigs_from
+
 if TYPE_CHECKING:  # the same names for type checkers; a test holds the two together
     from fes_pin.allocate.allocate import allocate as allocate
     from fes_pin.body.build import Body as Body
@@ -23,6 +25,8 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.identify.fit import fit as fit
     from fes_pin.models import effects as effects
     from fes_pin.models import rigs as rigs
+    from fes_pin.models.catalogue import Catalogue as Catalogue
+    from fes_pin.models.catalogue import load_library as load_library
     from fes_pin.models.model import Model as Model
     from fes_pin.models.nominal import nominal_model as nominal_model
     from fes_pin.models.predict import predict as predict
@@ -32,8 +36,6 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.muscles.nerve_inputs import controllability as controllability
     from fes_pin.muscles.nerves import Nerves as Nerves
     from fes_pin.view.report import report as report
-
-from fes_pin.data.schema import rigs_from
 
 __version__ = "0.1.0"
 
