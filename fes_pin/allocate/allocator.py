@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.allocate.allocation import Allocation, AllocationSequence
-from fes_pin.allocate.bounded import BoundedProgram, known_solver, solve_by, solve_sequence
+from fes_pin.allocate.bounded import BoundedProgram, known_solver, refined, solve_by, solve_sequence
 from fes_pin.allocate.certificate import Certifier
 from fes_pin.allocate.efforts import CUBE_TOLERANCE, error_then_effort, least_cubes
 from fes_pin.allocate.inputs import wanted_torque, wanted_torques
@@ -17,6 +17,9 @@ from fes_pin.data.errors import InputError
 from fes_pin.muscles.named import by_name
 
 __all__ = ["Allocator"]
+
+PRECISE = 1e-11
+"""Residual up to which an answer of DAQP is taken as it is."""
 
 
 class Allocator:
@@ -92,6 +95,12 @@ class Allocator:
         before = self.previous if previous is None else previous
         if before is not self.previous and before is not self.at_rest:
             before = by_name(before, p.names, "previous recruitment", 0.0)
+        found = self._solve(wanted, before, solver)
+        self.previous = found.recruitment
+        return found
+
+    def _solve(self, wanted: np.ndarray, before: np.ndarray, solver: str) -> Allocation:
+        p = self.problem
         lower, upper = p.limits(before)
         f = wanted @ self.pull
         if p.lexicographic:
@@ -104,9 +113,13 @@ class Allocator:
         if p.cubes:
             r, note = least_cubes(self.squares, f, p.prices, p.change, lower, upper)
             return self.result(r, wanted, lower, upper, before, note, CUBE_TOLERANCE)
-        if solver == "daqp":
-            return self.result(self.program.solve(f, lower, upper), wanted, lower, upper, before)
-        return self.result(self._ask(solver, f, lower, upper), wanted, lower, upper, before)
+        if solver != "daqp":
+            return self.result(self._ask(solver, f, lower, upper), wanted, lower, upper, before)
+        found = self.result(self.program.solve(f, lower, upper), wanted, lower, upper, before)
+        if found.certificate.residual <= PRECISE:
+            return found
+        again = refined(self.H, f, found.recruitment, lower, upper)  # numbers of very different sizes
+        return min(found, self.result(again, wanted, lower, upper, before), key=lambda a: a.certificate.residual)
 
     def result(
         self,
@@ -122,7 +135,6 @@ class Allocator:
         r = self.certify.at_limits(before, wanted, r, lower, upper, accuracy)
         certificate, achieved, gradient = self.certify(before, wanted, r, lower, upper)
         width = self.problem.curves.pulse_width_us(r)
-        self.previous = r
         return Allocation(
             r,
             width,
@@ -157,7 +169,6 @@ class Allocator:
         on = choice.r > 0.0
         low, high = np.where(on, np.maximum(lower, p.least), 0.0), np.where(on, upper, 0.0)
         certificate, achieved, gradient = self.certify(before, wanted, choice.r, low, high)
-        self.previous = choice.r
         width, note = p.curves.pulse_width_us(choice.r), f"{choice.nodes} choices compared"
         return Allocation(
             choice.r, width, wanted, achieved, gradient, lower, upper, before, certificate, choice.gap, p, note

@@ -50,6 +50,14 @@ def solve_once(H: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarra
     return held(r, info["lam"], lower, upper)
 
 
+def refined(H: np.ndarray, f: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """An answer after one step of Newton's method for what is free: its slope is 0 to rounding of the given H."""
+    free = np.flatnonzero((r > lower) & (r < upper))
+    better = r.copy()
+    better[free] -= np.linalg.solve(H[np.ix_(free, free)], (H @ r + f)[free])
+    return np.clip(better, lower, upper)
+
+
 class BoundedProgram:
     """A bounded program that starts where its last answer was; threads take turns.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import nnls
 
 from fes_pin.allocate.bounded import BoundedProgram, solve_once
 from fes_pin.allocate.problem import EPSILON
@@ -78,7 +79,7 @@ def error_then_effort(
             outside = (r < lower) | (r > upper)
             missed = max(
                 natural_residual(squares @ r + f, r, lower, upper),
-                natural_residual(second_slope(squares, f, total, target, r, lower, upper), r, lower, upper),
+                effort_unexplained(squares, f, total, target, r, lower, upper),
             )
             if missed < least:
                 best, least = np.clip(r, lower, upper), missed
@@ -106,7 +107,7 @@ def least_norm(
     return r
 
 
-def second_slope(
+def effort_unexplained(
     squares: np.ndarray,
     f: np.ndarray,
     total: np.ndarray,
@@ -114,15 +115,16 @@ def second_slope(
     r: np.ndarray,
     lower: np.ndarray,
     upper: np.ndarray,
-) -> np.ndarray:
-    """Slope of effort and change at equal torque error, 0 where the error holds a limit.
+) -> float:
+    """Greatest slope of effort and change at equal torque error that neither a price of torque nor a limit explains.
 
-    What of it lies in the range of S for the channels that the error leaves free is paid for by torque.
+    The best prices are those of least squares, limits' not negative; what the error holds at a limit is not asked.
     """
     slope = total / total.max() * (r - target)
     loose = np.abs(squares @ r + f) <= PRESSED
-    free = loose & (r > lower) & (r < upper)
-    if not free.any():
-        return np.where(loose, slope, 0.0)
-    pull = np.linalg.lstsq(squares[free], -slope[free], rcond=1e-12)[0]
-    return np.where(loose, slope + squares @ pull, 0.0)
+    if not loose.any():
+        return 0.0
+    at = np.eye(len(f))
+    explains = np.hstack([squares, -squares, at[:, r <= lower], -at[:, r >= upper]])[loose]
+    prices, _ = nnls(explains, slope[loose])
+    return float(np.abs(explains @ prices - slope[loose]).max())
