@@ -18,10 +18,12 @@ def main() -> None:
     parser.add_argument("--table", type=Path, help="write the table here as well")
     parser.add_argument("--figure", type=Path, help="write the picture here")
     parser.add_argument("--read-only", action="store_true", help="run nothing: table of what the results hold")
+    parser.add_argument("--check", action="store_true", help="60 studies; exit code 1 if they are worse than the table")
     given = parser.parse_args()
     os.environ["FES_PIN_THREADS"] = "1"
 
     from confusion_matrix import runner  # noqa: PLC0415
+    from confusion_matrix.check import complaints, slice_of  # noqa: PLC0415
     from confusion_matrix.picture import draw  # noqa: PLC0415
     from confusion_matrix.plan import Item  # noqa: PLC0415
     from confusion_matrix.table import one_line, table  # noqa: PLC0415
@@ -30,6 +32,10 @@ def main() -> None:
         for record in runner.run([[Item.parse(name)] for name in given.only], None, given.workers):
             print(one_line(record))
         return
+    if given.check:
+        found = complaints(runner.run(slice_of(given.seed), None, given.workers))
+        print("\n".join(found) or "as good as the table that is committed")
+        raise SystemExit(bool(found))
     if given.read_only:
         records = list(runner.read(given.results).values())
     else:

@@ -1,10 +1,12 @@
 """The table's sums, and a slice of the matrix from end to end."""
 
 import json
+from pathlib import Path
 
 import pytest
-from confusion_matrix import picture, plan, runner, stimuli, table
+from confusion_matrix import check, picture, plan, runner, stimuli, table
 from confusion_matrix.plan import Item
+from scipy.stats import binom
 
 
 def record(name, sets, verdict="causes_found", **more):
@@ -65,6 +67,49 @@ def test_any_beginning_is_a_slice():
     assert sum(len(g) for g in groups) == 25
     assert groups[:3] == runner.plan(50, seed=1)[:3]
     assert plan.DISTANCES == (15, 40, 150)
+
+
+GOLDEN = Path(__file__).parents[1] / "golden/confusion.txt"
+
+
+def counted(label):
+    """Hits and studies of the rows of the committed table that begin with a label."""
+    rows = [line.split() for line in GOLDEN.read_text().splitlines() if line.startswith(label)]
+    studies = [int(row[-1]) for row in rows]
+    percent = [float(row[[k for k, word in enumerate(row) if word == "%"][1] - 1]) for row in rows]
+    return round(sum(p * n / 100.0 for p, n in zip(percent, studies, strict=True))), sum(studies)
+
+
+def test_the_check_passes_what_the_table_holds_and_notices_what_is_worse():
+    alarms, blanks = counted("false alarms")
+    assert (alarms, blanks) == (1, 216)
+    assert binom.cdf(check.MOST_ALARMS, check.STUDIES, alarms / blanks) > 0.98
+    assert binom.sf(check.MOST_ALARMS, check.STUDIES, 0.15) > 0.95
+    rows = [counted(f"true cause in the first set, d = {d}") for d in (40, 150)]
+    found, hidden = map(sum, zip(*rows, strict=True))
+    assert binom.cdf(check.MOST_MISSED, check.STUDIES, 1.0 - found / hidden) > 0.98
+    assert binom.sf(check.MOST_MISSED, check.STUDIES, 0.25) > 0.95
+
+
+def test_the_check_is_thirty_of_each_sort():
+    items = [item for group in check.slice_of(0) for item in group]
+    assert [sum(map(check.hides_nothing, items)), len(items)] == [30, 60]
+    assert {item.rig for item in items} == {"ankle", "joint", "muscle"}
+    assert all(item.distance >= 40 for item in items if not check.hides_nothing(item))
+
+
+def test_the_check_complains():
+    right = [
+        record("ankle-fatigue-same-d40-white-1", [["fatigue"]]),
+        record("ankle-none-null-d0-ar1-1", [], "adequate"),
+    ]
+    assert check.complaints(right * 15) == []
+    alarm = record("ankle-none-null-d0-ar1-2", [["fatigue"]])
+    missed = record("ankle-load_error-same-d150-ar1-1", [["base_tilt"]])
+    assert check.complaints([alarm]) == [] and check.complaints([missed] * 3) == []
+    assert "2 false alarms" in check.complaints([alarm] * 2)[0]
+    assert "4 causes missed" in check.complaints([missed] * 4)[0]
+    assert "no answer: E: x" in check.complaints([{**alarm, "error": "E: x"}])[0]
 
 
 def test_slice_from_end_to_end_and_again(tmp_path, monkeypatch):
