@@ -21,6 +21,7 @@ from fes_pin.identify.fit import fit
 from fes_pin.models.effects import effect
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
+from fes_pin.paper.equation_1 import static_torque_nm
 
 OUT = Path(__file__).parents[1] / "out"
 OUT.mkdir(exist_ok=True)
@@ -62,10 +63,7 @@ class TrueAnkle:
         return at
 
     def torque(self, force: float, angle: float, rate: float, load_kg: float) -> float:
-        antagonist = max(RIG["f0_n"] * math.expm1(RIG["f1_per_rad"] * (angle - RIG["theta_r_rad"])), 0.0)
-        cable = RIG["moment_arm_m"] * force - RIG["com_distance_m"] * (antagonist - 9.81 * load_kg)
-        weight = 9.81 * RIG["foot_mass_kg"] * RIG["com_distance_m"] * math.cos(angle)
-        return cable * math.sin(angle) + weight - self.true["damping_nms"] * rate
+        return static_torque_nm(RIG, angle, force, load_kg) - self.true["damping_nms"] * rate
 
     def run(self, trial: Trial) -> Trial:
         """The trial with what is measured of it."""

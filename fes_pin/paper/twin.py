@@ -14,8 +14,8 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
+from fes_pin.paper.equation_1 import antagonist_n, static_torque_nm
 
-GRAVITY = 9.81
 MAX_STEP_S = 1.25e-3
 """Longest step of the integrator: 1/14 of the joint's fastest radian (57 rad/s at table 1); it errs by 1e-7 rad."""
 FATIGUE_FLOOR = 0.35
@@ -71,7 +71,7 @@ class AnkleTwin:
 
     def antagonist(self, q: float) -> float:
         """F_ANT in N at an angle in rad."""
-        return self.f0_n * math.expm1(self.f1_per_rad * max(q - self.theta_r_rad, 0.0))
+        return antagonist_n(vars(self), q)
 
     def rest_angle(self, force_n: float = 0.0) -> float:
         """Angle in rad at which the joint rests under a constant muscle force; by bisection.
@@ -90,9 +90,7 @@ class AnkleTwin:
         return 0.5 * (low + high)
 
     def _torque(self, q: float, v: float, force_n: float) -> float:
-        cable = self.moment_arm_m * force_n - self.com_distance_m * (self.antagonist(q) - self.load_kg * GRAVITY)
-        weight = self.foot_mass_kg * GRAVITY * self.com_distance_m
-        return cable * math.sin(q) + weight * math.cos(q) - self.damping_nms * v
+        return static_torque_nm(vars(self), q, force_n, self.load_kg) - self.damping_nms * v
 
     def constants(self) -> dict[str, float]:
         """The `[rig]` and `[rig.passive]` numbers of a study of this ankle."""

@@ -23,6 +23,7 @@ from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle
 from fes_pin.models.simulate import Simulator
+from fes_pin.paper.equation_1 import static_torque_nm
 
 KNOWN = {
     "foot_mass_kg": 0.12,
@@ -56,10 +57,8 @@ def _trial(seconds: float, rate: float, seed: int = 0) -> Trial:
 def _rates(t: float, x: np.ndarray, r: float, p: dict[str, float]) -> list[float]:
     """Eq. (1) in plain Python, as one would write it for solve_ivp."""
     act, q, v = x
-    passive = p["f0_n"] * (np.exp(p["f1_per_rad"] * (q - p["theta_r_rad"])) - 1.0) if q > p["theta_r_rad"] else 0.0
     force = p["gain"] * p["force_scale_n"] * act
-    torque = (p["moment_arm_m"] * force - p["com_distance_m"] * (passive - p["load_kg"] * 9.81)) * np.sin(q)
-    torque += p["foot_mass_kg"] * 9.81 * p["com_distance_m"] * np.cos(q) - p["damping_nms"] * v
+    torque = static_torque_nm(p, q, force, p["load_kg"]) - p["damping_nms"] * v
     return [(r - act) / p["time_constant_s"], v, torque / p["inertia_kgm2"]]
 
 

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from confusion_matrix.form import Form
-from confusion_matrix.rigs import GRAVITY
 from confusion_matrix.stimuli import DT
+from fes_pin.paper.equation_1 import static_torque_nm
 
 HOOKS = ("time_constant", "activation", "force", "net_force", "torque", "accelerate")
 
@@ -222,10 +222,7 @@ class _Run:
         pull = s.force
         for form in self._net_force:
             pull = form.net_force(pull, s)
-        passive = np.maximum(k["f0_n"] * np.expm1(k["f1_per_rad"] * (s.q - k["theta_r_rad"])), 0.0)
-        cable = k["moment_arm_m"] * pull - k["com_distance_m"] * (passive - s.load * GRAVITY)
-        weight = k["foot_mass_kg"] * GRAVITY * k["com_distance_m"]
-        return cable * np.sin(s.q) + weight * np.cos(s.q + s.tilt)
+        return static_torque_nm(k, s.q, pull, s.load, s.tilt)
 
     def _pendulum_torque(self) -> np.ndarray:
         s, k = self.s, self.s.k

@@ -1,6 +1,6 @@
 """Writes analysis/studies/ankle_demo: an ankle with a hidden cause, from scipy's integrator and the equations alone.
 
-Nothing of fes_pin is imported: what the engine is asked to find comes from other code.
+Nothing of the engine is imported: what it is asked to find comes from other code.
 """
 
 import math
@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+
+from fes_pin.paper.equation_1 import static_torque_nm
 
 HALF_WIDTH_US = 35.0  # the hidden cause: play in the recruitment
 TRUTH = {"gain": 0.74, "time_constant_s": 0.061, "inertia_kgm2": 1.18e-3, "damping_nms": 0.086}
@@ -25,7 +27,6 @@ PASSIVE = {"f0_n": 3.9, "f1_per_rad": 2.25, "theta_r_rad": 1.22}
 STEP_S, SECONDS = 0.005, 6.0
 NOISE = {"angle_rad": 0.002, "force_n": 0.2}
 SEED = 20261
-GRAVITY = 9.81
 
 README = """# ankle_demo
 
@@ -81,12 +82,7 @@ def activations(r: np.ndarray) -> np.ndarray:
 
 def torque(force: float, angle: float, rate: float, load_kg: float) -> float:
     """Eq. (1)'s right-hand side, N m."""
-    c = RIG | PASSIVE
-    stretch = angle - c["theta_r_rad"]
-    antagonist = c["f0_n"] * math.expm1(c["f1_per_rad"] * stretch) if stretch > 0.0 else 0.0
-    cable = c["moment_arm_m"] * force - c["com_distance_m"] * (antagonist - load_kg * GRAVITY)
-    gravity = c["foot_mass_kg"] * GRAVITY * c["com_distance_m"] * math.cos(angle)
-    return cable * math.sin(angle) + gravity - TRUTH["damping_nms"] * rate
+    return static_torque_nm(RIG | PASSIVE, angle, force, load_kg) - TRUTH["damping_nms"] * rate
 
 
 def angles(time: np.ndarray, r: np.ndarray, load_kg: float) -> np.ndarray:

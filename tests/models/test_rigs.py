@@ -24,6 +24,7 @@ from fes_pin.models.rigs.rigid import (
     point_foot,
     urdf_path,
 )
+from fes_pin.paper.equation_1 import static_torque_nm
 
 STATES = 200
 TIMING = {"t0": 0.0, "dt": 5e-3, "step": 2.5e-3, "shift": 0.0}
@@ -114,15 +115,13 @@ def test_ankle_is_equation_1_and_pinocchio_to_1e_12():
         for _ in range(STATES // 20):
             q, v, act = rng.uniform(0.0, math.pi), rng.uniform(-10.0, 10.0), rng.uniform(0.0, 1.0)
             a = engine({"q": q, "v": v, "act": act}, (0.0,))
-            antagonist = k["f0_n"] * (math.exp(k["f1_per_rad"] * (q - k["theta_r_rad"])) - 1.0)
-            antagonist = antagonist if q > k["theta_r_rad"] else 0.0
             muscle = rig.gain * k["force_scale_n"] * act
-            cable = k["moment_arm_m"] * muscle - k["com_distance_m"] * (antagonist - load * 9.81)
-            forces = cable * math.sin(q) - rig.damping_nms * v
+            static = static_torque_nm(k, q, muscle, load)
+            weight = k["foot_mass_kg"] * 9.81 * k["com_distance_m"] * math.cos(q)
+            forces = static - weight - rig.damping_nms * v
             rnea = pin.rnea(foot, data, np.array([q]), np.array([v]), np.array([a]))[0]
             size = abs(rig.inertia_kgm2 * a) + abs(forces) + 1.0
             assert abs(rnea - forces) <= 1e-12 * size
-            weight = k["foot_mass_kg"] * 9.81 * k["com_distance_m"] * math.cos(q)
             assert abs(rig.inertia_kgm2 * a - (forces + weight)) <= 1e-12 * size
 
 

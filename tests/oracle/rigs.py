@@ -5,9 +5,8 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
+from fes_pin.paper.equation_1 import static_torque_nm
 from oracle.causes import fatigue_rate, force_factor, joint_torque, time_constant
-
-G = 9.81
 
 
 class _Muscle:
@@ -125,15 +124,10 @@ class Ankle(_Muscle, _Moving):
         self.names = self.muscle_names() + (self.joint_names() if self.moves else [])
         self.times, self.speeds = [0.0], [0.0]
 
-    def static(self, q, force, t=0.0):
+    def static(self, q, force):
         """Torque of cable, antagonist and gravity."""
-        k = self.k
-        passive = k["f0_n"] * (math.exp(k["f1_per_rad"] * (q - k["theta_r_rad"])) - 1.0)
-        passive = passive if q > k["theta_r_rad"] else 0.0
         tilt = self.causes.get("base_tilt", {}).get("tilt_rad", 0.0)
-        length = k["com_distance_m"]
-        cable = k["moment_arm_m"] * force - length * (passive - self.load * G)
-        return cable * math.sin(q) + k["foot_mass_kg"] * G * length * math.cos(q + tilt)
+        return static_torque_nm(self.k, q, force, self.load, tilt)
 
     def rest(self):
         if not self.moves:
