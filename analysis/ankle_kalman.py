@@ -14,7 +14,7 @@ from fes_pin.identify.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_twin
-from fes_pin.paper.kalman import GainFilter, Recruitment, chi2_band, nees, track_gain
+from fes_pin.paper.kalman import GainFilter, StraightRecruitment, chi2_band, nees, track_gain
 from fes_pin.paper.twin import record, staircase
 
 OUT = Path(__file__).parents[1] / "out"
@@ -35,7 +35,7 @@ ours = track_gain(isometric(isometric_stimulus(8.0), 1, 1.0), twin.constants(), 
 runs, squares, innovations = 60, [], []
 for seed in range(2000, 2000 + runs):
     one = isometric(isometric_stimulus(5.25), seed)
-    tracker = GainFilter(one.dt, Recruitment.of(twin.constants()), FORCE_NOISE_N)
+    tracker = GainFilter(one.dt, StraightRecruitment.of(twin.constants()), FORCE_NOISE_N)
     for k, (force, width) in enumerate(zip(one["force_n"], one["pulse_width_us"], strict=True)):
         tracker.step(force, width)
         if k >= 225:

@@ -19,7 +19,7 @@ LONGEST = 1000
 
 
 @dataclass(frozen=True)
-class Fatigue:
+class StrengthFatigue:
     """Strength falls with use, comes back with rest (Riener, Quintern and Schmidt 1996, J. Biomech. 29:1157-1167).
 
         d left / dt = (least - left) act / fatigue_s + (1 - left) (1 - act) / recovery_s
@@ -127,7 +127,7 @@ class Horizon:
     time_constant_s: float = 0.05
     delay_steps: int = 0
     steps: int = 10
-    fatigue: Fatigue | None = None
+    fatigue: StrengthFatigue | None = None
     act: np.ndarray = field(init=False)
     left: np.ndarray = field(init=False)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.named import by_name
+from fes_pin.muscles.checked_numbers import by_name
 
 LARGEST_NM, SMALLEST_NM = 1e4, 1e-6
 """No joint of any body makes more: the strongest people's hips extend with some hundred N m (Anderson, Madigan and

@@ -11,7 +11,7 @@ import numpy as np
 from fes_pin.allocate.inputs import number, torque_matrix
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.named import by_name
+from fes_pin.muscles.checked_numbers import by_name
 from fes_pin.muscles.recruitment import ChannelRecruitment, LinearRecruitment
 
 EFFORT = 1e-4
@@ -192,7 +192,7 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> Problem:
     n, count = len(names), len(nominal)
     joints = JOINT_NAMES if count == len(JOINT_NAMES) else tuple(f"joint_{j + 1}" for j in range(count))
     curve = LinearRecruitment() if options.recruitment is None else options.recruitment
-    lower, upper, least = limits_of(options, names)
+    lower, upper, least = joint_limits(options, names)
     weights = checked_weights(options.weights, joints)
     kinds = ("squares", "cubes", "fatigue")
     if options.effort_kind not in kinds:
@@ -272,7 +272,7 @@ def checked_prices(effort: Any, names: tuple[str, ...]) -> np.ndarray:
     return array
 
 
-def limits_of(options: Options, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+def joint_limits(options: Options, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Lower and upper limits and least recruitments, (n,), with dead channels at 0.
 
     Raises

@@ -79,7 +79,7 @@ _LIMITS_DEG = {
 
 
 @dataclass(frozen=True)
-class Joint:
+class BodyJoint:
     """A mechanical joint between two segments: one hinge, or a ball as three revolutes from the pelvis outwards."""
 
     name: str
@@ -105,29 +105,29 @@ def axis_of(name: str) -> np.ndarray:
     return -axis if side_of(name) == "left" and abs(axis[1]) < 0.5 else axis
 
 
-def limits_of(name: str) -> tuple[float, float]:
+def joint_limits(name: str) -> tuple[float, float]:
     """Smallest and greatest angle, rad."""
     low, high = np.radians(_LIMITS_DEG[_plain(name)])
     return float(low), float(high)
 
 
-def _leg_joints(side: str) -> list[Joint]:
+def _leg_joints(side: str) -> list[BodyJoint]:
     def named(*parts: str) -> tuple[str, ...]:
         return tuple(f"{side}_{part}" for part in parts)
 
     thigh, shank, hindfoot, forefoot = named("thigh", "shank", "hindfoot", "forefoot")
     return [
-        Joint(f"{side}_hip", "pelvis", thigh, named(*_LEG[0:3])),
-        Joint(f"{side}_knee", thigh, shank, named(_LEG[3])),
-        Joint(f"{side}_ankle", shank, hindfoot, named(*_LEG[4:7])),
-        Joint(f"{side}_mtp", hindfoot, forefoot, named(_LEG[7])),
+        BodyJoint(f"{side}_hip", "pelvis", thigh, named(*_LEG[0:3])),
+        BodyJoint(f"{side}_knee", thigh, shank, named(_LEG[3])),
+        BodyJoint(f"{side}_ankle", shank, hindfoot, named(*_LEG[4:7])),
+        BodyJoint(f"{side}_mtp", hindfoot, forefoot, named(_LEG[7])),
     ]
 
 
-JOINTS: tuple[Joint, ...] = (
+JOINTS: tuple[BodyJoint, ...] = (
     *_leg_joints("left"),
     *_leg_joints("right"),
-    Joint("lumbar", "pelvis", "trunk", JOINT_NAMES[16:]),
+    BodyJoint("lumbar", "pelvis", "trunk", JOINT_NAMES[16:]),
 )
 """The nine joints of the paper's ten segments."""
 

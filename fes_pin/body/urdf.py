@@ -7,7 +7,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fes_pin.body.joints import JOINTS, SIDES, Joint, axis_of, limits_of
+from fes_pin.body.joints import JOINTS, SIDES, BodyJoint, axis_of, joint_limits
 from fes_pin.body.skeleton import Skeleton
 from fes_pin.data.errors import InputError
 
@@ -53,7 +53,7 @@ def write_urdf(skeleton: Skeleton, stance: str, title: str, provenance: str) -> 
     return "\n".join([*lines, "</robot>", ""])
 
 
-def tree(stance: str) -> Iterator[tuple[Joint, str, str]]:
+def tree(stance: str) -> Iterator[tuple[BodyJoint, str, str]]:
     """Joint, parent segment and child segment, from the stance forefoot outwards."""
     reached, todo = {f"{stance}_forefoot"}, list(JOINTS)
     while todo:
@@ -83,14 +83,14 @@ def _fixed(name: str, parent: str, child: str, xyz: np.ndarray) -> list[str]:
     ]
 
 
-def _joint(joint: Joint, parent: str, child: str, xyz: np.ndarray) -> list[str]:
+def _joint(joint: BodyJoint, parent: str, child: str, xyz: np.ndarray) -> list[str]:
     """One revolute, or three with massless links between; walked backwards, order and axes turn round."""
     outwards = parent == joint.inner
     names = joint.revolutes if outwards else joint.revolutes[::-1]
     links = [parent, *(f"{name}_link" for name in names[:-1]), child]
     lines = []
     for k, name in enumerate(names):
-        low, high = limits_of(name)
+        low, high = joint_limits(name)
         axis = axis_of(name) if outwards else -axis_of(name)
         lines += [
             f'  <joint name="{name}" type="revolute">',

@@ -83,7 +83,7 @@ def allocate(
     from math import degrees, radians
 
     from fes_pin.allocate.allocate import allocate as solve
-    from fes_pin.body.joints import limits_of
+    from fes_pin.body.joints import joint_limits
     from fes_pin.muscles.nerves import STRONGEST, Nerves
     from fes_pin.muscles.recruitment import LinearRecruitment
 
@@ -112,7 +112,7 @@ def allocate(
     wanted = pairs(torque or [], "a torque", MOST_NM)
     posture = {name: radians(value) for name, value in pairs(angle or [], "--angle", 360.0).items()}
     for name, value in posture.items():
-        low, high = limits_of(name)
+        low, high = joint_limits(name)
         if not low <= value <= high:
             raise InputError(f"--angle: {name} must lie within {degrees(low):.0f} to {degrees(high):.0f} degrees")
     rates = {name: radians(value) for name, value in pairs(rate or [], "--rate", MOST_DEG_S).items()}

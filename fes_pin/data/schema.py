@@ -250,7 +250,7 @@ def check_conditions(
 def unknown(name: str, known: Iterable[str]) -> str:
     """What to say of an unknown name: another unit, a likely typo, or what is known."""
     known = list(known)
-    same = [candidate for candidate in known if quantity(candidate) == quantity(name)]
+    same = [candidate for candidate in known if without_unit(candidate) == without_unit(name)]
     if same:
         return f"wrong unit or none; expected {same[0]}"
     close = get_close_matches(name.lower(), known, n=1, cutoff=0.75)
@@ -267,7 +267,7 @@ def unread(name: str, known: Iterable[str]) -> str:
     known = list(known)
     words = set(name.lower().replace("-", "_").split("_"))
     meant = [k for k in known if words & MEANT.get(k, set())]
-    near = meant or get_close_matches(quantity(name), known, n=1, cutoff=0.5)
+    near = meant or get_close_matches(without_unit(name), known, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]}? " if near else ""
     return f"unknown; {hint}this rig reads {', '.join(known)}: name the column so, or take it out"
 
@@ -275,11 +275,11 @@ def unread(name: str, known: Iterable[str]) -> str:
 def is_like(name: str, known: Iterable[str], cutoff: float = 0.8) -> bool:
     """Whether an unknown name is another unit or a likely typo of a known one."""
     known = list(known)
-    same = any(quantity(name) == quantity(each) for each in known)
+    same = any(without_unit(name) == without_unit(each) for each in known)
     return same or bool(get_close_matches(name.lower(), known, n=1, cutoff=cutoff))
 
 
-def quantity(name: str) -> str:
+def without_unit(name: str) -> str:
     """The name without its unit: `angle_rad` -> `angle`."""
     name = name.strip().lower()
     for unit in UNITS:

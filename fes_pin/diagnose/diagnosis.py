@@ -23,7 +23,7 @@ from fes_pin.diagnose.search.search import Search, Searched, Unfit
 from fes_pin.diagnose.search.unfinished import alike
 from fes_pin.identify.fit import Fit, rough_noise
 from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
-from fes_pin.identify.own import amplitude
+from fes_pin.identify.per_trial import amplitude
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model

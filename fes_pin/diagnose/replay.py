@@ -11,7 +11,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import RUNAWAY, within
 from fes_pin.diagnose.diagnosis import Diagnosis
 from fes_pin.identify.noise import NoiseModel
-from fes_pin.identify.own import predictions
+from fes_pin.identify.per_trial import predictions
 from fes_pin.models.model import Model
 
 

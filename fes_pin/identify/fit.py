@@ -164,7 +164,7 @@ def fit_growing(problem: Problem, start: Mapping[str, float], max_iterations: in
     return fit_problem(problem, values, unknowns, max_iterations)
 
 
-def fit_anyhow(
+def fit_multistart(
     problem: Problem,
     start: Mapping[str, float],
     unknowns: Unknowns | None = None,
@@ -240,12 +240,12 @@ def fit(
     """
     with one_thread_each():  # products this small are slower on several threads
         if noise is None:
-            first = fit_anyhow(Problem(model, trials, rough_noise(model, trials)), model.parameters())
+            first = fit_multistart(Problem(model, trials, rough_noise(model, trials)), model.parameters())
             if not math.isfinite(first.sse):  # the simulation runs away wherever the fit began
                 return first
             model, noise = first.model, noise_of(first)
             return fit_problem(Problem(model, trials, noise), first.values, first.unknowns, max_iterations)
-        return fit_anyhow(Problem(model, trials, noise), model.parameters(), max_iterations=max_iterations)
+        return fit_multistart(Problem(model, trials, noise), model.parameters(), max_iterations=max_iterations)
 
 
 def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:

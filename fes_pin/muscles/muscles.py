@@ -21,7 +21,7 @@ KNOWN_DEG = {
     "ankle_inversion": (-25.0, 35.0),
     "mtp_extension": (-30.0, 80.0),
 }
-"""Angles at which the paths are anatomy: a joint's whole range (`limits_of`), but for what runs straight where bone
+"""Angles at which the paths are anatomy: a joint's whole range (`joint_limits`), but for what runs straight where bone
 would hold it off. Iliacus and psoas lose the pelvic rim in front of them beyond 85 degrees of hip flexion and would
 extend the hip beyond 102; the long biceps would cross in front of the knee beyond 115 degrees of flexion.
 """

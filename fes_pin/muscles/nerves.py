@@ -9,8 +9,8 @@ import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
+from fes_pin.muscles.checked_numbers import number
 from fes_pin.muscles.muscles import MuscleTable, angles_of, standard_muscles
-from fes_pin.muscles.named import number
 
 STRENGTH_FACTOR = 1.8
 """A given strength is known to this factor: two standard deviations between healthy people either way (a coefficient of

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.named import number
+from fes_pin.muscles.checked_numbers import number
 
 STRAIGHT_BELOW = 1e-6
 """Fraction of the way below which a Hill curve is straight, as in the model of the same name."""

@@ -33,7 +33,7 @@ GAIN_95 = float(scipy.stats.norm.ppf(0.975))
 
 
 @dataclass(frozen=True)
-class Recruitment:
+class StraightRecruitment:
     """Straight recruitment from threshold to saturation, and the force that belongs to gain 1."""
 
     threshold_us: float = 180.0
@@ -41,7 +41,7 @@ class Recruitment:
     force_scale_n: float = 1.0
 
     @classmethod
-    def of(cls, constants: Mapping[str, float]) -> Recruitment:
+    def of(cls, constants: Mapping[str, float]) -> StraightRecruitment:
         """From the `[rig]` numbers of a study."""
         names = ("threshold_us", "saturation_us", "force_scale_n")
         return cls(**{n: float(constants[n]) for n in names if n in constants})
@@ -77,7 +77,7 @@ class GainFilter:
     def __init__(
         self,
         dt: float,
-        recruitment: Recruitment,
+        recruitment: StraightRecruitment,
         noise_std: float,
         greatest_gain: float = 2.0,
         wander: float = 0.0,
@@ -145,7 +145,9 @@ class RegressionFilter:
     Same parameters as `GainFilter`; its innovation is y+ - alpha y - beta r, whose noise it takes for white.
     """
 
-    def __init__(self, dt: float, recruitment: Recruitment, noise_std: float, greatest_gain: float = 2.0) -> None:
+    def __init__(
+        self, dt: float, recruitment: StraightRecruitment, noise_std: float, greatest_gain: float = 2.0
+    ) -> None:
         start = GainFilter(dt, recruitment, noise_std, greatest_gain)
         self.dt, self.recruitment, self.noise_std = dt, recruitment, noise_std
         self.x, self.p = start.x[1:], start.p[1:, 1:]
@@ -236,7 +238,7 @@ def track_gain(
     for column in ("force_n", "pulse_width_us"):
         if column not in trial:
             raise InputError(f"trial {trial.name} has no column {column}; gain and time constant need isometric trials")
-    recruitment = Recruitment.of(constants)
+    recruitment = StraightRecruitment.of(constants)
     filter_: GainFilter | RegressionFilter
     if plain:
         filter_ = RegressionFilter(trial.dt, recruitment, noise_std)

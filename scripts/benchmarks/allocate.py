@@ -19,7 +19,7 @@ if __name__ == "__main__":
 import numpy as np
 
 from fes_pin.allocate.allocate import Allocator, allocate
-from fes_pin.allocate.horizon import Fatigue, Horizon
+from fes_pin.allocate.horizon import Horizon, StrengthFatigue
 from fes_pin.allocate.walk import allocate_walk, clipped, direction_error, rescaled
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.measured_walk import read_walk
@@ -149,7 +149,7 @@ def horizon() -> list[tuple]:
     """
     torque = smooth_torque(420, 14.0)
     rows = []
-    for (name, matrix), fatigue in itertools.product(matrices().items(), (None, Fatigue())):
+    for (name, matrix), fatigue in itertools.product(matrices().items(), (None, StrengthFatigue())):
         plans: list = []
         ahead = Horizon(Allocator(matrix, change=1e-3, rate=0.2), fatigue=fatigue)
         rank = np.linalg.matrix_rank(matrix)

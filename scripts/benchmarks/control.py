@@ -13,7 +13,7 @@ from fes_pin.control.control import PositionController
 from fes_pin.control.loop import sine, track
 from fes_pin.models.effects.fatigue import Fatigue
 from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_twin
-from fes_pin.paper.kalman import GainFilter, Recruitment
+from fes_pin.paper.kalman import GainFilter, StraightRecruitment
 from fes_pin.paper.ratios import ankle_of
 from fes_pin.paper.twin import RunningTwin, record
 
@@ -42,7 +42,7 @@ def run() -> list[tuple[str, float, float, str]]:
 def _filter_step() -> float:
     twin = paper_twin("3-23")
     trial = record(twin, isometric_stimulus(4.0), "held", held_at_rad=HELD_AT_RAD, noise_std=FORCE_NOISE_N)
-    tracker = GainFilter(trial.dt, Recruitment.of(twin.constants()), FORCE_NOISE_N)
+    tracker = GainFilter(trial.dt, StraightRecruitment.of(twin.constants()), FORCE_NOISE_N)
     took = []
     for force, width in zip(trial["force_n"], trial["pulse_width_us"], strict=True):
         began = time.perf_counter()

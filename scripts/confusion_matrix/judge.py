@@ -10,7 +10,7 @@ import numpy as np
 
 from confusion_matrix.generator import Made
 from fes_pin.diagnose.diagnosis import Diagnosis, diagnose
-from fes_pin.identify.own import predictions
+from fes_pin.identify.per_trial import predictions
 
 
 def judge(made: Made) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from scipy.sparse import issparse
 
 from fes_pin.allocate import active_limits
 from fes_pin.allocate.allocate import Allocator
-from fes_pin.allocate.horizon import Fatigue, Horizon, invert_lag
+from fes_pin.allocate.horizon import Horizon, StrengthFatigue, invert_lag
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.nerves import Nerves
 
@@ -130,7 +130,7 @@ def test_a_plan_does_not_depend_on_the_plans_before_it():
 def test_channels_that_die_in_the_middle_of_random_runs_and_torques_that_are_refused():
     rng = np.random.default_rng(15)
     for _ in range(60):
-        horizon = random_horizon(rng, 6, fatigue=Fatigue(1.0, 3.0, 0.1))
+        horizon = random_horizon(rng, 6, fatigue=StrengthFatigue(1.0, 3.0, 0.1))
         p = horizon.program.problem
         for k in range(8):
             if k == 4:
@@ -212,7 +212,7 @@ def test_looking_ahead_beats_looking_at_now():
 def test_a_run_keeps_limits_and_rates_and_survives_a_dying_channel():
     rng = np.random.default_rng(2)
     nerves = Nerves(["left_tibial", "left_femoral", "left_hamstrings", "left_deep_peroneal"])
-    horizon = Horizon(Allocator(nerves, rate=0.1, upper=0.9), fatigue=Fatigue(2.0, 5.0, 0.1))
+    horizon = Horizon(Allocator(nerves, rate=0.1, upper=0.9), fatigue=StrengthFatigue(2.0, 5.0, 0.1))
     before = np.zeros(4)
     for k in range(60):
         if k == 30:
@@ -283,7 +283,7 @@ def test_other_solvers_are_given_the_stages_sparse(monkeypatch):
 def test_fatigue_is_carried_from_pulse_to_pulse_and_the_plan_knows_it():
     """Every plan is the one of a fresh horizon whose muscles have just the strength that is left."""
     rng = np.random.default_rng(14)
-    matrix, fatigue = rng.normal(size=(3, 4)) * 40, Fatigue(1.0, 3.0, 0.1)
+    matrix, fatigue = rng.normal(size=(3, 4)) * 40, StrengthFatigue(1.0, 3.0, 0.1)
     tiring = Horizon(Allocator(matrix, rate=0.2, change=1e-3), steps=6, fatigue=fatigue)
     left = np.ones(4)
     for _ in range(40):
@@ -300,7 +300,7 @@ def test_fatigue_is_carried_from_pulse_to_pulse_and_the_plan_knows_it():
 
 
 def test_fatigue_is_the_solution_of_its_equation():
-    fatigue = Fatigue(15.0, 30.0, 0.25)
+    fatigue = StrengthFatigue(15.0, 30.0, 0.25)
     left, act, dt = np.array([1.0, 0.5, 0.3]), np.array([1.0, 0.4, 0.0]), 1e-4
     euler = left.copy()
     for _ in range(10_000):
@@ -332,7 +332,7 @@ def test_inverting_the_lag_gives_back_the_activation():
         lambda p: Horizon(np.eye(2)),
         lambda p: Horizon(p).plan([["a", "b"]] * 10),
         lambda p: Horizon(p).plan(np.full((10, 2), 1e300)),
-        lambda p: Fatigue("x"),
+        lambda p: StrengthFatigue("x"),
         lambda p: Horizon(p, delay_steps=-1),
         lambda p: Horizon(Allocator(np.eye(2), least=0.2)),
         lambda p: Horizon(p).carry_on(Allocator(np.eye(3))),
@@ -340,7 +340,7 @@ def test_inverting_the_lag_gives_back_the_activation():
         lambda p: Horizon(p).plan(np.zeros((9, 2))),
         lambda p: Horizon(p).plan(np.full((10, 2), np.nan)),
         lambda p: Horizon(p).plan(np.zeros((10, 2)), solver="abacus"),
-        lambda p: Fatigue(-1.0),
+        lambda p: StrengthFatigue(-1.0),
     ],
 )
 def test_bad_input_is_one_clear_line(make):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from fes_pin.body.anthropometry import Subject, combined, skeleton_of_subject
 from fes_pin.body.build import Body
-from fes_pin.body.joints import JOINT_NAMES, SEGMENT_NAMES, axis_of, limits_of, mirrored
+from fes_pin.body.joints import JOINT_NAMES, SEGMENT_NAMES, axis_of, joint_limits, mirrored
 from fes_pin.body.skeleton import read_segments
 from fes_pin.data.errors import InputError
 
@@ -137,7 +137,7 @@ def test_directions_are_the_anatomists():
 
 def test_limits_hold_zero_and_are_in_the_urdf(body):
     for joint in JOINT_NAMES:
-        low, high = limits_of(joint)
+        low, high = joint_limits(joint)
         assert low < 0.0 < high
         i = body.joint_names.index(joint)
         assert (body.limits[0][i], body.limits[1][i]) == (low, high)

@@ -12,12 +12,12 @@ from identify.rigs import trials_of
 
 from fes_pin.diagnose.remainder import open_set
 from fes_pin.diagnose.remainder.bursts import burst_p_value
+from fes_pin.diagnose.remainder.heteroscedastic import heteroscedastic_p_value
 from fes_pin.diagnose.remainder.innovations import channels, under_own_noise
 from fes_pin.diagnose.remainder.open_set import FULL_NOISE, REMAINDER_LEVEL, remainder
 from fes_pin.diagnose.remainder.play import play_p_value
 from fes_pin.diagnose.remainder.repeated import repeated_p_value
 from fes_pin.diagnose.remainder.slips import slip_p_value
-from fes_pin.diagnose.remainder.uneven import uneven_p_value
 from fes_pin.diagnose.search.promise import Projection
 from fes_pin.identify.fit import fit
 from fes_pin.identify.noise import Noise, estimate_noise
@@ -64,7 +64,7 @@ def test_eight_tests_together_keep_the_level(monkeypatch):
     """Uniform p-values, of two channels where a test looks at each: 20 000 remainders, with a deviation of 0.1 %."""
     rng = np.random.default_rng(43)
     one = (WHITE, [SimpleNamespace(values=None, dt=DT)])
-    for name in ("burst", "detent", "repeated", "uneven", "slip", "play"):
+    for name in ("burst", "detent", "repeated", "heteroscedastic", "slip", "play"):
         monkeypatch.setattr(open_set, f"{name}_p_value", lambda *_: rng.uniform())
     monkeypatch.setattr(open_set, "line_p_value", lambda _: (rng.uniform(), "time"))
     monkeypatch.setattr(open_set, "channels", lambda _: [one, one])
@@ -102,7 +102,9 @@ def test_tests_that_need_no_white_noise_keep_their_level(poles):
     p_values = []
     for _ in range(80):
         e = scipy.signal.lfilter([1.0], poles, rng.standard_normal((5, 700)))[:, 100:]
-        p_values.append((burst_p_value(list(e), WHITE, DT), repeated_p_value(e, DT), uneven_p_value(e, driver, DT)))
+        p_values.append(
+            (burst_p_value(list(e), WHITE, DT), repeated_p_value(e, DT), heteroscedastic_p_value(e, driver, DT))
+        )
     assert (np.sum(np.array(p_values) < 0.05, axis=0) <= 9).all()
 
 

@@ -11,7 +11,7 @@ from models.cases import JOINT, RIGS, trial
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.descent import TOLERANCE
-from fes_pin.identify.fit import GROSS, fit, fit_anyhow, fit_problem, noise_of
+from fes_pin.identify.fit import GROSS, fit, fit_multistart, fit_problem, noise_of
 from fes_pin.identify.noise import Noise, thinning
 from fes_pin.identify.problem import Problem, normal_equations
 from fes_pin.models.effects import effect
@@ -172,7 +172,7 @@ def test_a_joint_that_tumbles_is_fitted_from_its_beginning(seed):
     start = model.with_parameters({"inertia_scale": 1.3, "damping": 0.004})
     problem = Problem(start, trials, WHITE)
     assert fit_problem(problem, start.parameters()).reduced > 1e3 * GROSS
-    fitted = fit_anyhow(problem, start.parameters())
+    fitted = fit_multistart(problem, start.parameters())
     assert fitted.reduced == pytest.approx(1.0, abs=0.1)
     for name in fitted.free:
         assert abs(fitted.values[name] - model.parameters()[name]) < 4.0 * fitted.std(name)

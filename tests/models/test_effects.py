@@ -94,7 +94,7 @@ def test_a_cause_is_one_file(tmp_path, monkeypatch):
     """Nothing else has to be edited for it to stand at its place on the path."""
     (tmp_path / "joint_creep.py").write_text(NEW_CAUSE)
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
-    names = [e.name for e in effects.catalogue()]
+    names = [e.name for e in effects.find_effects()]
     sys.modules.pop("fes_pin.models.effects.joint_creep")
     at = names.index("joint_creep")
     assert names[at - 1 : at + 2] == ["effort_offset", "joint_creep", "joint_stop"]

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 from fes_pin.allocate.allocate import allocate
-from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, limits_of
+from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, joint_limits
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.fibres import active_force, tendon_force
 from fes_pin.muscles.muscles import KNOWN_DEG, standard_muscles
@@ -119,7 +119,7 @@ def test_a_muscle_pulls_its_anatomical_way_over_all_angles_that_are_known(muscle
 
 def test_known_angles_are_those_of_the_joint_or_less():
     for joint, (low, high) in KNOWN_DEG.items():
-        limits = np.degrees(limits_of(f"left_{joint}"))
+        limits = np.degrees(joint_limits(f"left_{joint}"))
         assert limits[0] - 1e-9 <= low < high <= limits[1] + 1e-9
 
 

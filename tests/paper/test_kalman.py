@@ -8,7 +8,7 @@ from fes_pin.identify.fit import fit
 from fes_pin.identify.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_trial, paper_twin
-from fes_pin.paper.kalman import GainFilter, Recruitment, chi2_band, nees, track_gain
+from fes_pin.paper.kalman import GainFilter, StraightRecruitment, chi2_band, nees, track_gain
 from fes_pin.paper.twin import record
 
 TWIN = paper_twin("3-23")
@@ -28,7 +28,7 @@ def runs():
     squares, innovations = [], []
     for seed in range(RUNS):
         trial = isometric(2000 + seed, seconds=5.25)
-        tracker = GainFilter(trial.dt, Recruitment.of(CONSTANTS), FORCE_NOISE_N)
+        tracker = GainFilter(trial.dt, StraightRecruitment.of(CONSTANTS), FORCE_NOISE_N)
         at, nis = [], []
         for k, (force, width) in enumerate(zip(trial["force_n"], trial["pulse_width_us"], strict=True)):
             tracker.step(force, width)
@@ -49,7 +49,7 @@ def test_within_two_percent_after_five_seconds(seed):
 def test_the_filter_does_the_sums_of_a_kalman_filter():
     """Against matrices: the correction in Joseph's form, the prediction with the product's exact moments."""
     trial, noise = isometric(11, seconds=2.0), FORCE_NOISE_N
-    tracker = GainFilter(trial.dt, Recruitment.of(CONSTANTS), noise, wander=0.05)
+    tracker = GainFilter(trial.dt, StraightRecruitment.of(CONSTANTS), noise, wander=0.05)
     x, p = tracker.x, tracker.p
     for force, width in zip(trial["force_n"], trial["pulse_width_us"], strict=True):
         tracker.step(float(force), float(width))
@@ -117,4 +117,4 @@ def test_bad_input_is_one_line():
     with pytest.raises(InputError, match="no column force_n"):
         track_gain(paper_trial("3-23"), CONSTANTS, FORCE_NOISE_N)
     with pytest.raises(InputError, match="above 0"):
-        GainFilter(0.0, Recruitment(), 0.2)
+        GainFilter(0.0, StraightRecruitment(), 0.2)

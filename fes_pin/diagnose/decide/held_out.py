@@ -11,7 +11,7 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem, go_on
 from fes_pin.identify.noise import NoiseModel
-from fes_pin.identify.own import predictions
+from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
@@ -63,7 +63,8 @@ class Errors:
 def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
     """Open-loop errors of a model that starts each trial as a prediction does.
 
-    What is each trial's own is estimated from other parts of it than those that it is judged on; see `identify.own`.
+    What is each trial's own is estimated from other parts of it than those that it is judged on: see
+    `identify.per_trial`.
     """
     squares, spread, counts = [], [], []
     pieces = 1 if len(trials) >= 5 else 10

@@ -16,12 +16,12 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.remainder.bursts import burst_p_value
 from fes_pin.diagnose.remainder.detents import detent_p_value
+from fes_pin.diagnose.remainder.heteroscedastic import heteroscedastic_p_value
 from fes_pin.diagnose.remainder.innovations import channels, driven, under_own_noise
 from fes_pin.diagnose.remainder.lines import LONGEST_NOISE, line_p_value
 from fes_pin.diagnose.remainder.play import play_p_value
 from fes_pin.diagnose.remainder.repeated import repeated_p_value
 from fes_pin.diagnose.remainder.slips import slip_p_value
-from fes_pin.diagnose.remainder.uneven import uneven_p_value
 from fes_pin.diagnose.search.promise import Projection
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
@@ -32,13 +32,13 @@ from fes_pin.workers import in_parallel
 
 REMAINDER_LEVEL = 0.02
 """Level of all tests of the remainder together; see `search.CLAIM_LEVEL`."""
-OTHERS = ("burst", "line", "detent", "repeated", "uneven", "slip", "play")
+OTHERS = ("burst", "line", "detent", "repeated", "heteroscedastic", "slip", "play")
 SHARES = {"smooth": 1 / 2, **dict.fromkeys(OTHERS, 1 / (2 * len(OTHERS)))}
 """Of the level, for each test."""
 SMOOTH_LEVEL = REMAINDER_LEVEL * SHARES["smooth"]
 SHORT_NOISE = 2
-"""Order of the noise that bursts, repeated and uneven deviations are looked for under: these tests hold for noise of
-any spectrum, and a longer autoregression learns slow deviations as noise."""
+"""Order of the noise that bursts, repeated and heteroscedastic deviations are looked for under: these tests hold for
+noise of any spectrum, and a longer autoregression learns slow deviations as noise."""
 FULL_NOISE = 24
 """Order of the noise that slips and play are looked for under. It whitens a random torque down to the lowest
 frequencies, also where a criterion finds it too weak to be worth the coefficients, and reaches back too short a time,
@@ -186,8 +186,8 @@ def _others(fitted: Fit, seed: int) -> list[tuple[float, str]]:
     line, where = min(line_p_value(pieces) for _, pieces in channels(under_own_noise(fitted, LONGEST_NOISE)))
     detents = detent_p_value(own, Projection(own.parts))
     repeated = min(repeated_p_value([e.values for e in pieces], pieces[0].dt) for _, pieces in short)
-    uneven = min(
-        uneven_p_value([e.values for e in pieces], [np.abs(driven(e)) for e in pieces], pieces[0].dt)
+    heteroscedastic = min(
+        heteroscedastic_p_value([e.values for e in pieces], [np.abs(driven(e)) for e in pieces], pieces[0].dt)
         for _, pieces in short
     )
     return [
@@ -195,7 +195,7 @@ def _others(fitted: Fit, seed: int) -> list[tuple[float, str]]:
         (count * line / SHARES["line"], where),
         (detents / SHARES["detent"], "angle"),
         (count * repeated / SHARES["repeated"], "time"),
-        (count * uneven / SHARES["uneven"], "stimulus"),
+        (count * heteroscedastic / SHARES["heteroscedastic"], "stimulus"),
         (slip_p_value(full, beside, seed) / SHARES["slip"], "time"),
         (play_p_value(full, beside) / SHARES["play"], "rate"),
     ]

@@ -17,7 +17,7 @@ from fes_pin.identify.fit import (
     GROSS,
     MAX_ITERATIONS,
     Fit,
-    fit_anyhow,
+    fit_multistart,
     fit_problem,
     go_on,
     noise_of,
@@ -149,7 +149,7 @@ class JointFits:
 
         Slow noise leaves the fast parts of an answer to a fit, and those of a late one meet only where they are near.
         """
-        near = fit_anyhow(Problem(model, self.trials, white), model.parameters(), None, LOOK)
+        near = fit_multistart(Problem(model, self.trials, white), model.parameters(), None, LOOK)
         return fit_problem(self.problem(model), near.values, near.unknowns, LOOK)
 
     def _pursue(self, size: int) -> None:

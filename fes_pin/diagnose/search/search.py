@@ -11,7 +11,7 @@ from fes_pin.diagnose.decide.claims import Claims
 from fes_pin.diagnose.search.joint_fits import LOOK, PURSUED, JointFits, Names, subsets
 from fes_pin.diagnose.search.promise import Scored, best_by_effect, best_pairs
 from fes_pin.diagnose.search.unfinished import choose_by_prediction, fit_for_prediction
-from fes_pin.identify.fit import Fit, fit_anyhow, rough_noise
+from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -205,7 +205,7 @@ class Search:
         self.progress(0.02, "nominal model")
         sets.set_noise(rough_noise(sets.model, sets.trials))
         with time_limit(math.inf):
-            first = fit_anyhow(sets.problem(sets.model), sets.model.parameters(), None, LOOK)
+            first = fit_multistart(sets.problem(sets.model), sets.model.parameters(), None, LOOK)
         self._begun = first
         self._reached = ((), first.noise, {(): first})
         if not math.isfinite(first.sse):

@@ -13,7 +13,7 @@ from typing import Any
 from fes_pin.models.stage import Effect, in_order
 
 
-def catalogue() -> tuple[type[Effect], ...]:
+def find_effects() -> tuple[type[Effect], ...]:
     """The effects of this folder's files, in the order of the signal path, by name at each stage."""
     return in_order(_written_here())
 
@@ -25,7 +25,7 @@ def _written_here() -> Iterator[type[Effect]]:
                 yield one
 
 
-EFFECTS = catalogue()
+EFFECTS = find_effects()
 """Every effect, in the order of the signal path."""
 
 

@@ -13,7 +13,7 @@ SCALES_S = (0.0, 0.08, 0.3, 1.0)
 """Lengths that the innovations are averaged over, s; 0 takes them as they are."""
 
 
-def uneven_p_value(innovations: Sequence[np.ndarray], driver: Sequence[np.ndarray], dt: float) -> float:
+def heteroscedastic_p_value(innovations: Sequence[np.ndarray], driver: Sequence[np.ndarray], dt: float) -> float:
     """p-value of the innovations being no larger where a driver is large than where it is small.
 
     With z the innovations and d the driver averaged over a length, d from 0 to 1, the ratio of the means of z^2 with
