@@ -81,7 +81,7 @@ def test_models_are_compiled_and_run_side_by_side(engine, monkeypatch):
         return np.column_stack([simulated[n] for n in model.rig.outputs(one.kind)])
 
     alone = [run(case) for case in cases]
-    program._PROGRAMS.clear()
+    program.forget_programs()
     with ThreadPoolExecutor(THREADS) as pool:
         together = list(pool.map(run, cases))
     for one, other in zip(alone, together, strict=True):

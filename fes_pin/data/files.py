@@ -113,7 +113,7 @@ def write_bytes(path: str | Path, content: bytes, mode: int = 0o666) -> None:
         if not path.parent.is_dir():
             raise InputError("the folder to write into does not exist", file=path)
         target = path.resolve()
-        with _scratch(target.parent) as scratch:
+        with scratch_folder(target.parent) as scratch:
             os.replace(_stage(scratch / "new", content, mode), target)
         _sync_folder(target.parent)
 
@@ -173,7 +173,7 @@ def write_files(folder: str | Path, contents: Mapping[str, str | bytes], without
 
 def _write_into(folder: Path, contents: Mapping[str, str | bytes], without: Iterable[str]) -> None:
     targets = {name: _target(folder, name) for name in contents}
-    with _scratch(folder) as scratch:
+    with scratch_folder(folder) as scratch:
         staged = {}
         for index, (name, content) in enumerate(contents.items()):
             whole = content.encode("utf-8") if isinstance(content, str) else content
@@ -206,7 +206,7 @@ def _exchange(staged: Mapping[Path, Path], leaving: Iterable[Path], scratch: Pat
 
 
 @contextmanager
-def _scratch(folder: Path) -> Iterator[Path]:
+def scratch_folder(folder: Path) -> Iterator[Path]:
     """A folder inside `folder`, and so on the same disk, to prepare files in; what killed runs left there goes first.
 
     It is locked as long as it is used. A lock ends with its process: what can be locked is of a run that was killed.

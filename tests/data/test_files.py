@@ -70,7 +70,7 @@ def test_a_run_removes_what_killed_ones_left(tmp_path):
 
 
 def test_a_run_leaves_alone_what_another_works_on(tmp_path):
-    with files._scratch(tmp_path) as one, files._scratch(tmp_path) as other:
+    with files.scratch_folder(tmp_path) as one, files.scratch_folder(tmp_path) as other:
         (one / "half").write_text("")
         write_files(tmp_path, {"a": "a"})
         write_text(tmp_path / "b", "b")

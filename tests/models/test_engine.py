@@ -75,10 +75,13 @@ def test_the_guess_is_not_written_to():
 @pytest.fixture
 def fresh(monkeypatch, tmp_path):
     """No program in memory, and a cache folder of its own."""
-    monkeypatch.setattr(program, "_PROGRAMS", {})
+    program.forget_programs()
     monkeypatch.setenv("FES_PIN_CACHE", str(tmp_path / "cache"))
-    program._say_slow.cache_clear()
     return tmp_path / "cache"
+
+
+BARE_MUSCLE = (Model(RIGS["muscle"]), "isometric", ("pulse_width_us",), ())
+"""What `answer` runs."""
 
 
 def answer():
@@ -90,7 +93,9 @@ def test_the_environment_chooses_the_engine(fresh, monkeypatch):
     expected = answer()
     monkeypatch.setenv("FES_PIN_ENGINE", "casadi")
     assert answer() == pytest.approx(expected, abs=1e-10)
-    assert {type(p).__name__ for p in program._PROGRAMS.values()} == {"NativeProgram", "VirtualProgram"}
+    assert isinstance(program.program(*BARE_MUSCLE), VirtualProgram)
+    monkeypatch.setenv("FES_PIN_ENGINE", "llvm")
+    assert isinstance(program.program(*BARE_MUSCLE), native.NativeProgram)
     monkeypatch.setenv("FES_PIN_ENGINE", "abacus")
     with pytest.raises(InputError, match="FES_PIN_ENGINE: expected llvm or casadi, found 'abacus'"):
         answer()
@@ -102,7 +107,7 @@ def test_generic_code_uses_no_wide_registers_and_says_the_same(fresh, monkeypatc
     monkeypatch.setenv("FES_PIN_CPU", "generic")
     found = answer()
     assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)
-    assert len(list(fresh.iterdir())) == 2 and len(program._PROGRAMS) == 2
+    assert len(list(fresh.iterdir())) == 2
     if "x86_64" in llvm.get_default_triple():
         layout, _ = lanes(everything("ankle"), "motion", np.random.default_rng(0), 10)
         module = llvm.parse_assembly(native.emit(derive(everything("ankle"), layout)))
@@ -119,7 +124,7 @@ def test_all_effects_at_once_are_the_same_in_generic_code(monkeypatch, rig, kind
 @pytest.mark.parametrize("error", [RuntimeError("no such\nprocessor"), NotImplementedError("CasADi operation 99")])
 def test_where_nothing_compiles_the_virtual_machine_runs_and_says_so_once(fresh, monkeypatch, caplog, error):
     expected = answer()
-    program._PROGRAMS.clear()
+    program.forget_programs()
 
     def broken(*_):
         raise error
@@ -128,8 +133,7 @@ def test_where_nothing_compiles_the_virtual_machine_runs_and_says_so_once(fresh,
     monkeypatch.setenv("FES_PIN_CACHE", str(fresh / "other"))
     with caplog.at_level(logging.WARNING):
         assert answer() == pytest.approx(expected, abs=1e-10)
-        program._PROGRAMS.clear()
-        answer()
+        simulate(Model(RIGS["joint"]), trial("joint", "motion", np.random.default_rng(1)))
     assert len(caplog.messages) == 1
     assert "virtual machine" in caplog.messages[0]
     assert "\n" not in caplog.messages[0]
@@ -138,7 +142,7 @@ def test_where_nothing_compiles_the_virtual_machine_runs_and_says_so_once(fresh,
 def test_programs_are_kept_on_disk(fresh, monkeypatch):
     expected = answer()
     assert len(list(fresh.iterdir())) == 1
-    program._PROGRAMS.clear()
+    program.forget_programs()
     monkeypatch.setattr(native, "compile_equations", None)  # would raise if called
     assert np.array_equal(answer(), expected)
 
@@ -151,14 +155,14 @@ def test_a_damaged_cache_is_ignored_and_mended(fresh, damage):
     flipped = bytearray(whole)
     flipped[len(whole) // 2] ^= 0x10
     entry.write_bytes({"empty": b"", "cut": whole[:-100], "flipped": bytes(flipped), "text": b"no"}[damage])
-    program._PROGRAMS.clear()
+    program.forget_programs()
     assert np.array_equal(answer(), expected)
     assert entry.read_bytes() == whole
 
 
 def test_a_cache_that_cannot_be_written_is_no_error(fresh, monkeypatch):
     expected = answer()
-    program._PROGRAMS.clear()
+    program.forget_programs()
     fresh.parent.joinpath("a file").write_text("")
     monkeypatch.setenv("FES_PIN_CACHE", str(fresh.parent / "a file" / "cache"))
     assert np.array_equal(answer(), expected)

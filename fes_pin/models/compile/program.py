@@ -82,6 +82,13 @@ def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str
     return _PROGRAMS[key]
 
 
+def forget_programs() -> None:
+    """Drop the programs that are kept in memory, as if this process had just begun; those on disk stay."""
+    with _LOCK:
+        _PROGRAMS.clear()
+        _say_slow.cache_clear()
+
+
 def _classes(model: Model) -> tuple[type, ...]:
     """What writes the equations: the classes of rig and effects, also somebody else's of the same name."""
     return (type(model.rig), *(type(e) for e in model.effects))
