@@ -195,7 +195,11 @@ class Allocator:
             raise InputError("least recruitments, cubes and lexicographic are allocated one torque at a time")
         start = np.zeros(p.n) if previous is None else by_name(previous, p.names, "previous recruitment", 0.0)
         F = wanted @ self.pull
-        r = solve_sequence(self.H, F, p.lower, p.upper, keep=p.change, rate=p.rate, previous=start)
+
+        def settle(k: int, r: np.ndarray, before: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+            return self.certify.at_limits(before, wanted[k], r, low, high)
+
+        r = solve_sequence(self.H, F, p.lower, p.upper, keep=p.change, rate=p.rate, previous=start, settle=settle)
         return self._certified(r, wanted, start)
 
     def _certified(self, r: np.ndarray, wanted: np.ndarray, start: np.ndarray) -> AllocationSequence:
@@ -203,7 +207,7 @@ class Allocator:
         p = self.problem
         before: Any = np.vstack([start, r[:-1]]) if p.change or p.rate < np.inf else start
         lower, upper = p.limits(before)
-        if not p.change and p.rate == np.inf:  # else the next sample was made from this one as it is
+        if not p.change and p.rate == np.inf:  # else each was settled before the next followed from it
             slack = np.minimum(r - lower, upper - r)
             for k in np.flatnonzero(
                 ((slack > 0.0) & (slack <= self.certify.room(self.certify.rounding(wanted)))).any(1)

@@ -7,6 +7,7 @@ limit with a multiplier holds exactly.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import daqp
@@ -102,6 +103,7 @@ def solve_sequence(
     keep: float = 0.0,
     rate: float = np.inf,
     previous: np.ndarray | None = None,
+    settle: Callable[[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> np.ndarray:
     """Solutions (count, n) of samples in order, each warm-started from the last.
 
@@ -113,6 +115,8 @@ def solve_sequence(
         (n,).
     keep, rate, previous
         Price of change (H holds its diagonal already) and its bound per sample, from `previous` (n,), by default 0.
+    settle
+        What to make of sample k's answer before the next one follows from it: of k, answer, the one before, limits.
 
     Raises
     ------
@@ -138,7 +142,8 @@ def solve_sequence(
         if flag != 1:
             R[k], multipliers[k] = solve_once(H[k] if each else H, f, low, high), 0.0
         if carries:
-            R[k] = before = held(R[k], multipliers[k], low, high)
+            r = held(R[k], multipliers[k], low, high)
+            R[k] = before = r if settle is None else settle(k, r, before, low, high)
     return R if carries else held(R, multipliers, lower, upper)
 
 

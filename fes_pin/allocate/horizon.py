@@ -11,9 +11,11 @@ from fes_pin.allocate.allocator import Allocator
 from fes_pin.allocate.bounded import known_solver
 from fes_pin.allocate.horizon_program import NO_ROOM, HorizonProgram
 from fes_pin.allocate.inputs import number, wanted_torques
-from fes_pin.allocate.problem import EPSILON, within_rate
+from fes_pin.allocate.problem import within_rate
 from fes_pin.data.errors import InputError
 
+ROUNDED = 1e-13
+"""A plan may exceed the rate by so much: its steps are sums, and solvers round; a pulse width by 1e-10 us."""
 LONGEST = 1000
 """Steps ahead or under way, beyond which a horizon is no horizon: half a minute of pulses."""
 
@@ -216,7 +218,7 @@ class Horizon:
 
     def feasible(self, near: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """A solver's answer, moved into limits and rate step by step."""
-        u, rate = near.copy(), min(self.program.problem.rate, 1.0) + 4.0 * EPSILON  # steps are sums and rounded
+        u, rate = near.copy(), min(self.program.problem.rate, 1.0) + ROUNDED
         np.clip(u[0], low[0], high[0], out=u[0])
         for k in range(1, self.steps):
             np.clip(u[k], np.maximum(low[k], u[k - 1] - rate), np.minimum(high[k], u[k - 1] + rate), out=u[k])

@@ -378,6 +378,14 @@ def test_off_is_off_and_not_a_pulse_at_threshold(options, solver):
             assert not ((r < others["upper"]) & (r > others["upper"] - 1e-12)).any()
 
 
+def test_a_price_of_change_fades_to_off_and_not_for_ever_towards_it():
+    """Each sample is a part of the one before: what the certificate cannot tell from off ends it."""
+    torque = np.vstack([np.full((20, 19), 5.0), np.zeros((400, 19))])
+    together = Allocator(LEFT, change=1e-3).sequence(torque)
+    assert together.recruitment[19].any() and not together.pulse_width_us[-1].any()
+    assert together.residual.max() <= 1e-11
+
+
 def test_dust_beside_an_optimum_is_swept_off_and_work_is_not():
     """What the certificate cannot tell from off is off; what it can, stays."""
     program = Allocator(np.diag([50.0, 40.0, 30.0]))

@@ -259,6 +259,18 @@ def test_off_is_off_along_a_run():
             assert not ((u < 1.0) & (u > 1.0 - 1e-12)).any()
 
 
+@pytest.mark.parametrize("solver", ["daqp", "osqp"])
+def test_off_is_off_by_other_solvers(solver):
+    """Within their own rounding; 0.2 - 0.2 is off also where neither step is exactly 0.2."""
+    rng = np.random.default_rng(23)
+    for _ in range(10):
+        horizon = Horizon(Allocator(rng.normal(size=(4, 5)) * 40, rate=0.2, change=1e-3))
+        for torques in (np.zeros((10, 4)), rng.normal(size=(10, 4)) * 40):
+            u = horizon.plan(torques, solver=solver).recruitment
+            assert not ((u > 0.0) & (u < 1e-9)).any()
+            assert torques.any() or not u.any()
+
+
 def test_threads_that_share_a_horizon_get_the_plans_of_one():
     rng = np.random.default_rng(22)
     horizon = Horizon(Allocator(rng.normal(size=(6, 12)) * 40, rate=0.2, change=1e-3))
