@@ -16,13 +16,14 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.doubts import doubts, with_error
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.experiment import SEPARABLE, NextExperiment, next_experiment
+from fes_pin.diagnose.long_records import searched_part, thinned
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.open_set import Remainder, remainder
 from fes_pin.diagnose.search.promise import best_by_effect
 from fes_pin.diagnose.search.search import Search, Searched, Unfit
 from fes_pin.diagnose.search.unfinished import alike
 from fes_pin.identify.fit import Fit, rough_noise
-from fes_pin.identify.noise import NoiseModel, noise_step, thin, thinning
+from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import amplitude
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of, installed
 from fes_pin.models.model import Model
@@ -193,8 +194,12 @@ def diagnose(
     nominal = nominal_model(study)
     warnings = check_study(study, nominal)
     train, test = split(study)
+    train, spared, said = searched_part(train)
+    test, warnings = test or spared, warnings + said
     with one_thread_each():
         recorded = [t for t in study.trials if t.role != "held_out"]
+        if said:
+            recorded = train
         search = Search(nominal, train, recorded, seed, tell, catalogue.effects_for(nominal.rig))
         try:
             with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
@@ -243,13 +248,6 @@ def split(study: Study) -> tuple[list[Trial], list[Trial]]:
     return train, test
 
 
-def thinned(trial: Trial) -> Trial:
-    """Means of samples in a row, at the time step that noise is modelled at."""
-    count = thinning(trial.dt, noise_step([trial.dt]))
-    columns = {n: thin(values, count) for n, values in trial.columns.items()}
-    return Trial(trial.name, trial.kind, columns, thin(trial.time, count), trial.conditions, trial.role)
-
-
 def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Trial], seed: int) -> Diagnosis:
     left = remainder(searched.best, seed)
     causes, held = _causes(searched, left, test, seed)
@@ -287,7 +285,7 @@ def _judge(study: Study, search: Search, searched: Searched, test: Sequence[Tria
         ceiling_percent=in_sample.ceiling_percent(),
         next_experiment=_experiment(searched, causes, study),
         ranking=_ranking(searched),
-        held_out_by="the study's held-out trials" if test else "cross-validation over trials",
+        held_out_by="held-out trials" if test else "cross-validation over trials",
         left_out={},
         wall_s=0.0,
         warnings=tuple(doubts(searched, len(causes))),
@@ -313,7 +311,7 @@ def _unfitted(study: Study, nominal: Fit, reason: str, test: Sequence[Trial]) ->
         ceiling_percent=inside.ceiling_percent(),
         next_experiment=None,
         ranking={},
-        held_out_by="the study's held-out trials" if test else "cross-validation over trials",
+        held_out_by="held-out trials" if test else "cross-validation over trials",
         left_out={},
         wall_s=0.0,
         reason=reason,
