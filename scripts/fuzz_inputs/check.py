@@ -22,6 +22,7 @@ PATIENCE = 600.0
 """Seconds that a call may take where the machine is shared."""
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 CHANGES = {"os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.symlink", "os.link", "os.chmod", "os.truncate"}
+MOVES = {"os.rename", "os.symlink", "os.link"}
 PARTIAL = ".fes_pin-"
 """What is not whole yet has a name that begins so, beside its destination."""
 SPARE = 97
@@ -123,7 +124,7 @@ def _watch(allowed: Sequence[Path], told: int) -> None:
         if (
             event == "open" and isinstance(arguments[0], str | bytes) and (arguments[2] or 0) & WRITING
         ) or event in CHANGES:
-            path = arguments[0]
+            path = arguments[1] if event in MOVES else arguments[0]
         else:
             return
         if isinstance(path, int):
@@ -137,6 +138,5 @@ def _watch(allowed: Sequence[Path], told: int) -> None:
 
 def _is_for(path: Path, allowed: Path) -> bool:
     """True for what may be written: the path itself, what is in it, and what is moved there once it is whole."""
-    return (
-        path == allowed or allowed in path.parents or (path.parent == allowed.parent and path.name.startswith(PARTIAL))
-    )
+    partial = any(p.parent == allowed.parent and p.name.startswith(PARTIAL) for p in (path, *path.parents))
+    return path == allowed or allowed in path.parents or partial

@@ -33,7 +33,7 @@ def test_trials_are_left_out_evenly_and_judge_the_rest():
     part, left, said = searched_part(trials(20, 250, 0.005))
     assert [t.name for t in part] == ["00", "06", "13", "19"] and len(left) == 4
     assert not {t.name for t in part} & {t.name for t in left}
-    assert said == ["4 of 20 trials were searched, evenly spread; 4 others judged it"]
+    assert said == ["4 of 20 trials were searched, evenly spread, and 4 others judged it"]
 
 
 def test_a_single_record_is_cut_at_its_end():

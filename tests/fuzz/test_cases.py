@@ -1,14 +1,64 @@
 """A slice of `scripts/fuzz`: odd and spoilt input gets an answer or one line, and its checks see what they look for."""
 
+import numpy as np
 import pytest
 from fuzz_inputs.cases import KINDS, run_case
+from fuzz_inputs.check import Answer, call
+from fuzz_inputs.oddities import ODDITIES
+from fuzz_inputs.studies import RIGS, small_study
 
-from fes_pin.models.compile.machine import cache_folder
+from fes_pin.data.errors import InputError
+from fes_pin.data.study import Study
+from fes_pin.diagnose.diagnosis import despiked_study
+from fes_pin.diagnose.plausibility import check_study
+from fes_pin.models.compile.disk_cache import cache_folder
+from fes_pin.models.nominal import nominal_model
+
+FILES = [n for n in range(14) if KINDS[n % len(KINDS)] in {"csv", "model", "trial"}]
 
 
-@pytest.mark.parametrize("number", range(len(KINDS) * 3))
-def test_a_slice(tmp_path, number):
-    if KINDS[number % len(KINDS)] == "study":
-        pytest.skip("diagnoses take seconds: scripts/fuzz runs them")
-    result = run_case(number, 1, tmp_path / "case", cache_folder())
+@pytest.mark.parametrize("number", FILES)
+def test_spoilt_files(tmp_path, number):
+    result = run_case(number, 3, tmp_path / "case", cache_folder())
     assert not result.faults, str(result)
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_what_is_odd_is_refused_in_one_line_or_told(rig):
+    """Every oddity before any fit: the gate itself ends with an answer."""
+    study = small_study(np.random.default_rng(1), rig)
+    for name, make_odd in ODDITIES.items():
+        odd, _ = despiked_study(make_odd(study, np.random.default_rng(1)))
+        assert isinstance(odd, Study), name
+        try:
+            said = check_study(odd, nominal_model(odd))
+        except InputError as refused:
+            said = [str(refused)]
+        assert all(len(words.splitlines()) == 1 for words in said), name
+
+
+def test_broken_promises_are_seen():
+    def faults(code, out="", err="", strays=(), written=False):
+        return Answer(code, out, err, 1.0, tuple(strays)).faults(written)
+
+    assert faults(0) == faults(2, err="one line\n") == []
+    assert "exit code 97" in faults(97, err="ValueError: no")[0]
+    assert faults(-9) and faults(-11) and faults(1)
+    assert faults(2, err="two\nlines\n") and faults(2, err="") and faults(2, "out", "line\n")
+    assert faults(2, err="line\n", written=True) and faults(0, err="Traceback (most recent call last)")
+    assert faults(0, strays=["open /etc/passwd"])
+
+
+def test_a_file_written_elsewhere_is_seen(tmp_path):
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    study = small_study(np.random.default_rng(0), "muscle")
+    from fes_pin.data.trial import write_trial
+    from fes_pin.models.store import save_model
+
+    save_model(nominal_model(study), tmp_path / "model.toml")
+    write_trial(study.trials[0], tmp_path / "trial.csv")
+    given = ["predict", str(tmp_path / "model.toml"), str(tmp_path / "trial.csv"), "--out", str(tmp_path / "out.csv")]
+    answer = call(given, [tmp_path / "out.csv", cache_folder()], scratch)
+    assert answer.code == 0 and not answer.faults(True), answer
+    assert any("out.csv" in f for f in call(given, [cache_folder()], scratch).faults(True))
