@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 from urllib.request import urlopen
 
 import numpy as np
@@ -116,6 +117,55 @@ def test_the_command_serves_until_it_is_interrupted(opened):
     finally:
         process.kill()
         process.wait()
+
+
+def listening(root):
+    """Addresses on which a process and its descendants listen, from /proc: hexadecimal IP, port."""
+    table = Path("/proc")
+    if not (table / "net/tcp").exists():
+        pytest.skip("no /proc to list sockets from")
+    parents = {}
+    for stat in table.glob("[0-9]*/stat"):
+        try:
+            parents[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            continue
+    family = {root}
+    while more := {child for child, parent in parents.items() if parent in family} - family:
+        family |= more
+    inodes = set()
+    for member in family:
+        for link in table.glob(f"{member}/fd/*"):
+            try:
+                inodes.add(os.readlink(link))
+            except OSError:
+                continue
+    rows = [r.split() for n in ("tcp", "tcp6") for r in (table / "net" / n).read_text().splitlines()[1:]]
+    found = {tuple(r[1].split(":")) for r in rows if r[3] == "0A" and f"socket:[{r[9]}]" in inodes}
+    return {(address, int(port, 16)) for address, port in found}
+
+
+def test_the_live_viewer_listens_to_this_machine_alone_and_dies_with_the_command():
+    command = [sys.executable, "-c", "from fes_pin.cli.main import main; main()", "body", "view", "--live"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        process.stdout.readline()
+        url = process.stdout.readline().split()[0]
+        loopback = "0100007F"  # 127.0.0.1 as /proc writes it
+        port = int(url.split(":")[2].split("/")[0])
+        assert listening(process.pid) == {(loopback, port)}
+        assert b"meshcat" in urlopen(url, timeout=10).read()
+    finally:
+        process.kill()  # the end that no program can tidy up after
+        process.communicate()
+    with pytest.raises(OSError):
+        urlopen(url, timeout=2)
+
+
+def test_two_live_viewers_have_a_port_each(body):
+    with LiveViewer() as one, LiveViewer() as other:
+        assert one.url != other.url
+        other.show(Scene(body))
 
 
 def test_a_nerve_paints_the_joints_that_it_turns(body, screenshot, tmp_path):
