@@ -1,29 +1,34 @@
-"""What bounded inputs can hold: the posture itself, and a lean in each falling mode."""
+"""What constant stimulation within its bounds can hold: the posture itself, and a lean in each falling mode.
+
+A constant input holds a lean where it balances gravity in every falling mode. Inputs that change in time catch more
+(see `fes_pin.body.catchable`); what is here says what can be held for as long as the muscles last.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import optimize
 
+from fes_pin.body.balance import balance as _balance
 from fes_pin.body.inputs import Inputs
-from fes_pin.body.linearize import LinearBody
+from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, modes
-from fes_pin.data.errors import InputError
+from fes_pin.body.programs import Answer, Program
+from fes_pin.data.numbers import positive
 
 SETTLE_DEG = 10.0
 """How far a swinging mode may hang from the posture and still count as the posture: ours; linear models reach no
-further."""
+further. The answers depend on it: it is an option of the command."""
 
 
 @dataclass(frozen=True)
 class Demands:
-    """What an input must do, one row a mode, scaled so that the largest gain of a row is 1.
+    """What a constant input u must do, one row a mode, scaled so that the largest gain of a row is 1.
 
     Falling modes must be balanced: gains u = target (minus `load` for one degree of lean). Swinging modes may settle
     anywhere within `SETTLE_DEG` of the posture: settle_low <= settle_gains u <= settle_high. Neutral modes are let
-    drift.
+    drift. The centre of pressure lies on the soles: ground_gains u <= ground_room (minus `ground_load` for one degree).
     """
 
     falling: tuple[Mode, ...]
@@ -33,15 +38,31 @@ class Demands:
     settle_gains: np.ndarray
     settle_low: np.ndarray
     settle_high: np.ndarray
+    ground_gains: np.ndarray
+    ground_room: np.ndarray
+    ground_load: np.ndarray
 
-    def leaning(self, i: int, degrees: float) -> np.ndarray:
-        """Target of the falling modes when mode i leans by so many degrees, (k,)."""
-        target = self.target.copy()
-        target[i] -= self.load[i] * degrees
-        return target
+    @property
+    def limits(self) -> np.ndarray:
+        """Rows of the inequalities: settling both ways, then the ground."""
+        return np.vstack([self.settle_gains, -self.settle_gains, self.ground_gains])
+
+    def case(self, i: int = 0, degrees: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Target of the falling modes, (k,), and limits of the inequalities when mode i leans by so many degrees."""
+        target, room = self.target.copy(), self.ground_room.copy()
+        if degrees:
+            target[i] -= self.load[i] * degrees
+            room -= self.ground_load[:, i] * degrees
+        return target, np.concatenate([self.settle_high, -self.settle_low, room])
 
 
-def demands(linear: LinearBody, inputs: Inputs, gravity: bool = True, settle_deg: float = SETTLE_DEG) -> Demands:
+def demands(
+    linear: LinearBody,
+    inputs: Inputs,
+    gravity: bool = True,
+    settle_deg: float = SETTLE_DEG,
+    balance: bool = True,
+) -> Demands:
     """The demands of a posture on a set of inputs.
 
     Parameters
@@ -50,14 +71,15 @@ def demands(linear: LinearBody, inputs: Inputs, gravity: bool = True, settle_deg
         Whether the posture's weight (C) must be carried; otherwise only deviations count.
     settle_deg
         See `SETTLE_DEG`; infinite: swinging modes are ignored.
+    balance
+        Whether the centre of pressure must lie on the soles; without gravity there is none to ask for.
 
     Raises
     ------
     InputError
         `settle_deg` is not positive.
     """
-    if not settle_deg > 0.0:
-        raise InputError(f"must be positive, got {settle_deg}", column="settle_deg")
+    settle_deg = positive(settle_deg, "settle_deg", infinite=True)
     found = modes(linear)
     kinds = np.array([mode.kind for mode in found])
     degree = np.radians(1.0) / np.abs(found.shapes).max(axis=0)
@@ -65,8 +87,12 @@ def demands(linear: LinearBody, inputs: Inputs, gravity: bool = True, settle_deg
     constant = found.shapes.T @ linear.C * gravity
     size = np.abs(gains).max(axis=1, initial=0.0)
     size = np.where(size > 1e-12, size, 1.0)
-    fall, swing = kinds == "fall", (kinds == "swing") & np.isfinite(settle_deg)
-    room = -found.values * degree * settle_deg
+    fall, hang = kinds == "fall", kinds == "swing"
+    swing = hang & np.isfinite(settle_deg)
+    room = -found.values * degree * (settle_deg if np.isfinite(settle_deg) else 0.0)
+    ground = _balance(linear, found) if gravity and balance else None
+    rows = np.zeros((0, len(found))) if ground is None else ground.at_rest
+    hanging = rows[:, hang] / -found.values[hang]  # a swing hangs at F / -mu
     return Demands(
         falling=found.falling,
         gains=gains[fall] / size[fall, None],
@@ -75,6 +101,9 @@ def demands(linear: LinearBody, inputs: Inputs, gravity: bool = True, settle_deg
         settle_gains=gains[swing] / size[swing, None],
         settle_low=(-constant - room)[swing] / size[swing],
         settle_high=(-constant + room)[swing] / size[swing],
+        ground_gains=hanging @ gains[hang],
+        ground_room=np.zeros(0) if ground is None else -ground.constant - hanging @ constant[hang],
+        ground_load=rows[:, fall] * degree[fall],
     )
 
 
@@ -93,14 +122,18 @@ class Attainable:
         That input with the least greatest share of its bounds: by name; empty if it does not hold.
     lean_deg
         Greatest lean in each mode, with every other fall balanced, that inputs can still hold against gravity: degrees
-        of the mode's greatest joint, in the positive and in the negative direction of the shape; (k, 2). From a
-        greater lean at rest the body is lost. NaN where the posture cannot be held at all.
+        of the mode's greatest joint, in the positive and in the negative direction of the shape; (k, 2). NaN where the
+        posture cannot be held at all. No constant input holds a greater lean; inputs that change in time may catch it
+        (`fes_pin.body.catchable`).
+    error_deg
+        By how much rounding and the solver's tolerances may have moved each of them; (k, 2).
     """
 
     falling: tuple[Mode, ...] = field(repr=False)
     holds: bool
     effort: dict[str, float]
     lean_deg: np.ndarray
+    error_deg: np.ndarray = field(repr=False)
 
     @property
     def least_lean_deg(self) -> float:
@@ -109,8 +142,8 @@ class Attainable:
 
     def __str__(self) -> str:
         if not self.holds:
-            return "the posture cannot be held by these inputs"
-        lines = ["the posture can be held; greatest lean before it is lost, degrees one way / the other:"]
+            return "the posture cannot be held by these inputs, stimulated constantly"
+        lines = ["the posture can be held; greatest lean that constant stimulation holds, degrees one way / the other:"]
         for mode, (one, other) in zip(self.falling, self.lean_deg, strict=True):
             lines.append(f"  {mode.name:80s} {lean_text(one):>5s} / {lean_text(other)}")
         return "\n".join(lines)
@@ -121,8 +154,14 @@ def lean_text(degrees: float) -> str:
     return "> 45" if degrees > 45.0 else f"{degrees:.1f}"
 
 
-def attainable(linear: LinearBody, inputs, gravity: bool = True, settle_deg: float = SETTLE_DEG) -> Attainable:
-    """What inputs can hold, by linear programs.
+def attainable(
+    linear: LinearBody,
+    inputs,
+    gravity: bool = True,
+    settle_deg: float = SETTLE_DEG,
+    balance: bool = True,
+) -> Attainable:
+    """What constant inputs can hold, by linear programs.
 
     Parameters
     ----------
@@ -130,55 +169,60 @@ def attainable(linear: LinearBody, inputs, gravity: bool = True, settle_deg: flo
         From `linearize`, with or without braces.
     inputs
         `Inputs`, `Nerves`, or names of joints.
-    gravity, settle_deg
+    gravity, settle_deg, balance
         As `demands` takes them.
 
     Raises
     ------
     InputError
-        Inputs that are none.
+        Inputs that are none; `settle_deg` is not positive.
     """
     inputs = Inputs.of(inputs, linear)
-    wanted = demands(linear, inputs, gravity, settle_deg)
+    wanted = demands(linear, inputs, gravity, settle_deg, balance)
     effort = _least_effort(wanted, inputs)
     leans = np.full((len(wanted.falling), 2), np.nan)
+    errors = np.zeros_like(leans)
     if effort is not None:
         for i in range(len(wanted.falling)):
-            leans[i] = [_greatest_lean(wanted, inputs, i, sign) for sign in (1.0, -1.0)]
+            for way, sign in enumerate((1.0, -1.0)):
+                leans[i, way], errors[i, way] = _greatest_lean(wanted, inputs, i, sign)
     named = {} if effort is None else dict(zip(inputs.names, effort.tolist(), strict=True))
-    return Attainable(wanted.falling, effort is not None, named, leans)
+    return Attainable(wanted.falling, effort is not None, named, leans, errors)
 
 
-def _solve(wanted: Demands, inputs: Inputs, cost: np.ndarray, extra: np.ndarray, more_rows: np.ndarray | None = None):
-    """Linear program over (u, s): balance with s times `extra` in it; cost and further rows <= 0 given."""
-    rows = [np.column_stack([sign * wanted.settle_gains, np.zeros(len(wanted.settle_gains))]) for sign in (1.0, -1.0)]
-    limits = [wanted.settle_high, -wanted.settle_low]
-    if more_rows is not None:
-        rows.append(more_rows)
-        limits.append(np.zeros(len(more_rows)))
-    return optimize.linprog(
-        cost,
-        A_ub=np.vstack(rows),
-        b_ub=np.concatenate(limits),
-        A_eq=np.column_stack([wanted.gains, extra]) if len(extra) else None,
-        b_eq=wanted.target if len(extra) else None,
-        bounds=[*zip(inputs.lower, inputs.upper, strict=True), (0.0, None)],
-    )
+def _solve(
+    wanted: Demands, inputs: Inputs, cost: np.ndarray, balance: np.ndarray, limit: np.ndarray, further: np.ndarray
+) -> Answer:
+    """Linear program over (u, s): the posture's demands with s times two columns in them; further rows <= 0."""
+    target, room = wanted.case()
+    return Program(
+        cost=cost,
+        A_ub=np.vstack([np.column_stack([wanted.limits, limit]), further]),
+        b_ub=np.concatenate([room, np.zeros(len(further))]),
+        A_eq=np.column_stack([wanted.gains, balance]),
+        b_eq=target,
+        lower=np.append(inputs.lower, 0.0),
+        upper=np.append(inputs.upper, np.inf),
+    ).solve()
 
 
 def _least_effort(wanted: Demands, inputs: Inputs) -> np.ndarray | None:
     span = np.where(np.isfinite(inputs.upper), inputs.upper, 1.0)
     eye = np.eye(inputs.n)
     share = np.block([[eye, -span[:, None]], [-eye, -span[:, None]]])
-    found = _solve(wanted, inputs, np.append(np.zeros(inputs.n), 1.0), np.zeros(len(wanted.target)), share)
-    return found.x[:-1] if found.status == 0 else None
+    cost = np.append(np.zeros(inputs.n), 1.0)
+    nothing = np.zeros(len(wanted.target)), np.zeros(len(wanted.limits))
+    found = _solve(wanted, inputs, cost, *nothing, share)
+    return None if found.x is None else found.x[:-1]
 
 
-def _greatest_lean(wanted: Demands, inputs: Inputs, i: int, sign: float) -> float:
-    """Degrees of lean in mode i that can be held: mu eta + phi'(C + Q u) = 0 there, balance elsewhere."""
+def _greatest_lean(wanted: Demands, inputs: Inputs, i: int, sign: float) -> tuple[float, float]:
+    """Degrees of lean in mode i that can be held, and their error: mu eta + phi'(C + Q u) = 0 in every falling mode."""
     push = np.zeros(len(wanted.target))
     push[i] = sign * wanted.load[i]
-    found = _solve(wanted, inputs, np.append(np.zeros(inputs.n), -1.0), push)
-    if found.status == 3:
-        return np.inf
-    return max(0.0, float(found.x[-1])) if found.status == 0 else np.nan
+    tilt = np.concatenate([np.zeros(2 * len(wanted.settle_gains)), sign * wanted.ground_load[:, i]])
+    cost = np.append(np.zeros(inputs.n), -1.0)
+    found = _solve(wanted, inputs, cost, push, tilt, np.zeros((0, inputs.n + 1)))
+    if found.x is None:
+        return (np.inf, 0.0) if found.unbounded else (np.nan, 0.0)
+    return max(0.0, float(found.x[-1])), found.error

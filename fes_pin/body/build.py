@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from fes_pin.body.anthropometry import Subject, skeleton_of_subject
+from fes_pin.body.gait import posture_angles
 from fes_pin.body.joints import JOINT_NAMES, SIDES, angles_array
 from fes_pin.body.skeleton import Skeleton, read_segments
 from fes_pin.body.urdf import write_urdf
@@ -144,8 +145,8 @@ class Body:
         Parameters
         ----------
         posture
-            A name (`neutral`, `mid_stance`, ... see `fes_pin.body.gait.POSTURES`), a mapping by joint name (absent
-            joints are at 0), or an array in the order of `joint_names`.
+            A name (`standing`, `mid_stance`, ... see `fes_pin.body.gait.posture_names`), a mapping by joint name
+            (absent joints are at 0), or an array in the order of `joint_names`.
         check
             Whether angles must lie within the joints' limits.
 
@@ -155,8 +156,6 @@ class Body:
             Unknown posture or joint, wrong shape, not finite, or outside the limits.
         """
         if isinstance(posture, str):
-            from fes_pin.body.gait import posture_angles  # noqa: PLC0415
-
             posture = posture_angles(posture, self.stance)
         q = angles_array(posture, self.joint_names)
         low, high = self.limits

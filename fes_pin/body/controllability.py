@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg
 
 from fes_pin.body.inputs import Inputs
-from fes_pin.body.linearize import LinearBody
+from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Modes, modes
 from fes_pin.data.errors import InputError
 
@@ -45,7 +45,7 @@ class Controllability:
     mode_influence
         Acceleration of the mode's greatest joint per unit of input: (modes, inputs) rad/s2.
     joint_influence
-        Acceleration of each joint per unit of input, A^-1 Q: (joints, inputs) rad/s2.
+        Acceleration of each joint per unit of input, A^-1 Q on one foot: (joints, inputs) rad/s2.
     """
 
     linear: LinearBody = field(repr=False)
@@ -80,7 +80,7 @@ class Controllability:
         out = [f"{self.inputs.n} inputs, horizon {self.horizon:g} s: " + ", ".join(self.inputs.names)]
         if not self.linear.conservative:
             out.append("(of the modes without damping and rates: see pbh)")
-        out.append(f"{'mode':70s} PBH  both ways  energy of 1 deg  strongest input")
+        out.append(f"{'mode':70s} PBH  both ways  {f'1 deg, {self.inputs.price_unit}':>15s}  strongest input")
         for i, mode in enumerate(self.modes):
             strongest = self.inputs.names[int(np.abs(self.mode_influence[i]).argmax())] if self.inputs.n else "-"
             out.append(
@@ -131,7 +131,7 @@ def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> Control
         both_ways=_both_ways(gains, inputs),
         energy=energy,
         mode_influence=gains * greatest[:, None],
-        joint_influence=linalg.solve(linear.A, torque, assume_a="pos"),
+        joint_influence=linear.mobility @ torque,
     )
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
+from fes_pin.body.anthropometry import HIP_SPACING
 from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, mirrored
 from fes_pin.data.errors import InputError
 
@@ -22,21 +24,35 @@ def _table() -> dict[str, dict[str, float]]:
     return {row[0]: {n: float(np.radians(float(v))) for n, v in zip(names, row[2:], strict=True)} for row in rows[1:]}
 
 
+STILL = ("neutral", "standing", "one_leg")
+"""Postures in which one may stand still; every other named one is an instant of a walk, where the weight lies outside
+the foot and is caught by the next step."""
+BOTH_FEET = ("standing",)
+"""Postures with both feet on the ground."""
+_ONE_LEG_LEAN = math.atan(0.5 * HIP_SPACING / 0.5)
+"""Ankle angle, rad, that brings half the hips' spacing over the stance foot; they stand half the body's height above
+it (0.530 H to the hip less 0.039 H to the ankle: Winter, figure 4.1)."""
+
+
 def posture_names() -> tuple[str, ...]:
-    """`neutral` and the named postures of the walk."""
-    return ("neutral", *_table())
+    """The postures in which one may stand still, then those of the walk."""
+    return (*STILL, *_table())
 
 
 def posture_angles(name: str, stance: str) -> dict[str, float]:
     """Angles of a named posture, rad by joint name, for a body standing on that side.
+
+    `neutral` is upright on one foot, `standing` the same on both, `one_leg` leans from the ankle until the weight is
+    over the one foot; the others are measured instants of a walk.
 
     Raises
     ------
     InputError
         Unknown posture.
     """
-    if name == "neutral":
-        return dict.fromkeys(JOINT_NAMES, 0.0)
+    if name in STILL:
+        angles = dict.fromkeys(JOINT_NAMES, 0.0)
+        return {**angles, f"{stance}_ankle_inversion": -_ONE_LEG_LEAN} if name == "one_leg" else angles
     if name not in _table():
         raise InputError(f"unknown posture {name!r}; known are {', '.join(posture_names())}")
     angles = _table()[name]

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES, known_joint
-from fes_pin.body.linearize import LinearBody
+from fes_pin.body.linear_body import LinearBody
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number, positive
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,8 @@ class Inputs:
             Unknown joint, or a negative limit.
         """
         names = tuple(known_joint(name) for name in joints)
-        if not limit_nm >= 0.0:
-            raise InputError(f"the torque limit must be 0 or more, got {limit_nm}")
+        if number(limit_nm, "limit_nm", infinite=True) < 0.0:
+            raise InputError(f"the torque limit must be 0 or more, got {limit_nm}", column="limit_nm")
         matrix = np.array([[float(joint == name) for name in names] for joint in JOINT_NAMES]).reshape(19, len(names))
         bound = np.full(len(names), float(limit_nm))
         return cls(names, JOINT_NAMES, matrix, -bound, bound)
@@ -99,6 +100,11 @@ class Inputs:
         """Number of inputs."""
         return len(self.names)
 
+    @property
+    def price_unit(self) -> str:
+        """Unit of an integral of u'u: s of recruitments, (N m)2 s of torques."""
+        return "(N m)2 s" if set(self.names) <= set(JOINT_NAMES) else "s"
+
     def on(self, linear: LinearBody) -> np.ndarray:
         """The matrix with rows in the order of a linearized body's joints: (n, n_inputs)."""
         rows = {name: i for i, name in enumerate(self.joint_names)}
@@ -124,5 +130,12 @@ class Inputs:
         return Inputs(wanted, self.joint_names, self.matrix[:, keep], self.lower[keep], self.upper[keep])
 
     def scaled(self, factor: float) -> Inputs:
-        """All torques times a factor (strengths are known to 1.3-1.8)."""
+        """All torques times a factor (strengths are known to 1.3-1.8).
+
+        Raises
+        ------
+        InputError
+            A factor that is not positive.
+        """
+        factor = positive(factor, "factor")
         return Inputs(self.names, self.joint_names, factor * self.matrix, self.lower, self.upper)

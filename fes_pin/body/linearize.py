@@ -13,130 +13,16 @@ B. Around a moving posture (v0, a0) the same equation holds for the deviation wi
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 
 from fes_pin.body.build import GRAVITY, Body
+from fes_pin.body.gait import BOTH_FEET
+from fes_pin.body.ground import second_foot
+from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.passive import Passive
 from fes_pin.data.errors import InputError
-
-
-@dataclass(frozen=True)
-class LinearBody:
-    """A body linearized at a posture; arrays over joints in the order of `joint_names`.
-
-    Parameters
-    ----------
-    joint_names
-        The joints that move: 19, or fewer where braces hold some.
-    q
-        Their angles at the posture, rad.
-    A, B
-        Inertia, kg m2, and minus the stiffness of gravity and tissue, N m/rad: (n, n).
-    C
-        Minus the joint torques that hold the posture, N m: (n,).
-    E
-        Torque per joint rate, N m s/rad: (n, n); zero at rest without damping.
-    body, slope, braced, held
-        Where it was taken: the body, the ground's (alpha, beta), the joints that braces hold and their angles, rad.
-    """
-
-    joint_names: tuple[str, ...]
-    q: np.ndarray = field(repr=False)
-    A: np.ndarray = field(repr=False)
-    B: np.ndarray = field(repr=False)
-    C: np.ndarray = field(repr=False)
-    E: np.ndarray = field(repr=False)
-    body: Body = field(repr=False)
-    slope: tuple[float, float] = (0.0, 0.0)
-    braced: tuple[str, ...] = ()
-    held: dict[str, float] = field(default_factory=dict, repr=False)
-
-    @property
-    def n(self) -> int:
-        """Number of joints that move."""
-        return len(self.joint_names)
-
-    @property
-    def conservative(self) -> bool:
-        """Whether there is neither damping nor motion: the paper's case, where A and B tell everything."""
-        return not self.E.any() and np.allclose(self.B, self.B.T, rtol=0.0, atol=1e-9 * np.abs(self.B).max())
-
-    @cached_property
-    def F(self) -> np.ndarray:
-        """State matrix of equation (11), X = (Gamma, Gamma'): (2n, 2n), 1/s."""
-        n = self.n
-        F = np.zeros((2 * n, 2 * n))
-        F[:n, n:] = np.eye(n)
-        F[n:, :n] = np.linalg.solve(self.A, self.B)
-        F[n:, n:] = -np.linalg.solve(self.A, self.E)
-        return F
-
-    @cached_property
-    def R(self) -> np.ndarray:
-        """Input matrix of equation (11) for u = C + D: (2n, n)."""
-        return np.vstack([np.zeros((self.n, self.n)), np.linalg.inv(self.A)])
-
-    @property
-    def holding_torque(self) -> dict[str, float]:
-        """Joint torques that hold the posture (-C), N m by name."""
-        return dict(zip(self.joint_names, (-self.C).tolist(), strict=True))
-
-    @property
-    def posture(self) -> dict[str, float]:
-        """Angles of the joints that move, rad by name."""
-        return dict(zip(self.joint_names, self.q.tolist(), strict=True))
-
-    @property
-    def whole_posture(self) -> dict[str, float]:
-        """Angles of all joints, braced ones too, rad by name."""
-        return {**self.held, **self.posture}
-
-    def modes(self):
-        """The n eigenpairs of A^-1 B (see `fes_pin.body.modes.modes`)."""
-        from fes_pin.body.modes import modes  # noqa: PLC0415 (modes reads what is here)
-
-        return modes(self)
-
-    def brace(self, joints: Sequence[str]) -> LinearBody:
-        """The same body with these joints locked at the posture.
-
-        Raises
-        ------
-        InputError
-            A joint that is not free here, or all of them.
-        """
-        for name in joints:
-            if name not in self.joint_names:
-                raise InputError(f"cannot brace {name!r}: it is not among the joints that move")
-        keep = [i for i, name in enumerate(self.joint_names) if name not in set(joints)]
-        if not keep:
-            raise InputError("braces hold every joint: nothing is left to move")
-        block = np.ix_(keep, keep)
-        return LinearBody(
-            joint_names=tuple(self.joint_names[i] for i in keep),
-            q=self.q[keep],
-            A=self.A[block],
-            B=self.B[block],
-            C=self.C[keep],
-            E=self.E[block],
-            body=self.body,
-            slope=self.slope,
-            braced=(*self.braced, *joints),
-            held={**self.held, **{name: self.posture[name] for name in joints}},
-        )
-
-    def __str__(self) -> str:
-        held = f", {len(self.braced)} joints braced" if self.braced else ""
-        slope = f" on slope {self.slope}" if any(self.slope) else ""
-        worst = int(np.argmax(np.abs(self.C)))
-        return (
-            f"Linearized {self.body}{slope}{held}: {self.n} joints; "
-            f"largest torque to hold it {-self.C[worst]:+.1f} N m at {self.joint_names[worst]}"
-        )
 
 
 def ground_normal(slope: Sequence[float]) -> np.ndarray:
@@ -182,6 +68,7 @@ def linearize(
     passive: Passive | None = None,
     gravity: float = GRAVITY,
     check: bool = True,
+    both_feet: bool | None = None,
 ) -> LinearBody:
     """A, B and C of a body at a posture.
 
@@ -201,18 +88,28 @@ def linearize(
         m/s2.
     check
         Whether the posture must lie within the joints' limits.
+    both_feet
+        Whether the second forefoot stands on the ground, too (see `fes_pin.body.ground.second_foot`); by default as the
+        named posture has it. C is then that of joints that load both feet as the weight lies between them.
 
     Raises
     ------
     InputError
-        Unknown posture or joint, posture outside limits, no such slope.
+        Unknown posture or joint, posture outside limits, no such slope; a second foot that is not flat on the ground,
+        or moves.
     """
     q = body.angles(posture, check)
+    name = posture if isinstance(posture, str) else ""
     model = model_on_slope(body, slope, gravity)
     data = model.createData()
     n = model.nv
     A = pin.crba(model, data, q).copy()
     E = np.zeros((n, n))
+    second = None
+    if name in BOTH_FEET if both_feet is None else both_feet:
+        if rates is not None or accelerations is not None:
+            raise InputError("a body on both feet is linearized at rest only", column="both_feet")
+        second = second_foot(body, model, q)
     if rates is None and accelerations is None:
         B = -pin.computeGeneralizedGravityDerivatives(model, data, q)
         B, C = 0.5 * (B + B.T), -data.g.copy()
@@ -226,7 +123,11 @@ def linearize(
         damping = passive.damping(body.joint_names)
         E = E + damping
         C = C + passive.torque(q, body.joint_names) - damping @ body.rates(rates)
-    return LinearBody(body.joint_names, q, A, B, C, E, body, (float(slope[0]), float(slope[1])))
+    where, closure = (float(slope[0]), float(slope[1])), None
+    if second is not None:
+        stiffness = 0.5 * (second.stiffness + second.stiffness.T)
+        B, C, closure = B + stiffness, C + second.torque, second.closure
+    return LinearBody(body.joint_names, q, A, B, C, E, body, where, closure=closure, posture_name=name, gravity=gravity)
 
 
 def linearize_batch(

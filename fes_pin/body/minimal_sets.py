@@ -1,4 +1,9 @@
-"""The fewest nerves, and the fewest nerves with braces, that control every falling mode: exact search, with prices."""
+"""The fewest nerves, and the fewest nerves with braces, that control every falling mode: exact search, with prices.
+
+Two questions, two answers. *Constant* stimulation must balance gravity in the lean itself, as long as the lean is held.
+Stimulation *over time* must only bring the body back to rest; that needs fewer nerves, and is what "fewest" means
+unless the other is asked for.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +12,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
 
 from fes_pin.body.attainable import SETTLE_DEG, Demands, attainable, demands, lean_text
+from fes_pin.body.catchable import catchable, plans_of
 from fes_pin.body.controllability import controllability
+from fes_pin.body.covering import Demand, smallest
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import SIDES, known_joint
-from fes_pin.body.linearize import LinearBody
+from fes_pin.body.linear_body import LinearBody
+from fes_pin.body.programs import Program
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number, positive, whole
 
 ORTHOSES: dict[str, tuple[str, ...]] = {
     **{f"{side}_{name}": tuple(f"{side}_{joint}" for joint in joints) for side in SIDES for name, joints in {
@@ -29,7 +37,8 @@ ORTHOSES: dict[str, tuple[str, ...]] = {
 """What an orthosis locks. A hip guide leaves flexion free, as a hip guidance orthosis does; a corset joins trunk and
 pelvis."""
 
-_CUTS_A_ROUND = 4
+STIMULATIONS = ("over_time", "constant")
+"""How a set may be stimulated: in any course within the bounds, or constantly."""
 
 
 @dataclass(frozen=True)
@@ -40,35 +49,45 @@ class MinimalSet:
     ----------
     inputs, braces
         Names of both.
-    free_joints, falls
-        Joints that still move, and how many modes fall.
+    free_joints, locked_joints, falls
+        Joints that still move, joints that all braces lock, how many modes fall.
     energy
         Least integral of u'u that catches 1 degree in the worst falling mode, with the other falls held: s for nerves.
     condition
         Of that task: how much dearer the dearest combination of leans is than the cheapest.
+    stimulation
+        `over_time` or `constant`.
     lean_deg
-        Smallest lean in any falling mode and direction that can be held, degrees, at nominal strength.
+        Smallest lean in any falling mode and direction that is caught (over time) or held (constantly), degrees, at
+        nominal strength.
     lean_band_deg
         The same if all strengths are less or more by the factor they are known to.
+    error_deg
+        By how much rounding may have moved the three.
     """
 
     inputs: tuple[str, ...]
     braces: tuple[str, ...]
     free_joints: int
+    locked_joints: int
     falls: int
     energy: float
     condition: float
+    stimulation: str
     lean_deg: float
     lean_band_deg: tuple[float, float]
+    error_deg: float = 0.0
 
     def __str__(self) -> str:
         low, high = self.lean_band_deg
-        braces = ", ".join(self.braces) or "none"
+        further = f"further braces: {', '.join(self.braces) or 'none'}"
+        what = {"over_time": "catches", "constant": "holds"}[self.stimulation]
+        able = f"{what} a lean of {lean_text(self.lean_deg)} [{lean_text(low)}, {lean_text(high)}] deg"
+        able = able if self.falls else "nothing falls, and the posture is held"
+        price = f"; energy {self.energy:.2g} s, condition {self.condition:.1e}" if self.falls else ""
         return (
-            f"{len(self.inputs):2d} nerves, {len(self.braces)} braces ({self.falls} falls): "
-            f"{', '.join(self.inputs) or '-'}; braces: {braces}; "
-            f"energy {self.energy:.2g} s, condition {self.condition:.1e}, "
-            f"holds a lean of {lean_text(self.lean_deg)} [{lean_text(low)}, {lean_text(high)}] deg"
+            f"{len(self.inputs):2d} nerves ({self.locked_joints} joints locked, {self.falls} falls): "
+            f"{', '.join(self.inputs) or '-'}; {further}; {able}{price}"
         )
 
 
@@ -84,6 +103,8 @@ def minimal_sets(
     settle_deg: float = SETTLE_DEG,
     alternatives: int = 1,
     strength_factor: float = 1.8,
+    stimulation: str = "over_time",
+    balance: bool = True,
 ) -> list[MinimalSet]:
     """Smallest sets of inputs that control every falling mode, for each choice of braces up to a number.
 
@@ -98,34 +119,41 @@ def minimal_sets(
     max_braces
         At most so many of them at once; every combination is tried.
     lean_deg
-        Each falling mode must be held this far off, both ways, by inputs within their bounds.
+        Each falling mode must be caught, or held, this far off, both ways, by inputs within their bounds.
     together
-        True: with every other fall held at the same time by the same set. False: one mode at a time, the others let be
-        (Brammer's test with strength: what could do in principle, at a price that the answer shows).
+        True: with every other fall controlled at the same time by the same set. False: one mode at a time, the others
+        let be (Brammer's test with strength, the bound of `modal_bound`): no smaller set does, however stimulated; this
+        one does in principle, at a price that the answer shows.
     gravity
         Whether the set must also carry the posture's weight (C).
     settle_deg
-        How far swinging modes may hang from the posture (see `fes_pin.body.attainable`). Only with `together`.
+        How far modes may be from the posture (see `fes_pin.body.attainable` and `catchable`). Only with `together`.
     alternatives
         How many sets of the smallest size to find for each choice of braces; the cheapest first.
     strength_factor
         Strengths are known to this factor: the band of `lean_band_deg`.
+    stimulation
+        `over_time`: the body is brought back to rest by inputs that change (`fes_pin.body.catchable`); `constant`: a
+        constant input holds the lean (`fes_pin.body.attainable`).
+    balance
+        Whether the centre of pressure must lie on the soles. Only with `together` and `gravity`.
 
     Returns
     -------
     list of MinimalSet
         One or more per choice of braces for which a set exists; fewest nerves first, then fewest braces, then least
-        energy. Exact: no smaller set meets the demands (integer programs by HiGHS, each proved optimal).
+        energy. Exact: no smaller set meets the demands (integer programs by HiGHS, each proved optimal); over time,
+        of plans as `fes_pin.body.plans` divides them.
 
     Raises
     ------
     InputError
-        Unknown brace or joint, negative number, a lean that is not positive.
+        Unknown brace, joint or stimulation, negative number, a lean that is not positive and finite.
     """
-    if not lean_deg > 0.0:
-        raise InputError(f"must be positive, got {lean_deg}", column="lean_deg")
-    if max_braces < 0 or alternatives < 1 or not strength_factor >= 1.0:
-        raise InputError("max_braces must be 0 or more, alternatives 1 or more, strength_factor 1 or more")
+    asked = _Question(
+        positive(lean_deg, "lean_deg"), together, gravity, settle_deg, stimulation, balance, strength_factor
+    )
+    max_braces, alternatives = whole(max_braces, "max_braces"), whole(alternatives, "alternatives", 1)
     inputs = Inputs.of(inputs, linear)
     orthoses = _orthoses(braces)
     found = []
@@ -137,18 +165,8 @@ def minimal_sets(
             if len(set(locked)) == linear.n:
                 continue
             braced = linear.brace(list(dict.fromkeys(locked))) if locked else linear
-            wanted = demands(braced, inputs, gravity, settle_deg)
-            for names in _smallest(inputs, wanted, lean_deg, together, alternatives):
-                found.append(
-                    _priced(
-                        braced,
-                        inputs.select(names),
-                        chosen,
-                        gravity=gravity,
-                        settle_deg=settle_deg,
-                        strength_factor=strength_factor,
-                    )
-                )
+            for names in _smallest(braced, inputs, asked, alternatives):
+                found.append(_priced(braced, inputs.select(names), chosen, asked))
     return sorted(found, key=lambda s: (len(s.inputs), len(s.braces), s.energy, s.inputs, s.braces))
 
 
@@ -174,44 +192,63 @@ def _orthoses(braces: Iterable[str] | Mapping[str, Sequence[str]]) -> dict[str, 
     return {name: ORTHOSES[name] for name in names}
 
 
-def _smallest(
-    inputs: Inputs, wanted: Demands, lean_deg: float, together: bool, alternatives: int
-) -> list[tuple[str, ...]]:
-    """Smallest sets: a covering program in z (input chosen or not), to which demands add the rows that they lack.
+@dataclass(frozen=True)
+class _Question:
+    """What is asked of a set."""
 
-    Where the chosen inputs fail a demand, inputs are added as long as it still fails: of what is then left out every
-    set must hold at least one. Such rows hold for every answer, so the first choice that meets all demands is a
-    smallest one.
-    """
-    if not wanted.falling:
-        return [()]
-    cuts, needs = _in_turn(wanted, inputs, lean_deg)
-    everything = np.ones(inputs.n, dtype=bool)
-    k = len(wanted.falling)
-    cases = (
-        [wanted.target, *(wanted.leaning(i, s * lean_deg) for i in range(k) for s in (1.0, -1.0))] if together else []
-    )
-    if not np.all(cuts.sum(axis=1) >= needs) or not all(_met(wanted, inputs, everything, case) for case in cases):
-        return []
-    rows, bounds = list(cuts), list(needs)
-    if together:  # balance and leans in k modes need k inputs; inputs that only pull, around no load at all, k + 1
-        alone = not wanted.target.any() and not inputs.lower.any()
-        rows.append(np.ones(inputs.n))
-        bounds.append(float(k + alone))
-    found: list[tuple[str, ...]] = []
-    excluded: list[np.ndarray] = []
-    while len(found) < alternatives:
-        chosen = _cover(np.array(rows), np.array(bounds), excluded)
-        if chosen is None or (found and chosen.sum() > len(found[0])):
-            break
-        missing = [case for case in cases if not _met(wanted, inputs, chosen, case)]
-        for case in missing[:_CUTS_A_ROUND]:
-            rows.append(_still_lacking(wanted, inputs, chosen, case))
-            bounds.append(1.0)
-        if not missing:
-            found.append(tuple(name for name, z in zip(inputs.names, chosen, strict=True) if z))
-            excluded.append(chosen)
-    return found
+    lean_deg: float
+    together: bool
+    gravity: bool
+    settle_deg: float
+    stimulation: str
+    balance: bool
+    strength_factor: float
+
+    def __post_init__(self) -> None:
+        if self.stimulation not in STIMULATIONS:
+            raise InputError(
+                f"must be one of {', '.join(STIMULATIONS)}, got {self.stimulation!r}", column="stimulation"
+            )
+        if number(self.strength_factor, "strength_factor") < 1.0:
+            raise InputError(f"must be 1 or more, got {self.strength_factor}", column="strength_factor")
+        positive(self.settle_deg, "settle_deg", infinite=self.stimulation == "constant")
+
+
+def _smallest(linear: LinearBody, inputs: Inputs, asked: _Question, alternatives: int) -> list[tuple[str, ...]]:
+    """Names of the inputs of the smallest sets."""
+    settle = asked.settle_deg if asked.together else np.inf
+    wanted = demands(linear, inputs, asked.gravity, settle, asked.balance)
+    rows, needs = _in_turn(wanted, inputs, asked.lean_deg)
+    cases: list[Demand] = []
+    if asked.together and asked.stimulation == "constant":
+        cases = _held(wanted, inputs, asked.lean_deg)
+        # balance and leans in k modes need k inputs; inputs that only pull, around no load at all, k + 1
+        alone = bool(len(wanted.falling)) and not wanted.target.any() and not inputs.lower.any()
+        rows, needs = np.vstack([rows, np.ones(inputs.n)]), np.append(needs, len(wanted.falling) + alone)
+    elif asked.together:
+        cases = _caught(linear, inputs, asked)
+    found = smallest(inputs.n, rows, needs, cases, alternatives)
+    return [tuple(name for name, z in zip(inputs.names, chosen, strict=True) if z) for chosen in found]
+
+
+def _held(wanted: Demands, inputs: Inputs, lean_deg: float) -> list[Demand]:
+    """The posture, and a lean each way in each falling mode, held by constant inputs."""
+    leans = [(i, sign * lean_deg) for i in range(len(wanted.falling)) for sign in (1.0, -1.0)]
+    cases = [wanted.case(*lean) for lean in [(0, 0.0), *leans]]
+    nothing, owner = np.zeros(inputs.n), np.arange(inputs.n)
+    return [
+        Demand(Program(nothing, wanted.limits, room, wanted.gains, target, inputs.lower, inputs.upper), owner)
+        for target, room in cases
+    ]
+
+
+def _caught(linear: LinearBody, inputs: Inputs, asked: _Question) -> list[Demand]:
+    """The posture, and a lean each way in each falling mode, brought to rest by inputs over time."""
+    plans = plans_of(linear, inputs, asked.settle_deg, asked.balance, gravity=asked.gravity)
+    still = np.zeros(len(plans.modes))
+    leans = np.diag(asked.lean_deg * plans.degree)[plans.kinds == "fall"]
+    watched: list[int] = []
+    return [Demand(plans.program(start, still), plans.owner, watched) for start in [still, *leans, *-leans]]
 
 
 def _in_turn(wanted: Demands, inputs: Inputs, lean_deg: float) -> tuple[np.ndarray, np.ndarray]:
@@ -220,75 +257,31 @@ def _in_turn(wanted: Demands, inputs: Inputs, lean_deg: float) -> tuple[np.ndarr
     down = np.maximum(-wanted.gains * inputs.upper, -wanted.gains * inputs.lower)
     needs = np.concatenate([wanted.target + wanted.load * lean_deg, -wanted.target + wanted.load * lean_deg])
     rows = np.nan_to_num(np.vstack([up, down]), nan=0.0, posinf=1e9)
-    return _tidy(rows, needs)
+    return rows[needs > 1e-9], needs[needs > 1e-9]
 
 
-def _tidy(rows: np.ndarray, needs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """More than enough is enough: entries above the need count as the need, and each row is scaled to a need of 1."""
-    keep = needs > 1e-9
-    rows, needs = rows[keep], needs[keep]
-    return np.minimum(rows / needs[:, None], 1.0), np.ones(len(needs))
-
-
-def _cover(rows: np.ndarray, needs: np.ndarray, excluded: list[np.ndarray]) -> np.ndarray | None:
-    """Fewest columns that cover the rows, other than the excluded choices; None if there is no such choice."""
-    m = rows.shape[1]
-    constraints = [optimize.LinearConstraint(rows, lb=needs * (1.0 - 1e-9))]
-    if excluded:
-        constraints.append(optimize.LinearConstraint(np.array(excluded), ub=[e.sum() - 1 for e in excluded]))
-    answer = optimize.milp(np.ones(m), constraints=constraints, integrality=np.ones(m), bounds=optimize.Bounds(0, 1))
-    return np.round(answer.x).astype(bool) if answer.status == 0 else None
-
-
-def _met(wanted: Demands, inputs: Inputs, chosen: np.ndarray, target: np.ndarray) -> bool:
-    """Whether the chosen inputs within their bounds meet one demand."""
-    gains, settle = wanted.gains[:, chosen], wanted.settle_gains[:, chosen]
-    if not chosen.any():
-        settled = np.all(wanted.settle_low <= 0.0) and np.all(wanted.settle_high >= 0.0)
-        return bool(settled and np.abs(target).max(initial=0.0) < 1e-9)
-    found = optimize.linprog(
-        np.zeros(gains.shape[1]),
-        A_ub=np.vstack([settle, -settle]),
-        b_ub=np.concatenate([wanted.settle_high, -wanted.settle_low]),
-        A_eq=gains,
-        b_eq=target,
-        bounds=np.column_stack([inputs.lower[chosen], inputs.upper[chosen]]),
-    )
-    return found.status == 0
-
-
-def _still_lacking(wanted: Demands, inputs: Inputs, chosen: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Inputs of which at least one is needed: (m,) 0 or 1. The chosen are grown to a largest set that fails the
-    demand."""
-    grown = chosen.copy()
-    for j in np.flatnonzero(~chosen):
-        grown[j] = True
-        if _met(wanted, inputs, grown, target):
-            grown[j] = False
-    return (~grown).astype(float)
-
-
-def _priced(
-    linear: LinearBody,
-    inputs: Inputs,
-    chosen: tuple[str, ...],
-    *,
-    gravity: bool,
-    settle_deg: float,
-    strength_factor: float,
-) -> MinimalSet:
+def _priced(linear: LinearBody, inputs: Inputs, chosen: tuple[str, ...], asked: _Question) -> MinimalSet:
     energies, condition = controllability(linear, inputs).fall_energy
-    leans = [
-        attainable(linear, inputs.scaled(factor), gravity, settle_deg).least_lean_deg
-        for factor in (1.0 / strength_factor, 1.0, strength_factor)
-    ]
+    leans, error = [], 0.0
+    for factor in (1.0 / asked.strength_factor, 1.0, asked.strength_factor):
+        scaled = inputs.scaled(factor)
+        able = (
+            attainable(linear, scaled, asked.gravity, asked.settle_deg, asked.balance)
+            if asked.stimulation == "constant" or not asked.together
+            else catchable(linear, scaled, asked.settle_deg, asked.balance, gravity=asked.gravity)
+        )
+        leans.append(able.least_lean_deg)
+        error = max(error, float(able.error_deg.max(initial=0.0)))
     return MinimalSet(
         inputs=inputs.names,
         braces=tuple(chosen),
         free_joints=linear.n,
+        locked_joints=len(linear.braced),
         falls=len(energies),
         energy=float(energies.max(initial=0.0)),
         condition=condition,
+        stimulation=asked.stimulation if asked.together else "constant",
         lean_deg=leans[1],
         lean_band_deg=(leans[0], leans[2]),
+        error_deg=error,
     )

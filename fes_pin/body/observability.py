@@ -1,4 +1,11 @@
-"""Which goniometers see which modes, and the fewest that see them all."""
+"""Which goniometers see which modes, how well, and the fewest that see the falls well enough.
+
+That a sensor sees a mode says little: what counts is how far off the lean is that one believes in after a look. The
+figure is the posterior of a Bayesian regression: before, every mode's angle and rate (over its rate of growth or
+frequency) are normal with a deviation of `PRIOR_DEG`; angles are then read for `LOOK_S` seconds, `RATE_HZ` times a
+second, each with white noise of `NOISE_DEG`; what is left is the deviation of each mode's angle at the end of the look
+(S. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, section 11.6).
+"""
 
 from __future__ import annotations
 
@@ -10,9 +17,17 @@ import numpy as np
 
 from fes_pin.body.controllability import RELATIVE_TOLERANCE, _independent
 from fes_pin.body.joints import known_joint
-from fes_pin.body.linearize import LinearBody
-from fes_pin.body.modes import Modes, modes
+from fes_pin.body.linear_body import LinearBody
+from fes_pin.body.modes import Mode, Modes, modes
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import positive
+
+NOISE_DEG, RATE_HZ, LOOK_S = 0.5, 200.0, 0.3
+"""Noise of a good flexible goniometer, degrees; its sampling, Hz; the time that a fall leaves for a look, s (ours)."""
+PRIOR_DEG = 10.0
+"""What is known without sensors: within the linear model's reach, degrees (`fes_pin.body.attainable.SETTLE_DEG`)."""
+
+_SETS_AT_ONCE = 20000
 
 
 @dataclass(frozen=True)
@@ -27,30 +42,33 @@ class Observability:
         Angle seen per degree of the mode's greatest joint: (modes, sensors).
     observable
         Whether each mode is seen (PBH).
+    posterior_deg
+        Deviation of each mode's angle that a look of `LOOK_S` seconds leaves, degrees of its greatest joint: (modes,).
     """
 
     modes: Modes = field(repr=False)
     sensors: tuple[str, ...]
     gains: np.ndarray = field(repr=False)
     observable: np.ndarray = field(repr=False)
+    posterior_deg: np.ndarray = field(repr=False)
 
     @property
-    def weakest(self) -> float:
-        """Angle that the sensors see together, per degree of the worst-seen falling mode."""
+    def worst_deg(self) -> float:
+        """The largest posterior deviation of a falling mode, degrees; 0 where nothing falls."""
         rows = [i for i, mode in enumerate(self.modes) if mode.kind == "fall"]
-        return float(np.linalg.norm(self.gains[rows], axis=1).min(initial=np.inf))
+        return float(self.posterior_deg[rows].max(initial=0.0))
 
     def __str__(self) -> str:
         lines = ["goniometers: " + ", ".join(self.sensors)]
-        for mode, row, seen in zip(self.modes, self.gains, self.observable, strict=True):
-            lines.append(
-                f"  {mode.name:66s} {'seen' if seen else 'NOT seen':9s} {np.linalg.norm(row):8.2g} deg per deg"
-            )
+        look = f"{NOISE_DEG:g} deg of noise, {RATE_HZ:g} Hz, {LOOK_S:g} s"
+        lines.append(f"left in doubt by a look ({look}), degrees of the mode's greatest joint:")
+        for mode, seen, left in zip(self.modes, self.observable, self.posterior_deg, strict=True):
+            lines.append(f"  {mode.name:66s} {'seen' if seen else 'NOT seen':9s} {left:8.2g} deg")
         return "\n".join(lines)
 
 
 def observability(linear: LinearBody, sensors: Iterable[str]) -> Observability:
-    """Which modes goniometers at these joints see.
+    """Which modes goniometers at these joints see, and how well.
 
     Raises
     ------
@@ -64,46 +82,93 @@ def observability(linear: LinearBody, sensors: Iterable[str]) -> Observability:
     for name in names:
         if name not in linear.joint_names:
             raise InputError(f"{name!r} is braced: nothing moves there")
-    return _seen(linear, found, names)
+    rows = _angles(linear, found, names)
+    return Observability(found, names, rows, _independent(found.values, rows), _posteriors(found.modes, rows[None])[0])
 
 
-def _seen(linear: LinearBody, found: Modes, names: Sequence[str]) -> Observability:
+def _angles(linear: LinearBody, found: Modes, names: Sequence[str]) -> np.ndarray:
+    """Angle that each sensor sees per degree of each mode's greatest joint: (modes, sensors)."""
     rows = found.shapes[[linear.joint_names.index(name) for name in names]].T
     rows = rows / np.abs(found.shapes).max(axis=0)[:, None]
-    rows = np.where(np.abs(rows) > RELATIVE_TOLERANCE, rows, 0.0)
-    return Observability(found, tuple(names), rows, _independent(found.values, rows))
+    return np.where(np.abs(rows) > RELATIVE_TOLERANCE, rows, 0.0)
+
+
+def _courses(found: Sequence[Mode]) -> np.ndarray:
+    """Course of each mode's angle over a look per unit of its two unknowns: (samples, modes, 2).
+
+    Of a fall these are its growing part at the end and its decaying part at the beginning, so that no course grows;
+    of others the angle at the end, and its rate over the frequency (of a drift, the rate itself).
+    """
+    back = -np.arange(round(LOOK_S * RATE_HZ))[::-1] / RATE_HZ
+    out = np.empty((len(back), len(found), 2))
+    for i, mode in enumerate(found):
+        if mode.kind == "fall":
+            out[:, i] = 0.5 * np.exp(mode.rate * np.column_stack([back, back[0] - back]))
+        elif mode.kind == "swing":
+            out[:, i] = np.column_stack([np.cos(mode.rate * back), np.sin(mode.rate * back)])
+        else:
+            out[:, i] = np.column_stack([np.ones_like(back), back])
+    return out
+
+
+def _posteriors(found: Sequence[Mode], angles: np.ndarray) -> np.ndarray:
+    """Posterior deviation of every mode's angle at the end of a look, for sets of sensors: (sets, modes) degrees.
+
+    Parameters
+    ----------
+    found
+        The modes; of some of all, the posterior if the others were known, which is never more.
+    angles
+        As `_angles` gives them, by set: (sets, modes, sensors).
+    """
+    courses = _courses(found)
+    count = 2 * len(found)
+    flat = courses.reshape(len(courses), count)
+    falls = np.array([mode.kind == "fall" for mode in found])
+    prior = PRIOR_DEG**2 * np.repeat(np.where(falls, 2.0, 1.0), 2)  # z and y are angle plus and minus rate
+    seen = np.repeat(np.repeat(angles @ np.swapaxes(angles, 1, 2), 2, axis=1), 2, axis=2)
+    information = np.diag(1.0 / prior) + (flat.T @ flat) * seen / NOISE_DEG**2
+    covariance = np.linalg.inv(information).reshape(-1, len(found), 2, len(found), 2)
+    i = np.arange(len(found))
+    return np.sqrt(np.einsum("ia,niab,ib->ni", courses[-1], covariance[:, i, :, i].swapaxes(0, 1), courses[-1]))
 
 
 def fewest_goniometers(
-    linear: LinearBody, candidates: Sequence[str] | None = None, at_least: float = 0.1
+    linear: LinearBody, candidates: Sequence[str] | None = None, within_deg: float = 1.0
 ) -> tuple[Observability, ...]:
-    """All smallest sets of goniometers that see every falling mode; best-seen first.
+    """All smallest sets of goniometers that leave every falling mode known well enough; the best first.
 
     Parameters
     ----------
     candidates
         Joints that can carry one; all that move by default.
-    at_least
-        Angle that the set must see, per degree of each falling mode (a goniometer has noise too).
+    within_deg
+        Posterior deviation that a look may leave of each falling mode, degrees (see this file's head).
 
     Raises
     ------
     InputError
-        Unknown joint; or no set sees every fall.
+        Unknown joint; a figure that is not positive; or no set sees every fall so well.
     """
+    within_deg = positive(within_deg, "within_deg")
     names = tuple(linear.joint_names if candidates is None else candidates)
     whole = observability(linear, names)
     rows = [i for i, mode in enumerate(whole.modes) if mode.kind == "fall"]
-    squared = whole.gains[rows] ** 2
-    if not (np.all(whole.observable[rows]) and np.all(squared.sum(axis=1) >= at_least**2)):
-        raise InputError(f"these joints do not see every falling mode at {at_least} degrees per degree")
+    if whole.worst_deg > within_deg or not np.all(whole.observable[rows]):
+        raise InputError(
+            f"these joints leave a fall uncertain by {whole.worst_deg:.2g} degrees, more than {within_deg:g}: "
+            "they do not see every falling mode"
+        )
     for size in range(1, len(names) + 1):
-        sets = [
-            _seen(linear, whole.modes, [names[i] for i in chosen])
-            for chosen in itertools.combinations(range(len(names)), size)
-            if np.all(squared[:, chosen].sum(axis=1) >= at_least**2)
-        ]
-        sets = [found for found in sets if np.all(found.observable[rows])]
+        sets: list[Observability] = []
+        combinations = itertools.combinations(range(len(names)), size)
+        while some := list(itertools.islice(combinations, _SETS_AT_ONCE)):
+            good = np.array(some)
+            for part in [[i] for i in rows] + [rows, list(range(len(whole.modes)))] if rows else []:
+                angles = np.moveaxis(whole.gains[part][:, good], 0, 1)
+                left = _posteriors([whole.modes[i] for i in part], angles)
+                good = good[left[:, [i in rows for i in part]].max(axis=1) <= within_deg]
+            sets += [observability(linear, [names[i] for i in each]) for each in good]
         if sets:
-            return tuple(sorted(sets, key=lambda found: -found.weakest))
+            return tuple(sorted(sets, key=lambda found: found.worst_deg))
     return ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from inspect import Signature, signature
 from pathlib import Path
@@ -17,34 +17,58 @@ app = typer.Typer(cls=Commands, help="The walking body: modes, nerves, view.")
 
 
 def _body_options(
-    posture: Annotated[str, typer.Option(help="neutral, initial_contact, loading, mid_stance, ...")] = "mid_stance",
-    mass: Annotated[float, typer.Option("--mass", help="kg")] = 72.6,
-    height: Annotated[float, typer.Option("--height", help="m")] = 1.80,
-    sex: Annotated[str, typer.Option(help="male or female: which segment table")] = "male",
-    stance: Annotated[str, typer.Option(help="left or right: the foot on the ground")] = "right",
+    posture: Annotated[
+        str, typer.Option(help="to stand in: standing (both feet), one_leg, neutral; of a walk: mid_stance, ...")
+    ] = "mid_stance",
+    mass: Annotated[float | None, typer.Option("--mass", help="kg; 72.6 by default")] = None,
+    height: Annotated[float | None, typer.Option("--height", help="m; 1.80 by default")] = None,
+    sex: Annotated[str | None, typer.Option(help="male (default) or female: which segment table")] = None,
+    stance: Annotated[str | None, typer.Option(help="left or right (default): the foot on the ground")] = None,
     segments: Annotated[Path | None, typer.Option(help="table of segments (JSON) instead of mass, height, sex")] = None,
     urdf: Annotated[Path | None, typer.Option(help="URDF of the body instead")] = None,
     slope: Annotated[
         tuple[float, float], typer.Option(help="alpha beta: horizontal parts of the ground's unit normal")
     ] = (0.0, 0.0),
     brace: Annotated[list[str] | None, typer.Option(help="orthosis or joint that is locked; may be repeated")] = None,
+    passive: Annotated[float, typer.Option(help="passive torque of the legs: 1 healthy, 0 none")] = 0.0,
 ):
     """The linearized body that the options common to all commands name."""
     from fes_pin.body.build import Body
     from fes_pin.body.linearize import linearize
     from fes_pin.body.minimal_sets import ORTHOSES
+    from fes_pin.body.passive import PassiveLegs
 
+    person = {"--mass": mass, "--height": height, "--sex": sex, "--stance": stance}
     if segments is not None and urdf is not None:
-        raise InputError("give a table of segments or a URDF, not both")
+        raise InputError("give a table of segments or a URDF, not both", column="--urdf")
     if urdf is not None:
+        _none_of(person, "the URDF says it", "--urdf")
         body = Body.from_urdf(urdf)
     elif segments is not None:
-        body = Body.from_segments(segments, stance)
+        _none_of({n: v for n, v in person.items() if n != "--stance"}, "the table of segments says it", "--segments")
+        body = Body.from_segments(segments, stance or "right")
     else:
-        body = Body.from_subject(mass, height, sex, stance)
-    linear = linearize(body, posture, slope)
+        body = Body.from_subject(
+            72.6 if mass is None else mass, 1.80 if height is None else height, sex or "male", stance or "right"
+        )
+    legs = PassiveLegs(passive) if _within(passive, "--passive", 0.0, 10.0) else None
+    linear = linearize(body, posture, slope, passive=legs)
     joints = [joint for name in brace or [] for joint in ORTHOSES.get(name, (name,))]
     return linear.brace(list(dict.fromkeys(joints))) if joints else linear
+
+
+def _none_of(options: Mapping[str, object], why: str, with_option: str) -> None:
+    """Options that another one leaves no meaning are refused."""
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise InputError(f"does not go with {with_option}: {why}", column=given[0])
+
+
+def _within(value: float, option: str, low: float, high: float) -> float:
+    """A number between two others, both allowed."""
+    if not low <= value <= high:
+        raise InputError(f"must lie between {low:g} and {high:g}, got {value:g}", column=option)
+    return value
 
 
 def _of_a_body(command: Callable) -> Callable:
@@ -66,14 +90,21 @@ def _of_a_body(command: Callable) -> Callable:
 def modes(
     linear,
     goniometers: Annotated[bool, typer.Option("--goniometers", help="also the fewest that see every fall")] = False,
+    doubt: Annotated[float, typer.Option(help="with --goniometers: doubt they may leave of a fall, degrees")] = 1.0,
 ) -> None:
     """How the body falls and swings at a posture: the eigenpairs of A^-1 B."""
-    typer.echo(f"{linear}\n\n{linear.modes()}")
+    from fes_pin.body.balance import place_of_weight
+
+    lines = [f"{linear}\n{place_of_weight(linear)[1]}\n\n{linear.modes()}"]
     if goniometers:
         from fes_pin.body.observability import fewest_goniometers
 
-        best = fewest_goniometers(linear)
-        typer.echo(f"\nFewest goniometers that see every fall ({len(best)} such sets; the best):\n{best[0]}")
+        best = fewest_goniometers(linear, within_deg=doubt)
+        lines.append(
+            f"\nFewest goniometers that leave every fall known to {doubt:g} deg ({len(best)} such sets; the best):"
+            f"\n{best[0]}"
+        )
+    typer.echo("\n".join(lines))
 
 
 @app.command()
@@ -86,43 +117,66 @@ def nerves(
     map_to: Annotated[Path | None, typer.Option("--map", help="heat map of influence: image file")] = None,
     fewest: Annotated[bool, typer.Option("--fewest", help="search the fewest nerves (with the braces given)")] = False,
     max_braces: Annotated[int, typer.Option(help="with --fewest: try so many further orthoses (minutes)")] = 0,
-    lean: Annotated[float, typer.Option(help="lean that the fewest nerves must hold, degrees")] = 1.0,
+    lean: Annotated[float, typer.Option(help="lean that the fewest nerves must catch, degrees")] = 1.0,
+    constant: Annotated[
+        bool, typer.Option("--constant", help="with --fewest: the lean must be held by constant stimulation")
+    ] = False,
+    settle: Annotated[float, typer.Option(help="how far modes may be from the posture, degrees")] = 10.0,
+    strength: Annotated[float, typer.Option(help="strength of all nerves: 1 is the table's")] = 1.0,
 ) -> None:
-    """Which nerves control which modes, what they can hold, and the fewest that do."""
+    """Which nerves control which modes, what they can catch and hold, and the fewest that do."""
     from fes_pin.body.attainable import attainable
+    from fes_pin.body.balance import place_of_weight
+    from fes_pin.body.catchable import catchable
     from fes_pin.body.controllability import controllability
     from fes_pin.body.inputs import Inputs
-    from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto
     from fes_pin.muscles.nerve_inputs import subject_nerves
     from fes_pin.view.influence import influence_table, plot_influence
 
+    _within(strength, "--strength", 0.01, 10.0)
+    _within(settle, "--settle", 0.1, 90.0)
+    _within(lean, "--lean", 1e-3, 45.0)
+    _within(max_braces, "--max-braces", 0, 10)
     chosen = subject_nerves(linear.body, name or ())
-    result = controllability(linear, chosen, horizon)
-    typer.echo(f"{linear}\n\n{result}\n")
-    weak, strong = (
-        attainable(linear, Inputs.of(chosen, linear).scaled(f)).least_lean_deg for f in chosen.strength_band
-    )
-    typer.echo(f"With these nerves {attainable(linear, chosen)}")
-    typer.echo(
-        f"Strengths are known to a factor of 1.8: the least of these leans is {weak:.1f} to {strong:.1f} degrees."
-    )
+    inputs = Inputs.of(chosen, linear).scaled(strength)
+    result = controllability(linear, inputs, horizon)
+    lines = [f"{linear}\n{place_of_weight(linear)[1]}\n\n{result}\n"]
+    weak, strong = (attainable(linear, inputs.scaled(f), settle_deg=settle) for f in chosen.strength_band)
+    held = attainable(linear, inputs, settle_deg=settle)
+    lines.append(f"With these nerves {held}")
+    if held.falling:
+        lines.append(
+            f"Strengths are known to a factor of {max(chosen.strength_band):.1f}: the least of these leans is "
+            f"{weak.least_lean_deg:.1f} to {strong.least_lean_deg:.1f} degrees."
+        )
+        lines.append(f"With these nerves {catchable(linear, inputs, settle)}")
     if influence is not None:
-        typer.echo(f"\n{influence_table(result, influence)}")
+        lines.append(f"\n{influence_table(result, influence)}")
+    if fewest:
+        lines += _fewest(linear, inputs, lean, max_braces, "constant" if constant else "over_time", settle)
     if map_to is not None:
         try:
             plot_influence(result, map_to)
         except (OSError, ValueError) as error:
             raise InputError(f"cannot be written: {str(error).splitlines()[0]}", file=map_to) from None
-        typer.echo(f"wrote {map_to}")
-    if fewest:
-        free = [name for name, joints in ORTHOSES.items() if set(joints) <= set(linear.joint_names)]
-        some = {"braces": free, "max_braces": max_braces} if max_braces else {"alternatives": 3}
-        found = minimal_sets(linear, chosen, lean_deg=lean, **some)
-        found = pareto(found) if max_braces else found
-        typer.echo(f"\nFewest nerves that hold the posture and a lean of {lean:g} degrees in every fall:")
-        typer.echo(
-            "\n".join(map(str, found)) or "none of these nerves' sets does; brace more joints (--brace corset ...)"
-        )
+        lines.append(f"wrote {map_to}")
+    typer.echo("\n".join(lines))
+
+
+def _fewest(linear, inputs, lean: float, max_braces: int, stimulation: str, settle: float) -> list[str]:
+    """Lines on the fewest nerves."""
+    from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto
+
+    free = [name for name, joints in ORTHOSES.items() if set(joints) <= set(linear.joint_names)]
+    some = {"braces": free, "max_braces": max_braces} if max_braces else {"alternatives": 3}
+    found = minimal_sets(linear, inputs, lean_deg=lean, stimulation=stimulation, settle_deg=settle, **some)
+    found = pareto(found) if max_braces else found
+    what = "catch, over time," if stimulation == "over_time" else "hold, stimulated constantly,"
+    none = "none of these nerves' sets does; brace more joints (--brace corset ...)"
+    return [
+        f"\nFewest nerves that keep the posture and {what} a lean of {lean:g} degrees in every fall:",
+        *(map(str, found) if found else [none]),
+    ]
 
 
 @app.command()
@@ -149,7 +203,8 @@ def view(
             raise InputError(f"must be between 1 and {len(found)}, got {mode}", column="--mode")
         scene = show_mode(linear, found[mode - 1])
     elif nerve is not None:
-        scene = show_influence(linear, subject_nerves(linear.body, [nerve]), nerve)
+        chosen = subject_nerves(linear.body, [nerve])
+        scene = show_influence(linear, chosen, chosen.names)
     elif walk is not None:
         scene = _walking(linear.body, walk)
     else:

@@ -50,7 +50,9 @@ class LiveViewer:
         self._thread = threading.Thread(target=self._serve, args=(listener,), daemon=True)
         self._thread.start()
         self._started.wait()
-        self._drawing = _bridge().context.socket(zmq.REQ)
+        from meshcat.servers.zmqserver import ZMQWebSocketBridge  # noqa: PLC0415
+
+        self._drawing = ZMQWebSocketBridge.context.socket(zmq.REQ)
         self._drawing.connect(self._inside)
 
     def _serve(self, listener: socket.socket) -> None:

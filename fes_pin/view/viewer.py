@@ -19,7 +19,7 @@ import pinocchio as pin
 from fes_pin.body.build import Body
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINTS
-from fes_pin.body.linearize import LinearBody
+from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode
 from fes_pin.data.errors import InputError
 
@@ -142,9 +142,8 @@ class Scene:
         return _PAGE.format(script=script, commands=packed, caption=html.escape(self.caption))
 
     def write(self, path: str | Path) -> Path:
-        """Write the page to a file."""
+        """Write the page to a file, into a folder that is there."""
         path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(self.html(), encoding="utf-8")
         return path
 
@@ -218,16 +217,16 @@ def _put_down(body: Body, shapes: pin.GeometryModel, q: np.ndarray, turn: np.nda
     return pin.SE3(rotation, np.array([-middle[0], -middle[1], -lowest if np.isfinite(lowest) else 0.0]))
 
 
-def show_influence(linear: LinearBody, inputs, name: str) -> Scene:
-    """What one nerve turns: a ball at each joint, larger and redder the more of the nerve's torque acts there.
+def show_influence(linear: LinearBody, inputs, names: str | Sequence[str]) -> Scene:
+    """What nerves turn: a ball at each joint, larger and redder the more of the nerves' torque acts there.
 
     Raises
     ------
     InputError
         Inputs that are none, or a name that is not among them.
     """
-    inputs = Inputs.of(inputs, linear).select([name])
-    torque = dict(zip(inputs.joint_names, inputs.matrix[:, 0].tolist(), strict=True))
+    inputs = Inputs.of(inputs, linear).select([names] if isinstance(names, str) else names)
+    torque = dict(zip(inputs.joint_names, inputs.matrix.sum(axis=1).tolist(), strict=True))
     strength = {j.name: float(np.linalg.norm([torque.get(r, 0.0) for r in j.revolutes])) for j in JOINTS}
     greatest = max(strength.values())
     posture = linear.whole_posture
@@ -239,7 +238,7 @@ def show_influence(linear: LinearBody, inputs, name: str) -> Scene:
             continue
         scene.balls.append((_centre(linear.body, joint.name, posture), 0.05 + 0.06 * share, _red(share)))
         said += [f"{r} {torque[r]:+.0f} N m" for r in joint.revolutes if abs(torque.get(r, 0.0)) >= 0.01 * greatest]
-    scene.caption = f"{name}, full recruitment: " + (", ".join(said) or "no torque")
+    scene.caption = f"{' and '.join(inputs.names)}, full recruitment: " + (", ".join(said) or "no torque")
     return scene
 
 

@@ -1,6 +1,7 @@
 """Controllability and observability against brute force: ranks, quadrature, Riccati."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,7 +54,7 @@ def test_equal_poles_need_as_many_inputs():
     knees = linearize(body, "neutral").brace(
         [n for n in body.joint_names if n not in ("left_knee_flexion", "left_hip_flexion")]
     )
-    twins = type(knees)(**{**knees.__dict__, "A": np.diag([1.0, 1.0]), "B": np.diag([-4.0, -4.0]), "C": np.zeros(2)})
+    twins = replace(knees, A=np.diag([1.0, 1.0]), B=np.diag([-4.0, -4.0]), C=np.zeros(2))
     one = controllability(twins, Inputs.pulling(["a"], [[1.0], [2.0]], twins.joint_names))
     assert not one.controllable.any()
     two = controllability(twins, Inputs.pulling(["a", "b"], [[1.0, 0.0], [2.0, 1.0]], twins.joint_names))
@@ -66,9 +67,7 @@ def test_pbh_with_damping_sees_the_same_hole(body, standing):
     rng = np.random.default_rng(0)
     Q = rng.normal(size=(19, 2))
     Q = Q - np.outer(standing.A @ mode.shape, mode.shape @ Q)
-    damped = type(standing)(
-        **{**{k: v for k, v in standing.__dict__.items() if k not in ("F", "R")}, "E": 0.5 * standing.A}
-    )
+    damped = replace(standing, E=0.5 * standing.A)
     poles, reach = pbh(damped, Inputs.pulling(["a", "b"], Q, standing.joint_names))
     expected = -0.25 + np.sqrt(0.0625 + mode.value)
     assert reach[np.argmin(np.abs(poles - expected))] < 1e-8 * reach.max()

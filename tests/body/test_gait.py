@@ -23,7 +23,7 @@ SIX = ("initial_contact", "loading", "mid_stance", "terminal_stance", "pre_swing
 
 
 def test_the_six_postures_are_there_and_within_limits():
-    assert set(posture_names()) == {"neutral", *SIX}
+    assert set(posture_names()) == {"neutral", "standing", "one_leg", *SIX}
     for stance in ("left", "right"):
         body = Body.from_subject(mass_kg=70.0, height_m=1.75, stance=stance)
         for name in posture_names():

@@ -1,0 +1,175 @@
+"""What inputs that change in time can catch: the null-controllable region of the linear body under bounded inputs.
+
+The starts that bounded inputs can catch are a convex set: the growing parts of the falling modes that an integral of
+bounded inputs meets (T. Hu, Z. Lin, L. Qiu, "Stabilization of exponentially unstable linear systems with saturating
+actuators", IEEE Trans. Autom. Control 46:973-979, 2001). For one falling mode alone it is exact in closed form, -max F
+< mu z < -min F (`modal_bound`); with several, which the same inputs must catch together, within limits on every mode
+and on the centre of pressure, it is a linear program over inputs that are held between pulses (`catchable`). What no
+plan catches beyond the modal bound is lost to any stimulation; between the two a finer plan may do more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fes_pin.body.attainable import SETTLE_DEG, lean_text
+from fes_pin.body.inputs import Inputs
+from fes_pin.body.linear_body import LinearBody
+from fes_pin.body.modes import Mode, modes
+from fes_pin.body.plans import Plans
+from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number, positive
+
+
+@dataclass(frozen=True)
+class Catchable:
+    """From which leans at rest inputs within their bounds can bring the body to rest again.
+
+    Parameters
+    ----------
+    falling
+        The falling modes.
+    rests
+        Whether there is any rest within the limits that constant inputs keep.
+    lean_deg
+        Greatest lean in each mode, the others upright, that a plan catches: degrees of the mode's greatest joint, in
+        the positive and in the negative direction of the shape; (k, 2). NaN where not even the posture is kept.
+    error_deg
+        By how much rounding and the solver's tolerances may have moved each of them; (k, 2).
+    bound_deg
+        What no stimulation of these inputs catches, whatever its course (`modal_bound`); (k, 2).
+    """
+
+    falling: tuple[Mode, ...] = field(repr=False)
+    rests: bool
+    lean_deg: np.ndarray
+    error_deg: np.ndarray = field(repr=False)
+    bound_deg: np.ndarray
+
+    @property
+    def least_lean_deg(self) -> float:
+        """The smallest of the leans, 0 where the posture cannot be kept, infinite where nothing falls."""
+        return float(np.nan_to_num(self.lean_deg, nan=0.0, posinf=np.inf).min(initial=np.inf)) if self.rests else 0.0
+
+    def __str__(self) -> str:
+        if not self.rests:
+            return "the body cannot be brought to rest near the posture by these inputs"
+        lines = ["greatest lean that stimulation over time catches, degrees one way / the other (no course: beyond):"]
+        for mode, lean, bound in zip(self.falling, self.lean_deg, self.bound_deg, strict=True):
+            caught = " / ".join(f"{lean_text(x):>5s}" for x in np.nan_to_num(lean))
+            lines.append(f"  {mode.name:80s} {caught}  ({' / '.join(lean_text(x) for x in bound)})")
+        return "\n".join(lines)
+
+
+def modal_bound(linear: LinearBody, inputs, lag_s: float = 0.0, gravity: bool = True) -> np.ndarray:
+    """Leans at rest beyond which no stimulation of these inputs catches a falling mode, were it the only one.
+
+    Parameters
+    ----------
+    linear
+        From `linearize`, at rest.
+    inputs
+        `Inputs`, `Nerves`, or names of joints.
+    lag_s
+        First-order lag of the torques behind the stimulation, s, for muscles that held the posture before: the bound
+        shrinks by 1 + rate lag, for the mode grows while they change.
+    gravity
+        Whether the posture's weight counts.
+
+    Returns
+    -------
+    bound
+        Degrees of the mode's greatest joint, in the positive and in the negative direction of the shape; (k, 2).
+
+    Raises
+    ------
+    InputError
+        Inputs that are none, or a lag that is negative.
+    """
+    inputs = Inputs.of(inputs, linear)
+    if number(lag_s, "lag_s") < 0.0:
+        raise InputError(f"must not be negative, got {lag_s}", column="lag_s")
+    found = modes(linear)
+    fall = [i for i, mode in enumerate(found) if mode.kind == "fall"]
+    shapes, values = found.shapes[:, fall], found.values[fall]
+    gains, constant = shapes.T @ inputs.on(linear), shapes.T @ linear.C * gravity
+    with np.errstate(invalid="ignore"):  # a gain of 0 times no bound
+        ends = np.nan_to_num(
+            np.stack([gains * inputs.lower, gains * inputs.upper]), nan=0.0, posinf=np.inf, neginf=-np.inf
+        )
+    least, most = constant + ends.min(axis=0).sum(axis=1), constant + ends.max(axis=0).sum(axis=1)
+    share = np.maximum(np.column_stack([-least, most]), 0.0) / values[:, None]
+    degree = np.radians(1.0) / np.abs(shapes).max(axis=0)
+    return share / degree[:, None] / (1.0 + np.sqrt(values) * lag_s)[:, None]
+
+
+def catchable(
+    linear: LinearBody,
+    inputs,
+    settle_deg: float = SETTLE_DEG,
+    balance: bool = True,
+    rest_deg: float | None = None,
+    gravity: bool = True,
+) -> Catchable:
+    """From which leans inputs that change in time bring the body to rest, by linear programs over a horizon.
+
+    Parameters
+    ----------
+    linear
+        From `linearize`, at rest and without damping.
+    inputs
+        `Inputs`, `Nerves`, or names of joints.
+    settle_deg
+        No mode goes further than this from the posture, on the way and at rest.
+    balance
+        Whether the centre of pressure must lie on the soles, at all times.
+    rest_deg
+        How far from the posture falling modes may come to rest; `settle_deg` by default, 0 for the posture itself.
+    gravity
+        Whether the posture's weight must be carried; otherwise only deviations count.
+
+    Raises
+    ------
+    InputError
+        Inputs that are none; `settle_deg` not positive and finite; damping or motion.
+    """
+    inputs = Inputs.of(inputs, linear)
+    plans = plans_of(linear, inputs, settle_deg, balance, rest_deg, gravity)
+    falling = plans.modes.falling
+    still = np.zeros(len(plans.modes))
+    rests = plans.program(still, still).solve().x is not None
+    leans, errors = np.full((len(falling), 2), np.nan), np.zeros((len(falling), 2))
+    for i, row in enumerate(np.flatnonzero(plans.kinds == "fall")):
+        for way, sign in enumerate((1.0, -1.0)):
+            towards = still.copy()
+            towards[row] = sign * plans.degree[row]
+            found = plans.program(still, still, towards).solve() if rests else None
+            if found is not None and found.x is not None:
+                leans[i, way], errors[i, way] = found.x[-1], found.error
+            elif found is not None and found.unbounded:
+                leans[i, way] = np.inf
+    return Catchable(falling, rests, leans, errors, modal_bound(linear, inputs, gravity=gravity))
+
+
+def plans_of(
+    linear: LinearBody,
+    inputs: Inputs,
+    settle_deg: float,
+    balance: bool = True,
+    rest_deg: float | None = None,
+    gravity: bool = True,
+) -> Plans:
+    """The plans of a body's inputs, after a look at what is given.
+
+    Raises
+    ------
+    InputError
+        `settle_deg` not positive and finite, `rest_deg` negative; damping or motion.
+    """
+    if not linear.conservative:
+        raise InputError("what inputs catch is asked of a body at rest without damping")
+    if rest_deg is not None and number(rest_deg, "rest_deg") < 0.0:
+        raise InputError(f"must not be negative, got {rest_deg}", column="rest_deg")
+    return Plans(linear, inputs, positive(settle_deg, "settle_deg"), balance, rest_deg, gravity)

@@ -1,0 +1,189 @@
+"""Whether a set of inputs catches a fall in the body's full equations of motion, planned anew at every pulse.
+
+The controller knows the state and the linear model: at every pulse it solves the plan whose modes stray least
+(`fes_pin.body.plans`) and gives its first input. The body that it acts on is Pinocchio's: finite angles and velocities.
+Torques follow the stimulation at once, the state is known without error, and moment arms are those of the posture, as
+the linear model has them; with `moving_arms` they follow the joints, a stiffness of its own that the plan does not
+know. What is held here may still be lost with a person.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pinocchio as pin
+
+from fes_pin.body.attainable import SETTLE_DEG
+from fes_pin.body.balance import soles_of
+from fes_pin.body.catchable import plans_of
+from fes_pin.body.ground import centre_of_pressure
+from fes_pin.body.inputs import Inputs
+from fes_pin.body.joints import JOINT_NAMES, angles_array
+from fes_pin.body.linear_body import LinearBody
+from fes_pin.body.linearize import model_on_slope
+from fes_pin.body.plans import PULSE_S, Plans
+from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import positive
+
+STEP_S = 0.002
+"""Step of the Runge-Kutta integration, s; the fastest falls here double in ten of them."""
+LOST_DEG = 45.0
+"""A joint this far from the posture is lost: no linear model reaches there (`fes_pin.body.attainable.lean_text`)."""
+
+
+@dataclass(frozen=True)
+class Caught:
+    """A run of the closed loop.
+
+    Parameters
+    ----------
+    joint_names
+        The joints that move.
+    time_s, deviation
+        At each pulse: (T,) s, and the joints' deviations from the posture: (T, n) rad.
+    stimulation
+        Inputs given from each pulse on: (T - 1, m).
+    outside_m
+        How far the centre of pressure went outside the soles, m; negative inside.
+    lost
+        Why the body fell, or nothing.
+    """
+
+    joint_names: tuple[str, ...]
+    time_s: np.ndarray = field(repr=False)
+    deviation: np.ndarray = field(repr=False)
+    stimulation: np.ndarray = field(repr=False)
+    outside_m: float
+    lost: str = ""
+
+    @property
+    def last_deg(self) -> float:
+        """Largest deviation in the last fifth of the run, degrees."""
+        return float(np.degrees(np.abs(self.deviation[-max(1, len(self.deviation) // 5) :]).max()))
+
+    def __str__(self) -> str:
+        if self.lost:
+            return f"lost after {self.time_s[-1]:.2f} s: {self.lost}"
+        return f"held for {self.time_s[-1]:.1f} s, within {self.last_deg:.1f} deg of the posture in the end"
+
+
+def close_the_loop(
+    linear: LinearBody,
+    inputs,
+    start: Mapping[str, float] | np.ndarray,
+    seconds: float = 2.0,
+    settle_deg: float = SETTLE_DEG,
+    balance: bool = True,
+    moving_arms: bool = False,
+) -> Caught:
+    """Release a body at rest off its posture and stimulate it in closed loop, on the full equations of motion.
+
+    Parameters
+    ----------
+    linear
+        From `linearize`, on one foot, with or without braces; what the controller knows.
+    inputs
+        `Inputs`, `Nerves`, or names of joints.
+    start
+        Deviations of the joints that move, rad: by name, or (n,).
+    seconds
+        How long.
+    settle_deg, balance
+        As `fes_pin.body.catchable.catchable` takes them.
+    moving_arms
+        Whether nerves have the moment arms of the posture of each moment; the controller is told them at each pulse.
+
+    Raises
+    ------
+    InputError
+        Inputs that are none, a body on both feet, another time than a positive one.
+    """
+    if linear.both_feet:
+        raise InputError("the closed loop is simulated on one foot only")
+    if isinstance(start, Mapping):
+        given = dict(zip(JOINT_NAMES, angles_array(start, JOINT_NAMES), strict=True))
+        start = np.array([given[name] for name in linear.joint_names])
+    else:
+        start = angles_array(start, linear.joint_names)
+    plans = plans_of(linear, Inputs.of(inputs, linear), settle_deg, balance)
+    plant = _Plant(linear)
+    q, v = linear.q + start, np.zeros(linear.n)
+    deviations, given_inputs, outside, lost = [start], [], -np.inf, ""
+    for _ in range(round(positive(seconds, "seconds") / PULSE_S)):
+        now = plans
+        if moving_arms:
+            now = replace(plans, inputs=_acting(inputs, linear, q))
+        stimulation = _first_input(now, q - linear.q, v)
+        if stimulation is None:
+            lost = "no input within the bounds brings it back"
+            break
+        torque = now.inputs.on(linear) @ stimulation
+        q, v, far = plant.run(q, v, torque)
+        outside = max(outside, far)
+        deviations.append(q - linear.q)
+        given_inputs.append(stimulation)
+        if not np.abs(deviations[-1]).max() < np.radians(LOST_DEG):
+            lost = f"{linear.joint_names[int(np.abs(deviations[-1]).argmax())]} is {LOST_DEG:g} degrees off"
+            break
+    time = PULSE_S * np.arange(len(deviations))
+    used = np.array(given_inputs).reshape(-1, plans.inputs.n)
+    return Caught(linear.joint_names, time, np.array(deviations), used, outside, lost)
+
+
+def _first_input(plans: Plans, deviation: np.ndarray, rates: np.ndarray) -> np.ndarray | None:
+    """Input of the next pulse by the plan whose modes stray least; None if no plan ends the falls."""
+    project = plans.modes.shapes.T @ plans.linear.A
+    found = plans.gentlest(project @ deviation, project @ rates).solve()
+    return None if found.x is None else found.x[: plans.inputs.n]
+
+
+def _acting(inputs, linear: LinearBody, q: np.ndarray) -> Inputs:
+    """The inputs with the moment arms of the posture of the moment."""
+    if not hasattr(inputs, "torque_matrix"):
+        raise InputError("only nerves have moment arms that move", column="moving_arms")
+    now = {**dict.fromkeys(JOINT_NAMES, 0.0), **linear.held, **dict(zip(linear.joint_names, q.tolist(), strict=True))}
+    return Inputs.pulling(inputs.names, inputs.torque_matrix(now))
+
+
+class _Plant:
+    """The body with its braced joints locked, on the full equations of motion."""
+
+    def __init__(self, linear: LinearBody) -> None:
+        whole = model_on_slope(linear.body, linear.slope, linear.gravity)
+        locked = [whole.getJointId(name) for name in linear.held]
+        q = linear.body.angles(linear.whole_posture, check=False)
+        self.model = pin.buildReducedModel(whole, locked, q) if locked else whole
+        self.data = self.model.createData()
+        self.extra = -linear.C - pin.computeGeneralizedGravity(self.model, self.data, linear.q)
+        self.stiffness = -linear.B - pin.computeGeneralizedGravityDerivatives(self.model, self.data, linear.q)
+        self.rest, self.support = linear.q, soles_of(linear)
+        self.damping = linear.E
+
+    def _acceleration(self, q: np.ndarray, v: np.ndarray, torque: np.ndarray) -> np.ndarray:
+        passive = -self.extra - self.stiffness @ (q - self.rest) - self.damping @ v
+        return pin.aba(self.model, self.data, q, v, torque + passive)
+
+    def run(self, q: np.ndarray, v: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """State after a pulse of constant torque, and how far outside the soles the centre of pressure came, m."""
+        far = -np.inf
+        for _ in range(round(PULSE_S / STEP_S)):
+            far = max(far, self._outside(q, v, self._acceleration(q, v, torque)))
+            q, v = self._step(q, v, torque)
+        return q, v, far
+
+    def _step(self, q: np.ndarray, v: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        h = STEP_S
+        a1 = self._acceleration(q, v, torque).copy()
+        a2 = self._acceleration(q + 0.5 * h * v, v + 0.5 * h * a1, torque).copy()
+        a3 = self._acceleration(q + 0.5 * h * v + 0.25 * h**2 * a1, v + 0.5 * h * a2, torque).copy()
+        a4 = self._acceleration(q + h * v + 0.5 * h**2 * a2, v + h * a3, torque).copy()
+        return q + h * v + h**2 / 6.0 * (a1 + a2 + a3), v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+
+    def _outside(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> float:
+        rate = pin.computeCentroidalMomentumTimeVariation(self.model, self.data, q, v, a)
+        g, foot = self.model.gravity.linear, self.model.inertias[0]
+        force = rate.linear - pin.computeTotalMass(self.model) * g
+        moment = rate.angular + np.cross(self.data.com[0], force) - np.cross(foot.lever, foot.mass * g)
+        return self.support.outside(centre_of_pressure(np.concatenate([force - foot.mass * g, moment])))

@@ -1,0 +1,162 @@
+"""A body linearized at a posture: A, B, C, E of its joints, braces, and feet that stand on the ground beside the first.
+
+Two feet on the ground close a loop: the joints' deviations g obey J g = 0, J the Jacobian of the second foot
+(`closure`). They then lie in the span of `basis`, and accelerations are `mobility` times torques; on one foot the two
+are the identity and A^-1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import null_space
+
+from fes_pin.body.build import GRAVITY, Body
+from fes_pin.body.modes import Modes, modes
+from fes_pin.data.errors import InputError
+
+_RANK = 1e-9
+"""Singular values below this part of the largest are rounding: the second foot's rows are of order 1."""
+
+
+@dataclass(frozen=True)
+class LinearBody:
+    """A body linearized at a posture; arrays over joints in the order of `joint_names`.
+
+    Parameters
+    ----------
+    joint_names
+        The joints that move: 19, or fewer where braces hold some.
+    q
+        Their angles at the posture, rad.
+    A, B
+        Inertia, kg m2, and minus the stiffness of gravity and tissue, N m/rad: (n, n).
+    C
+        Minus the joint torques that hold the posture, N m: (n,).
+    E
+        Torque per joint rate, N m s/rad: (n, n); zero at rest without damping.
+    body, slope, braced, held
+        Where it was taken: the body, the ground's (alpha, beta), the joints that braces hold and their angles, rad.
+    closure
+        What a second foot on the ground holds: (c, n) rows that deviations are orthogonal to; none on one foot.
+    posture_name, gravity
+        The posture's name, if it has one; m/s2.
+    """
+
+    joint_names: tuple[str, ...]
+    q: np.ndarray = field(repr=False)
+    A: np.ndarray = field(repr=False)
+    B: np.ndarray = field(repr=False)
+    C: np.ndarray = field(repr=False)
+    E: np.ndarray = field(repr=False)
+    body: Body = field(repr=False)
+    slope: tuple[float, float] = (0.0, 0.0)
+    braced: tuple[str, ...] = ()
+    held: dict[str, float] = field(default_factory=dict, repr=False)
+    closure: np.ndarray | None = field(default=None, repr=False)
+    posture_name: str = ""
+    gravity: float = GRAVITY
+
+    @property
+    def n(self) -> int:
+        """Number of joints that move."""
+        return len(self.joint_names)
+
+    @property
+    def both_feet(self) -> bool:
+        """Whether the second foot stands on the ground, too."""
+        return self.closure is not None
+
+    @cached_property
+    def basis(self) -> np.ndarray:
+        """Columns that span the deviations that the ground allows: (n, r), orthonormal."""
+        return np.eye(self.n) if self.closure is None else null_space(self.closure, rcond=_RANK)
+
+    @cached_property
+    def mobility(self) -> np.ndarray:
+        """Acceleration of each joint per torque at each: (n, n), 1/(kg m2); A^-1 on one foot."""
+        return self.basis @ np.linalg.solve(self.basis.T @ self.A @ self.basis, self.basis.T)
+
+    @property
+    def conservative(self) -> bool:
+        """Whether there is neither damping nor motion: the paper's case, where A and B tell everything."""
+        return not self.E.any() and np.allclose(self.B, self.B.T, rtol=0.0, atol=1e-9 * np.abs(self.B).max())
+
+    @cached_property
+    def F(self) -> np.ndarray:
+        """State matrix of equation (11), X = (Gamma, Gamma'): (2n, 2n), 1/s."""
+        n = self.n
+        F = np.zeros((2 * n, 2 * n))
+        F[:n, n:] = np.eye(n)
+        F[n:, :n] = self.mobility @ self.B
+        F[n:, n:] = -self.mobility @ self.E
+        return F
+
+    @cached_property
+    def R(self) -> np.ndarray:
+        """Input matrix of equation (11) for u = C + D: (2n, n)."""
+        return np.vstack([np.zeros((self.n, self.n)), self.mobility])
+
+    @property
+    def holding_torque(self) -> dict[str, float]:
+        """Joint torques that hold the posture (-C), N m by name."""
+        return dict(zip(self.joint_names, (-self.C).tolist(), strict=True))
+
+    @property
+    def posture(self) -> dict[str, float]:
+        """Angles of the joints that move, rad by name."""
+        return dict(zip(self.joint_names, self.q.tolist(), strict=True))
+
+    @property
+    def whole_posture(self) -> dict[str, float]:
+        """Angles of all joints, braced ones too, rad by name."""
+        return {**self.held, **self.posture}
+
+    def modes(self) -> Modes:
+        """The eigenpairs of A^-1 B, n of them on one foot (see `fes_pin.body.modes.modes`)."""
+        return modes(self)
+
+    def brace(self, joints: Sequence[str]) -> LinearBody:
+        """The same body with these joints locked at the posture.
+
+        Raises
+        ------
+        InputError
+            A joint that is not free here, or all of them.
+        """
+        for name in joints:
+            if name not in self.joint_names:
+                raise InputError(f"cannot brace {name!r}: it is not among the joints that move")
+        keep = [i for i, name in enumerate(self.joint_names) if name not in set(joints)]
+        if not keep:
+            raise InputError("braces hold every joint: nothing is left to move")
+        block = np.ix_(keep, keep)
+        braced = replace(
+            self,
+            joint_names=tuple(self.joint_names[i] for i in keep),
+            q=self.q[keep],
+            A=self.A[block],
+            B=self.B[block],
+            C=self.C[keep],
+            E=self.E[block],
+            braced=(*self.braced, *joints),
+            held={**self.held, **{name: self.posture[name] for name in joints}},
+            closure=None if self.closure is None else self.closure[:, keep],
+        )
+        if braced.both_feet and not braced.basis.shape[1]:
+            raise InputError("braces and the ground hold every joint: nothing is left to move")
+        return braced
+
+    def __str__(self) -> str:
+        held = f", {len(self.braced)} joints braced" if self.braced else ""
+        slope = f" on slope {self.slope}" if any(self.slope) else ""
+        if self.both_feet:
+            return f"Linearized {self.body}, both feet on the ground{slope}{held}: {self.n} joints"
+        worst = int(np.argmax(np.abs(self.C)))
+        return (
+            f"Linearized {self.body}{slope}{held}: {self.n} joints; "
+            f"largest torque to hold it {-self.C[worst]:+.1f} N m at {self.joint_names[worst]}"
+        )

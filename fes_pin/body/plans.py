@@ -1,0 +1,318 @@
+"""Plans of bounded inputs over a horizon, as linear programs: what they do to falls, swings and the ground's pressure.
+
+Mode i obeys eta'' = mu eta + F with F = phi' (C + Q u). Of a falling mode the growing part z = eta + eta'/r, r =
+sqrt(mu), obeys z' = r z + F/r. It stays bounded if and only if z(0) = -integral of e^(-rt) F(t)/r dt, so growing parts
+are computed backwards from the end of the plan, decaying ones, y = eta - eta'/r, forwards: nothing grows with time.
+Torques follow the stimulation at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fes_pin.body.attainable import SETTLE_DEG
+from fes_pin.body.balance import Balance
+from fes_pin.body.balance import balance as _balance
+from fes_pin.body.inputs import Inputs
+from fes_pin.body.linear_body import LinearBody
+from fes_pin.body.modes import Modes, modes
+from fes_pin.body.programs import Program
+
+PULSE_S = 0.04
+"""Time between pulses, s: 25 a second, within the 20 to 50 of functional stimulation (Peckham, Knutson, Annu. Rev.
+Biomed. Eng. 7:327-360, 2005)."""
+PIECES = (1, 1, 1, 1, 2, 2, 3, 5, 8)
+"""Pulses for which each input of a plan is held: fine at first, coarse later, 1 s in all; then the last one stays.
+Any plan is one that the body could be given; a finer one may catch a little more."""
+LOOK_S = 0.08
+"""Longest time between instants at which a plan's limits are looked at, s."""
+
+_SPARED, _OUTSIDE_M = 1e-3, 1e-3
+"""Of the gentlest plan: full stimulation of all inputs counts as much as a thousandth of the limit on modes, and a
+millimetre outside the soles as much as the whole of it."""
+
+
+@dataclass(frozen=True)
+class Plans:
+    """What a plan of inputs does to the modes: rows over the inputs of all pieces, one after the other.
+
+    Parameters
+    ----------
+    linear, inputs, settle_deg, balance
+        The body, its inputs, and the limits: every mode stays within `settle_deg` of the posture, at all times and
+        at the rest that the last input keeps; the centre of pressure stays on the soles.
+    rest_deg
+        How far from the posture falling modes may come to rest, degrees; `settle_deg` by default. 0: in the posture
+        itself, as the null-controllable region has it.
+    gravity
+        Whether the posture's weight (C) must be carried; otherwise only deviations count, and no pressure is known.
+    pieces, pulse_s
+        How long each input is held, in pulses, and the time between pulses, s.
+    """
+
+    linear: LinearBody
+    inputs: Inputs
+    settle_deg: float = SETTLE_DEG
+    balance: bool = True
+    rest_deg: float | None = None
+    gravity: bool = True
+    pieces: Sequence[int] = PIECES
+    pulse_s: float = PULSE_S
+
+    @cached_property
+    def modes(self) -> Modes:
+        """The body's modes."""
+        return modes(self.linear)
+
+    @cached_property
+    def degree(self) -> np.ndarray:
+        """Modal coordinate of one degree of the mode's greatest joint: (r,)."""
+        return np.radians(1.0) / np.abs(self.modes.shapes).max(axis=0)
+
+    @cached_property
+    def gains(self) -> np.ndarray:
+        """Modal force per input: (r, m)."""
+        return self.modes.shapes.T @ self.inputs.on(self.linear)
+
+    @cached_property
+    def constant(self) -> np.ndarray:
+        """Modal force of gravity: (r,)."""
+        return self.modes.shapes.T @ self.linear.C * self.gravity
+
+    @cached_property
+    def kinds(self) -> np.ndarray:
+        """`fall`, `swing` or `neutral` by mode."""
+        return np.array([mode.kind for mode in self.modes])
+
+    @cached_property
+    def _edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Beginnings and ends of the pieces, s; the last has no end."""
+        ends = self.pulse_s * np.cumsum(self.pieces)
+        return np.concatenate([[0.0], ends[:-1]]), np.append(ends[:-1], np.inf)
+
+    @cached_property
+    def _looks(self) -> tuple[np.ndarray, np.ndarray]:
+        """Instants at which limits are looked at, s, and the piece whose input acts there: both ends of each piece.
+
+        The centre of pressure jumps with the input and is looked at at both; modes do not, and are at the later ones.
+        """
+        times, which, start = [], [], 0.0
+        for j, pulses in enumerate(self.pieces):
+            length = self.pulse_s * pulses
+            count = max(1, int(np.ceil(length / LOOK_S - 1e-9)))
+            times += [start + length * k / count for k in range(count + 1)]
+            which += [j] * (count + 1)
+            start += length
+        return np.array(times), np.array(which)
+
+    @cached_property
+    def _later(self) -> np.ndarray:
+        """The first look, and those that are not the beginning of a piece: (looks,) bool."""
+        _, which = self._looks
+        return np.append(True, which[1:] == which[:-1])
+
+    @cached_property
+    def _starts(self) -> np.ndarray:
+        """Response of the growing part's start to a force in each piece, for the falling modes: (k, pieces)."""
+        begin, end = self._edges
+        rate, values = self._rates
+        return -(np.exp(-rate[:, None] * begin) - np.exp(-rate[:, None] * end)) / values[:, None]
+
+    @property
+    def _rates(self) -> tuple[np.ndarray, np.ndarray]:
+        values = self.modes.values[self.kinds == "fall"]
+        return np.sqrt(values), values
+
+    @cached_property
+    def _responses(self) -> np.ndarray:
+        """Of each mode's coordinate at each look to a unit of force in each piece: (r, looks, pieces)."""
+        times, _ = self._looks
+        begin, end = self._edges
+        since, until = times[:, None] - begin, times[:, None] - end
+        out = np.zeros((len(self.modes), len(times), len(begin)))
+        for i, value in enumerate(self.modes.values):
+            rate = np.sqrt(abs(value))
+            if self.kinds[i] == "fall":
+                decaying = np.exp(-rate * np.maximum(until, 0.0)) - np.exp(-rate * np.maximum(since, 0.0))
+                growing = np.exp(-rate * np.maximum(-since, 0.0)) - np.exp(-rate * np.maximum(-until, 0.0))
+                out[i] = -0.5 * (growing + decaying) / value
+            elif self.kinds[i] == "swing":
+                out[i] = (np.cos(rate * np.maximum(until, 0.0)) - np.cos(rate * np.maximum(since, 0.0))) / -value
+        return out
+
+    def _ending(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of each swing, at the end of the plan: coordinate, and rate over frequency, per force: (r, pieces) each."""
+        begin, end = self._edges
+        last = self.pulse_s * float(np.sum(self.pieces))
+        since, until = last - begin, np.maximum(last - end, 0.0)
+        rate = np.sqrt(np.abs(self.modes.values))[:, None]
+        size = np.maximum(np.abs(self.modes.values), 1e-300)[:, None]
+        return (np.cos(rate * until) - np.cos(rate * since)) / size, (
+            np.sin(rate * since) - np.sin(rate * until)
+        ) / size
+
+    def _spread(self, i, response: np.ndarray) -> np.ndarray:
+        """Rows over all inputs of responses (rows, pieces) of mode i."""
+        return np.kron(response, self.gains[i])
+
+    @cached_property
+    def _limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows <= limits over all inputs, for a body that starts in the posture at rest; (rows, m pieces), (rows,)."""
+        count = len(self.pieces)
+        rows, limits = [np.zeros((0, self.inputs.n * count))], [np.zeros(0)]
+        last = np.zeros((1, count))
+        last[0, -1] = 1.0
+        position, rate = self._ending()
+        for i, value in enumerate(self.modes.values):
+            if self.kinds[i] == "neutral":
+                continue
+            pull, weight = self.constant[i], self.degree[i] * self.settle_deg
+            along = [self._responses[i][self._later], last / -value]
+            if self.kinds[i] == "swing":  # what still swings then goes on: |rest| + |offset| + |rate| within the limit
+                offset = position[[i]] - last / -value
+                along += [last / -value + a * offset + b * rate[[i]] for a in (1.0, -1.0) for b in (1.0, -1.0)]
+            response = np.vstack(along)
+            spread, still = self._spread(i, response) / weight, pull * response.sum(axis=1) / weight
+            room = np.ones(len(response))
+            if self.kinds[i] == "fall" and self.rest_deg is not None:
+                room[self._later.sum()] = self.rest_deg / self.settle_deg
+            rows += [spread, -spread]
+            limits += [room - still, room + still]
+        if self.balance and self.gravity:
+            for row, limit in self._on_the_soles():
+                rows.append(row)
+                limits.append(limit)
+        return np.vstack(rows), np.concatenate(limits)
+
+    @cached_property
+    def _musts(self) -> np.ndarray:
+        """Where each falling mode's growing part may start, over all inputs, in degrees: (k, m pieces)."""
+        fall = np.flatnonzero(self.kinds == "fall")
+        spread = [self._spread(i, row[None]) / self.degree[i] for i, row in zip(fall, self._starts, strict=True)]
+        return np.vstack([np.zeros((0, self.inputs.n * len(self.pieces))), *spread])
+
+    @cached_property
+    def ground(self) -> Balance:
+        """The inequalities of the centre of pressure."""
+        return _balance(self.linear, self.modes)
+
+    def _on_the_soles(self):
+        """Rows and limits that keep the centre of pressure on the soles at every look, and at rest in the end."""
+        times, which = self._looks
+        now = np.zeros((len(times), len(self.pieces)))
+        now[np.arange(len(times)), which] = 1.0
+        resting = np.where(self.kinds == "neutral", 0.0, -1.0 / np.where(self.modes.values, self.modes.values, 1.0))
+        for e in range(len(self.ground.constant)):
+            row, limit = (
+                np.zeros((len(times), self.inputs.n * len(self.pieces))),
+                np.full(len(times), -self.ground.constant[e]),
+            )
+            end = np.zeros(self.inputs.n)
+            rest = -self.ground.constant[e]
+            for i in range(len(self.modes)):
+                response = self.ground.per_mode[e, i] * self._responses[i] + self.ground.per_force[e, i] * now
+                row = row + self._spread(i, response)
+                limit = limit - self.constant[i] * response.sum(axis=1)
+                end += self.ground.at_rest[e, i] * resting[i] * self.gains[i]
+                rest -= self.ground.at_rest[e, i] * resting[i] * self.constant[i]
+            yield row, limit
+            final = np.zeros((1, self.inputs.n * len(self.pieces)))
+            final[0, -self.inputs.n :] = end
+            yield final, np.array([rest])
+
+    def _free(self, eta: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """What a start adds by itself to the limits, (rows,).
+
+        Of a falling mode only the decaying part: the growing one is what the plan must meet.
+        """
+        times, _ = self._looks
+        count = len(times)
+        frequency = np.sqrt(np.abs(self.modes.values))
+        last = self.pulse_s * float(np.sum(self.pieces))
+        added, alone = [np.zeros(0)], np.zeros((len(self.modes), count))
+        for i, kind in enumerate(self.kinds):
+            w = frequency[i]
+            if kind == "neutral":
+                continue
+            weight = self.degree[i] * self.settle_deg
+            if kind == "fall":
+                alone[i] = 0.5 * (eta[i] - rate[i] / w) * np.exp(-w * times)
+                own = np.append(alone[i][self._later], 0.0)
+            else:
+                alone[i] = eta[i] * np.cos(w * times) + rate[i] / w * np.sin(w * times)
+                end = eta[i] * np.cos(w * last) + rate[i] / w * np.sin(w * last)
+                turn = rate[i] / w * np.cos(w * last) - eta[i] * np.sin(w * last)
+                corners = [a * end + b * turn for a in (1.0, -1.0) for b in (1.0, -1.0)]
+                own = np.concatenate([alone[i][self._later], [0.0], corners])
+            added += [-own / weight, own / weight]
+        if self.balance and self.gravity:
+            for row in self.ground.per_mode:
+                added += [-(row @ alone), np.zeros(1)]
+        return np.concatenate(added)
+
+    @property
+    def owner(self) -> np.ndarray:
+        """The input that each column of a plan belongs to: (m pieces,) int."""
+        return np.tile(np.arange(self.inputs.n), len(self.pieces))
+
+    def program(self, eta: np.ndarray, rate: np.ndarray, towards: np.ndarray | None = None) -> Program:
+        """The plan that brings a start to rest; with `towards`, from as far that way as it can.
+
+        Parameters
+        ----------
+        eta, rate
+            Modal coordinates of the start and their rates: (r,) each.
+        towards
+            A direction of starts at rest, (r,): the start is eta + s towards, and s, the last variable, is greatest.
+        """
+        fall = self.kinds == "fall"
+        rows, limits = self._limits
+        limits = limits + self._free(eta, rate)
+        must = self._musts
+        growing = eta[fall] + rate[fall] / self._rates[0] - self.constant[fall] * self._starts.sum(axis=1)
+        start = growing / self.degree[fall]
+        lower, upper = (np.tile(bound, len(self.pieces)) for bound in (self.inputs.lower, self.inputs.upper))
+        cost = np.zeros(len(upper))
+        if towards is not None:
+            rows = np.column_stack([rows, -self._free(towards, np.zeros_like(towards))])
+            must = np.column_stack([must, -towards[fall] / self.degree[fall]])
+            cost, lower, upper = np.append(cost, -1.0), np.append(lower, 0.0), np.append(upper, np.inf)
+        return Program(cost, rows, limits, must, start, lower, upper)
+
+    def gentlest(self, eta: np.ndarray, rate: np.ndarray) -> Program:
+        """The plan whose modes stray least, on the way and at the rest in the end.
+
+        Further variables are how far each mode strays, on the way and in the end, as a part of `settle_deg`, and, the
+        last, how far the centre of pressure lies outside the soles, m, where no plan keeps it inside. The sum is least;
+        a little effort is spared.
+        """
+        plan, reach = self.program(eta, rate), self._reach
+        modal = reach.any(axis=1)
+        count = reach.shape[1]
+        return Program(
+            cost=np.concatenate([np.full(len(plan.cost), _SPARED / len(plan.cost)), np.ones(count), [1 / _OUTSIDE_M]]),
+            A_ub=np.column_stack([plan.A_ub, -reach, -1.0 * ~modal]),
+            b_ub=plan.b_ub - modal,
+            A_eq=np.column_stack([plan.A_eq, np.zeros((len(plan.A_eq), count + 1))]),
+            b_eq=plan.b_eq,
+            lower=np.append(plan.lower, np.zeros(count + 1)),
+            upper=np.append(plan.upper, np.full(count + 1, np.inf)),
+        )
+
+    @cached_property
+    def _reach(self) -> np.ndarray:
+        """Which rows of the limits are about which mode, on the way and in the end: (rows, 2 modes) 0 or 1."""
+        rows = []
+        for i, kind in enumerate(self.kinds[self.kinds != "neutral"]):
+            own = np.zeros(
+                (int(self._later.sum()) + (5 if kind == "swing" else 1), 2 * int((self.kinds != "neutral").sum()))
+            )
+            own[: self._later.sum(), 2 * i] = 1.0
+            own[self._later.sum() :, 2 * i + 1] = 1.0
+            rows += [own, own]
+        modal = np.vstack(rows)
+        return np.vstack([modal, np.zeros((len(self._limits[1]) - len(modal), modal.shape[1]))])

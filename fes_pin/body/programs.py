@@ -1,0 +1,93 @@
+"""Linear programs with an account of their error: by how much rounding and the solver's tolerances can move a result.
+
+The answer x of min c'x and its multipliers bound the true optimum from both sides: by weak duality from below, and from
+above as far as x meets its constraints, each of whose violations moves the optimum by its multiplier, to first order.
+Sums of n products are exact to n units of rounding of the sum of their sizes (N. Higham, Accuracy and Stability of
+Numerical Algorithms, 2002, section 3.1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import optimize, sparse
+
+FEASIBLE = 1e-7
+"""By how much HiGHS lets an answer miss its constraints."""
+_UNIT = float(np.finfo(float).eps)
+
+
+WAYS = ({"method": "highs"}, {"method": "highs", "options": {"presolve": False}}, {"method": "highs-ipm"})
+"""HiGHS as it chooses by itself, and what to try where it gives up on the numbers of a program."""
+
+
+def linprog(*arguments, **options):
+    """`scipy.optimize.linprog` by HiGHS; tried in another way where it ends without an answer (status 4)."""
+    for way in WAYS:
+        found = optimize.linprog(*arguments, **options, **way)
+        if found.status != 4:
+            break
+    return found
+
+
+@dataclass(frozen=True)
+class Program:
+    """min c'x with A_ub x <= b_ub, A_eq x = b_eq, lower <= x <= upper.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit (from the solver).
+    """
+
+    cost: np.ndarray
+    A_ub: np.ndarray = field(repr=False)
+    b_ub: np.ndarray = field(repr=False)
+    A_eq: np.ndarray = field(repr=False)
+    b_eq: np.ndarray = field(repr=False)
+    lower: np.ndarray = field(repr=False)
+    upper: np.ndarray = field(repr=False)
+
+    def solve(self) -> Answer:
+        """The answer by HiGHS."""
+        equal = len(self.b_eq) > 0
+        if not len(self.cost):
+            kept = np.all(self.b_ub >= -FEASIBLE) and np.all(np.abs(self.b_eq) <= FEASIBLE)
+            return Answer(np.zeros(0) if kept else None, 0.0)
+        found = linprog(
+            self.cost,
+            A_ub=sparse.csr_array(self.A_ub),
+            b_ub=self.b_ub,
+            A_eq=sparse.csr_array(self.A_eq) if equal else None,
+            b_eq=self.b_eq if equal else None,
+            bounds=np.column_stack([self.lower, self.upper]),
+        )
+        if found.status != 0:
+            return Answer(None, np.inf, unbounded=found.status == 3)
+        return Answer(found.x, self._error(found, equal))
+
+    def _error(self, found, equal: bool) -> float:
+        x, z = found.x, np.minimum(found.ineqlin.marginals, 0.0)
+        y = found.eqlin.marginals if equal else np.zeros(0)
+        reduced = self.cost - self.A_ub.T @ z - (self.A_eq.T @ y if equal else 0.0)
+        ends = np.where(reduced > 0.0, self.lower, self.upper)
+        far = ~np.isfinite(ends)  # where a bound is infinite a multiplier is rounding: it acts over the answer's reach
+        ends = np.where(far, x, ends)
+        gap = abs(self.cost @ x - (self.b_ub @ z + self.b_eq @ y + reduced @ ends))
+        over = np.maximum(self.A_ub @ x - self.b_ub, 0.0)
+        missed = np.abs(self.A_eq @ x - self.b_eq) if equal else np.zeros(0)
+        size = np.abs(x)
+        terms = np.abs(z) @ (np.abs(self.A_ub) @ size + np.abs(self.b_ub)) + np.abs(self.cost) @ size
+        terms += np.abs(y) @ (np.abs(self.A_eq) @ size + np.abs(self.b_eq)) if equal else 0.0
+        rounding = (len(x) + len(self.b_ub) + len(self.b_eq)) * _UNIT * terms
+        return float(gap + np.abs(z) @ over + np.abs(y) @ missed + rounding)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a linear program gave: x, or None where there is none, and the error of its cost."""
+
+    x: np.ndarray | None
+    error: float
+    unbounded: bool = False
