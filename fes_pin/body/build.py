@@ -12,14 +12,17 @@ import pinocchio as pin
 
 from fes_pin.body.anthropometry import Subject, skeleton_of_subject
 from fes_pin.body.gait import posture_angles
-from fes_pin.body.joints import JOINT_NAMES, SIDES, angles_array
+from fes_pin.body.joints import JOINT_NAMES, JOINTS, SIDES, angles_array, axis_of, side_of
 from fes_pin.body.skeleton import Skeleton, read_segments
 from fes_pin.body.urdf import write_urdf
 from fes_pin.data.errors import InputError
+from fes_pin.data.urdf import moving_joints
 
 GRAVITY = 9.80665
 """Standard gravity, m/s2 (CGPM 1901); the paper prints 9.81."""
 _LIMIT_SLACK = 1e-9
+_ALONG = 0.5
+"""Cosine of the angle, 60 degrees, that a joint's axis may have with ours: models differ by some 40 (subtalar axis)."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +97,9 @@ class Body:
         Raises
         ------
         InputError
-            The file is no URDF, or its joints are not the 19.
+            The file is no URDF, its joints are not the 19 or turn about other axes, or a segment has no mass.
         """
+        moving_joints(path)  # links, masses and joints that no body has are said with their row
         try:
             text = Path(path).read_text()
             model = pin.buildModelFromXML(text)
@@ -109,6 +113,7 @@ class Body:
         stance = SIDES[int(np.argmin(depth))]
         if min(depth) != 2:
             raise InputError("it is not rooted at a forefoot", file=path)
+        _check_segments(model, stance, path)
         body = cls(text, stance, None, Path(path).name)
         if model.existFrame("vertex"):
             height = float(body.placement("vertex", np.zeros(model.nq))[1][2])
@@ -206,3 +211,21 @@ class Body:
 
 def _odd(name: str, names: set[str]) -> str:
     return "not one of them" if name in names else "missing"
+
+
+def _check_segments(model: pin.Model, stance: str, path: str | Path) -> None:
+    """Every segment has a mass, and every joint turns about its axis, the way it is named after."""
+    if not model.inertias[0].mass > 0.0:
+        raise InputError("the segment has no mass", file=path, column=f"{stance}_forefoot")
+    data = model.createData()
+    turns = pin.computeJointJacobians(model, data, np.zeros(model.nq))[3:]
+    for joint in JOINTS:
+        ids = [model.getJointId(name) for name in joint.revolutes]
+        if not max(model.inertias[i].mass for i in ids) > 0.0:
+            raise InputError("the segment beyond the joint has no mass", file=path, column=joint.name)
+        for name, i in zip(joint.revolutes, ids, strict=True):
+            wanted = -axis_of(name) if side_of(name) == stance else axis_of(name)
+            along = float(turns[:, model.idx_vs[i]] @ wanted)
+            if along < _ALONG:
+                way = "the other way round" if along < -_ALONG else "about another axis"
+                raise InputError(f"the joint turns {way}: expected {wanted.tolist()}", file=path, column=name)

@@ -56,7 +56,7 @@ class Support:
         a, edges = self.corners, np.roll(self.corners, -1, axis=0) - self.corners
         along = np.clip(((point - a) * edges).sum(axis=1) / (edges**2).sum(axis=1), 0.0, 1.0)
         distance = float(np.linalg.norm(point - a - along[:, None] * edges, axis=1).min())
-        inside = bool((np.cross(edges, point - a) >= 0.0).all())
+        inside = bool((edges[:, 0] * (point - a)[:, 1] - edges[:, 1] * (point - a)[:, 0] >= 0.0).all())
         return -distance if inside else distance
 
 

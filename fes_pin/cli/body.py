@@ -122,7 +122,7 @@ def nerves(
         bool, typer.Option("--constant", help="with --fewest: the lean must be held by constant stimulation")
     ] = False,
     settle: Annotated[float, typer.Option(help="how far modes may be from the posture, degrees")] = 10.0,
-    strength: Annotated[float, typer.Option(help="strength of all nerves: 1 is the table's")] = 1.0,
+    strength: Annotated[float, typer.Option(help="strength of all nerves: 1 a healthy adult's; paralysed muscle has less")] = 1.0,
 ) -> None:
     """Which nerves control which modes, what they can catch and hold, and the fewest that do."""
     from fes_pin.body.attainable import attainable
@@ -131,25 +131,27 @@ def nerves(
     from fes_pin.body.controllability import controllability
     from fes_pin.body.inputs import Inputs
     from fes_pin.muscles.nerve_inputs import subject_nerves
+    from fes_pin.muscles.nerves import PARALYSED
     from fes_pin.view.influence import influence_table, plot_influence
 
     _within(strength, "--strength", 0.01, 10.0)
     _within(settle, "--settle", 0.1, 90.0)
     _within(lean, "--lean", 1e-3, 45.0)
     _within(max_braces, "--max-braces", 0, 10)
-    chosen = subject_nerves(linear.body, name or ())
-    inputs = Inputs.of(chosen, linear).scaled(strength)
+    chosen = subject_nerves(linear.body, name or (), strength=strength)
+    inputs = Inputs.of(chosen, linear)
     result = controllability(linear, inputs, horizon)
     lines = [f"{linear}\n{place_of_weight(linear)[1]}\n\n{result}\n"]
     weak, strong = (attainable(linear, inputs.scaled(f), settle_deg=settle) for f in chosen.strength_band)
     held = attainable(linear, inputs, settle_deg=settle)
-    lines.append(f"With these nerves {held}")
+    whose = "a healthy adult's" if strength == 1.0 else f"{strength:g} of a healthy adult's"
+    lines.append(f"At {whose} strength (paralysed, stimulated muscle has about {PARALYSED:g} of it) {held}")
     if held.falling:
         lines.append(
-            f"Strengths are known to a factor of {max(chosen.strength_band):.1f}: the least of these leans is "
+            f"A given strength is known to a factor of {max(chosen.strength_band):.1f}: the least of these leans is "
             f"{weak.least_lean_deg:.1f} to {strong.least_lean_deg:.1f} degrees."
         )
-        lines.append(f"With these nerves {catchable(linear, inputs, settle)}")
+        lines.append(f"With these nerves: {catchable(linear, inputs, settle)}")
     if influence is not None:
         lines.append(f"\n{influence_table(result, influence)}")
     if fewest:
