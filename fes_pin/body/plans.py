@@ -29,7 +29,7 @@ PIECES = (1, 1, 1, 1, 2, 2, 3, 5, 8)
 """Pulses for which each input of a plan is held: fine at first, coarse later, 1 s in all; then the last one stays.
 Any plan is one that the body could be given; a finer one may catch a little more."""
 LOOK_S = 0.08
-"""Longest time between instants at which a plan's limits are looked at, s."""
+"""Longest time between instants at which a plan's limits are looked at, s; between them it may pass them a little."""
 
 _SPARED, _OUTSIDE_M = 1e-3, 1e-3
 """Of the gentlest plan: full stimulation of all inputs counts as much as a thousandth of the limit on modes, and a

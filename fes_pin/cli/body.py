@@ -122,7 +122,9 @@ def nerves(
         bool, typer.Option("--constant", help="with --fewest: the lean must be held by constant stimulation")
     ] = False,
     settle: Annotated[float, typer.Option(help="how far modes may be from the posture, degrees")] = 10.0,
-    strength: Annotated[float, typer.Option(help="strength of all nerves: 1 a healthy adult's; paralysed muscle has less")] = 1.0,
+    strength: Annotated[
+        float, typer.Option(help="strength of all nerves: 1 a healthy adult's; paralysed muscle has less")
+    ] = 1.0,
 ) -> None:
     """Which nerves control which modes, what they can catch and hold, and the fewest that do."""
     from fes_pin.body.attainable import attainable

@@ -179,7 +179,7 @@ def test_a_nerve_paints_the_joints_that_it_turns(body, screenshot, tmp_path):
 
 
 def test_a_page_needs_no_network(body, tmp_path):
-    text = Scene(body, caption="<b>&").pose("neutral").write(tmp_path / "a" / "page.html").read_text()
+    text = Scene(body, caption="<b>&").pose("neutral").write(tmp_path / "page.html").read_text()
     assert "src=" not in text.split("<script>")[0]
     assert "&lt;b&gt;&amp;" in text
     assert len(text) < 4_000_000

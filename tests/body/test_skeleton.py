@@ -1,6 +1,7 @@
 """Subjects, tables of segments, and the URDFs written from them."""
 
 import json
+import re
 import subprocess
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -199,3 +200,29 @@ def test_files_that_are_none(tmp_path):
     ):
         with pytest.raises(InputError, match=name):
             read(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda text: re.sub(r'<mass value="[0-9.]+"', '<mass value="-1.0"', text, count=2), "mass above 0"),
+        (lambda text: re.sub(r"<inertial>.*?</inertial>", "", text, count=1, flags=re.S), "no mass"),
+        (lambda text: re.sub(r'(link name="trunk">).*?</inertial>', r"\1", text, flags=re.S), "lumbar"),
+        (lambda text: turned(text, "right_knee_flexion", -1.0), "right_knee_flexion: the joint turns the other way"),
+        (lambda text: text.replace('type="revolute"', 'type="prismatic"'), "about another axis"),
+    ],
+    ids=["negative mass", "foot without mass", "trunk without mass", "reversed axis", "slides"],
+)
+def test_a_urdf_of_no_body_is_refused(tmp_path, body, spoil, says):
+    path = tmp_path / "body.urdf"
+    path.write_text(spoil(body.urdf))
+    with pytest.raises(InputError, match=says):
+        Body.from_urdf(path)
+
+
+def turned(text, joint, factor):
+    """The URDF with a joint's axis times a factor."""
+    head, tail = text.split(f'<joint name="{joint}"', 1)
+    axis = re.search(r'<axis xyz="([^"]*)"', tail)
+    numbers = " ".join(repr(factor * float(x) + 0.0) for x in axis.group(1).split())
+    return f'{head}<joint name="{joint}"{tail[: axis.start(1)]}{numbers}{tail[axis.end(1) :]}'

@@ -3,7 +3,11 @@
 import pytest
 from typer.testing import CliRunner
 
+from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.linearize import linearize
+from fes_pin.body.minimal_sets import minimal_sets
 from fes_pin.cli.body import app
+from fes_pin.muscles.nerves import Nerves
 
 BRACES = ("corset", "left_ankle_foot_orthosis", "right_ankle_foot_orthosis", "left_foot_plate", "right_foot_plate")
 
@@ -17,7 +21,8 @@ def test_modes_in_words():
     assert result.exit_code == 0
     assert "60.0 kg" in result.output
     assert "fall sideways about the stance ankle" in result.output
-    assert len(result.output.splitlines()) == 22
+    assert len(result.output.splitlines()) == 23
+    assert "mid_stance is an instant of a walk" in result.output
 
 
 def test_modes_of_a_urdf(body, tmp_path):
@@ -27,26 +32,57 @@ def test_modes_of_a_urdf(body, tmp_path):
 
 def test_nerves_with_braces_and_the_fewest(tmp_path):
     braces = [x for b in BRACES for x in ("--brace", b)]
-    some = [f"right_{n}" for n in ("superior_gluteal", "hamstrings", "femoral", "iliopsoas", "obturator")]
-    some += [f"left_{n}" for n in ("obturator", "sacral_rotators", "tibial")]
-    result = run("nerves", *some, *braces, "--fewest", "--lean", "0.2", "--map", str(tmp_path / "map.png"))
+    some = ["left_superior_gluteal", *(f"right_{n}" for n in ("superior_gluteal", "femoral", "iliopsoas", "tibial"))]
+    some += ["right_biceps_short_head", "right_inferior_gluteal"]
+    common = ("nerves", *some, *braces, "--posture", "one_leg", "--fewest")
+    result = run(*common, "--map", str(tmp_path / "map.png"))
     assert result.exit_code == 0, result.output
-    assert "8 joints" in result.output
-    assert "7 nerves" in result.output
+    assert "8 joints" in result.output and "11 joints locked" in result.output
+    assert " 5 nerves (" in result.output and "catches a lean" in result.output
+    assert "1 deg, s" in result.output  # a price has a unit
     assert (tmp_path / "map.png").stat().st_size > 10_000
-    nobody = run("nerves", "right_tibial", "--fewest")
-    assert "brace more joints" in nobody.output
+    constant = run(*common, "--constant").output
+    assert " 6 nerves (" in constant and "holds a lean" in constant
+    assert "brace more joints" in run(*common, "--strength", "0.3").output
+    assert "brace more joints" in run("nerves", "right_tibial", "--fewest").output
+
+
+@pytest.mark.parametrize("stimulation", ["constant", "over_time"])
+def test_what_does_not_fall_must_still_be_held(body, stimulation):
+    """A bent knee that hangs falls nowhere; without its nerves it hangs elsewhere, and the set is not empty."""
+    leg = linearize(body, "mid_stance").brace([j for j in JOINT_NAMES if j != "left_knee_flexion"])
+    nerves = Nerves(("left_hamstrings", "left_femoral"), strength=1.0)
+    found = minimal_sets(leg, nerves, stimulation=stimulation, settle_deg=5.0, balance=False)
+    assert [s.inputs for s in found] == [("left_hamstrings",)]
+    assert "the posture is held" in str(found[0]) and "inf" not in str(found[0])
+
+
+def test_strength_settling_and_passive_legs_are_options():
+    braces = [x for b in BRACES for x in ("--brace", b)]
+    some = ("right_superior_gluteal", "right_femoral", "right_iliopsoas", "right_tibial", "left_superior_gluteal")
+    common = ("nerves", *some, "right_biceps_short_head", *braces, "--posture", "one_leg")
+    options = ((), ("--strength", "0.7"), ("--settle", "5"), ("--passive", "1"))
+    outputs = {run(*common, *more).output for more in options}
+    assert len(outputs) == 4
+    assert "paralysed, stimulated muscle" in outputs.pop()
+
+
+def test_standing_on_both_feet():
+    output = run("modes", "--posture", "standing", "--brace", "left_foot_plate", "--brace", "right_foot_plate").output
+    assert "both feet on the ground" in output and "inside the edge of the left foot and right foot" in output
+    assert "11 modes" in output
 
 
 def test_goniometers_and_influence():
-    assert "goniometers: " in run("modes", "--goniometers").output
+    braces = [x for b in BRACES for x in ("--brace", b)]
+    assert "goniometers: " in run("modes", *braces, "--goniometers").output
     output = run("nerves", "femoral", "--influence", "joints").output
     assert "1 left_femoral, 2 right_femoral" in output
     assert run("nerves", "femoral", "--influence", "bones").exit_code == 2
 
 
 def test_view_writes_pages(tmp_path):
-    for arguments in ((), ("--mode", "3"), ("--nerve", "right_tibial")):
+    for arguments in ((), ("--mode", "3"), ("--nerve", "right_tibial"), ("--nerve", "femoral")):
         page = tmp_path / "page.html"
         assert run("view", str(page), *arguments).exit_code == 0
         assert page.stat().st_size > 500_000
@@ -81,7 +117,16 @@ def test_a_spoilt_walk_is_one_line_and_no_page(walk, tmp_path, spoil, says):
 def test_a_map_that_cannot_be_written_is_one_line(tmp_path):
     for path in (tmp_path / "none" / "map.png", tmp_path / "map.unknown"):
         result = run("nerves", "right_femoral", "--map", str(path))
-        assert result.exit_code == 2 and "cannot be written" in result.output.splitlines()[-1]
+        assert result.exit_code == 2 and "cannot be written" in result.output
+        assert len(result.output.splitlines()) == 1 and not path.parent.joinpath("map.png").exists()
+    assert run("view", str(tmp_path / "none" / "page.html")).exit_code == 2 and not (tmp_path / "none").exists()
+
+
+def test_nothing_is_written_or_printed_where_an_option_is_wrong(tmp_path):
+    for wrong in (("--lean", "inf"), ("--influence", "bones"), ("--max-braces", "-1"), ("--settle", "nan")):
+        result = run("nerves", "right_femoral", "--fewest", "--map", str(tmp_path / "map.png"), *wrong)
+        assert result.exit_code == 2 and len(result.output.splitlines()) == 1, result.output
+        assert not (tmp_path / "map.png").exists()
 
 
 @pytest.mark.parametrize(
@@ -93,6 +138,12 @@ def test_a_map_that_cannot_be_written_is_one_line(tmp_path):
         (("modes", "--slope", "1", "1"), "slope"),
         (("modes", "--brace", "plaster"), "cannot brace 'plaster'"),
         (("modes", "--urdf", "none.urdf"), "none.urdf"),
+        (("modes", "--urdf", "a.urdf", "--stance", "left"), "--stance: does not go with --urdf"),
+        (("modes", "--urdf", "a.urdf", "--sex", "female"), "--sex: does not go with --urdf"),
+        (("modes", "--segments", "a.json", "--mass", "70"), "--mass: does not go with --segments"),
+        (("modes", "--passive", "-1"), "--passive"),
+        (("nerves", "--lean", "inf"), "--lean"),
+        (("nerves", "--strength", "1e300"), "--strength"),
         (("nerves", "right_vagus"), "unknown nerve"),
         (("view",), "--live"),
         (("view", "a.html", "--mode", "99"), "--mode"),
