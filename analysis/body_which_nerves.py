@@ -1,14 +1,14 @@
-"""Which nerves, and which orthoses, does a paralysed body need to be controllable, standing and stepping?
+"""Which nerves, and which orthoses, does a paralysed body need to be controllable, standing on one foot or on both?
 
 The paper ends on the question whether a nerve acts on one joint or on several, and leaves open what to stimulate.
-Here every nerve of the legs may be used; braces are added one by one; for each the fewest nerves are found, exactly.
-Strength is a healthy adult's, so that no set is dropped that somebody's muscles could do; another is an argument.
-Run the cells, or `python analysis/body_which_nerves.py [0.5]` (some minutes); the picture goes to
-out/body_which_nerves.png.
+Here every nerve of the legs may be used; braces are added one by one; for each the fewest nerves are found, exactly:
+that hold a degree of lean stimulated constantly, and that catch it, stimulated over time. The centre of pressure must
+lie on the soles, so the postures are ones to stand in. The command line asks the same:
+`fes-pin body nerves --posture one_leg --brace corset ... --fewest [--constant]`.
+Run the cells, or `python analysis/body_which_nerves.py` (minutes); the picture goes to out/body_which_nerves.png.
 """
 
-# %% One adult on the right foot: standing on one leg with the weight over the foot, and at mid-stance of a step
-import sys
+# %% One adult of healthy strength, standing on one leg with the weight over the foot, and on both
 from pathlib import Path
 
 import matplotlib
@@ -17,20 +17,21 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.body.attainable import attainable, lean_text
+from fes_pin.body.attainable import attainable
 from fes_pin.body.build import Body
+from fes_pin.body.closed_loop import close_the_loop
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.linearize import linearize
-from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto
-from fes_pin.muscles.nerves import HEALTHY, Nerves
+from fes_pin.body.minimal_sets import ORTHOSES, STIMULATIONS, minimal_sets
+from fes_pin.body.passive import PassiveLegs
+from fes_pin.muscles.nerve_inputs import subject_nerves
+from fes_pin.muscles.nerves import PARALYSED, Nerves
 
 body = Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
-strength = float(sys.argv[1]) if len(sys.argv) > 1 else HEALTHY
-leg_nerves = tuple(n for n in Nerves().names if not n.endswith(("erector_spinae", "abdominals")))
-legs = Nerves(leg_nerves, strength=strength)
-LEAN = np.arctan(0.5 * 0.095 * 1.80 / 0.9)  # brings the hips' width over the stance foot, 0.9 m above its ankle
-POSTURES = {"standing on one leg": {"right_ankle_inversion": -LEAN}, "mid-stance": "mid_stance"}
+LEGS = tuple(n for n in Nerves().names if not n.endswith(("erector_spinae", "abdominals")))
+legs = subject_nerves(body, LEGS)
+POSTURES = ("one_leg", "standing")
 both = lambda name: (*ORTHOSES[f"left_{name}"], *ORTHOSES[f"right_{name}"])  # noqa: E731
 STEPS = {
     "heel on the ground": both("foot_plate"),
@@ -62,56 +63,73 @@ def shortest(linear):
     return linear.joint_names[worst], need[worst], have[worst]
 
 
+def brace(linear, joints):
+    """With the joints locked that still move; None where nothing would be left to move."""
+    left = [joint for joint in joints if joint in linear.joint_names]
+    return linear.brace(left) if left else linear
+
+
 table = {}
-for posture, angles in POSTURES.items():
-    locked: list[str] = []
-    print(f"\n{posture}: the fewest of 22 leg nerves that hold the posture and 1 degree of lean each way")
+for posture in POSTURES:
+    linear = linearize(body, posture)
+    print(f"\n{posture}: the fewest of 22 leg nerves that keep the posture and 1 degree of lean each way")
     for step, joints in STEPS.items():
-        locked += joints
-        linear = linearize(body, angles).brace(locked)
+        linear = brace(linear, joints)
         everything = attainable(linear, legs)
-        found = minimal_sets(linear, legs, lean_deg=1.0)
-        table[posture, step] = found[0] if found else None
-        line = f"  {step:30s} {len(locked):2d} joints locked, {len(everything.falling)} falls; "
+        line = f"  {step:30s} {len(linear.braced):2d} joints locked, {len(everything.falling)} falls"
         if not everything.holds:
             joint, need, have = shortest(linear)
-            print(line + "cannot be held by all nerves of the legs together")
-            if abs(need) > abs(have):
-                print(f"  {'':30s} ({joint} needs {need:+.0f} N m, its nerves give {have:+.0f})")
-        elif not found:
-            print(line + f"held, but not a degree off (least lean {lean_text(everything.least_lean_deg)} deg)")
-        else:
-            best = found[0]
-            low, high = (lean_text(x) for x in best.lean_band_deg)
-            lean = f"lean {lean_text(best.lean_deg)} deg [{low}, {high}]"
-            print(line + f"{len(best.inputs)} nerves, {lean}, energy {best.energy:.1e} s")
-            print(f"  {'':30s} {', '.join(best.inputs)}")
+            short = f"; {joint} needs {need:+.0f} N m, its nerves give {have:+.0f}" if abs(need) > abs(have) else ""
+            line += f"; all nerves together hold nothing{short}"
+        print(line, flush=True)
+        for stimulation in STIMULATIONS:
+            found = minimal_sets(linear, legs, stimulation=stimulation)
+            table[posture, step, stimulation] = len(found[0].inputs) if found else None
+            print(f"    {stimulation:10s} {found[0] if found else 'no set'}", flush=True)
 
-# %% Which brace saves most nerves? Every pair of orthoses, heel on the ground and trunk held, standing on one leg
-base = linearize(body, POSTURES["standing on one leg"]).brace([*STEPS["heel on the ground"], *STEPS["+ trunk held"]])
-free = [name for name, joints in ORTHOSES.items() if set(joints) <= set(base.joint_names)]
-pairs = minimal_sets(base, legs, braces=free, max_braces=2)
-print("\nFewest nerves for every number of further braces (of all single ones and pairs):")
-for best in pareto(pairs):
-    print(f"  {best}")
-print("\nBy single brace:")
-for best in (s for s in pairs if len(s.braces) == 1):
-    print(f"  {best.braces[0]:28s} {len(best.inputs):2d} nerves, energy {best.energy:.1e} s")
+# %% What strength, settling and passive legs do to the answer: on one leg, both ankles in orthoses
+LOCKED = [joint for step in list(STEPS)[:4] for joint in STEPS[step]]
+QUESTIONS = [
+    *((f"modes within {deg:g} deg", {"settle_deg": deg}, 1.0, None) for deg in (5.0, 20.0)),
+    *((f"strength {s:g}", {}, s, None) for s in (0.7, PARALYSED)),
+    ("passive legs", {}, 1.0, PassiveLegs(1.0)),
+    (f"passive legs, strength {PARALYSED:g}", {}, PARALYSED, PassiveLegs(1.0)),
+]
+print("\nOn one leg, both ankles in orthoses: fewest nerves, over time / constantly")
+for question, options, strength, passive in [("as above", {}, 1.0, None), *QUESTIONS]:
+    linear = linearize(body, "one_leg", passive=passive).brace(LOCKED)
+    nerves = subject_nerves(body, LEGS, strength=strength)
+    found = [minimal_sets(linear, nerves, stimulation=s, **options) for s in STIMULATIONS]
+    print(f"  {question:32s} {' / '.join(str(len(f[0].inputs)) if f else 'none' for f in found)}", flush=True)
+
+# %% Do the fewest catch a fall on the full equations? A degree off in every fall, both ways, for two seconds
+linear = linearize(body, "one_leg").brace(LOCKED)
+for stimulation in STIMULATIONS:
+    for best in minimal_sets(linear, legs, stimulation=stimulation, alternatives=3):
+        names = subject_nerves(body, best.inputs)
+        starts = [sign * mode.one_degree for mode in linear.modes().falling for sign in (1.0, -1.0)]
+        for moving in (False, True):
+            runs = [close_the_loop(linear, names, start, moving_arms=moving) for start in starts]
+            held = sum(not run.lost for run in runs)
+            arms = "moment arms that follow the joints" if moving else "moment arms of the posture"
+            print(f"  {len(best.inputs)} nerves, {stimulation}, {arms}: held {held} of {len(starts)}", flush=True)
 
 # %% The answer, and a picture
-first = {p: next((s for s in STEPS if table[p, s]), None) for p in POSTURES}
-for posture, step in first.items():
-    answer = "never" if step is None else f"from '{step}' on, with {len(table[posture, step].inputs)} of them"
-    print(f"\n{posture}: the nerves of the legs suffice {answer}")
-figure, axes = plt.subplots(figsize=(8, 4))
-for k, posture in enumerate(POSTURES):
-    counts = [len(table[posture, s].inputs) if table[posture, s] else np.nan for s in STEPS]
-    places = np.arange(len(STEPS)) + 0.2 * (2 * k - 1)
-    bars = axes.bar(places, np.nan_to_num(counts), 0.38, label=posture)
-    axes.bar_label(bars, ["no set" if np.isnan(c) else f"{c:.0f}" for c in counts], fontsize=8)
-axes.set_xticks(range(len(STEPS)), [s.replace(", ", "\n") for s in STEPS], fontsize=8)
-axes.set(ylabel="fewest nerves", title="Fewest leg nerves that hold the body on one foot, and 1° of lean in every fall")
-axes.legend()
+for posture in POSTURES:
+    for stimulation in STIMULATIONS:
+        first = next((s for s in STEPS if table[posture, s, stimulation]), None)
+        answer = "never" if first is None else f"from '{first}' on, with {table[posture, first, stimulation]} of them"
+        print(f"\n{posture}, {stimulation}: the nerves of the legs suffice {answer}")
+figure, rows = plt.subplots(2, 1, figsize=(8, 6), sharex=True)
+for axes, posture in zip(rows, POSTURES, strict=True):
+    for k, stimulation in enumerate(STIMULATIONS):
+        counts = [table[posture, s, stimulation] for s in STEPS]
+        places = np.arange(len(STEPS)) + 0.2 * (2 * k - 1)
+        bars = axes.bar(places, [c or 0 for c in counts], 0.38, label=f"stimulated {stimulation.replace('_', ' ')}")
+        axes.bar_label(bars, ["no set" if c is None else str(c) for c in counts], fontsize=8)
+    axes.set(ylabel="fewest nerves", title=posture.replace("_", " "))
+rows[0].legend()
+rows[1].set_xticks(range(len(STEPS)), [s.replace(", ", "\n") for s in STEPS], fontsize=8)
 figure.tight_layout()
 Path("out").mkdir(exist_ok=True)
 figure.savefig("out/body_which_nerves.png", dpi=110)

@@ -4,6 +4,7 @@ Measured walking (walk) reads the body, and the parameters and stages of models 
 """
 
 import ast
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -44,3 +45,23 @@ def test_imports_run_one_way(path):
     known = set(ALLOWED) | {"cli"}
     forbidden = (imported_chapters(path) & known) - ALLOWED[chapter] - {chapter}
     assert not forbidden, f"{path} imports {sorted(forbidden)}"
+
+
+def imported_files(path: Path) -> set[Path]:
+    """Files of the package that a file imports, wherever in it: inside functions, too."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fes_pin"):
+            names.update({node.module, *(f"{node.module}.{alias.name}" for alias in node.names)})
+    files = {PACKAGE.parent.joinpath(*name.split(".")).with_suffix(".py") for name in names}
+    return {file for file in files if file.exists()} - {path}
+
+
+@pytest.mark.parametrize("chapter", ["body", "muscles", "allocate", "models", "identify", "data", "view", "control"])
+def test_files_import_one_way(chapter):
+    """No circle within a chapter; between chapters there is none by the order above."""
+    files = {path: imported_files(path) for path in (PACKAGE / chapter).rglob("*.py")}
+    try:
+        tuple(TopologicalSorter(files).static_order())
+    except CycleError as error:
+        pytest.fail(f"a circle: {' -> '.join(path.name for path in error.args[1])}")

@@ -223,8 +223,9 @@ def _smallest(linear: LinearBody, inputs: Inputs, asked: _Question, alternatives
     if asked.together and asked.stimulation == "constant":
         cases = _held(wanted, inputs, asked.lean_deg)
         # balance and leans in k modes need k inputs; inputs that only pull, around no load at all, k + 1
-        alone = bool(len(wanted.falling)) and not wanted.target.any() and not inputs.lower.any()
-        rows, needs = np.vstack([rows, np.ones(inputs.n)]), np.append(needs, len(wanted.falling) + alone)
+        alone = not wanted.target.any() and not inputs.lower.any()
+        if wanted.falling:
+            rows, needs = np.vstack([rows, np.ones(inputs.n)]), np.append(needs, len(wanted.falling) + alone)
     elif asked.together:
         cases = _caught(linear, inputs, asked)
     found = smallest(inputs.n, rows, needs, cases, alternatives)

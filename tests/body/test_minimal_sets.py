@@ -71,13 +71,8 @@ def test_pulling_inputs_need_one_more_than_falls(braced):
     falls = len(braced.modes().falling)
     found = minimal_sets(braced, Nerves(RIGHT), gravity=False, stimulation="constant")
     assert len(found[0].inputs) >= falls + 1
-    motors = minimal_sets(
-        braced,
-        Inputs.torques(braced.joint_names, limit_nm=200.0),
-        gravity=False,
-        settle_deg=np.inf,
-        stimulation="constant",
-    )
+    limited = Inputs.torques(braced.joint_names, limit_nm=200.0)
+    motors = minimal_sets(braced, limited, gravity=False, settle_deg=np.inf, stimulation="constant")
     assert len(motors[0].inputs) == falls
 
 
