@@ -1,5 +1,6 @@
 """Causes and rigs from outside the package: a file, a module, an installed package's entry points."""
 
+import ast
 import json
 import os
 import re
@@ -234,3 +235,16 @@ def test_a_rig_is_one_file_of_its_folder(monkeypatch, own):
     names = {rig.name for rig in rigs._written_here()}
     sys.modules.pop("fes_pin.models.rigs.tail")
     assert names == {*(rig.name for rig in rigs.RIGS), "tail"}
+
+
+def test_nothing_asks_for_a_rigs_name():
+    """No comparison with it and no table by it; effects name the rigs that they act on."""
+    asked, names = [], {rig.name for rig in rigs.RIGS}
+    for path in sorted(Path(fp.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            compared = [node.left, *node.comparators] if isinstance(node, ast.Compare) else []
+            keys = node.keys if isinstance(node, ast.Dict) else []
+            found = {one.value for one in (*compared, *keys) if isinstance(one, ast.Constant)}
+            if len(found & names) and not {"nerve", "sensor"} <= found:  # a table by stage is another matter
+                asked.append(f"{path.name}:{node.lineno}")
+    assert not asked
