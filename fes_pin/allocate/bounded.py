@@ -130,6 +130,14 @@ def solve_sequence(
     if not count:
         return R
     model, low, high = new_model(H[0] if each else H, F[0], lower, upper), lower, upper
+    if not each and not carries:  # nothing but the linear term changes
+        for k in range(count):
+            model.update(f=F[k])
+            R[k], _, flag, info = model.solve()
+            multipliers[k] = info["lam"]
+            if flag != 1:
+                R[k], multipliers[k] = solve_once(H, F[k], lower, upper), 0.0
+        return held(R, multipliers, lower, upper)
     for k in range(count):
         changed: dict[str, Any] = {"H": H[k]} if each else {}
         if rate < np.inf:

@@ -147,11 +147,11 @@ class Horizon:
         self.queue = np.zeros((self.delay_steps, n))
         self._assemble()
 
-    def _assemble(self) -> None:
+    def _assemble(self, like: HorizonProgram | None = None) -> None:
         p, steps = self.program.problem, self.steps
         self.matrix = p.matrix * self.left
         strength = np.sqrt(p.weights / p.scale)[:, None] * self.matrix
-        self.exact = HorizonProgram(strength, p.prices, p.change, self.keep, steps, p.rate < 1.0)
+        self.exact = HorizonProgram(strength, p.prices, p.change, self.keep, steps, p.rate < 1.0, like)
         self.response = self.exact.response
         self.G = (self.matrix.T * p.weights) @ self.matrix / p.scale
         step = np.eye(steps) - np.eye(steps, k=-1)
@@ -259,7 +259,7 @@ class Horizon:
         self.before = command
         if self.fatigue is not None:
             self.left = self.fatigue.after(self.left, self.act, self.step_s)
-            self._assemble()
+            self._assemble(self.exact)
         return plan
 
     def carry_on(self, program: Allocator) -> None:

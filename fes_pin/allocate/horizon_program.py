@@ -55,10 +55,19 @@ class HorizonProgram:
         Length.
     tied
         Whether changes are limited.
+    like
+        A program that differs in strength alone, if there is one: what does not depend on it is taken over.
     """
 
     def __init__(
-        self, strength: np.ndarray, price: np.ndarray, change: float, keep: float, steps: int, tied: bool
+        self,
+        strength: np.ndarray,
+        price: np.ndarray,
+        change: float,
+        keep: float,
+        steps: int,
+        tied: bool,
+        like: HorizonProgram | None = None,
     ) -> None:
         values, vectors = np.linalg.eigh(strength @ strength.T)
         V = vectors[:, values > RANK * max(values[-1], 1e-300)].T @ strength
@@ -69,24 +78,33 @@ class HorizonProgram:
         over_time, changes = self.response.T @ self.response, change * step.T @ step
         self.curvature = np.kron(over_time, V.T @ V) + np.kron(changes, np.eye(self.n))  # of u alone
         self.curvature[np.diag_indices(steps * self.n)] += np.tile(price, steps)
-        self._stages(V, price, changes, keep)
+        self._stages(V, price, changes, keep, like)
         self._lock = threading.Lock()
         self._solver: piqp.SparseSolver | None = None
 
-    def _stages(self, V: np.ndarray, price: np.ndarray, changes: np.ndarray, keep: float) -> None:
+    def _stages(
+        self, V: np.ndarray, price: np.ndarray, changes: np.ndarray, keep: float, like: HorizonProgram | None
+    ) -> None:
         """The program over u and t, stage by stage: sparse, as solvers for sparse matrices want it."""
         (rank, n), steps = V.shape, self.steps
         width, channels, torques = n + rank, np.arange(n), np.arange(rank)
-        P, A, G = (np.zeros((k, m, steps, width)) for k, m in ((steps, width), (steps, rank), (steps - 1, n)))
-        P[:, channels, :, channels] = changes + np.multiply.outer(price, np.eye(steps))
-        P[:, n + torques, :, n + torques] = np.eye(steps)
+        self.size = width * steps
+        A = np.zeros((steps, rank, steps, width))
         A[:, torques, :, n + torques] = np.eye(steps) - keep * np.eye(steps, k=-1)
         A[np.arange(steps), :, np.arange(steps), :n] = -(1.0 - keep) * V
-        G[:, channels, :, channels] = np.diff(np.eye(steps), axis=0)
-        self.P, self.A, G = (csc_matrix(a.reshape(-1, steps * width)) for a in (P, A, G))
-        self.G = G if self.tied and steps > 1 else None
+        self.A = csc_matrix(A.reshape(-1, self.size))
+        self.P: csc_matrix
+        self.G: csc_matrix | None
+        if like is not None and like.size == self.size:
+            self.P, self.G = like.P, like.G
+        else:
+            P, G = np.zeros((steps, width, steps, width)), np.zeros((steps - 1, n, steps, width))
+            P[:, channels, :, channels] = changes + np.multiply.outer(price, np.eye(steps))
+            P[:, n + torques, :, n + torques] = np.eye(steps)
+            G[:, channels, :, channels] = np.diff(np.eye(steps), axis=0)
+            self.P = csc_matrix(P.reshape(-1, self.size))
+            self.G = csc_matrix(G.reshape(-1, self.size)) if self.tied and steps > 1 else None
         self.where = (np.arange(steps)[:, None] * width + np.arange(n)).ravel()
-        self.size = width * steps
 
     def _spread(self, values: np.ndarray, other: float) -> np.ndarray:
         """Values of u among those of u and t."""
