@@ -7,7 +7,6 @@ from fes_pin.body.build import Body
 
 REPOSITORY = Path(__file__).parents[1]
 ROUNDING = {
-    "allocate/test_horizon.py": "limits that hold in plans that are nearly undetermined",
     "allocate": "active sets, and certificates to the last digit",
     "body/test_controllability.py": "eigen-decompositions",
     "body/test_linearize.py": "eigen-decompositions",
