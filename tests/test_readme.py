@@ -8,7 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 BLOCKS = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-GIVEN = {"angle_rad": 0.1, "reference_rad": 0.4}
+GIVEN = {"angle_rad": 1.6, "angles_rad": [1.6, 1.7]}
 """What a block takes from the reader's own rig."""
 
 

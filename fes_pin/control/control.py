@@ -2,10 +2,12 @@
 
     reference -> feedforward: eq. (1) turned round, the activation's lag turned round
               -> + feedback on the estimated state
-              -> inverse recruitment -> pulse width
+              -> inverse recruitment -> limits -> pulse width
 
-How its gains are chosen: `fes_pin.control.tuning`. If the loop swings by itself all the same, because of something
-that the model does not have, the controller says so and becomes calmer.
+Nothing is stimulated before the sensor has shown a joint, and readings are judged before they are acted on
+(`fes_pin.control.faults`): after a fault the pulses ramp down and stay off until `reset()`. How the gains are chosen:
+`fes_pin.control.tuning`. If the loop swings by itself all the same, because of something that the model does not have,
+the controller says so and becomes calmer; if that does not help, it is a fault.
 """
 
 from __future__ import annotations
@@ -15,24 +17,35 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fes_pin.control.angles import LARGEST_RAD, hint
+from fes_pin.control.angles import reading as read
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.control.endurance import EnduranceWatch, fatigue_of
+from fes_pin.control.faults import FaultMonitor, Status
+from fes_pin.control.limits import StimulationLimits
 from fes_pin.control.observer import JointObserver
 from fes_pin.control.oscillation import OscillationWatch
 from fes_pin.control.pulse import PulseWidth
-from fes_pin.control.reference import LOOKAHEAD, ReferenceWindow
+from fes_pin.control.reference import LOOKAHEAD, ReferenceWindow, coming, trajectory
 from fes_pin.control.tuning import Gains, tune
+from fes_pin.data.errors import InputError
 from fes_pin.models.effects.recruitment_hysteresis import RecruitmentHysteresis
 from fes_pin.models.model import Model
 from fes_pin.muscles.recruitment import LinearRecruitment
 
-BLIND_S = 1.0
-"""A joint that has not been seen for this long is no longer stimulated."""
+START_READINGS = 5
+"""Valid readings in a row, before the first pulse: 0.11 s, in which the observer learns what turns the idle joint."""
+START_RAD = math.radians(10.0)
+"""The first pulse waits for a joint this near to where the model has it at rest: load, sensor's zero, its sign."""
 MARGIN_RAD = math.radians(2.0)
 """A reference is held this far inside of what the muscle can reach, as a share is kept for the feedback."""
 CALMER = 1.0 / 3.0
 """What remains, each time that the loop swings by itself, of the torque that the observer may find in a second and of
 the feedback."""
+CALMEST = 0.1
+"""A loop that still swings with less of the feedback than this is at fault: two calmings did not help."""
+RESOLUTION_RAD = 1e-3
+"""Step of the sensor's readings: 12 bits of a potentiometer of 270 degrees make 1.15 mrad."""
 REACH_ANGLES = 200
 """Angles that the muscle's reach is tabulated at: to half a degree."""
 
@@ -43,15 +56,22 @@ class PositionController:
     Parameters
     ----------
     model
-        The ankle as identified; of its effects, `recruitment_hysteresis` is compensated, and `fatigue` tells how long
-        the muscle will last.
+        The ankle as identified; of its effects, `recruitment_hysteresis` is compensated, `frame_vibration` is tuned
+        for, and `fatigue` tells how long the muscle will last.
     load_kg
         M.
     observer
         State estimate; by default one with the noise levels of `JointObserver`.
+    limits
+        What the stimulation may do; by default what the muscle can.
+    resolution_rad
+        Step of the sensor's readings. The coarser beside its noise, the later a frozen reading is told from one that
+        is just the same again.
 
     Attributes
     ----------
+    status
+        What the controller is doing, in words; a fault says why the pulses are off.
     recruitment
         That the nerve got in the last pulse.
     wanted_rad
@@ -60,68 +80,186 @@ class PositionController:
         Recruitment that was wanted beyond what the muscle has, in the last pulse.
     calm
         Share of the tuned feedback that is in use: below 1 the loop has swung by itself.
+
+    Raises
+    ------
+    InputError
+        For another rig, a load that is none, limits that allow no pulses, or an ankle that no gains hold.
+
+    Examples
+    --------
+    >>> controller = PositionController(model, load_kg=1.0)  # doctest: +SKIP
+    >>> controller.follow(angles_rad)  # the whole trajectory, one angle per pulse  # doctest: +SKIP
+    >>> pulse_width_us = controller.step(angle_rad)  # 45 times a second  # doctest: +SKIP
     """
 
-    def __init__(self, model: Model, load_kg: float = 0.0, observer: JointObserver | None = None) -> None:
+    def __init__(
+        self,
+        model: Model,
+        load_kg: float = 0.0,
+        observer: JointObserver | None = None,
+        limits: StimulationLimits | None = None,
+        resolution_rad: float = RESOLUTION_RAD,
+    ) -> None:
+        if not 0.0 <= resolution_rad < math.inf:
+            raise InputError(f"resolution_rad: expected 0 or more rad, found {resolution_rad!r}")
         dynamics = AnkleDynamics.of(model, load_kg)
         constants = model.rig.constants
         play = [e.half_width_us for e in model.effects if isinstance(e, RecruitmentHysteresis)]
         curve = LinearRecruitment(constants["threshold_us"], constants["saturation_us"])
-        self.pulse = PulseWidth(curve, play[0] if play else 0.0)
+        self.limits = limits if limits is not None else StimulationLimits()
+        self.pulse = PulseWidth(curve, play[0] if play else 0.0, self.limits)
         self.dynamics = dynamics
         self.observer = observer if observer is not None else JointObserver(dynamics)
         self.gains = tune(dynamics, self.observer)
+        self.monitor = FaultMonitor(
+            dynamics, self.limits.range_of_motion_rad, self.observer.angle_std_rad, resolution_rad
+        )
         self.lowest, self.fade = dynamics.rest_angle(), math.exp(-PULSE_S / dynamics.time_constant)
-        self.window = ReferenceWindow(self.lowest)
-        self.recruitment = self.short_of = 0.0
-        self.wanted_rad = self.lowest
         angles = np.linspace(self.lowest, 2.8, REACH_ANGLES)
         # from the first angle on that needs more than those before
         self.reachable = angles, np.maximum.accumulate([dynamics.activation_for(q) for q in angles.tolist()])
-        self.highest = dynamics.rest_angle(1.0)
+        self.fatigue = fatigue_of(model)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, after a fault or for another bout: waiting for readings, fresh, without a trajectory.
+
+        After a fault call this when its cause was found and mended, not by a program. What charge was given in the last
+        second still counts.
+        """
+        self.status = Status.WAITING
+        self.observer.reset()
+        self.observer.torque_wander = self.gains.torque_wander
+        self.monitor.reset()
+        self.pulse.reset()
+        self.window = ReferenceWindow(self.lowest)
+        self.trajectory: list[float] = []
+        self.place = self.count = self.good = 0
+        self.falling: list[float] | None = None
+        self.recruitment = self.short_of = 0.0
+        self.wanted_rad = self.lowest
+        self.highest = self.dynamics.rest_angle(self.pulse.most)
         self.swings, self.calm = OscillationWatch(), 1.0
-        self.count = 0
-        fatigue = fatigue_of(model)
-        self.watch = EnduranceWatch(fatigue) if fatigue else None
+        self.watch = EnduranceWatch(self.fatigue) if self.fatigue else None
 
     @property
     def share(self) -> float:
         """Share of the believed gain that the muscle has: below 1 it is tired."""
         return self.observer.x[4]
 
-    def step(self, angle_rad: float, reference_rad: float | Sequence[float]) -> float:
-        """One pulse: the pulse width in us from a reading and the reference.
+    def follow(self, reference_rad: Sequence[float] | np.ndarray) -> None:
+        """Take a trajectory that `step` follows from its next call on, one angle per pulse; its last angle is held.
+
+        A trajectory is seen `LOOKAHEAD` pulses (133 ms) ahead, which is what the muscle's lag takes.
+
+        Parameters
+        ----------
+        reference_rad
+            Shape (n,), within `limits.range_of_motion_rad`. What the muscle cannot reach is cut off.
+
+        Raises
+        ------
+        InputError
+            For what is no row of such angles; the trajectory before it stays.
+        """
+        self.trajectory = trajectory(reference_rad, self.limits.range_of_motion_rad)
+        self.place = 0
+
+    def step(self, angle_rad: float | None, reference_rad: float | Sequence[float] | None = None) -> float:
+        """One pulse: the pulse width in us from a reading.
 
         Parameters
         ----------
         angle_rad
             As measured now; NaN or None if there is none.
         reference_rad
-            The angle wanted now and at the next `LOOKAHEAD` pulses; a single number is taken for the last of these, so
-            the joint follows it `LOOKAHEAD` pulses late. What is not finite is replaced by the value before it.
+            Without it the trajectory given to `follow` goes on, or the joint is left at rest. Or the angles wanted now
+            and at the next `LOOKAHEAD` pulses, as far as they are known; the last is held. Or a single number, for a
+            target that nobody knows before: it is taken for `LOOKAHEAD` pulses ahead, and the joint follows that late.
 
         Returns
         -------
         float
-            0, or threshold to saturation, whatever comes in.
+            0, or threshold to saturation, within the limits.
+
+        Raises
+        ------
+        InputError
+            For what is no reading or no reference: text, lists, booleans, degrees, angles outside the range of motion.
+            It is a fault, too. A number that no joint can have is refused only before the first pulse; later it is the
+            sensor that is at fault, not the caller.
         """
-        if self.count % 15 == 0:
-            self._reach()
-        self.count += 1
-        self.window.take(reference_rad, self.lowest, self.highest)
-        self.observer.correct(angle_rad)
-        if self.observer.blind * PULSE_S > BLIND_S:
-            width, self.recruitment = self.pulse(0.0)
+        if self.status.is_fault:
+            return self._ramp()
+        try:
+            reading = read(angle_rad)
+            if self.status is Status.WAITING and abs(reading) > LARGEST_RAD:
+                raise InputError(f"angle_rad: expected an angle in rad, found {reading:g}{hint(reading)}")
+            self._next(reference_rad)
+        except InputError:
+            self.status = Status.REFUSED
+            raise
+        if self.status is Status.WAITING:
+            self._await(reading)
+        elif self.monitor.judge(reading, self.observer, self.recruitment > 0.0):
+            self.observer.correct(reading)
+            self.monitor.look(self.observer, self.recruitment > 0.0)
+        if self.status is Status.WAITING:
+            width, self.recruitment = self.pulse.give(0.0)
         else:
+            self.status = self.monitor.fault or self._calmed(reading)
+            if self.status.is_fault:
+                return self._ramp()
             wanted = self._law()
             width, self.recruitment = self.pulse(wanted)
             self.short_of = max(wanted - 1.0, 0.0)
-            if self.swings.take(self.wanted_rad, self.observer.x[1]):
-                self.calm *= CALMER
-                self.observer.torque_wander *= CALMER
         if self.watch is not None:
             self.watch.take(self.observer.x[0] * self.share, self.share)
         self.observer.predict(self.recruitment)
+        return width
+
+    def _next(self, reference_rad: object) -> None:
+        """Let the window go on by one pulse."""
+        if self.count % 15 == 0:
+            self._reach()
+        self.count += 1
+        if reference_rad is not None:
+            wanted, preview = coming(reference_rad, self.limits.range_of_motion_rad)
+        elif self.trajectory:
+            wanted, preview = self.trajectory[self.place : self.place + LOOKAHEAD + 1], True
+            self.place = min(self.place + 1, len(self.trajectory) - 1)
+        else:
+            wanted, preview = [self.lowest], True
+        self.window.take(wanted, preview, self.lowest, self.highest)
+
+    def _await(self, reading: float) -> None:
+        """Wait for a row of readings of one joint near its rest."""
+        if not (self.monitor.possible(reading) and abs(reading - self.lowest) < START_RAD):
+            self.good = 0
+            return
+        if not (self.good and self.monitor.judge(reading, self.observer, False)) or self.monitor.fault:
+            self.monitor.reset()
+            self.observer.reset(reading)
+            self.good = 0
+        self.observer.correct(reading)
+        self.good += 1
+        if self.good >= START_READINGS:
+            self.status = Status.RUNNING
+
+    def _calmed(self, reading: float) -> Status:
+        """Note how the joint follows; calm a loop that swings by itself."""
+        if self.monitor.possible(reading) and self.swings.take(self.wanted_rad, reading):
+            self.calm *= CALMER
+            self.observer.torque_wander *= CALMER
+        return Status.SWINGING if self.calm < CALMEST else Status.RUNNING
+
+    def _ramp(self) -> float:
+        """Pulses on their way to off: what they have above the threshold goes in equal steps within `limits.ramp_s`."""
+        if self.falling is None:
+            pulses, over = round(self.limits.ramp_s / PULSE_S), self.pulse.limiter.last_us - self.pulse.threshold
+            self.falling = [self.pulse.threshold + over * k / pulses for k in range(1, pulses)] if over >= 0.0 else []
+        width, self.recruitment = self.pulse.give(self.falling.pop() if self.falling else 0.0, at_once=True)
         return width
 
     @property
@@ -140,7 +278,8 @@ class PositionController:
     def _reach(self) -> None:
         """How far the muscle can move the joint now."""
         angles, needed = self.reachable
-        full = float(np.interp(self.share + self.observer.x[3] / self.dynamics.pull_nm, needed, angles))
+        force = self.share * self.pulse.most + self.observer.x[3] / self.dynamics.pull_nm
+        full = float(np.interp(force, needed, angles))
         self.highest = max(full - MARGIN_RAD, self.lowest)
 
     def _law(self) -> float:

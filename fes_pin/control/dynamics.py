@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
 
 import numpy as np
 
@@ -24,20 +23,11 @@ PULSE_S = 1.0 / 45.0
 """Time between pulses, s; Dombre, Fournier and Coiffet, section II-3-1."""
 RESOLVED = 0.7
 """Longest integration step, in units of the joint's fastest radian: Runge-Kutta's fourth order then errs by 1e-3."""
+ANGLES_RAD = (0.3, 2.8)
+"""Angles that eq. (1) is used between, rad: at 0 and at pi its cables pull along the leg and turn nothing; an ankle's
+own lie well within."""
 LONGEST_STRETCH = 3.0
 """Angle in rad beyond theta_r from which F_ANT grows no more, so that no state overflows."""
-
-
-def number(value: object) -> float:
-    """A reading as a float; NaN for what is no number, or too large for one."""
-    if type(value) is float:
-        return value
-    if isinstance(value, np.ndarray) and value.ndim == 0:
-        value = value.item()
-    try:
-        return float(value) if isinstance(value, Real) else math.nan
-    except OverflowError:
-        return math.nan
 
 
 def _frame_of(model: Model) -> dict[str, float]:
@@ -127,9 +117,14 @@ class AnkleDynamics:
         torque = -self.lever * pull * s - self.gravity_cos * c - self.gravity_sin * s
         return torque, -self.lever * (slope * s + pull * c) + self.gravity_cos * s - self.gravity_sin * c
 
+    def acceleration(self, q: float, v: float, pull_nm: float, torque: float) -> float:
+        """Eq. (1): rad/s2 under a muscle that would pull `pull_nm` at sin(theta) = 1, and an unknown torque, N m."""
+        held = self.passive(q)[0] + pull_nm * math.sin(q)
+        return (held + torque - self.damping * v) / self.inertia
+
     def rest_angle(self, activation: float = 0.0) -> float:
         """Angle in rad that a steady activation of the believed muscle holds; by bisection."""
-        low, high = 0.3, 2.8
+        low, high = ANGLES_RAD
         for _ in range(50):
             middle = 0.5 * (low + high)
             rising = self.passive(middle)[0] + self.pull_nm * activation * math.sin(middle) > 0.0
@@ -176,28 +171,19 @@ class PulseToPulse:
         self, act: float, q: float, v: float, torque: float, share: float, recruitment: float
     ) -> tuple[float, float, float]:
         """Activation, angle and rate a pulse later: the classical Runge-Kutta method, activation exact."""
-        d, h = self.dynamics, self.step_s
-        f0, f1, start, lever, load = d.f0, d.f1, d.theta_r, d.lever, d.load_n
-        a, b, inverse, damping, pull = d.gravity_cos, d.gravity_sin, 1.0 / d.inertia, d.damping, d.pull_nm * share
-        sin, cos, exp = math.sin, math.cos, math.exp
-
-        def rise(angle: float, rate: float, active: float) -> float:
-            stretch = angle - start
-            grown = f0 * (exp(f1 * min(stretch, LONGEST_STRETCH)) - 1.0) if stretch > 0.0 else 0.0
-            held = pull * active - lever * (grown - load) - b
-            return (held * sin(angle) - a * cos(angle) + torque - damping * rate) * inverse
-
+        rise, h = self.dynamics.acceleration, self.step_s
+        pull = self.dynamics.pull_nm * share
         half = 0.5 * h
         for _ in range(self.pieces):
             rest = act - recruitment
             middle, end = recruitment + rest * self.half_fade, recruitment + rest * self.fade
-            k1 = rise(q, v, act)
+            k1 = rise(q, v, pull * act, torque)
             v2 = v + half * k1
-            k2 = rise(q + half * v, v2, middle)
+            k2 = rise(q + half * v, v2, pull * middle, torque)
             v3 = v + half * k2
-            k3 = rise(q + half * v2, v3, middle)
+            k3 = rise(q + half * v2, v3, pull * middle, torque)
             v4 = v + h * k3
-            k4 = rise(q + h * v3, v4, end)
+            k4 = rise(q + h * v3, v4, pull * end, torque)
             q += h / 6.0 * (v + 2.0 * (v2 + v3) + v4)
             v += h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
             act = end

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fes_pin.control.control import LOOKAHEAD, PositionController
+from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S
 
 
@@ -65,15 +65,14 @@ def track(
     sensor
         What becomes of a reading: number of the pulse, and the noisy angle.
     """
-    rng, ahead = np.random.default_rng(seed), np.r_[reference_rad, np.full(LOOKAHEAD, reference_rad[-1])]
-    noise = noise_std_rad * rng.standard_normal(len(reference_rad))
+    noise = noise_std_rad * np.random.default_rng(seed).standard_normal(len(reference_rad))
+    controller.follow(reference_rad)
     rows = []
     for k in range(len(reference_rad)):
         angle = joint.angle_rad
         measured = sensor(k, angle + float(noise[k]))
-        window = ahead[k : k + LOOKAHEAD + 1].tolist()
         began = time.perf_counter()
-        width = controller.step(measured, window)
+        width = controller.step(measured)
         took = time.perf_counter() - began
         joint.step(width, PULSE_S)
         rows.append((k * PULSE_S, reference_rad[k], angle, measured, width, controller.share, took))

@@ -15,15 +15,12 @@ import math
 import numpy as np
 import scipy.linalg
 
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, PulseToPulse, number
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, PulseToPulse
 from fes_pin.data.errors import InputError
 
 GATE = 5.0
-"""Standard deviations beyond which a reading says no more than this many: the model may be wrong, or the reading."""
-SPIKE_RAD = 0.2
-"""A reading beyond the gate and this far from the one expected is a spike: the joint would have to be 9 rad/s off."""
-PATIENCE = 6
-"""Spikes in a row after which the sensor is right and the state is wrong."""
+"""Standard deviations beyond which a reading says no more than this many: the model may be wrong, or the reading. Which
+readings come here at all: `fes_pin.control.faults`."""
 LEAST_SHARE, MOST_SHARE = 0.1, 2.0
 """Bounds of the gain's share."""
 RECRUITMENT_STD = 0.025
@@ -57,8 +54,6 @@ class JointObserver:
         Mean: five numbers.
     upper
         Upper triangle of the covariance, by rows: fifteen numbers.
-    blind
-        Pulses since the last reading that was believed.
     """
 
     def __init__(
@@ -72,6 +67,7 @@ class JointObserver:
         if not (angle_std_rad > 0.0 and torque_wander > 0.0 and share_wander >= 0.0 and share_std > 0.0):
             raise InputError("expected noise of the angle, and of torque and gain, above 0")
         self.dynamics, self.variance = dynamics, angle_std_rad**2
+        self.angle_std_rad = angle_std_rad
         self.pulse = PulseToPulse(dynamics)
         self.fade = math.exp(-PULSE_S / dynamics.time_constant)
         activation = (1.0 - self.fade) * RECRUITMENT_STD / math.sqrt(PULSE_S)
@@ -81,12 +77,13 @@ class JointObserver:
         self.start_std = [0.01, 0.1, 0.1, 0.3, share_std]
         self.reset()
 
-    def reset(self) -> None:
-        """Forget everything: at rest, fresh."""
+    def reset(self, angle_rad: float | None = None) -> None:
+        """Forget everything: fresh, and resting at an angle; without one, at that of the believed load."""
         self.x = list(self.start)
+        if angle_rad is not None:
+            self.x[1] = angle_rad
         variances = [std * std for std in self.start_std]
         self.upper = [variances[i] if i == k else 0.0 for i in range(5) for k in range(i, 5)]
-        self.blind = self.spikes = 0
 
     @property
     def covariance(self) -> np.ndarray:
@@ -95,25 +92,15 @@ class JointObserver:
         p[np.triu_indices(5)] = self.upper
         return p + np.triu(p, 1).T
 
-    def correct(self, angle_rad: float) -> bool:
-        """Take in a reading; False if it is none, no angle, or a spike."""
-        angle_rad = number(angle_rad)
-        believed = 0.0 < angle_rad < math.pi
-        if believed:
-            innovation = angle_rad - self.x[1]
-            size = self.upper[5] + self.variance
-            far = GATE * math.sqrt(size)
-            if abs(innovation) > max(far, SPIKE_RAD):
-                self.spikes += 1
-                believed = self.spikes > PATIENCE
-                if believed:
-                    self._restart_at(angle_rad)
-                    return True
-            innovation = min(max(innovation, -far), far)
-        if not believed:
-            self.blind += 1
-            return False
-        self.spikes = self.blind = 0
+    def expects(self, angle_rad: float) -> tuple[float, float]:
+        """The innovation of a reading, and the standard deviation that it should have, rad."""
+        return angle_rad - self.x[1], math.sqrt(self.upper[5] + self.variance)
+
+    def correct(self, angle_rad: float) -> None:
+        """Take in a reading: an angle that was judged before."""
+        size = self.upper[5] + self.variance
+        far = GATE * math.sqrt(size)
+        innovation = min(max(angle_rad - self.x[1], -far), far)
         p00, c0, p02, p03, p04, c1, c2, c3, c4, p22, p23, p24, p33, p34, p44 = self.upper
         g0, g1, g2, g3, g4 = c0 / size, c1 / size, c2 / size, c3 / size, c4 / size
         x0, x1, x2, x3, x4 = self.x
@@ -134,12 +121,6 @@ class JointObserver:
             *(p22 - g2 * c2, p23 - g2 * c3, s * (p24 - g2 * c4)),
             *(p33 - g3 * c3, s * (p34 - g3 * c4), s * s * p44),
         ]
-        return True
-
-    def _restart_at(self, angle_rad: float) -> None:
-        share = self.x[4]
-        self.reset()
-        self.x[1], self.x[4] = angle_rad, share
 
     @property
     def torque_wander(self) -> float:

@@ -12,12 +12,14 @@ import math
 
 from fes_pin.control.dynamics import PULSE_S
 
-AMPLITUDE_RAD = math.radians(0.6)
+AMPLITUDE_RAD = math.radians(0.4)
 """A sine as large as this, and larger ones, count as swings."""
 SLOWEST_HZ = 1.0
 """Slower ones are left to the feedback: references move so."""
 SWINGS = 8
 """Half periods in a row that make an oscillation."""
+PAUSE_PULSES = 90
+"""2 s after an oscillation was found, in which a calmer loop comes to rest."""
 
 
 class _Turns:
@@ -46,7 +48,7 @@ class OscillationWatch:
     def __init__(self) -> None:
         self.frequency_hz = 0.0
         self.turns = _Turns()
-        self.area, self.pulses = 0.0, 0
+        self.area, self.pulses, self.pause = 0.0, 0, 0
         self._start()
 
     def _start(self) -> None:
@@ -54,6 +56,9 @@ class OscillationWatch:
 
     def take(self, wanted_rad: float, angle_rad: float) -> bool:
         """Note where the joint should be and is; True when it has swung about that `SWINGS` times in a row."""
+        if self.pause:
+            self.pause -= 1
+            return False
         error = wanted_rad - angle_rad
         self.turns.take(wanted_rad)
         if self.area * error < 0.0:
@@ -66,6 +71,7 @@ class OscillationWatch:
         found = self.turns.count <= SWINGS // 2
         if found:
             self.frequency_hz = 0.5 * self.count / (self.lasted * PULSE_S)
+            self.pause = PAUSE_PULSES
         self._start()
         return found
 

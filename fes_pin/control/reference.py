@@ -7,7 +7,9 @@ from operator import mul
 
 import numpy as np
 
-from fes_pin.control.dynamics import PULSE_S, number
+from fes_pin.control.angles import reference as checked
+from fes_pin.control.dynamics import PULSE_S
+from fes_pin.data.errors import InputError
 
 HALF_WINDOW = 4
 """Pulses that a step is spread over, to each side: 89 ms, about two time constants of the muscle."""
@@ -17,6 +19,35 @@ _LENGTH = 2 * LOOKAHEAD
 _BELL = np.hanning(2 * HALF_WINDOW + 3)[1:-1]
 BELL: list[float] = (_BELL / _BELL.sum()).tolist()
 """Weights of the smoothing, by pulse; they add up to 1."""
+
+
+def trajectory(reference_rad: object, ends: tuple[float, float]) -> list[float]:
+    """A trajectory as plain numbers, one angle per pulse.
+
+    Raises
+    ------
+    InputError
+        For what is no row of angles, or an angle outside of two, with the pulse that it stands at.
+    """
+    if isinstance(reference_rad, np.ndarray) and reference_rad.ndim == 1:
+        reference_rad = reference_rad.tolist()
+    if not isinstance(reference_rad, (list, tuple)) or not len(reference_rad):
+        raise InputError("reference_rad: expected a row of angles in rad, one per pulse")
+    return [checked(value, ends, f", pulse {k}") for k, value in enumerate(reference_rad)]
+
+
+def coming(reference_rad: object, ends: tuple[float, float]) -> tuple[list[float], bool]:
+    """What a caller wants in one pulse: an angle and False, or the angles of this pulse and of at most `LOOKAHEAD` next
+    ones and True.
+
+    Raises
+    ------
+    InputError
+        As `trajectory`.
+    """
+    if isinstance(reference_rad, (list, tuple)) or (isinstance(reference_rad, np.ndarray) and reference_rad.ndim):
+        return trajectory(reference_rad[: LOOKAHEAD + 1], ends), True
+    return [checked(reference_rad, ends)], False
 
 
 class ReferenceWindow:
@@ -30,30 +61,26 @@ class ReferenceWindow:
 
     def __init__(self, rest_rad: float) -> None:
         self.values = [rest_rad] * _LENGTH
-        self.last = rest_rad
 
-    def take(self, reference: float | Sequence[float], lowest: float, highest: float) -> None:
-        """Go on by one pulse; see `PositionController.step`. Values are held between two angles; one that is none is
-        replaced by the one before it.
+    def take(self, wanted: Sequence[float], preview: bool, lowest: float, highest: float) -> None:
+        """Go on by one pulse.
+
+        Parameters
+        ----------
+        wanted
+            With preview: the angles of this pulse and the next ones, of which the last is held. Without: one angle,
+            taken for the farthest pulse ahead.
+        lowest, highest
+            Angles are held between these.
         """
         values = self.values
         values.append(values[-1])
         del values[0]
-        if isinstance(reference, np.ndarray) and reference.ndim == 1:
-            reference = reference[: LOOKAHEAD + 1].tolist()
-        several = isinstance(reference, (list, tuple))
-        coming = reference[: LOOKAHEAD + 1] if several else [reference]  # type: ignore[index]
-        k = LOOKAHEAD - 1 if several else _LENGTH - 1
-        before = values[k - 1] if several else self.last
-        for value in coming:
-            good = value if type(value) is float else number(value)
-            if -1e9 < good < 1e9:
-                before = lowest if good < lowest else highest if good > highest else good
-            else:
-                before = lowest if before < lowest else highest if before > highest else before
-            values[k] = before
+        k = LOOKAHEAD - 1 if preview else _LENGTH - 1
+        for value in wanted:
+            values[k] = lowest if value < lowest else highest if value > highest else value
             k += 1
-        self.last = values[-1]
+        values[k:] = [values[k - 1]] * (_LENGTH - k)
 
     def now(self) -> tuple[float, float, float, float, float, float]:
         """Angle, rate and acceleration now, then the same a pulse ahead; rad and s."""

@@ -33,8 +33,6 @@ UNCERTAINTY = 0.3
 """Of gain, time constant and stiffness."""
 ANGLES = 9
 """Angles that gains are computed for."""
-FREQUENCIES = 4000
-"""Up to half the pulse rate, for the margins."""
 
 
 @dataclass(frozen=True)
@@ -182,50 +180,6 @@ class Loop:
             angle = np.linalg.solve(z * np.eye(len(self.a)) - self.a, self.b)[1]
             found.append(-(self.law @ np.linalg.solve(z * np.eye(4) - self.own, self.seen) + self.direct) * angle)
         return np.array(found)
-
-
-@dataclass(frozen=True)
-class Margins:
-    """How far a stable loop is from instability.
-
-    Attributes
-    ----------
-    gain
-        Factor on the muscle's gain that it bears: the least one above 1.
-    phase_deg
-        Phase lag that it bears at any frequency where it answers with gain 1, degrees.
-    delay_s
-        The dead time that it bears.
-    distance
-        Least distance of the open loop from -1: one over the greatest sensitivity.
-    distance_hz
-        Where that is.
-    """
-
-    gain: float
-    phase_deg: float
-    delay_s: float
-    distance: float
-    distance_hz: float
-
-
-def margins(loop: Loop) -> Margins:
-    """Margins of a loop, from its frequency response up to half the pulse rate."""
-    hz = np.linspace(0.0, 0.5 / PULSE_S, FREQUENCIES + 1)[1:]
-    answer = loop.opened(hz)
-    size, turn = np.abs(answer), np.unwrap(np.angle(answer))
-    real, flips = answer.real, np.diff(np.sign(answer.imag)) != 0
-    crossing = [1.0 / -r for r in 0.5 * (real[1:] + real[:-1])[flips] if -1.0 < r < 0.0]
-    ones = np.diff(np.sign(size - 1.0)) != 0
-    lag = np.mod(turn[1:][ones] + math.pi, 2.0 * math.pi)
-    least = int(np.argmin(np.abs(1.0 + answer)))
-    return Margins(
-        min(crossing, default=math.inf),
-        math.degrees(min(lag, default=math.inf)),
-        float(min(lag / (2.0 * math.pi * hz[1:][ones]), default=math.inf)),
-        float(np.abs(1.0 + answer[least])),
-        float(hz[least]),
-    )
 
 
 def loop_at(truth: AnkleDynamics, observer: JointObserver, gains: Gains, q: float) -> Loop:

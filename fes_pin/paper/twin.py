@@ -99,7 +99,12 @@ class AnkleTwin:
 
 
 class RunningTwin:
-    """A twin at work: stimulated sample by sample from its rest.
+    """A twin at work: stimulated sample by sample from its rest, or from the angle that it is held at.
+
+    Parameters
+    ----------
+    max_step_s
+        Longest step of the integrator; with 4 ms it errs by 1e-5 rad.
 
     Attributes
     ----------
@@ -111,8 +116,8 @@ class RunningTwin:
         Muscle force, total torque, and the torque of the passive antagonist.
     """
 
-    def __init__(self, twin: AnkleTwin, held_at_rad: float | None = None) -> None:
-        self.twin, self.held = twin, held_at_rad
+    def __init__(self, twin: AnkleTwin, held_at_rad: float | None = None, max_step_s: float = MAX_STEP_S) -> None:
+        self.twin, self.held, self.max_step_s = twin, held_at_rad, max_step_s
         start = twin.rest_angle() if held_at_rad is None else held_at_rad
         self.state = [0.0, start, 0.0, 0.0, 0.0, 0.0]
         self.followed_us = 0.0
@@ -143,7 +148,7 @@ class RunningTwin:
             max(self.followed_us, pulse_width_us - t.hysteresis_us), pulse_width_us + t.hysteresis_us
         )
         r = min(max((self.followed_us - t.threshold_us) / (t.saturation_us - t.threshold_us), 0.0), 1.0)
-        count = max(1, math.ceil(dt / MAX_STEP_S - 1e-9))
+        count = max(1, math.ceil(dt / self.max_step_s - 1e-9))
         h = dt / count
         for _ in range(count):
             x = self.state

@@ -10,9 +10,10 @@ import scipy.linalg
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, PulseToPulse
 from fes_pin.control.loop import sine, track
+from fes_pin.control.margins import delay_margin, margins
 from fes_pin.control.observer import JointObserver
 from fes_pin.control.oscillation import OscillationWatch
-from fes_pin.control.tuning import LADDER, corners, loop_at, margins, plant, swinging, tune
+from fes_pin.control.tuning import LADDER, corners, loop_at, plant, swinging, tune
 from fes_pin.data.errors import InputError
 from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.paper.constants import STEPWISE, paper_trial, paper_twin
@@ -117,6 +118,37 @@ def test_delay_margin_is_where_the_loop_becomes_unstable():
     loop = loop_at(dynamics, observer, tune(dynamics, observer), 1.8)
     pulses = margins(loop).delay_s / PULSE_S
     assert delayed(loop, math.floor(pulses)).radius() < 1.0 < delayed(loop, math.ceil(pulses)).radius()
+
+
+def late(pulses):
+    past = []
+
+    def sense(k, angle):
+        past.append(angle)
+        return past[max(0, k - pulses)]
+
+    return sense
+
+
+def test_the_delay_margin_that_is_stated_is_that_of_the_twin_where_it_is_least():
+    controller = PositionController(ankle_of(TWIN), TWIN.load_kg)
+    believed, worst = delay_margin(controller.dynamics, controller.observer, controller.gains)
+    assert 1.0 < believed / PULSE_S < 2.0 and worst < 0.5 * believed
+    hold = np.full(360, TWIN.rest_angle() + math.radians(4.0))
+    swung = {}
+    for pulses in (1, 2):
+        controller.reset()
+        run = track(controller, RunningTwin(TWIN), hold, sensor=late(pulses))
+        swung[pulses] = controller.calm < 1.0
+        assert pulses == 2 or run.rms_error_deg(start_s=2.0) < 0.3
+    assert swung == {1: False, 2: True}
+
+
+@pytest.mark.parametrize("pulses", [3, 6])
+def test_a_late_sensor_does_not_make_a_limit_cycle_in_silence(pulses):
+    controller = PositionController(ankle_of(TWIN), TWIN.load_kg)
+    run = track(controller, RunningTwin(TWIN), sine(TWIN.rest_angle(), 15.0, 0.5, 8.0), sensor=late(pulses))
+    assert controller.status.is_fault and not run.pulse_width_us[90:].any()
 
 
 def test_a_frame_takes_the_margins_that_eq_1_promises():

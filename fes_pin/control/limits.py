@@ -1,0 +1,133 @@
+"""What a caller allows of the stimulation: pulse width, how fast it changes, charge, and the angles of the joint."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fes_pin.control.dynamics import ANGLES_RAD, PULSE_S
+from fes_pin.data.errors import InputError
+
+BURST = 0.2
+"""Share of a second's charge that may be given at once; the rest is what may be given steadily. Together they are what
+any one second can hold."""
+
+
+@dataclass(frozen=True)
+class StimulationLimits:
+    """Limits that hold for every pulse, whatever the feedback wants; by default the muscle's own.
+
+    Parameters
+    ----------
+    pulse_width_us
+        The widest pulse, us; beyond saturation it changes nothing.
+    rate_us_per_s
+        How fast the width may rise or fall, us/s. Pulses below threshold are never given, so that switching on at the
+        threshold and off from it is free.
+    charge_uc_per_s
+        Charge of all pulses within any one second, uC; needs `current_ma`. What may be given steadily is 1 - `BURST`
+        of it.
+    current_ma
+        Amplitude of the pulses, mA.
+    range_of_motion_rad
+        Angles that this joint may have: references outside are refused, readings outside are faults.
+    ramp_s
+        Time that pulses take to ramp down after a fault, s: a loaded joint that is let go at once falls. 0 is at once.
+
+    Raises
+    ------
+    InputError
+        For a limit that is none, or contradicts another.
+    """
+
+    pulse_width_us: float = math.inf
+    rate_us_per_s: float = math.inf
+    charge_uc_per_s: float = math.inf
+    current_ma: float | None = None
+    range_of_motion_rad: tuple[float, float] = ANGLES_RAD
+    ramp_s: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name, unit in (("pulse_width_us", "us"), ("rate_us_per_s", "us/s"), ("charge_uc_per_s", "uC/s")):
+            _above_zero(name, getattr(self, name), unit)
+        if self.current_ma is not None:
+            _above_zero("current_ma", self.current_ma, "mA")
+            if self.current_ma == math.inf:
+                raise InputError("current_ma: expected a finite current, found inf")
+        elif self.charge_uc_per_s < math.inf:
+            raise InputError("charge_uc_per_s: a limit of charge needs current_ma")
+        if not (_is_number(self.ramp_s) and 0.0 <= self.ramp_s <= 1.0):
+            raise InputError(f"ramp_s: expected 0 to 1 s, found {self.ramp_s!r}")
+        ends = self.range_of_motion_rad
+        two = isinstance(ends, tuple) and len(ends) == 2 and all(map(_is_number, ends))
+        if not (two and ANGLES_RAD[0] <= ends[0] < ends[1] <= ANGLES_RAD[1]):
+            low, high = ANGLES_RAD
+            raise InputError(f"range_of_motion_rad: expected two angles within {low:g} to {high:g} rad, found {ends!r}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value)
+
+
+def _above_zero(name: str, value: object, unit: str) -> None:
+    if not (_is_number(value) and value > 0.0):  # type: ignore[operator]
+        raise InputError(f"{name}: expected a number above 0 {unit}, found {value!r}")
+
+
+class Limiter:
+    """Holds pulse after pulse within the limits.
+
+    Charge is a bucket: a fifth of a second's charge at most, refilled steadily with the other four fifths. No second
+    can then hold more than the limit, and a steady demand meets a steady width instead of bursts.
+
+    Raises
+    ------
+    InputError
+        If the widest pulse is below threshold, or the charge is too little for pulses at threshold.
+    """
+
+    def __init__(self, limits: StimulationLimits, threshold_us: float, saturation_us: float) -> None:
+        if limits.pulse_width_us < threshold_us:
+            raise InputError(
+                f"pulse_width_us: expected at least the threshold of {threshold_us:g} us, "
+                f"found {limits.pulse_width_us:g}"
+            )
+        self.most_us = min(limits.pulse_width_us, saturation_us)
+        self.threshold_us = threshold_us
+        self.change_us = limits.rate_us_per_s * PULSE_S
+        # charge in us of pulse width: current times width
+        whole = limits.charge_uc_per_s / (1e-3 * (limits.current_ma or 1.0))
+        self.bucket_us, self.refill_us = BURST * whole, (1.0 - BURST) * whole * PULSE_S
+        if self.refill_us < threshold_us:
+            least = limits.charge_uc_per_s * threshold_us / self.refill_us
+            raise InputError(
+                f"charge_uc_per_s: expected at least {least:.3g} uC/s, which steady pulses at threshold need, "
+                f"found {limits.charge_uc_per_s:g}"
+            )
+        self.left_us, self.last_us = self.bucket_us, 0.0
+
+    @property
+    def steady_us(self) -> float:
+        """The widest pulse that may be given for long, us."""
+        return min(self.most_us, self.refill_us)
+
+    def allowed(self, width_us: float, at_once: bool = False) -> float:
+        """The width nearest to a wanted one that may be given now; 0, or threshold to the widest. Notes nothing.
+
+        Parameters
+        ----------
+        at_once
+            A fall may be as fast as it will: after a fault.
+        """
+        width = width_us if width_us >= self.threshold_us else 0.0
+        if not at_once and self.last_us - self.change_us >= self.threshold_us:
+            width = max(width, self.last_us - self.change_us)
+        width = min(width, max(self.last_us, self.threshold_us) + self.change_us)
+        width = min(width, self.most_us, self.left_us)
+        return width if width >= self.threshold_us else 0.0
+
+    def give(self, width_us: float) -> None:
+        """Note the width that was given."""
+        self.last_us = width_us
+        if self.bucket_us < math.inf:
+            self.left_us = min(self.left_us - width_us + self.refill_us, self.bucket_us)

@@ -1,0 +1,364 @@
+"""How safe is the ankle's position control: simulated faults, and hours of normal use without any.
+
+.venv/bin/python scripts/control_safety.py                    # 1000 faults, 10 hours; 15 minutes on two cores
+.venv/bin/python scripts/control_safety.py --faults 80 --hours 0.5
+
+The ankles are twins (`fes_pin.paper.twin`), whose integrator shares no line with the controller's model. Each is off by
+up to 30 % in gain, time constant and stiffness from what the controller believes, half of them tire, a third stand on
+a frame that swings, of which the controller knows in half of the cases; readings have 2 mrad of noise and steps of
+1 mrad, 2 in 100 are lost and 1 in 1000 is a spike.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cache
+from multiprocessing import Pool
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fes_pin.control.control import PositionController
+from fes_pin.control.dynamics import PULSE_S
+from fes_pin.control.faults import Status
+from fes_pin.models.effects.fatigue import Fatigue
+from fes_pin.models.effects.frame_vibration import FrameVibration
+from fes_pin.paper.constants import paper_twin
+from fes_pin.paper.ratios import ankle_of
+from fes_pin.paper.twin import AnkleTwin, RunningTwin
+
+BELIEVED = replace(paper_twin("3-23"), load_kg=0.5)
+NOISE_RAD, STEP_RAD, LOST, SPIKED = 2e-3, 1e-3, 0.02, 0.001
+CURRENT_MA = 40.0
+"""For the charge that is printed."""
+WATCHED_S = 30.0
+"""A fault that is not off after this is not detected."""
+SETTLED_S = 2.0
+"""How long the pulses are seen to stay off; then the run ends."""
+ASTRAY_DEG = 3.0
+BOUT_S = 300.0
+FATIGUE = {"rate_per_s": 0.03, "recovery_s": 60.0}
+STEP_S = 4e-3
+"""Of the twins' integrator: it errs by 1e-5 rad."""
+Sensor = Callable[[int, float], float]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A true ankle, and what its controller knows of it."""
+
+    twin: AnkleTwin
+    knows_frame: bool
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> Subject:
+        """One of the population."""
+        gain, tau, stiff = rng.uniform(0.7, 1.3, 3)
+        f1, rest = BELIEVED.f1_per_rad * stiff, BELIEVED.rest_angle() - BELIEVED.theta_r_rad
+        twin = replace(
+            BELIEVED,
+            gain=BELIEVED.gain * gain,
+            time_constant_s=BELIEVED.time_constant_s * tau,
+            f0_n=BELIEVED.f0_n * math.expm1(BELIEVED.f1_per_rad * rest) / math.expm1(f1 * rest),
+            f1_per_rad=f1,
+            fatigue_per_s=FATIGUE["rate_per_s"] if rng.random() < 0.5 else 0.0,
+        )
+        if rng.random() < 1.0 / 3.0:
+            coupling, hz, zeta = rng.uniform(0.2, 1.33), rng.uniform(4.0, 12.0), rng.uniform(0.03, 0.08)
+            twin = replace(twin, frame_coupling=coupling, frame_hz=hz, frame_damping=zeta)
+        return cls(twin, rng.random() < 0.5)
+
+    def controller(self) -> PositionController:
+        """As this subject's clinic would make it: the believed ankle, and its frame where that was identified."""
+        t = self.twin
+        frame = (t.frame_coupling, t.frame_hz, t.frame_damping) if self.knows_frame and t.frame_coupling else None
+        made = _controller(frame)
+        made.reset()
+        return made
+
+
+@cache
+def _controller(frame: tuple[float, float, float] | None) -> PositionController:
+    model = ankle_of(BELIEVED) + Fatigue(**FATIGUE)
+    if frame is not None:
+        model = model + FrameVibration(coupling=frame[0], frequency_hz=frame[1], damping_ratio=frame[2])
+    return PositionController(model, BELIEVED.load_kg)
+
+
+def schedule(rng: np.random.Generator, seconds: float) -> np.ndarray:
+    """What is done in a session: sines, steps, ramps and rests of 2 to 8 s, up to 15 degrees above rest, rad."""
+    rest, count = BELIEVED.rest_angle(), round(seconds / PULSE_S)
+    parts: list[np.ndarray] = [np.full(45, rest)]
+    while sum(map(len, parts)) < count:
+        t = np.arange(round(rng.uniform(2.0, 8.0) / PULSE_S)) * PULSE_S
+        height = math.radians(rng.uniform(5.0, 15.0))
+        kind = rng.integers(4)
+        if kind == 0:
+            parts.append(rest + 0.5 * height * (1.0 - np.cos(2.0 * math.pi * rng.uniform(0.2, 1.0) * t)))
+        elif kind == 1:
+            parts.append(rest + height * (np.floor(t / rng.uniform(0.7, 2.0)) % 2 == 0))
+        elif kind == 2:
+            parts.append(rest + height * np.minimum(t / rng.uniform(0.5, 2.0), 1.0))
+        else:
+            parts.append(np.full(len(t), rest))
+    return np.concatenate(parts)[:count]
+
+
+class Sensors:
+    """A potentiometer that works as potentiometers do."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng = rng
+
+    def __call__(self, k: int, angle: float) -> float:
+        chance = self.rng.random()
+        if chance < LOST:
+            return math.nan
+        if chance < LOST + SPIKED:
+            return float(self.rng.uniform(0.3, 2.8))
+        return STEP_RAD * round((angle + NOISE_RAD * self.rng.standard_normal()) / STEP_RAD)
+
+
+def lost(rng: np.random.Generator) -> Sensor:
+    """No readings any more."""
+    return lambda k, reading: math.nan
+
+
+def frozen(rng: np.random.Generator) -> Sensor:
+    """The last reading again and again."""
+    held: list[float] = []
+
+    def sense(k: int, reading: float) -> float:
+        if not held and not math.isnan(reading):
+            held.append(reading)
+        return held[0] if held else reading
+
+    return sense
+
+
+def loose(rng: np.random.Generator) -> Sensor:
+    """Off the joint: rests where it was, with its noise."""
+    held: list[float] = []
+
+    def sense(k: int, reading: float) -> float:
+        if not held and not math.isnan(reading):
+            held.append(reading)
+        return held[0] + NOISE_RAD * rng.standard_normal() if held else reading
+
+    return sense
+
+
+def mirrored(rng: np.random.Generator) -> Sensor:
+    """Turned round, about an angle of up to 10 degrees from rest."""
+    middle = BELIEVED.rest_angle() + math.radians(rng.uniform(-10.0, 10.0))
+    return lambda k, reading: 2.0 * middle - reading
+
+
+def slipped(rng: np.random.Generator) -> Sensor:
+    """Shows 10 to 40 degrees more or less."""
+    shift = math.radians(rng.uniform(10.0, 40.0)) * rng.choice([-1.0, 1.0])
+    return lambda k, reading: reading + shift
+
+
+def wild(rng: np.random.Generator) -> Sensor:
+    """A bad contact: 50 to 100 in 100 readings are anything."""
+    share = rng.uniform(0.5, 1.0)
+    return lambda k, reading: float(rng.uniform(-1.0, 4.0)) if rng.random() < share else reading
+
+
+def silent(rng: np.random.Generator) -> dict[str, float]:
+    """An electrode off: the muscle does nothing."""
+    return {"gain": 0.0}
+
+
+def opposite(rng: np.random.Generator) -> dict[str, float]:
+    """The other electrode: the antagonist pulls, with 30 to 100 % of the muscle's gain."""
+    return {"gain": -BELIEVED.gain * rng.uniform(0.3, 1.0)}
+
+
+SENSOR_FAULTS = (lost, frozen, loose, mirrored, slipped, wild)
+MUSCLE_FAULTS = (silent, opposite)
+KINDS = {fault.__name__: fault for fault in (*SENSOR_FAULTS, *MUSCLE_FAULTS)}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a fault.
+
+    Attributes
+    ----------
+    off_s
+        From the fault to the last pulse; infinite if pulses go on.
+    found_s
+        From the fault to its detection.
+    astray_s
+        From the moment that the joint was `ASTRAY_DEG` from where it was to be, to the last pulse; 0 if it never was.
+    pulses, charge_uc, widest_us
+        That were given after it.
+    status
+        Of the controller at the end.
+    early
+        True if the controller had stopped before the fault.
+    """
+
+    kind: str
+    found_s: float
+    off_s: float
+    astray_s: float
+    pulses: int
+    charge_uc: float
+    widest_us: float
+    status: str
+    early: bool
+
+
+def fault(kind: str, seed: int) -> Outcome:
+    """One simulated fault: from the first pulse on in one of five, else while the joint is being moved."""
+    rng = np.random.default_rng([seed, list(KINDS).index(kind)])
+    subject, working = Subject.drawn(rng), Sensors(rng)
+    start = 0 if rng.random() < 0.2 else round(rng.uniform(5.0, 20.0) / PULSE_S)
+    count = start + round(WATCHED_S / PULSE_S)
+    controller, joint = subject.controller(), RunningTwin(subject.twin, max_step_s=STEP_S)
+    controller.follow(schedule(rng, count * PULSE_S))
+    change, broken, early, found, astray, widths = KINDS[kind](rng), None, False, math.inf, math.inf, []
+    for k in range(count):
+        if k == start:
+            early = controller.status.is_fault
+            if isinstance(change, dict):
+                joint.twin = replace(joint.twin, **change)
+            else:
+                broken = change
+        reading = working(k, joint.angle_rad)
+        width = controller.step(broken(k, reading) if broken else reading)
+        joint.step(width, PULSE_S)
+        if k < start:
+            continue
+        widths.append(width)
+        since = (k - start) * PULSE_S
+        if controller.status.is_fault:
+            found = min(found, since)
+        elif abs(joint.angle_rad - controller.wanted_rad) > math.radians(ASTRAY_DEG):
+            astray = min(astray, since)
+        if since - found > controller.limits.ramp_s + SETTLED_S:
+            break
+    given = np.flatnonzero(widths)
+    last = 0.0 if not len(given) else (given[-1] + 1) * PULSE_S
+    safe = controller.status is not Status.RUNNING and (not len(given) or last <= found + controller.limits.ramp_s)
+    return Outcome(
+        kind=kind,
+        found_s=found,
+        off_s=last if safe else math.inf,
+        astray_s=max(last - astray, 0.0),
+        pulses=len(given),
+        charge_uc=1e-3 * CURRENT_MA * sum(widths),
+        widest_us=max(widths),
+        status=controller.status.name,
+        early=early,
+    )
+
+
+@dataclass(frozen=True)
+class Bout:
+    """Five minutes of normal use: false stop or none, the largest surprise, and whether the loop was calmed."""
+
+    status: str
+    surprise: float
+    calm: float
+    subject: Subject
+    stopped_s: float
+
+
+def normal(seed: int, seconds: float = BOUT_S) -> Bout:
+    """A bout of normal use."""
+    rng = np.random.default_rng([seed, 77])
+    subject, working = Subject.drawn(rng), Sensors(rng)
+    controller, joint = subject.controller(), RunningTwin(subject.twin, max_step_s=STEP_S)
+    controller.follow(schedule(rng, seconds))
+    surprise, stopped = 0.0, math.inf
+    for k in range(round(seconds / PULSE_S)):
+        joint.step(controller.step(working(k, joint.angle_rad)), PULSE_S)
+        surprise = max(surprise, controller.monitor.surprise)
+        if controller.status.is_fault:
+            stopped = k * PULSE_S
+            break
+    return Bout(controller.status.name, surprise, controller.calm, subject, stopped)
+
+
+def show_faults(outcomes: Iterable[Outcome]) -> None:
+    """The table of faults."""
+    every = list(outcomes)
+    print(
+        f"{'':10s} {'':6s} {'':6s} {'off, s':>15s} {'astray, s':>15s} {'pulses':>13s} {'charge, uC':>15s}\n"
+        f"{'kind':10s} {'faults':>6s} {'found':>6s}"
+        + f" {'median':>8s} {'worst':>6s}"
+        * 2
+        + f" {'median':>6s} {'worst':>6s}"
+        f" {'median':>8s} {'worst':>6s}  named"
+    )
+    for kind in KINDS:
+        rows = [o for o in every if o.kind == kind]
+        if not rows:
+            continue
+        names = {s: sum(o.status == s for o in rows) for s in sorted({o.status for o in rows})}
+        off, astray, pulses, charge = (
+            np.array([getattr(o, n) for o in rows]) for n in ("off_s", "astray_s", "pulses", "charge_uc")
+        )
+        print(
+            f"{kind:10s} {len(rows):6d} {np.isfinite(off).sum():6d} {np.median(off):8.2f} {off.max():6.2f} "
+            f"{np.median(astray):8.2f} {astray.max():6.2f} {np.median(pulses):6.0f} {pulses.max():6d} "
+            f"{np.median(charge):8.0f} {charge.max():6.0f}  " + ", ".join(f"{s.lower()} {n}" for s, n in names.items())
+        )
+    print(
+        f"{sum(math.isfinite(o.off_s) for o in every)} of {len(every)} detected and off; "
+        f"{sum(o.early for o in every)} had stopped before their fault. Off: from the fault to the last pulse; "
+        f"astray: from {ASTRAY_DEG:g} degrees off the reference to the last pulse; charge at {CURRENT_MA:g} mA"
+    )
+    for o in every:
+        if not math.isfinite(o.off_s):
+            print(f"  {o}")
+
+
+def show_normal(bouts: Iterable[Bout], hours: float) -> None:
+    """False stops, and what the tail of the innovations' test says of rarer ones."""
+    every = list(bouts)
+    stops = [b for b in every if b.status != "RUNNING"]
+    largest = np.sort([b.surprise for b in every])
+    # Gumbel's law of the largest of many, by its moments
+    scale = max(math.sqrt(6.0) / math.pi * float(np.std(largest)), 1e-9)
+    place = float(np.mean(largest)) - 0.5772156649 * scale
+    rate = -math.expm1(-math.exp(-(1.0 - place) / scale)) * 3600.0 / BOUT_S
+    print(
+        f"{hours:g} hours of normal use: {len(stops)} false stops (below {3.0 / hours:.2g} an hour at 95 % if none); "
+        f"surprise in 5 minutes: median {np.median(largest):.2f}, largest {largest[-1]:.2f} of 1; by Gumbel's law of "
+        f"the largest it passes 1 {rate:.1g} times an hour; {sum(b.calm < 1.0 for b in every)} loops were calmed"
+    )
+    for b in stops:
+        print(f"  {b.status} after {b.stopped_s:.0f} s, calm {b.calm:.2f}, surprise {b.surprise:.2f}: {b.subject}")
+
+
+def _fault(job: tuple[str, int]) -> Outcome:
+    return fault(*job)
+
+
+def main() -> None:
+    """Both tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--faults", type=int, default=1000, help="of all kinds together")
+    parser.add_argument("--hours", type=float, default=10.0, help="of normal use")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    given = parser.parse_args()
+    jobs = [(kind, given.seed + k) for k in range(-(-given.faults // len(KINDS))) for kind in KINDS][: given.faults]
+    with Pool(given.jobs, threadpool_limits, (1,)) as pool:
+        if jobs:
+            show_faults(pool.imap_unordered(_fault, jobs, chunksize=4))
+        bouts = range(given.seed, given.seed + round(given.hours * 3600.0 / BOUT_S))
+        if bouts:
+            show_normal(pool.imap_unordered(normal, bouts), given.hours)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,174 @@
+"""Faults end the pulses and keep them off; normal use does not. Slices of scripts/control_safety.py, single rules."""
+
+import math
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fes_pin.control.control import START_READINGS, PositionController
+from fes_pin.control.dynamics import PULSE_S
+from fes_pin.control.faults import BAD_READINGS, FALSE_STOPS_PER_HOUR, FaultMonitor, Status, most_repeats
+from fes_pin.control.loop import sine, track
+from fes_pin.data.errors import InputError
+from fes_pin.paper.constants import paper_twin
+from fes_pin.paper.ratios import ankle_of
+from fes_pin.paper.twin import RunningTwin
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
+import control_safety
+
+TWIN = replace(paper_twin("3-23"), load_kg=0.5)
+REST = TWIN.rest_angle()
+WAVE = sine(REST, 15.0, 0.5, 8.0)
+RAMP = 9
+"""Pulses of the ramp."""
+
+
+@cache
+def made():
+    return PositionController(ankle_of(TWIN), 0.5)
+
+
+def fresh():
+    controller = made()
+    controller.reset()
+    return controller
+
+
+@pytest.mark.parametrize("kind", list(control_safety.KINDS))
+@pytest.mark.parametrize("seed", [11, 12])
+def test_a_slice_of_the_faults_is_found_and_off(kind, seed):
+    outcome = control_safety.fault(kind, seed)
+    assert math.isfinite(outcome.off_s) and not outcome.early and outcome.status != "RUNNING"
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_slice_of_normal_use_is_not_stopped(seed):
+    bout = control_safety.normal(seed, 60.0)
+    assert bout.status == "RUNNING" and bout.surprise < 1.0
+
+
+@pytest.mark.parametrize("reading", [math.nan, None, 0.2, 3.0, REST + 0.3])
+def test_no_pulse_before_a_valid_reading(reading):
+    controller = fresh()
+    controller.follow(WAVE)
+    assert not any(controller.step(reading) for _ in range(300))
+    assert controller.status is Status.WAITING
+
+
+def test_the_first_pulse_comes_after_readings_in_a_row():
+    controller, widths = fresh(), []
+    controller.follow(np.full(60, REST + 0.2))
+    for k in range(30):
+        widths.append(controller.step(math.nan if k == 3 else REST + 1e-3 * (k % 3)))
+    assert not any(widths[: 3 + START_READINGS]) and all(widths[3 + START_READINGS : 3 + START_READINGS + 5])
+
+
+@pytest.mark.parametrize(
+    ("broken", "status", "within"),
+    [
+        (lambda k, a: math.nan, Status.MISSING, BAD_READINGS),
+        (lambda k, a: 100.0 * a, Status.IMPOSSIBLE, BAD_READINGS),
+        (lambda k, a: math.inf, Status.IMPOSSIBLE, BAD_READINGS),
+        (lambda k, a: a + 0.3, Status.JUMPING, BAD_READINGS),
+        (lambda k, a: math.nan if k % 2 else a, Status.MISSING, 4 * BAD_READINGS),
+    ],
+)
+def test_faults_of_the_sensor_are_named_within_pulses_ramp_down_and_stay_off(broken, status, within):
+    controller, start, named = fresh(), 90, []
+
+    def sensor(k, angle):
+        named.append(controller.status)
+        return broken(k, angle) if k >= start else angle
+
+    widths = track(controller, RunningTwin(TWIN), WAVE, sensor=sensor).pulse_width_us
+    found = named.index(status) - 1  # seen at the next pulse
+    assert start <= found < start + within and controller.status is status
+    ramp = widths[found : found + RAMP]
+    assert (np.diff(widths[found - 1 : found + RAMP]) < 0.0).all() and ramp[-2] >= 180.0
+    assert not widths[found + RAMP - 1 :].any()
+    # off until reset, whatever comes in
+    assert controller.step(REST) == 0.0 == controller.step("x", math.nan)
+    controller.reset()
+    assert controller.status is Status.WAITING
+    again = track(controller, RunningTwin(TWIN), WAVE)
+    assert controller.status is Status.RUNNING and again.rms_error_deg(1.0) < 0.3
+
+
+def test_a_frozen_reading_is_named_within_the_pulses_that_noise_allows():
+    controller, held = fresh(), []
+
+    def sensor(k, angle):
+        held.append(angle)
+        return held[min(k, 200)]
+
+    run = track(controller, RunningTwin(TWIN), np.full(300, REST + math.radians(8.0)), sensor=sensor)
+    assert controller.status is Status.FROZEN
+    assert not run.pulse_width_us[200 + math.ceil(controller.monitor.repeats_allowed) + RAMP :].any()
+
+
+def test_repeats_come_as_rarely_as_stated():
+    """Rate of runs as long as allowed, from the simulated chance that a quantized reading comes again."""
+    rng, noise, step = np.random.default_rng(0), 2e-3, 1e-3
+    shown = np.round(rng.normal(0.0, noise, 400_000) / step)
+    again = float(np.mean(shown[1:] == shown[:-1]))
+    runs = most_repeats(noise, step)
+    assert again ** (runs - 1) * 3600.0 / PULSE_S < FALSE_STOPS_PER_HOUR
+    assert most_repeats(noise, 0.0) == BAD_READINGS and most_repeats(noise, 0.02) == math.inf
+
+
+def test_innovations_of_noise_alone_pass_the_limit_as_rarely_as_stated():
+    """The clipped sum's tail, from the exact tail of its squares: clipping only takes away; its limit is near to it."""
+    monitor = FaultMonitor(made().dynamics, (0.3, 2.8), 2e-3, 1e-3)
+    squares = np.random.default_rng(1).chisquare(5, 2_000_000)
+    # chi square of 5: the tail falls by e^-1/2 a unit, times x^3/2
+    seen = float(np.mean(squares > 20.0))
+    told = seen * math.exp(-0.5 * (monitor.limit - 20.0)) * (monitor.limit / 20.0) ** 1.5
+    assert told * 3600.0 / PULSE_S == pytest.approx(FALSE_STOPS_PER_HOUR, rel=0.5)
+
+
+@pytest.mark.parametrize("angle", ["1.9", [1.9], np.array([1.9]), True, np.True_, b"1", 2j, 105.0, -math.inf])
+def test_what_is_no_reading_is_refused_in_one_line_and_nothing_is_stimulated_after(angle):
+    controller = fresh()
+    with pytest.raises(InputError, match=r"^angle_rad: expected .* in rad.*, found [^\n]*$"):
+        controller.step(angle, REST + 0.2)
+    assert controller.status is Status.REFUSED and controller.step(REST, REST + 0.2) == 0.0
+
+
+@pytest.mark.parametrize(
+    "reference", [100.0, 1e8, math.nan, "1.8", True, [1.8, math.nan], [1.8, "1"], [], np.full((2, 2), 1.8), {}]
+)
+def test_what_is_no_reference_is_refused_in_one_line(reference):
+    controller = fresh()
+    for _ in range(20):
+        controller.step(REST, [REST])
+    with pytest.raises(InputError, match=r"^reference_rad[^\n]*expected[^\n]*$"):
+        controller.step(REST, reference)
+    assert controller.status is Status.REFUSED and not any(controller.step(REST, REST) for _ in range(20))
+
+
+@pytest.mark.parametrize(
+    ("row", "where"), [([1.8, 95.0], r"pulse 1: .*found 95.0 \(degrees\?\)"), (1.8, "a row"), ("12", "a row")]
+)
+def test_a_trajectory_is_checked_before_anything_moves(row, where):
+    controller = fresh()
+    with pytest.raises(InputError, match=where):
+        controller.follow(row)
+    assert controller.status is Status.WAITING
+
+
+def test_single_outliers_do_not_stop():
+    def sensor(k, angle):
+        return angle + math.radians(6.0) if k in {90, 140, 200} else angle
+
+    track(controller := fresh(), RunningTwin(TWIN), WAVE, sensor=sensor)
+    assert controller.status is Status.RUNNING
+
+
+def test_every_fault_has_words():
+    assert len({str(s) for s in Status}) == len(Status) and all(len(str(s)) > 5 for s in Status)
+    assert not Status.WAITING.is_fault and not Status.RUNNING.is_fault and Status.SWINGING.is_fault
