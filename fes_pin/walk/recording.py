@@ -29,8 +29,14 @@ class Recording:
         On one clock; the filter's ends are cut off.
     raw_time, raw_plates
         The plates' own clock and columns, as read.
+    coordinates_time, coordinates
+        The coordinates, as read.
+    hip, cutoff_hz
+        As the motion was read with.
     belt_speed_mps
         Of the treadmill.
+    start_s
+        Time at which the belt's way is 0, s.
     role
         As in the study.
     """
@@ -40,7 +46,12 @@ class Recording:
     plates: Plates
     raw_time: np.ndarray = field(repr=False)
     raw_plates: dict[str, np.ndarray] = field(repr=False)
+    coordinates_time: np.ndarray = field(repr=False)
+    coordinates: dict[str, np.ndarray] = field(repr=False)
+    hip: np.ndarray = field(repr=False)
+    cutoff_hz: float | None = CUTOFF_HZ
     belt_speed_mps: float = 0.0
+    start_s: float = 0.0
     role: str | None = None
 
 
@@ -119,4 +130,6 @@ def _recording(study: Study, trial: Trial, body: Body, hip: np.ndarray, cutoff_h
         plates = plates_of(raw_time, raw, motion.time, cutoff_hz=cutoff_hz, belt_speed_mps=belt, start_s=float(time[0]))
     except InputError as error:
         raise InputError(error.message, file=source, column=error.column) from None
-    return Recording(trial.name, motion, plates, raw_time, raw, belt, trial.role)
+    return Recording(
+        trial.name, motion, plates, raw_time, raw, time, columns, hip, cutoff_hz, belt, float(time[0]), trial.role
+    )

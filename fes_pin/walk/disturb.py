@@ -1,0 +1,68 @@
+"""What errors in the coordinates do to the residual: soft tissue that moves alike in every stride, and white noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fes_pin.data.motion import TRANSLATIONS
+from fes_pin.walk.dynamics import about, centre_of_mass, required
+from fes_pin.walk.motion import motion_of
+from fes_pin.walk.recording import Recording
+from fes_pin.walk.strides import Strides
+
+PAD_S = 0.3
+"""Beside a stride, so that the filter's ends do not matter."""
+TISSUE_M, TISSUE_RAD = 0.002, 0.01
+"""Soft tissue's share of a coordinate's wave once a stride; it falls as 1 / h (Leardini et al., Gait Posture 21, 2005:
+some 10 mm on the thigh, a few degrees in its angles). Only proportions matter."""
+TISSUE_WAVES = 4
+CLUSTER_M = 0.15
+"""Half the length of a cluster of markers, m: noise of markers, in m, over this is noise of angles, in rad."""
+
+Disturbance = Callable[[np.ndarray, np.ndarray, bool, np.random.Generator], np.ndarray]
+
+
+def tissue(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
+    """An error that comes again in each stride, (n,)."""
+    out = np.zeros(len(time))
+    for h in range(1, TISSUE_WAVES + 1):
+        a, b = random.normal(size=2) / h
+        out += a * np.cos(2.0 * np.pi * h * phase) + b * np.sin(2.0 * np.pi * h * phase)
+    return (TISSUE_RAD if angle else TISSUE_M) * out
+
+
+def white(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
+    """White noise as of markers with 1 mm, (n,)."""
+    return 1e-3 * random.normal(size=len(time)) / (CLUSTER_M if angle else 1.0)
+
+
+def disturbed(recording: Recording, strides: Strides, kind: Disturbance, draws: int, seed: int) -> np.ndarray:
+    """Changes of the residual's waves in the first stride: (draws, 6, k)."""
+    _, rows, phase = strides.windows[0]
+    time = recording.motion.time[rows]
+    near = (recording.coordinates_time >= time[0] - PAD_S) & (recording.coordinates_time <= time[-1] + PAD_S)
+    clock = recording.coordinates_time[near]
+    columns = {n: c[near] for n, c in recording.coordinates.items() if n.startswith("q_")}
+    turn = (clock - time[0]) / ((time[-1] - time[0]) * len(time) / (len(time) - 1)) + phase[0]
+    inside = (clock >= time[0] - 1e-9) & (clock <= time[-1] + 1e-9)
+    total = recording.plates.total[rows]
+    random = np.random.default_rng(seed)
+
+    def residual(own: dict[str, np.ndarray]) -> np.ndarray:
+        motion = motion_of(
+            recording.motion.body, clock, own, recording.hip, cutoff_hz=recording.cutoff_hz,
+            belt_speed_mps=recording.belt_speed_mps,
+        ).part(inside)  # fmt: skip
+        way = np.zeros((len(motion.time), 3))
+        way[:, 0] = recording.belt_speed_mps * (clock[0] - recording.start_s)
+        centre = centre_of_mass(motion)
+        return about(total, centre + way) - about(required(motion), centre)
+
+    base = residual(columns)
+    out = []
+    for _ in range(draws):
+        moved = {n: c + kind(clock, turn, n.removeprefix("q_") not in TRANSLATIONS, random) for n, c in columns.items()}
+        out.append((residual(moved) - base)[:, :, None])
+    return strides.first(np.concatenate(out, axis=2))

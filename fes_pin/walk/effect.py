@@ -1,0 +1,124 @@
+"""What a walking model may leave out: causes, and the forms that each can take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from fes_pin.body.joints import SIDES
+from fes_pin.walk.scene import Scene
+
+STAGE = "body"
+"""Where the contract files these causes."""
+AXES = ("forward", "left", "up")
+
+Columns = Callable[[Scene], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Form:
+    """One way in which a cause may act.
+
+    Attributes
+    ----------
+    cause
+        Its canonical name.
+    site
+        Where or how, in a few words.
+    parameters, units
+        Of each column.
+    plausible
+        A size of each parameter that is large but happens; what stays unseen at this size is not testable.
+    columns
+        Residual (measured - required) per unit of each parameter: (n, 6, p).
+    shifts
+        Whether the parameter is a shift of the plates' clock, which the fit follows beyond the linear.
+    positive
+        Whether a negative value has no meaning.
+    segments
+        By segment, the change of its ten mass parameters per unit of each parameter, (10, p), given what is believed.
+    """
+
+    cause: str
+    site: str
+    parameters: tuple[str, ...]
+    units: tuple[str, ...]
+    plausible: tuple[float, ...]
+    columns: Columns = field(repr=False, compare=False)
+    shifts: bool = False
+    positive: bool = False
+    segments: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]] | None = field(
+        default=None, repr=False, compare=False
+    )
+
+    @property
+    def label(self) -> str:
+        """Cause and site."""
+        return f"{self.cause} ({self.site})"
+
+
+class WalkEffect:
+    """One physical thing that a model of walking leaves out, or a measurement gets wrong.
+
+    A subclass says what it is in its docstring and lists its forms. Each form is linear in its parameters.
+
+    Attributes
+    ----------
+    name
+        The canonical name of the cause.
+    """
+
+    name: ClassVar[str]
+    rigs: ClassVar[tuple[str, ...]] = ("body",)
+
+    @classmethod
+    def forms(cls) -> Iterator[Form]:
+        """Every form, the simplest first."""
+        raise NotImplementedError
+
+
+SITES: dict[str, tuple[str, ...]] = {
+    "trunk": ("trunk",),
+    "pelvis": ("pelvis",),
+    **{f"both {part}s": tuple(f"{side}_{part}" for side in SIDES) for part in ("thigh", "shank")},
+    "both feet": tuple(f"{side}_{part}" for side in SIDES for part in ("hindfoot", "forefoot")),
+    **{f"{side} {part}": (f"{side}_{part}",) for part in ("thigh", "shank") for side in SIDES},
+    **{f"{side} foot": tuple(f"{side}_{part}" for part in ("hindfoot", "forefoot")) for side in SIDES},
+}
+"""Where a segment's figures may be off: one segment, or the same of both legs."""
+
+
+def segment_form(
+    cause: str,
+    site: str,
+    parameters: tuple[str, ...],
+    units: tuple[str, ...],
+    plausible: tuple[float, ...],
+    change: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]],
+) -> Form:
+    """A form that changes segments' mass parameters: its columns are Pinocchio's regressors times that change."""
+
+    def columns(scene: Scene) -> np.ndarray:
+        return sum(scene.regressors[s] @ d for s, d in change(scene.parameters).items())  # type: ignore[return-value]
+
+    return Form(cause, site, parameters, units, plausible, columns, segments=change)
+
+
+def central(parameters: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, centre (3,) and inertia about the centre (3, 3) of ten mass parameters."""
+    mass = float(parameters[0])
+    centre = parameters[1:4] / mass
+    return mass, centre, _matrix(parameters[4:]) - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+
+
+def _matrix(six: np.ndarray) -> np.ndarray:
+    xx, xy, yy, xz, yz, zz = six
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def six_of(matrix: np.ndarray) -> np.ndarray:
+    """A symmetric matrix in Pinocchio's order: xx, xy, yy, xz, yz, zz."""
+    return np.array([matrix[0, 0], matrix[0, 1], matrix[1, 1], matrix[0, 2], matrix[1, 2], matrix[2, 2]])

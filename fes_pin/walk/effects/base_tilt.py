@@ -1,0 +1,41 @@
+"""The ground slopes: gravity acts at another angle than believed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from fes_pin.body.build import GRAVITY
+from fes_pin.walk.effect import Form, WalkEffect
+from fes_pin.walk.scene import Scene
+
+_WORDS = {"forward": 0, "left": 1}
+
+
+class BaseTilt(WalkEffect):
+    """The treadmill or the laboratory's frame slopes: gravity acts at another angle than believed.
+
+        g -> g + g0 tilt, along the frame's level axes; positive: downhill that way
+
+    Tell-tale: a horizontal force of constant size, tilt times weight, at the centre of mass.
+    Source: gravity in a frame that is not level.
+    """
+
+    name = "base_tilt"
+
+    @classmethod
+    def forms(cls) -> Iterator[Form]:
+        for words in (("forward",), ("left",), ("forward", "left")):
+            names = tuple(f"{w}_rad" for w in words)
+            columns = partial(_tilted, axes=tuple(_WORDS[w] for w in words))
+            yield Form(cls.name, " and ".join(words), names, ("rad",) * len(words), (0.05,) * len(words), columns)
+
+
+def _tilted(scene: Scene, axes: tuple[int, ...]) -> np.ndarray:
+    mass = sum(p[0] for p in scene.parameters.values())
+    out = np.zeros((len(scene.centre), 6, len(axes)))
+    for k, axis in enumerate(axes):
+        out[:, axis, k] = -mass * GRAVITY
+    return out

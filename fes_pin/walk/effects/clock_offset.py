@@ -1,0 +1,30 @@
+"""Force plates and motion capture are not in time with each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fes_pin.walk.effect import Form, WalkEffect
+from fes_pin.walk.scene import Scene
+
+
+class ClockOffset(WalkEffect):
+    """Force plates and motion capture are not in time with each other.
+
+        measured(t) = true(t - late); positive: the plates are late
+
+    Tell-tale: the residual is the rate of the reaction, greatest where a foot comes and goes.
+    Source: two recorders, one trigger; a camera's exposure, an amplifier's filter.
+    """
+
+    name = "clock_offset"
+
+    @classmethod
+    def forms(cls) -> Iterator[Form]:
+        yield Form(cls.name, "both plates", ("late_s",), ("s",), (0.03,), _rate, shifts=True)
+
+
+def _rate(scene: Scene) -> np.ndarray:
+    return -np.gradient(scene.measured, scene.dt, axis=0)[:, :, None]

@@ -1,0 +1,52 @@
+"""Something pushes or holds the body that no plate measures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from fes_pin.walk.effect import AXES, Form, WalkEffect
+from fes_pin.walk.misfit import segment_poses
+from fes_pin.walk.scene import Scene
+
+PLACES = {
+    "pelvis": ("pelvis", (0.0, 0.0, 0.0)),
+    "trunk": ("trunk", (0.0, 0.0, 0.30)),
+    "left hand": ("trunk", (0.25, 0.35, 0.10)),
+    "right hand": ("trunk", (0.25, -0.35, 0.10)),
+}
+"""Segment and place in it, m from the centre between the hips or from the lumbar joint: belt, harness, hand rails
+beside the hips (round figures for an adult)."""
+
+
+class ExternalForce(WalkEffect):
+    """A hand rail, harness or push carries load that no plate measures.
+
+        measured = required - F, at a place that moves with pelvis or trunk; F constant
+
+    Tell-tale: plates show too little weight, or a horizontal force whose mean is not zero although the speed is steady.
+    Source: equilibrium of the whole body; a steady walk's mean acceleration is zero.
+    """
+
+    name = "external_force"
+
+    @classmethod
+    def forms(cls) -> Iterator[Form]:
+        for place in PLACES:
+            for axes in ((0,), (1,), (2,), (0, 2)):
+                names = tuple(f"{AXES[a]}_n" for a in axes)
+                words = " and ".join(AXES[a] for a in axes)
+                columns = partial(_pushed, place=place, axes=axes)
+                yield Form(cls.name, f"{place}, {words}", names, ("N",) * len(axes), (50.0,) * len(axes), columns)
+
+
+def _pushed(scene: Scene, place: str, axes: tuple[int, ...]) -> np.ndarray:
+    segment, offset = PLACES[place]
+    turn, origin = segment_poses(scene.motion)[segment]
+    point = origin + turn @ np.array(offset)
+    if segment == "pelvis":  # the pelvis's link begins at one hip
+        poses = segment_poses(scene.motion)
+        point = 0.5 * (poses["left_thigh"][1] + poses["right_thigh"][1]) + turn @ np.array(offset)
+    return np.stack([-scene.force_at(point, np.eye(3)[a]) for a in axes], axis=2)

@@ -1,0 +1,32 @@
+"""Accelerations carry noise or filtering that the plates do not confirm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fes_pin.walk.effect import Form, WalkEffect
+from fes_pin.walk.scene import Scene
+
+
+class MarkerNoise(WalkEffect):
+    """Accelerations carry noise or filtering that the plates do not confirm.
+
+        required = true + smoothing^2 d2 required / dt2 (motion smoothed more than the plates), or
+        coordinates = true + white noise, whose second derivative is in the required reaction
+
+    Tell-tale: too little of the reaction's fast part, or a residual that no two strides share and that grows with
+    frequency.
+    Source: a low pass of width s keeps 1 - (s w)^2 / 2 of a slow wave; noise of differentiated signals grows as w^4.
+    """
+
+    name = "marker_noise"
+
+    @classmethod
+    def forms(cls) -> Iterator[Form]:
+        yield Form(cls.name, "smoothed", ("smoothing_s2",), ("s2",), (4e-4,), _smoothed, positive=True)
+
+
+def _smoothed(scene: Scene) -> np.ndarray:
+    return -np.gradient(np.gradient(scene.needed, scene.dt, axis=0), scene.dt, axis=0)[:, :, None]

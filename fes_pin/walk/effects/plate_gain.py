@@ -1,0 +1,46 @@
+"""A force plate reads off by a factor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from fes_pin.body.joints import SIDES
+from fes_pin.walk.effect import Form, WalkEffect
+from fes_pin.walk.scene import Scene
+
+
+class PlateGain(WalkEffect):
+    """A force plate reads off by a factor, in all of its channels or in one axis of the force.
+
+        read = (1 + share) true
+
+    Tell-tale: the residual is a copy of one foot's reaction; weight is off while that foot stands.
+    Source: amplifier gain, calibration matrix.
+    """
+
+    name = "plate_gain"
+
+    @classmethod
+    def forms(cls) -> Iterator[Form]:
+        for site in ("both plates", *(f"{side} plate" for side in SIDES)):
+            sides = SIDES if site == "both plates" else (site.split()[0],)
+            yield Form(cls.name, site, ("share",), ("",), (0.1,), partial(_scaled, sides=sides, axes=(0, 1, 2)))
+            for axis, word in ((2, "vertical"), (0, "forward"), (1, "sideways")):
+                columns = partial(_scaled, sides=sides, axes=(axis,))
+                yield Form(cls.name, f"{site}, {word}", ("share",), ("",), (0.1,), columns)
+
+
+def _scaled(scene: Scene, sides: tuple[str, ...], axes: tuple[int, ...]) -> np.ndarray:
+    total = np.zeros((len(scene.centre), 6, 1))
+    for side in sides:
+        if len(axes) == 3:
+            total[:, :, 0] += scene.true_feet[side]
+            continue
+        force = np.zeros((len(scene.centre), 3))
+        force[:, axes] = scene.true_feet[side][:, axes]
+        arm = scene.plates.pressure[side] - scene.centre
+        total[:, :, 0] += np.hstack([force, np.cross(arm, force)])
+    return total

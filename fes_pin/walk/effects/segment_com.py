@@ -1,0 +1,53 @@
+"""A segment's centre of mass lies elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from fes_pin.walk.effect import AXES, SITES, Form, WalkEffect, central, segment_form, six_of
+
+
+class SegmentCom(WalkEffect):
+    """A segment's centre of mass lies elsewhere in it than the anthropometric table says.
+
+        c -> c + d, mass and central inertia as believed; d forward, to the left (both legs: outwards), up at neutral
+
+    Tell-tale: a moment that turns with the segment, m g d level, m a d with its acceleration; for the trunk it is the
+    classic finding of residual reduction.
+    Source: S. L. Delp et al., OpenSim, IEEE Trans. Biomed. Eng. 54:1940, 2007 (RRA moves the torso's centre of mass).
+    """
+
+    name = "segment_com"
+
+    @classmethod
+    def forms(cls) -> Iterator[Form]:
+        for site, segments in SITES.items():
+            for axes in ((0,), (1,), (2,), *(((0, 1), (0, 2)) if len(segments) == 1 else ())):
+                names = tuple(f"{AXES[a]}_m" if len(segments) == 1 or a != 1 else "outwards_m" for a in axes)
+                words = " and ".join(n.removesuffix("_m") for n in names)
+                label, size = f"{site}, {words}", (0.03,) * len(axes)
+                yield segment_form(cls.name, label, names, ("m",) * len(axes), size, _shifted(segments, axes))
+
+
+def _shifted(
+    segments: tuple[str, ...], axes: tuple[int, ...]
+) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
+    def change(believed: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        out = {}
+        for s in segments:
+            outwards = -1.0 if len(segments) > 1 and s.startswith("right") else 1.0
+            columns = [(outwards if a == 1 else 1.0) * _along(believed[s], a) for a in axes]
+            out[s] = np.stack(columns, axis=1)
+        return out
+
+    return change
+
+
+def _along(believed: np.ndarray, axis: int) -> np.ndarray:
+    """Derivative of the ten parameters by the centre's place along one axis."""
+    mass, centre, _ = central(believed)
+    unit = np.eye(3)[axis]
+    grown = mass * (2.0 * centre[axis] * np.eye(3) - np.outer(unit, centre) - np.outer(centre, unit))
+    return np.concatenate([[0.0], mass * unit, six_of(grown)])

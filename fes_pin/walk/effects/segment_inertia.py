@@ -1,0 +1,33 @@
+"""A segment's inertia tensor is off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from fes_pin.walk.effect import SITES, Form, WalkEffect, central, segment_form, six_of
+
+
+class SegmentInertia(WalkEffect):
+    """A segment's inertia about its centre of mass is off by a factor.
+
+        I -> (1 + share) I, mass and centre as believed
+
+    Tell-tale: a moment as the segment's angular acceleration, and no force.
+    Source: radii of gyration of different tables differ by some 10 %: de Leva, J. Biomech. 29, 1996.
+    """
+
+    name = "segment_inertia"
+
+    @classmethod
+    def forms(cls) -> Iterator[Form]:
+        for site, segments in SITES.items():
+            yield segment_form(cls.name, site, ("share",), ("",), (0.3,), _scaled(segments))
+
+
+def _scaled(segments: tuple[str, ...]) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
+    def change(believed: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return {s: np.concatenate([np.zeros(4), six_of(central(believed[s])[2])])[:, None] for s in segments}
+
+    return change

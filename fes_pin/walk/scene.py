@@ -1,0 +1,97 @@
+"""What a diagnosis of walking sees of a trial: the residual of the ground reaction, and what could make it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from fes_pin.walk.dynamics import about, centre_of_mass, required, segment_parameters, segment_regressors
+from fes_pin.walk.motion import Motion
+from fes_pin.walk.plates import Plates, plates_of
+from fes_pin.walk.recording import Recording
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One trial. Forces in N, moments in N m about the believed centre of mass; x forward, y left, z up.
+
+    Attributes
+    ----------
+    name
+        Of the trial.
+    motion, plates
+        On one clock.
+    centre
+        (n, 3) m: the believed centre of mass.
+    """
+
+    name: str
+    motion: Motion = field(repr=False)
+    plates: Plates = field(repr=False)
+    centre: np.ndarray = field(repr=False)
+
+    @cached_property
+    def needed(self) -> np.ndarray:
+        """The reaction that the motion requires: (n, 6)."""
+        return about(required(self.motion), self.centre)
+
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """Measured - required: (n, 6)."""
+        return self.measured - self.needed
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        """Both feet together: (n, 6)."""
+        return about(self.plates.total, self.centre)
+
+    @cached_property
+    def feet(self) -> dict[str, np.ndarray]:
+        """Measured reaction of each foot: (n, 6)."""
+        return {side: about(wrench, self.centre) for side, wrench in self.plates.feet.items()}
+
+    @cached_property
+    def true_feet(self) -> dict[str, np.ndarray]:
+        """What each foot's reaction would be if both together were what the motion requires: (n, 6).
+
+        The residual is shared out as the vertical load is. An error in proportion to the reaction is one in proportion
+        to this: were it counted from the reading, a gain that makes all readings small would make every residual small.
+        """
+        up = {side: np.clip(wrench[:, 2], 0.0, None) for side, wrench in self.feet.items()}
+        total = np.maximum(sum(up.values()), 1.0)
+        return {side: wrench - (up[side] / total)[:, None] * self.residual for side, wrench in self.feet.items()}
+
+    @cached_property
+    def regressors(self) -> dict[str, np.ndarray]:
+        """By segment, (n, 6, 10); see `segment_regressors`."""
+        return {s: about(y, self.centre) for s, y in segment_regressors(self.motion).items()}
+
+    @cached_property
+    def parameters(self) -> dict[str, np.ndarray]:
+        """By segment, (10,): what is believed."""
+        return segment_parameters(self.motion)
+
+    @property
+    def dt(self) -> float:
+        """Time step, s."""
+        return self.motion.dt
+
+    def force_at(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """A force of 1 N along world directions at points: (n, 6) about the centre; `point`, `direction` (n, 3)."""
+        along = np.broadcast_to(direction, point.shape)
+        return np.hstack([along, np.cross(point - self.centre, along)])
+
+
+def scene_of(recording: Recording, cutoff_hz: float | None, later_s: float = 0.0) -> Scene:
+    """A trial as a scene; `later_s` reads the plates that much later than their clock says."""
+    plates = recording.plates
+    if later_s:
+        time = recording.raw_time - later_s
+        held = np.clip(recording.motion.time, time[0], time[-1])
+        plates = plates_of(
+            time, recording.raw_plates, held, cutoff_hz=cutoff_hz, belt_speed_mps=recording.belt_speed_mps,
+            start_s=recording.start_s - later_s,
+        )  # fmt: skip
+    return Scene(recording.name, recording.motion, plates, centre_of_mass(recording.motion))

@@ -1,0 +1,262 @@
+"""The search for sets of causes: every form beside every other, by one likelihood with a price for each parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fes_pin.body.build import GRAVITY
+from fes_pin.walk.disturb import disturbed, tissue, white
+from fes_pin.walk.effect import Form
+from fes_pin.walk.effects import EFFECTS
+from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, Fitted, Noise, fit, fit_many, rotation
+from fes_pin.walk.recording import Recording
+from fes_pin.walk.scene import Scene, scene_of
+from fes_pin.walk.strides import Strides, strides_of
+
+BEAM = 4
+"""Sets of one size that are carried on."""
+MOST = 3
+"""Causes in a set, at most."""
+SIMULATED = 100
+"""Residuals without a cause that the critical value is taken from."""
+LEVEL = 0.01
+"""Chance that anything is named where nothing is wrong, over the whole library, if the noise is what it is taken for."""
+SEPARABLE = 6.0
+"""Twice the log-likelihood by which a rival must fall short: odds of 20 to 1."""
+SIMULATED_ROUNDS = 4
+TISSUE_DRAWS, WHITE_DRAWS = 40, 8
+FLOOR_SHARE = 0.3
+"""Of the fitted noise beside soft tissue's, as amplitudes."""
+TAKEN = 0.3
+"""Share of a wave of the required reaction that errors in the motion may make, as a standard deviation: soft tissue
+moves by 10 mm and more where a trunk moves by 20 to 40 (A. Leardini et al., Gait Posture 21:212, 2005)."""
+SHIFT_ROUNDS = 4
+"""Of following a shift of the clock."""
+
+Chosen = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Residual and columns of every form, (1, 6, k, ...) in the mean stride, for plates read `later_s` late."""
+
+    scenes: list[Scene] = field(repr=False)
+    y: np.ndarray = field(repr=False)
+    x: list[np.ndarray] = field(repr=False)
+    later_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Set:
+    """A set of forms with its fit; its price is its deviance: sizes are integrated over their priors."""
+
+    forms: Chosen
+    fitted: Fitted = field(repr=False)
+    price: float
+
+
+def library() -> tuple[Form, ...]:
+    """Every form of every cause."""
+    return tuple(form for effect in EFFECTS for form in effect.forms())
+
+
+class Search:
+    """One diagnosis's fits."""
+
+    def __init__(self, recordings: Sequence[Recording], cutoff_hz: float, seed: int = 0) -> None:
+        self.recordings, self.cutoff_hz = list(recordings), cutoff_hz
+        self.forms = library()
+        scenes = [scene_of(r, cutoff_hz) for r in self.recordings]
+        self.strides: Strides = strides_of(scenes, cutoff_hz)
+        self.banks = {False: self._bank(scenes, 0.0)}
+        first = self.recordings[self.strides.windows[0][0]]
+        self.tissue = disturbed(first, self.strides, tissue, TISSUE_DRAWS, seed)
+        self.jitter = self._jitter(disturbed(first, self.strides, white, WHITE_DRAWS, seed))
+        self._turn(self.banks[False].y)
+        self.shift = next(i for i, f in enumerate(self.forms) if f.shifts)
+        self.banks[True] = self._shifted()
+        self.fits: dict[Chosen, Set] = {}
+
+    def _bank(self, scenes: list[Scene], later_s: float) -> Bank:
+        y = self.strides.mean([s.residual[:, :, None] for s in scenes])[..., 0]
+        x = [self.strides.mean([form.columns(s) for s in scenes]) for form in self.forms]
+        return Bank(scenes, y, x, later_s)
+
+    def _jitter(self, draws: np.ndarray) -> np.ndarray:
+        """Second moment of what white noise leaves, wave by wave, of draws (draws, 6, k): (6, 6, k)."""
+        moment = np.einsum("dik,djk->ijk", draws, draws) / len(draws)
+        h = self.strides.harmonics
+        for wave in np.unique(h):
+            moment[:, :, h == wave] = moment[:, :, h == wave].mean(axis=2, keepdims=True)
+        return moment
+
+    def _turn(self, left: np.ndarray) -> None:
+        turn = rotation(left, self.strides.harmonics)
+        scene = self.banks[False].scenes[0]
+        weight = GRAVITY * sum(p[0] for p in scene.parameters.values())
+        means = np.r_[np.full(3, MEAN_FORCE * weight), np.full(3, MEAN_ARM_M * weight)] ** 2
+        bare = Noise(self.strides.harmonics, turn, means, self._none())
+        self.noise = replace(bare, nuisance=bare.rotated(self._nuisance()))
+        self.fits = {}
+
+    def _nuisance(self) -> np.ndarray:
+        """What errors in the motion take from every wave of the required reaction, in units of `TAKEN`: (n, 6, k, 7).
+
+        A share of each channel, and one that grows with the square of the frequency, as of accelerations.
+        """
+        h = self.strides.harmonics
+        needed = self.strides.mean([s.needed[:, :, None] for s in self.banks[False].scenes])[..., 0]
+        waves = needed * (h > 0)
+        out = np.zeros((*waves.shape, 7))
+        for channel in range(6):
+            out[:, channel, :, channel] = TAKEN * waves[:, channel]
+        out[..., 6] = TAKEN * waves * (h / 4.0) ** 2
+        return out
+
+    def _shifted(self) -> Bank:
+        """The plates read as late as fits best, followed beyond the linear."""
+        later, bank = 0.0, self.banks[False]
+        for _ in range(SHIFT_ROUNDS):
+            prior = np.array(self.forms[self.shift].plausible)
+            found = fit(self.noise.rotated(bank.y), self.noise.rotated(bank.x[self.shift]), prior, self.noise)
+            step = float(np.clip(found.values[0], -0.05, 0.05))
+            later = float(np.clip(later + step, -0.2, 0.2))
+            scenes = [scene_of(r, self.cutoff_hz, later) for r in self.recordings]
+            y = self.strides.mean([s.residual[:, :, None] for s in scenes])[..., 0]
+            rate = self.strides.mean([self.forms[self.shift].columns(s) for s in scenes])
+            x = list(bank.x)
+            x[self.shift] = rate
+            bank = Bank(scenes, y, x, later)
+            if abs(step) < 5e-4:
+                break
+        return self._bank(bank.scenes, later)
+
+    def bank(self, chosen: Chosen) -> Bank:
+        """The bank in which a set is fitted: with the clock moved if it holds a shift."""
+        return self.banks[self.shift in chosen]
+
+    def columns(self, chosen: Chosen) -> np.ndarray:
+        """Rotated columns of a set, one form after the other: (n, 6, k, p)."""
+        bank = self.bank(chosen)
+        return self.noise.rotated(np.concatenate([bank.x[i] for i in chosen], axis=3)) if chosen else self._none()
+
+    def _none(self) -> np.ndarray:
+        return np.zeros((*self.banks[False].y.shape, 0))
+
+    def fit(self, chosen: Chosen) -> Set:
+        """A set's fit; kept."""
+        chosen = tuple(sorted(chosen))
+        if chosen not in self.fits:
+            y = self.noise.rotated(self.bank(chosen).y)
+            prior = np.array([size for i in chosen for size in self.forms[i].plausible])
+            fitted = fit(y, self.columns(chosen), prior, self.noise)
+            possible = all(v >= 0.0 for i, v in self._named(chosen, fitted.values) if self.forms[i].positive)
+            self.fits[chosen] = Set(chosen, fitted, fitted.deviance if possible else np.inf)
+        return self.fits[chosen]
+
+    def _named(self, chosen: Chosen, values: np.ndarray) -> Iterator[tuple[int, float]]:
+        """Form and value of every parameter of a set."""
+        owners = [i for i in chosen for _ in self.forms[i].parameters]
+        return zip(owners, values.tolist(), strict=False)
+
+    def sizes(self, one: Set) -> dict[int, np.ndarray]:
+        """Values of a set's parameters by form; a shift counts from the clock as it was read."""
+        out: dict[int, list[float]] = {i: [] for i in one.forms}
+        for i, value in self._named(one.forms, one.fitted.values):
+            out[i].append(value + (self.banks[True].later_s if self.forms[i].shifts else 0.0))
+        return {i: np.array(values) for i, values in out.items()}
+
+    def causes(self, chosen: Chosen) -> list[str]:
+        """Names of a set's causes."""
+        return [self.forms[i].cause for i in chosen]
+
+    def extensions(self, chosen: Chosen) -> Iterator[Chosen]:
+        """The set with one more form, of a site that it has not: no two forms of one cause at one site."""
+        taken = {_place(self.forms[i]) for i in chosen}
+        for i, form in enumerate(self.forms):
+            if _place(form) not in taken:
+                yield tuple(sorted((*chosen, i)))
+
+    def run(self) -> list[Set]:
+        """The best set of every size, from none on; the channels are rotated anew for what the best one leaves."""
+        best = self._beam(2)[-1]
+        residual = self.bank(best.forms).y
+        if best.forms:
+            found = np.concatenate([self.bank(best.forms).x[i] for i in best.forms], axis=3)
+            residual = residual - found @ best.fitted.values[: found.shape[3]]
+        self._turn(residual)
+        return self._beam(MOST)
+
+    def _beam(self, most: int) -> list[Set]:
+        sizes = [self.fit(())]
+        front = [sizes[0]]
+        for _ in range(most):
+            seen = {chosen for one in front for chosen in self.extensions(one.forms)}
+            ranked = sorted((self.fit(c) for c in seen), key=lambda s: (s.price, s.forms))
+            front = self._diverse(ranked)
+            sizes.append(self._swapped(ranked[0]))
+            if sizes[-1].price > sizes[-2].price:
+                break
+        return sizes
+
+    def _diverse(self, ranked: list[Set]) -> list[Set]:
+        """The best sets, at most two of the same causes."""
+        kept: list[Set] = []
+        for one in ranked:
+            names = sorted(self.causes(one.forms))
+            if sum(sorted(self.causes(k.forms)) == names for k in kept) < 2:
+                kept.append(one)
+            if len(kept) == BEAM:
+                break
+        return kept
+
+    def _swapped(self, one: Set) -> Set:
+        """The set after every single swap that makes it better."""
+        while len(one.forms) > 1:
+            better = min((s for _, s in self.swaps(one)), key=lambda s: (s.price, s.forms))
+            if better.price >= one.price - 1e-6:
+                return one
+            one = better
+        return one
+
+    def swaps(self, one: Set) -> Iterator[tuple[int, Set]]:
+        """Every set in which one form stands in another's place: the form that went, and the set."""
+        for gone in one.forms:
+            rest = tuple(i for i in one.forms if i != gone)
+            for chosen in self.extensions(rest):
+                if chosen != one.forms:
+                    yield gone, self.fit(chosen)
+
+    def critical(self, noise_of: Set, seed: int) -> float:
+        """What the best form of the library gains, price paid, where there is none: exceeded with chance `LEVEL`."""
+        return float(np.quantile(self.null_gains(noise_of, seed), 1.0 - LEVEL))
+
+    def null_gains(self, noise_of: Set, seed: int) -> np.ndarray:
+        """Gains of the best form where there is none: (SIMULATED,).
+
+        Noise is soft tissue's, errors in the coordinates carried through the body, and some of the fitted noise.
+        """
+        variance = noise_of.fitted.variance
+        random = np.random.default_rng(seed)
+        drawn = random.normal(size=(SIMULATED, *variance.shape)) * np.sqrt(variance)
+        mixed = random.normal(size=(SIMULATED, len(self.tissue))) / np.sqrt(len(self.tissue))
+        shared = np.einsum("sd,djk->sjk", mixed, self.tissue)
+        shared = self.noise.rotated(shared)
+        waves = self.noise.harmonics > 0
+        size = np.sqrt(variance[0][:, waves].sum() / np.mean(np.sum(shared[..., waves] ** 2, axis=(1, 2))))
+        drawn[:, 0][..., waves] = size * shared[..., waves] + FLOOR_SHARE * drawn[:, 0][..., waves]
+        none = np.zeros((*variance.shape, 0))
+        alone = fit_many(drawn, none, np.zeros(0), self.noise, SIMULATED_ROUNDS)[2]
+        best = np.full(SIMULATED, -np.inf)
+        for i, form in enumerate(self.forms):
+            x = self.noise.rotated(self.banks[False].x[i])
+            fitted = fit_many(drawn, x, np.array(form.plausible), self.noise, SIMULATED_ROUNDS)
+            best = np.maximum(best, alone - fitted[2])
+        return best
+
+
+def _place(form: Form) -> tuple[str, str]:
+    return form.cause, form.site.split(",")[0]
