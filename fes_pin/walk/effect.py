@@ -102,7 +102,7 @@ def segment_form(
     """A form that changes segments' mass parameters: its columns are Pinocchio's regressors times that change."""
 
     def columns(scene: Scene) -> np.ndarray:
-        return sum(scene.regressors[s] @ d for s, d in change(scene.parameters).items())  # type: ignore[return-value]
+        return np.sum([scene.regressors[s] @ d for s, d in change(scene.parameters).items()], axis=0)
 
     return Form(cause, site, parameters, units, plausible, columns, segments=change)
 

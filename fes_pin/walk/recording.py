@@ -26,7 +26,7 @@ class Recording:
     name
         Of the trial.
     motion, plates
-        On one clock; the filter's ends are cut off.
+        On one clock; where coordinates are filtered, the filter's ends are cut off.
     raw_time, raw_plates
         The plates' own clock and columns, as read.
     coordinates_time, coordinates
@@ -120,7 +120,8 @@ def _recording(study: Study, trial: Trial, body: Body, hip: np.ndarray, cutoff_h
         columns = {n: v for n, v in trial.columns.items() if n.startswith(("q_", "qd_", "qdd_"))}
         raw = {n: v for n, v in trial.columns.items() if n not in columns}
     belt = trial.conditions.get("belt_speed_mps", 0.0)
-    edge = 0.5 / cutoff_hz if cutoff_hz else 0.0
+    filtered = cutoff_hz and not all(f"qdd_{n[2:]}" in columns for n in columns if n.startswith("q_"))
+    edge = 0.5 / cutoff_hz if cutoff_hz and filtered else 0.0
     inside = (time >= max(raw_time[0], time[0] + edge)) & (time <= min(raw_time[-1], time[-1] - edge))
     if inside.sum() < 10:
         raise InputError(f"trial {trial.name} has {inside.sum()} samples of motion and reaction together", file=source)

@@ -23,7 +23,7 @@ MOST = 3
 SIMULATED = 100
 """Residuals without a cause that the critical value is taken from."""
 LEVEL = 0.01
-"""Chance that anything is named where nothing is wrong, over the whole library, if the noise is what it is taken for."""
+"""Chance that anything is named where nothing is wrong, over the whole library, in soft tissue's noise."""
 SEPARABLE = 6.0
 """Twice the log-likelihood by which a rival must fall short: odds of 20 to 1."""
 SIMULATED_ROUNDS = 4
@@ -33,6 +33,8 @@ FLOOR_SHARE = 0.3
 TAKEN = 0.3
 """Share of a wave of the required reaction that errors in the motion may make, as a standard deviation: soft tissue
 moves by 10 mm and more where a trunk moves by 20 to 40 (A. Leardini et al., Gait Posture 21:212, 2005)."""
+POSSIBLE = 3.0
+"""Sizes beyond this many times the plausible one are no explanation."""
 SHIFT_ROUNDS = 4
 """Of following a shift of the clock."""
 
@@ -153,7 +155,8 @@ class Search:
             y = self.noise.rotated(self.bank(chosen).y)
             prior = np.array([size for i in chosen for size in self.forms[i].plausible])
             fitted = fit(y, self.columns(chosen), prior, self.noise)
-            possible = all(v >= 0.0 for i, v in self._named(chosen, fitted.values) if self.forms[i].positive)
+            possible = bool((np.abs(fitted.values) <= POSSIBLE * prior).all())
+            possible &= all(v >= 0.0 for i, v in self._named(chosen, fitted.values) if self.forms[i].positive)
             self.fits[chosen] = Set(chosen, fitted, fitted.deviance if possible else np.inf)
         return self.fits[chosen]
 

@@ -184,7 +184,7 @@ def make(gait, folder, wrong, seed, subject=None):
     truth = {n[2:]: base[:, k] for k, n in enumerate(gait.names)}
     for n in ("pelvis_tx", "pelvis_ty", "pelvis_tz"):
         truth[n] = truth[n] * scale
-    real, gravity, push = hidden_body(person, wrong)
+    real, gravity = hidden_body(person, wrong)
     wrench, anchor, place = required(real, truth, dt, gravity)
     wrench = wrench - external(wrong, place, anchor, len(time))
     feet = split(gait, wrench, phase, anchor, place)
@@ -215,7 +215,7 @@ def hidden_body(person, wrong):
             real.inertia[s] = (1 + wrong.size) * person.inertia[s]
     if wrong.cause == "base_tilt":
         gravity = tuple(G * np.array([*(wrong.size * np.array(wrong.extra["axis"][:2])), -np.sqrt(1 - wrong.size**2)]))
-    return real, gravity, None
+    return real, gravity
 
 
 def external(wrong, place, anchor, n):
@@ -297,6 +297,7 @@ def write(folder, subject, recorded, read, time, wrong, period):
     np.savetxt(
         folder / "grf.csv", np.stack(rows, axis=1), delimiter=",", header=",".join(names), comments="", fmt="%.7g"
     )
-    study = {"study": {"name": folder.name, "rig": "body"}, "rig": {"mass_kg": float(subject.mass_kg), "height_m": float(subject.height_m)},
-             "trial": [{"coordinates": "coords.csv", "ground_reaction": "grf.csv"}]}  # fmt: skip
+    rig = {"mass_kg": float(subject.mass_kg), "height_m": float(subject.height_m)}
+    trial = {"coordinates": "coords.csv", "ground_reaction": "grf.csv"}
+    study = {"study": {"name": folder.name, "rig": "body"}, "rig": rig, "trial": [trial]}
     (folder / "study.toml").write_text(tomli_w.dumps(study))

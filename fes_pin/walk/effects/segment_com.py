@@ -8,6 +8,9 @@ import numpy as np
 
 from fes_pin.walk.effect import AXES, SITES, Form, WalkEffect, central, segment_form, six_of
 
+_PLAUSIBLE = {"trunk": 0.03, "pelvis": 0.02}
+"""m; limbs 0.015: a shank is some 0.05 m thick about its centre."""
+
 
 class SegmentCom(WalkEffect):
     """A segment's centre of mass lies elsewhere in it than the anthropometric table says.
@@ -27,7 +30,7 @@ class SegmentCom(WalkEffect):
             for axes in ((0,), (1,), (2,), *(((0, 1), (0, 2)) if len(segments) == 1 else ())):
                 names = tuple(f"{AXES[a]}_m" if len(segments) == 1 or a != 1 else "outwards_m" for a in axes)
                 words = " and ".join(n.removesuffix("_m") for n in names)
-                label, size = f"{site}, {words}", (0.03,) * len(axes)
+                label, size = f"{site}, {words}", (_PLAUSIBLE.get(site, 0.015),) * len(axes)
                 yield segment_form(cls.name, label, names, ("m",) * len(axes), size, _shifted(segments, axes))
 
 

@@ -1,0 +1,268 @@
+"""The verdict on a study of walking: which causes are named, how sure, with what gain, and what stays open."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.study import Study
+from fes_pin.walk.effect import STAGE
+from fes_pin.walk.experiment import NextExperiment, next_experiment
+from fes_pin.walk.judge import Gain, error_percent, floor_percent, gain, other_leg, remainder, unseen
+from fes_pin.walk.likelihood import white_level
+from fes_pin.walk.recording import recordings_of
+from fes_pin.walk.search import LEVEL, SEPARABLE, Search, Set
+from fes_pin.walk.smooth import CUTOFF_HZ
+
+LEFT_LEVEL = 0.01
+"""Level at which what is left counts as something."""
+CERTAIN = 1e-6
+"""Level of a cause in a single stride."""
+ORDINARY_MM = 2.0
+"""Marker noise up to this is no cause: cameras' and fixations' own (L. Chiari et al., Gait Posture 21:197, 2005)."""
+SURE = 3.0
+"""Standard deviations by which marker noise must exceed that."""
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class WalkCause:
+    """One named cause.
+
+    Attributes
+    ----------
+    name, site
+        What, and where or how.
+    parameters
+        By name: value, standard deviation, unit.
+    equivalents
+        Other causes that these data cannot tell from it.
+    elsewhere
+        Other sites of the same cause that would do as well.
+    p_value
+        Of such a gain where nothing is wrong, over the whole library.
+    gain_fit, gain_held_out
+        On all strides, and on strides that took no part in its size; the second is None for one stride.
+    other_leg_percent
+        Gain on one leg's single supports of sizes fitted to the other's; only for what belongs to neither leg.
+    """
+
+    name: str
+    site: str
+    parameters: dict[str, tuple[float, float, str]]
+    equivalents: tuple[str, ...]
+    elsewhere: tuple[str, ...]
+    p_value: float
+    gain_fit: Gain
+    gain_held_out: Gain | None
+    other_leg_percent: float | None = None
+    stage: str = STAGE
+
+    def helps(self) -> bool:
+        """Whether what took no part speaks for it: strides held out and, for what belongs to neither leg, other stances.
+
+        A single stride leaves nothing out: then only what is certain is named.
+        """
+        if self.gain_held_out is None:
+            return self.p_value < CERTAIN and (self.other_leg_percent is None or self.other_leg_percent > 0.0)
+        return self.gain_held_out.low > 0.0 and (self.other_leg_percent is None or self.other_leg_percent > 0.0)
+
+
+@dataclass(frozen=True)
+class WalkDiagnosis:
+    """What a model of walking gets wrong.
+
+    Attributes
+    ----------
+    verdict
+        "adequate", "causes_found" or "unexplained".
+    causes
+        By held-out gain, largest first.
+    unexplained, left_p_value, left_where
+        Whether what is left comes again in every stride, its p-value, and where it is largest.
+    absorbed
+        Causes that these data could not show.
+    nominal_error, extended_error
+        E in percent: on all strides, and held out.
+    search, best
+        The fits behind it.
+    """
+
+    study: Study
+    verdict: str
+    causes: tuple[WalkCause, ...]
+    unexplained: bool
+    left_p_value: float
+    left_where: str | None
+    absorbed: tuple[str, ...]
+    nominal_error: tuple[float, float | None]
+    extended_error: tuple[float, float | None]
+    ceiling_percent: float
+    next_experiment: NextExperiment | None
+    search: Search = field(repr=False, compare=False)
+    best: Set = field(repr=False, compare=False)
+    cutoff_hz: float = CUTOFF_HZ
+    wall_s: float = field(default=0.0, compare=False)
+
+    def __str__(self) -> str:
+        from fes_pin.walk.text import verdict_text  # noqa: PLC0415
+
+        return verdict_text(self)
+
+
+def diagnose_walk(
+    study: Study, *, seed: int = 0, cutoff_hz: float = CUTOFF_HZ, progress: Progress | None = None
+) -> WalkDiagnosis:
+    """Find out what the believed body and its measurements get wrong in measured walking.
+
+    Parameters
+    ----------
+    study
+        Of rig `body`; trials with the role "held_out" take no part.
+    seed
+        Of what is simulated: soft tissue, critical values, bootstrap intervals.
+    cutoff_hz
+        Of the zero-phase low pass that motion (where its rates are not in the file) and plates go through.
+    progress
+        Called with a share done and a few words.
+
+    Raises
+    ------
+    InputError
+        The study is of another rig, or a file of it cannot be used.
+    """
+    began = time.perf_counter()
+    tell = progress or (lambda _share, _words: None)
+    trials = tuple(t for t in study.trials if t.role != "held_out")
+    if not trials:
+        raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)
+    tell(0.02, "inverse dynamics")
+    _, recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
+    search = Search(recordings, cutoff_hz, seed)
+    tell(0.3, "sets of causes")
+    sizes = search.run()
+    tell(0.7, "critical values")
+    nulls = search.null_gains(sizes[-1], seed)
+    best = _chosen(sizes, max(float(np.quantile(nulls, 1.0 - LEVEL)), 0.0))
+    tell(0.85, "strides held out")
+    out = _judged(study, search, best, nulls, seed)
+    tell(1.0, "done")
+    return replace(out, cutoff_hz=cutoff_hz, wall_s=time.perf_counter() - began)
+
+
+def _chosen(sizes: list[Set], critical: float) -> Set:
+    """The last set whose every step beyond the smaller one gains more than chance does."""
+    best = sizes[0]
+    for larger in sizes[1:]:
+        if best.price - larger.price <= critical:
+            break
+        best = larger
+    return best
+
+
+def _judged(study: Study, search: Search, best: Set, nulls: np.ndarray, seed: int) -> WalkDiagnosis:
+    many = search.strides.count > 1
+    refused = False
+    causes = _causes(search, best, nulls, seed)
+    while weak := [c for c in causes if not c[1].helps()]:
+        refused = True
+        gone = max(weak, key=lambda c: c[1].p_value)[0]
+        best = search.fit(tuple(i for i in best.forms if i != gone))
+        causes = _causes(search, best, nulls, seed)
+    named = [c for _, c in causes]
+    if (noise := _marker_noise(search)) is not None and all(c.name != noise.name for c in named):
+        named.append(noise)
+    p_value, where = remainder(search, best)
+    left = refused or p_value < LEFT_LEVEL
+    order = sorted(named, key=lambda c: -(c.gain_held_out or c.gain_fit).percent)
+    none = search.fit(())
+    return WalkDiagnosis(
+        study=study,
+        verdict="causes_found" if named else ("unexplained" if left else "adequate"),
+        causes=tuple(order),
+        unexplained=left,
+        left_p_value=p_value,
+        left_where=where if left else None,
+        absorbed=tuple(unseen(search, best)),
+        nominal_error=(error_percent(search, none, False), error_percent(search, none, True) if many else None),
+        extended_error=(error_percent(search, best, False), error_percent(search, best, True) if many else None),
+        ceiling_percent=floor_percent(search),
+        next_experiment=_experiment(search, best, order),
+        search=search,
+        best=best,
+    )
+
+
+def _causes(search: Search, best: Set, nulls: np.ndarray, seed: int) -> list[tuple[int, WalkCause]]:
+    sizes = search.sizes(best)
+    spread = np.sqrt(np.diag(best.fitted.covariance))
+    owners = [i for i in best.forms for _ in search.forms[i].parameters]
+    rivals: dict[int, list[Set]] = {i: [] for i in best.forms}
+    for gone, other in search.swaps(best):
+        if other.price - best.price < SEPARABLE:
+            rivals[gone].append(other)
+    out = []
+    for i in best.forms:
+        form, without = search.forms[i], search.fit(tuple(k for k in best.forms if k != i))
+        stds = [s for owner, s in zip(owners, spread, strict=True) if owner == i]
+        instead = [search.forms[k] for r in rivals[i] for k in r.forms if k not in best.forms]
+        others = tuple(sorted({f.cause for f in instead} - {form.cause}))
+        sites = tuple(dict.fromkeys(f.site for f in instead if f.cause == form.cause))
+        either = not form.site.startswith(("left", "right"))
+        out.append(
+            (
+                i,
+                WalkCause(
+                    name=form.cause,
+                    site=form.site,
+                    parameters={
+                        n: (float(v), float(s), u)
+                        for n, v, s, u in zip(form.parameters, sizes[i], stds, form.units, strict=True)
+                    },
+                    equivalents=others,
+                    elsewhere=sites,
+                    p_value=_tail(without.price - best.price, nulls),
+                    gain_fit=gain(search, without, best, False, seed),
+                    gain_held_out=gain(search, without, best, True, seed) if search.strides.count > 1 else None,
+                    other_leg_percent=other_leg(search, search.fit((i,))) if either else None,
+                ),
+            )
+        )
+    return out
+
+
+def _tail(value: float, nulls: np.ndarray) -> float:
+    """Chance of at least this where nothing is wrong: the maxima's Gumbel distribution, by moments."""
+    scale = float(np.std(nulls)) * np.sqrt(6.0) / np.pi
+    place = float(np.mean(nulls)) - 0.5772156649 * scale
+    return float(max(-np.expm1(-np.exp(-(value - place) / max(scale, 1e-6))), 1e-300))
+
+
+def _marker_noise(search: Search) -> WalkCause | None:
+    """White noise on the coordinates that is more than cameras' own, from what differs from stride to stride."""
+    if search.strides.count < 2:
+        return None
+    y = search.strides.coefficients([s.residual[:, :, None] for s in search.banks[False].scenes])[..., 0]
+    apart = search.noise.rotated((y - y.mean(axis=0)) * np.sqrt(len(y) / (len(y) - 1.0)))
+    jitter = np.einsum("ai,ijk,aj->ak", search.noise.turn, search.jitter, search.noise.turn)
+    level, std, saved = white_level(apart, search.noise, jitter)
+    std *= np.sqrt(len(y) / (len(y) - 1.0))
+    if level - SURE * std < ORDINARY_MM or saved < SEPARABLE:
+        return None
+    from scipy.stats import chi2  # noqa: PLC0415
+
+    whole = Gain(0.0, 0.0, 0.0)
+    parameters = {"markers_m": (1e-3 * level, 1e-3 * std, "m")}
+    return WalkCause("marker_noise", "white", parameters, (), (), float(chi2.sf(saved, 1)), whole, whole)
+
+
+def _experiment(search: Search, best: Set, causes: list[WalkCause]) -> NextExperiment | None:
+    for cause in causes:
+        if cause.equivalents:
+            return next_experiment(search, best, cause.name, SEPARABLE)
+    return None

@@ -1,0 +1,147 @@
+"""The next walk, or stand, that tells two causes apart: which of a few that anybody can do separates them most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.body.build import GRAVITY
+from fes_pin.walk.dynamics import about, centre_of_mass, required
+from fes_pin.walk.motion import Motion
+from fes_pin.walk.plates import Plates
+from fes_pin.walk.scene import Scene
+from fes_pin.walk.search import Search, Set
+
+CARRIED_KG = 10.0
+SLOWER = 0.6
+ENOUGH = 6.0
+"""Twice the log-likelihood that separates, as in the search."""
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """A trial to do next.
+
+    Attributes
+    ----------
+    why
+        In words.
+    separates
+        The two causes.
+    conditions
+        Of the trial, as a `[[trial]]` table; None where none of the trials known here separates them.
+    coordinates
+        Columns of the motion to make: `time_s`, `q_<coordinate>`.
+    """
+
+    why: str
+    separates: tuple[str, str]
+    conditions: dict[str, float] | None
+    coordinates: dict[str, np.ndarray] | None
+
+
+def next_experiment(search: Search, best: Set, cause: str, within: float) -> NextExperiment | None:
+    """The trial that separates a cause from its nearest rival of another name; None if it has none."""
+    rivals = []
+    for gone, other in search.swaps(best):
+        (new,) = set(other.forms) - set(best.forms) or {gone}
+        form = search.forms[new]
+        if search.forms[gone].cause == cause and form.cause != cause and other.price - best.price < within:
+            rivals.append((other.price, gone, new, other))
+    if not rivals:
+        return None
+    _, gone, new, other = min(rivals, key=lambda r: (r[0], r[2]))
+    pair = (cause, search.forms[new].cause)
+    signal = search.sizes(best)[gone]
+    scores = {}
+    for name, make in _TRIALS.items():
+        scene = make(search.banks[False].scenes[0])
+        mine, its = (search.forms[i].columns(scene) for i in (gone, new))
+        scores[name] = _separation(search, mine @ signal, its, np.array(search.forms[new].plausible), best)
+    name = max(scores, key=lambda n: scores[n])
+    if scores[name] < ENOUGH:
+        why = (
+            f"{pair[0]} and {pair[1]} look alike in standing, in slower walking and under a known weight: "
+            "weigh the plates with known masses, or measure the body by other means"
+        )
+        return NextExperiment(why, pair, None, None)
+    first = search.recordings[0]
+    time, columns = first.coordinates_time, {n: c for n, c in first.coordinates.items() if n.startswith("q_")}
+    time, columns, conditions = _program(name, time - time[0], columns, first.belt_speed_mps)
+    why = f"{_WORDS[name]} (it separates {pair[0]} from {pair[1]} by {np.sqrt(scores[name]):.1f} standard deviations)"
+    return NextExperiment(why, pair, conditions, {"time_s": time, **columns})
+
+
+def _program(
+    name: str, time: np.ndarray, columns: dict[str, np.ndarray], belt_speed_mps: float
+) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, float]]:
+    if name == "slower":
+        return time / SLOWER, columns, {"belt_speed_mps": SLOWER * belt_speed_mps}
+    if name == "stand":
+        still = {
+            n: np.full_like(c, float(np.mean(c)) if n.startswith("q_pelvis_t") else 0.0) for n, c in columns.items()
+        }
+        return time, still, {"belt_speed_mps": 0.0}
+    return time, columns, {"belt_speed_mps": belt_speed_mps}
+
+
+def _scene(old: Scene, motion: Motion, load: dict[str, np.ndarray], extra: np.ndarray | None = None) -> Scene:
+    """A trial that measures just what its motion requires, shared out between the feet; `extra` (n, 6) is added."""
+    needed = required(motion)
+    if extra is not None:
+        needed = needed + extra
+    feet = {side: share[:, None] * needed for side, share in load.items()}
+    loaded = {side: share > 0.0 for side, share in load.items()}
+    plates = Plates(old.motion.time, feet, old.plates.pressure, loaded)
+    return Scene(old.name, motion, plates, centre_of_mass(motion))
+
+
+def _shares(old: Scene) -> dict[str, np.ndarray]:
+    up = {side: np.clip(w[:, 2], 0.0, None) for side, w in old.plates.feet.items()}
+    total = np.maximum(up["left"] + up["right"], 1.0)
+    return {side: v / total for side, v in up.items()}
+
+
+def _stand(old: Scene) -> Scene:
+    motion = old.motion
+    still = Motion(motion.body, motion.model, motion.time, motion.q[:1].repeat(len(motion.time), axis=0),
+                   0.0 * motion.v, 0.0 * motion.a)  # fmt: skip
+    one = np.ones(len(motion.time))
+    return _scene(old, still, {"left": 0.0 * one, "right": one})
+
+
+def _slower(old: Scene) -> Scene:
+    motion = old.motion
+    slow = Motion(motion.body, motion.model, motion.time, motion.q, SLOWER * motion.v, SLOWER**2 * motion.a)
+    return _scene(old, slow, _shares(old))
+
+
+def _carry(old: Scene) -> Scene:
+    trunk = old.regressors["trunk"] @ (CARRIED_KG * old.parameters["trunk"] / old.parameters["trunk"][0])
+    return _scene(old, old.motion, _shares(old), about(trunk, -old.centre))
+
+
+_TRIALS: dict[str, Callable[[Scene], Scene]] = {"stand": _stand, "slower": _slower, "carry": _carry}
+_WORDS = {
+    "stand": "stand still on one plate",
+    "slower": f"walk at {100 * SLOWER:.0f} % of the speed",
+    "carry": f"carry a known weight of {CARRIED_KG:g} kg at the trunk",
+}
+
+
+def _separation(search: Search, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: Set) -> float:
+    """Squared distance of a signal (n, 6) from what a rival (n, 6, p) can make of it, in the noise that was found."""
+    root = 1.0 / np.sqrt(best.fitted.variance)
+    scenes = [np.concatenate([signal[:, :, None], rival], axis=2)]
+    one = type(search.strides)(
+        [w for w in search.strides.windows if w[0] == 0][:1] or search.strides.windows[:1], search.strides.harmonics
+    )
+    waves = search.noise.rotated(one.mean(scenes)) * root[..., None]
+    y, x = waves[..., 0].ravel(), waves[..., 1:].reshape(root.size, -1) * prior
+    values = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ y)
+    return float(np.sum((y - x @ values) ** 2) + np.sum(values**2) - np.sum(values**2))
+
+
+__all__ = ["GRAVITY", "NextExperiment", "next_experiment"]

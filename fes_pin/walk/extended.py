@@ -1,0 +1,72 @@
+"""The body with what a diagnosis found: it goes back into `linearize`, `allocate` and the viewer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import tostring
+
+import numpy as np
+from defusedxml.ElementTree import fromstring
+
+from fes_pin.body.build import Body
+from fes_pin.data.errors import InputError
+from fes_pin.walk.effect import central
+
+if TYPE_CHECKING:
+    from fes_pin.walk.diagnosis import WalkDiagnosis
+
+
+def extended_body(diagnosis: WalkDiagnosis) -> Body:
+    """The body with the segments' masses, centres and inertias that the diagnosis names; the same where it names none.
+
+    Raises
+    ------
+    InputError
+        The figures are no body's: a mass that is not positive, say.
+    """
+    search = diagnosis.search
+    body = search.recordings[0].motion.body
+    believed = search.banks[False].scenes[0].parameters
+    found = {s: p.copy() for s, p in believed.items()}
+    for i, sizes in search.sizes(diagnosis.best).items():
+        change = search.forms[i].segments
+        if change is not None:
+            for segment, columns in change(believed).items():
+                found[segment] += columns @ sizes
+    changed = {s: p for s, p in found.items() if not np.array_equal(p, believed[s])}
+    return with_segments(body, changed) if changed else body
+
+
+def with_segments(body: Body, parameters: dict[str, np.ndarray]) -> Body:
+    """A body with other mass parameters (10,) of some segments, in their links' frames.
+
+    Raises
+    ------
+    InputError
+        A segment's mass is not positive, or its inertia no body's.
+    """
+    tree = fromstring(body.urdf)
+    for link in tree.iter("link"):
+        name = link.get("name", "")
+        if name not in parameters:
+            continue
+        mass, centre, inertia = central(parameters[name])
+        moments = np.linalg.eigvalsh(inertia)
+        if mass <= 0.0 or moments[0] <= 0.0 or moments[2] > 1.001 * (moments[0] + moments[1]):
+            raise InputError(
+                f"no body has a {name} of {mass:.3g} kg with moments {np.round(moments, 5).tolist()} kg m2"
+            )
+        inertial = link.find("inertial")
+        if inertial is None:
+            raise InputError("the link has no inertial element", column=name)
+        for child in list(inertial):
+            if child.tag == "origin":
+                child.set("xyz", " ".join(repr(float(c)) for c in centre))
+            elif child.tag == "mass":
+                child.set("value", repr(float(mass)))
+            elif child.tag == "inertia":
+                for key, (i, k) in {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2),
+                                    "izz": (2, 2)}.items():  # fmt: skip
+                    child.set(key, repr(float(inertia[i, k])))
+    text = '<?xml version="1.0"?>\n' + tostring(tree, encoding="unicode") + "\n"
+    return Body(text, body.stance, body.height_m, f"{body.label}, extended")

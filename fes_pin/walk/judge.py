@@ -1,0 +1,161 @@
+"""What is claimed: gains on strides and stances that took no part, what is left, what could not be seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from fes_pin.walk.likelihood import fit
+from fes_pin.walk.search import Chosen, Search, Set
+
+ARM = 0.1
+"""Moments count as forces at this arm, in standing heights (or 0.18 m): about a foot's half length and more."""
+BOOTSTRAP = 400
+SEEN = 3.0
+"""Standard deviations that an effect of plausible size must have beside the nuisance to be testable."""
+WAVES = ("mean", "once a stride", "twice a stride")
+CHANNELS = ("forward force", "leftward force", "vertical force", "moment about forward", "moment about left",
+            "moment about vertical")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Percent of the squared error above the noise that a cause removes, with a 95 % interval."""
+
+    percent: float
+    low: float
+    high: float
+
+
+def weights(search: Search) -> np.ndarray:
+    """Scale of the six channels for errors: (6,); forces 1 / N, moments by `ARM`."""
+    height = search.recordings[0].motion.body.height_m or 1.8
+    return np.r_[np.ones(3), np.full(3, 1.0 / (ARM * height))]
+
+
+def per_stride(search: Search, chosen: Chosen) -> tuple[np.ndarray, np.ndarray]:
+    """Residual (n, 6, k) and columns (n, 6, k, p) of a set, stride by stride."""
+    bank = search.bank(chosen)
+    y = search.strides.coefficients([s.residual[:, :, None] for s in bank.scenes])[..., 0]
+    if not chosen:
+        return y, np.zeros((*y.shape, 0))
+    columns = [np.concatenate([search.forms[i].columns(s) for i in chosen], axis=2) for s in bank.scenes]
+    return y, search.strides.coefficients(columns)
+
+
+def left_by(search: Search, one: Set, held_out: bool) -> np.ndarray:
+    """What a set leaves in every stride, its sizes fitted to all strides or to the others: (n, 6, k)."""
+    y, x = per_stride(search, one.forms)
+    if not one.forms:
+        return y
+    if not held_out:
+        return y - x @ one.fitted.values
+    prior = np.array([size for i in one.forms for size in search.forms[i].plausible])
+    out = []
+    for k in range(len(y)):
+        others = np.arange(len(y)) != k
+        mean_y, mean_x = (search.noise.rotated(v[others].mean(axis=0, keepdims=True)) for v in (y, x))
+        out.append(y[k] - x[k] @ fit(mean_y, mean_x, prior, search.noise).values)
+    return np.array(out)
+
+
+def gain(search: Search, without: Set, with_it: Set, held_out: bool, seed: int) -> Gain:
+    """What the second set removes of the first one's squared error, above what differs from stride to stride."""
+    scale = weights(search)[:, None]
+    before, after = (np.sum((scale * left_by(search, s, held_out)) ** 2, axis=1) for s in (without, with_it))
+    y = per_stride(search, ())[0]
+    floor = np.zeros_like(before)
+    if len(y) > 1:
+        floor += np.sum((scale * (y - y.mean(axis=0))) ** 2, axis=(0, 1)) / (len(y) - 1)
+    random = np.random.default_rng(seed)
+    waves = search.strides.harmonics
+    parts = np.array([[v[:, waves == h].sum(axis=1) for v in (before, after, floor)] for h in np.unique(waves)])
+    strides = random.integers(0, len(y), size=(BOOTSTRAP, len(parts), len(y)))  # anew for every wave
+    drawn = np.stack([part[:, strides[:, h]].sum(axis=2) for h, part in enumerate(parts)]).sum(axis=0).T
+    ratio = lambda s: 100.0 * (s[..., 0] - s[..., 1]) / np.maximum(s[..., 0] - s[..., 2], 0.05 * s[..., 0])  # noqa: E731
+    low, high = np.quantile(ratio(drawn), [0.025, 0.975])
+    return Gain(float(ratio(parts.sum(axis=(0, 2)))), float(low), float(high))
+
+
+def error_percent(search: Search, one: Set, held_out: bool) -> float:
+    """E: squared error over the measured reaction's spread about its mean, all channels together."""
+    scale = weights(search)[:, None]
+    measured = search.strides.coefficients([s.measured[:, :, None] for s in search.banks[False].scenes])[..., 0]
+    spread = np.sum((scale * measured[:, :, search.strides.harmonics > 0]) ** 2)
+    return float(100.0 * np.sum((scale * left_by(search, one, held_out)) ** 2) / spread)
+
+
+def floor_percent(search: Search) -> float:
+    """E of what differs from stride to stride, which no model of the mean stride takes away; 0 for one stride."""
+    y, scale = per_stride(search, ())[0], weights(search)[:, None]
+    measured = search.strides.coefficients([s.measured[:, :, None] for s in search.banks[False].scenes])[..., 0]
+    spread = np.sum((scale * measured[:, :, search.strides.harmonics > 0]) ** 2)
+    share = len(y) / max(len(y) - 1, 1)
+    return float(100.0 * share * np.sum((scale * (y - y.mean(axis=0))) ** 2) / spread)
+
+
+def other_leg(search: Search, one: Set) -> float | None:
+    """Gain in percent on one leg's single supports of sizes fitted to the other's; None where a leg has none."""
+    scale = weights(search)
+    before, after = 0.0, 0.0
+    data: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"left": [], "right": []}
+    for scene in search.bank(one.forms).scenes:
+        x = np.concatenate([search.forms[i].columns(scene) for i in one.forms], axis=2)
+        for side, rows in scene.plates.single_supports():
+            data[side].append((scene.residual[rows] * scale, x[rows] * scale[:, None]))
+    if not all(data.values()):
+        return None
+    prior = np.array([size for i in one.forms for size in search.forms[i].plausible])
+    for fitted, tested in (("left", "right"), ("right", "left")):
+        y, x = (np.concatenate([d[k] for d in data[fitted]]) for k in (0, 1))
+        flat = x.reshape(-1, x.shape[2]) * prior
+        values = prior * np.linalg.lstsq(flat, y.ravel(), rcond=None)[0]
+        y, x = (np.concatenate([d[k] for d in data[tested]]) for k in (0, 1))
+        before, after = before + float(np.sum(y**2)), after + float(np.sum((y - x @ values) ** 2))
+    return 100.0 * (before - after) / before
+
+
+def remainder(search: Search, one: Set) -> tuple[float, str | None]:
+    """Whether what is left comes again in every stride: p-value, and the channel and wave where it is largest.
+
+    For one stride there is nothing to compare with; what a millimetre of marker noise and the plates make is taken.
+    """
+    left = left_by(search, one, held_out=False)
+    y = per_stride(search, ())[0]
+    n, waves = len(left), search.strides.harmonics
+    mean = left.mean(axis=0)
+    apart = np.sum((y - y.mean(axis=0)) ** 2, axis=0) / max(n - 1, 1) / n
+    spread = apart if n > 1 else np.einsum("iik->ik", search.jitter)
+    smooth = spread.copy()
+    for h in np.unique(waves):
+        near = np.abs(waves - h) <= 1
+        smooth[:, waves == h] = spread[:, near].mean(axis=1, keepdims=True)
+    smooth += 0.3**2
+    free = 6 * len(waves) - sum(len(search.forms[i].parameters) for i in one.forms)
+    ratio = mean**2 / smooth
+    p_value = float(f_distribution.sf(ratio.sum() / free, free, max(6 * len(waves) * (n - 1), 6 * len(waves))))
+    by_wave = np.array([[ratio[c, waves == h].sum() for h in np.unique(waves)] for c in range(6)])
+    channel, wave = np.unravel_index(int(np.argmax(by_wave)), by_wave.shape)
+    word = WAVES[wave] if wave < len(WAVES) else f"{wave} times a stride"
+    return p_value, f"{CHANNELS[channel]}, {word}"
+
+
+def unseen(search: Search, one: Set) -> list[str]:
+    """Causes whose every form, at its plausible size, stands out of noise and nuisance by less than `SEEN`."""
+    noise, variance = search.noise, one.fitted.variance
+    root = 1.0 / np.sqrt(variance).ravel()
+    chosen = search.columns(one.forms) if one.forms else np.zeros((*variance.shape, 0))
+    taken = np.concatenate([noise.nuisance, chosen], axis=3).reshape(variance.size, -1) * root[:, None]
+    ridge = np.diag(np.r_[np.ones(noise.nuisance.shape[3]), np.zeros(chosen.shape[3])])
+    best: dict[str, float] = {}
+    for i, form in enumerate(search.forms):
+        x = search.noise.rotated(search.banks[False].x[i]).reshape(variance.size, -1) * root[:, None]
+        x = x * np.array(form.plausible)
+        kept = x - taken @ np.linalg.solve(taken.T @ taken + ridge + 1e-12 * np.eye(len(ridge)), taken.T @ x)
+        best[form.cause] = max(best.get(form.cause, 0.0), float(np.sqrt(max(np.sum(kept * x, axis=0).max(), 0.0))))
+    found = set(search.causes(one.forms))
+    if search.strides.count > 1:  # what differs from stride to stride shows noise
+        found.add("marker_noise")
+    return sorted(name for name, size in best.items() if size < SEEN and name not in found)
