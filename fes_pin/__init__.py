@@ -36,6 +36,7 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.muscles.nerve_inputs import controllability as controllability
     from fes_pin.muscles.nerves import Nerves as Nerves
     from fes_pin.view.report import report as report
+    from fes_pin.walk.diagnosis import diagnose_walk as diagnose_walk
 
 __version__ = "0.1.0"
 
@@ -59,6 +60,7 @@ _WHERE = {
     "Fit": "fes_pin.identify.fit",
     "diagnose": "fes_pin.diagnose.diagnosis",
     "Diagnosis": "fes_pin.diagnose.diagnosis",
+    "diagnose_walk": "fes_pin.walk.diagnosis",
     "report": "fes_pin.view.report",
     "Body": "fes_pin.body.build",
     "linearize": "fes_pin.body.linearize",

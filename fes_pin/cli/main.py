@@ -13,6 +13,7 @@ import typer
 from fes_pin.cli.allocate import allocate
 from fes_pin.cli.body import app as body
 from fes_pin.cli.group import Commands
+from fes_pin.cli.walk import diagnose_walking, print_effects
 
 if TYPE_CHECKING:
     from fes_pin.diagnose.diagnosis import Diagnosis
@@ -68,6 +69,11 @@ def diagnose(
     catalogue = _catalogue(library)
     measured = read_study(study, rigs=catalogue.schemas())
     check_folder(out)  # what cannot be read or written is said before any work
+    if measured.rig == "body":
+        with _progress() as tell:
+            verdict = diagnose_walking(measured, out, seed, tell)
+        typer.echo(f"{verdict}\nreport: {out / 'report.html'}")
+        return
     from fes_pin.diagnose.diagnosis import diagnose as find
     from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files
     from fes_pin.view.report import report_html
@@ -121,6 +127,7 @@ def effects(library: Libraries = None) -> None:
     _say_whose_code(catalogue)
     for one in catalogue.effects:
         typer.echo(describe(one))
+    print_effects()
 
 
 def _catalogue(library: list[str] | None) -> Catalogue:

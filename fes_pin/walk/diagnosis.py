@@ -17,6 +17,7 @@ from fes_pin.walk.likelihood import white_level
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.search import LEVEL, SEPARABLE, Search, Set
 from fes_pin.walk.smooth import CUTOFF_HZ
+from fes_pin.workers import one_thread_each
 
 LEFT_LEVEL = 0.01
 """Level at which what is left counts as something."""
@@ -64,7 +65,7 @@ class WalkCause:
     stage: str = STAGE
 
     def helps(self) -> bool:
-        """Whether what took no part speaks for it: strides held out and, for what belongs to neither leg, other stances.
+        """Whether what took no part speaks for it: strides held out; for what belongs to neither leg, other stances.
 
         A single stride leaves nothing out: then only what is certain is named.
         """
@@ -141,16 +142,17 @@ def diagnose_walk(
     trials = tuple(t for t in study.trials if t.role != "held_out")
     if not trials:
         raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)
-    tell(0.02, "inverse dynamics")
-    _, recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
-    search = Search(recordings, cutoff_hz, seed)
-    tell(0.3, "sets of causes")
-    sizes = search.run()
-    tell(0.7, "critical values")
-    nulls = search.null_gains(sizes[-1], seed)
-    best = _chosen(sizes, max(float(np.quantile(nulls, 1.0 - LEVEL)), 0.0))
-    tell(0.85, "strides held out")
-    out = _judged(study, search, best, nulls, seed)
+    with one_thread_each():
+        tell(0.02, "inverse dynamics")
+        _, recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
+        search = Search(recordings, cutoff_hz, seed)
+        tell(0.3, "sets of causes")
+        sizes = search.run()
+        tell(0.7, "critical values")
+        nulls = search.null_gains(sizes[-1], seed)
+        best = _chosen(sizes, max(float(np.quantile(nulls, 1.0 - LEVEL)), 0.0))
+        tell(0.85, "strides held out")
+        out = _judged(study, search, best, nulls, seed)
     tell(1.0, "done")
     return replace(out, cutoff_hz=cutoff_hz, wall_s=time.perf_counter() - began)
 

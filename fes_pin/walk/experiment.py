@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.body.build import GRAVITY
 from fes_pin.walk.dynamics import about, centre_of_mass, required
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import Plates
@@ -141,7 +140,4 @@ def _separation(search: Search, signal: np.ndarray, rival: np.ndarray, prior: np
     waves = search.noise.rotated(one.mean(scenes)) * root[..., None]
     y, x = waves[..., 0].ravel(), waves[..., 1:].reshape(root.size, -1) * prior
     values = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ y)
-    return float(np.sum((y - x @ values) ** 2) + np.sum(values**2) - np.sum(values**2))
-
-
-__all__ = ["GRAVITY", "NextExperiment", "next_experiment"]
+    return float(np.sum((y - x @ values) ** 2))

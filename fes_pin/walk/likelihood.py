@@ -1,7 +1,7 @@
 """One likelihood for everything a set of causes is judged by: what is left of the ground reaction, as coloured noise.
 
-Residuals are waves of the stride, in the mean over strides: soft tissue moves alike in each, so more strides are no more
-evidence. They are Gaussian, independent from wave to wave and, after a rotation of the six channels, from channel
+Residuals are waves of the stride, in the mean over strides: soft tissue moves alike in each, so more strides are no
+more evidence. They are Gaussian, independent from wave to wave and, after a rotation of the six channels, from channel
 to channel, with a variance whose logarithm is a + b h, h the number of waves in a stride: Whittle's likelihood at the
 walk's own frequencies. Means over a stride are known better: momentum comes back to what it was, so a mean force is
 wrong by no more than 0.2 % of the weight, a mean moment by what a centre of mass 5 mm off makes.

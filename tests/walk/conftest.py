@@ -1,6 +1,8 @@
 """The measured walk as the walking model reads it."""
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,8 @@ from fes_pin.body.build import Body
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
 from fes_pin.walk.motion import motion_of, pelvis_to_hip
 from fes_pin.walk.plates import plates_of
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
 
 
 @pytest.fixture(scope="session")
@@ -40,3 +44,10 @@ def with_plates(walk, measured):
 
 def rms(values):
     return np.sqrt(np.mean(np.square(values), axis=0))
+
+
+@pytest.fixture(scope="session")
+def gait(walk):
+    from walking_matrix.synthetic import gait_of
+
+    return gait_of(walk)

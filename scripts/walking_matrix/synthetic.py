@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import tomli_w
+from scipy.interpolate import CubicSpline
 
 from fes_pin.body.anthropometry import Subject, skeleton_of_subject
 from fes_pin.body.joints import JOINTS, axis_of
@@ -158,8 +159,6 @@ def smooth_noise(random, time, period, n=1):
     """A slow random course with unit size that no two strides share: (n, time)."""
     knots = np.arange(time[0] - 2 * period, time[-1] + 3 * period, 0.5 * period)
     values = random.normal(size=(n, len(knots)))
-    from scipy.interpolate import CubicSpline
-
     return np.array([CubicSpline(knots, v)(time) for v in values])
 
 

@@ -1,0 +1,155 @@
+"""The diagnosis of walking: what is hidden is named, what is not hidden is not, and all of it is said."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+
+from fes_pin.body.build import Body
+from fes_pin.data.study import read_study
+from fes_pin.walk.diagnosis import diagnose_walk
+from fes_pin.walk.dynamics import required, segment_parameters
+from fes_pin.walk.extended import extended_body, with_segments
+from fes_pin.walk.likelihood import Noise, fit, white_level
+from fes_pin.walk.motion import motion_of
+from fes_pin.walk.text import verdict_text, walk_files
+
+pytestmark = pytest.mark.shared
+
+
+def hidden(gait, folder, seed, *args, **more):
+    from walking_matrix.synthetic import Wrong, make
+
+    make(gait, folder, Wrong(*args, **{"strides": 2, "tissue": 0.4, **more}), seed)
+    return diagnose_walk(read_study(folder))
+
+
+@pytest.fixture(scope="module")
+def heavy(gait, tmp_path_factory):
+    return hidden(gait, tmp_path_factory.mktemp("heavy"), 2, "segment_mass", "trunk", 0.15)
+
+
+def test_a_heavy_trunk_is_in_the_first_set(heavy):
+    first = heavy.causes[0]
+    assert heavy.verdict == "causes_found"
+    assert "segment_mass" in (first.name, *first.equivalents)
+    assert first.gain_held_out.low > 0.0
+    assert heavy.wall_s < 120.0
+
+
+def test_files_are_as_the_contract_says(heavy):
+    files = walk_files(heavy)
+    record = json.loads(files["diagnosis.json"])
+    keys = {"study", "verdict", "causes", "remainder", "absorbed", "nominal", "extended", "noise", "ceiling_percent",
+            "next_experiment", "wall_s"}  # fmt: skip
+    assert keys <= set(record)
+    assert {"name", "stage", "parameters", "equivalents", "p_value", "gain_percent"} <= set(record["causes"][0])
+    assert tomllib.loads(files["model.toml"])["effect"][0]["name"] == heavy.causes[0].name
+    if heavy.causes[0].equivalents:
+        plan = record["next_experiment"]
+        assert set(plan["separates"]) <= {heavy.causes[0].name, *heavy.causes[0].equivalents}
+        assert plan["trial"] is None or plan["trial"]["file"] in files
+    assert heavy.causes[0].name in verdict_text(heavy)
+
+
+def test_the_report_is_a_whole_page(heavy):
+    from fes_pin.view.walk_report import walk_report_html
+
+    text = walk_report_html(heavy)
+    assert text.startswith("<!DOCTYPE html>") and text.endswith("</html>\n")
+    assert heavy.causes[0].name in text and "<svg" in text and "<script" not in text
+
+
+def test_late_plates_are_found(gait, tmp_path):
+    found = hidden(gait, tmp_path, 5, "clock_offset", "", 0.03)
+    first = found.causes[0]
+    assert first.name == "clock_offset"
+    value, std, unit = first.parameters["late_s"]
+    assert unit == "s" and value == pytest.approx(0.03, abs=max(3 * std, 0.003))
+
+
+def test_soft_tissue_alone_names_nothing(gait, tmp_path):
+    found = hidden(gait, tmp_path, 9, strides=3)
+    assert not found.causes
+    assert found.verdict == "unexplained"  # soft tissue does come again in every stride
+
+
+def test_the_measured_walk_is_honestly_unexplained(walk, tmp_path):
+    """Two strides of an adult: nothing in the library survives, and the verdict says that something is there."""
+    (tmp_path / "study.toml").write_text(
+        '[study]\nname = "subject01"\nrig = "body"\n[rig]\nmass_kg = 72.6\nheight_m = 1.80\n'
+        'segments = "segments.json"\n'
+        '[[trial]]\ncoordinates = "coords.csv"\nground_reaction = "grf.csv"\nbelt_speed_mps = 1.135\n'
+    )
+    for source, name in (("coords_mtpfree.csv", "coords.csv"), ("grf_raw_600hz.csv", "grf.csv"),
+                         ("reference/subject01_model.json", "segments.json")):  # fmt: skip
+        (tmp_path / name).write_bytes((walk / source).read_bytes())
+    found = diagnose_walk(read_study(tmp_path))
+    assert found.search.strides.count == 2
+    assert found.verdict == "unexplained" and not found.causes
+
+
+def test_the_extended_body_requires_what_the_column_says(measured, hip):
+    motion, columns = measured
+    parameters = segment_parameters(motion)
+    heavier = with_segments(motion.body, {"trunk": 1.1 * parameters["trunk"]})
+    assert isinstance(heavier, Body)
+    assert heavier.mass_kg == pytest.approx(motion.body.mass_kg + 0.1 * parameters["trunk"][0])
+    moved = motion_of(heavier, motion.time, columns, hip)
+    from fes_pin.walk.dynamics import segment_regressors
+
+    column = segment_regressors(motion)["trunk"] @ parameters["trunk"]
+    assert np.abs(required(moved) - required(motion) - 0.1 * column).max() < 1e-6
+
+
+def test_the_extended_body_is_the_diagnosiss(heavy):
+    body = extended_body(heavy)
+    name, site = heavy.causes[0].name, heavy.causes[0].site
+    share = heavy.causes[0].parameters.get("share", (0.0,))[0]
+    if name == "segment_mass" and site == "trunk":
+        assert body.mass_kg > heavy.search.recordings[0].motion.body.mass_kg * (1 + 0.3 * share)
+    assert len(body.joint_names) == 19
+
+
+def noise_of(harmonics, rows=1):
+    none = np.zeros((rows, 6, len(harmonics), 0))
+    return Noise(harmonics, np.eye(6), np.full(6, 4.0), none)
+
+
+def test_the_fit_is_generalized_least_squares_with_the_noises_own_spectrum():
+    random = np.random.default_rng(0)
+    harmonics = np.array([0, *(h for h in range(1, 9) for _ in range(2))])
+    noise = noise_of(harmonics)
+    sd = np.exp(1.0 - 0.2 * harmonics)
+    x = random.normal(size=(1, 6, len(harmonics), 1))
+    z = []
+    for _ in range(300):
+        y = 2.0 * x[..., 0] + sd * random.normal(size=x.shape[:3])
+        found = fit(y, x, np.array([100.0]), noise)
+        z.append((found.values[0] - 2.0) / np.sqrt(found.covariance[0, 0]))
+    assert abs(np.mean(z)) < 0.2
+    assert 0.88 < np.mean(np.abs(z) < 1.96) < 0.98
+
+
+def test_an_effect_that_is_not_there_costs_evidence():
+    random = np.random.default_rng(1)
+    harmonics = np.array([0, *(h for h in range(1, 9) for _ in range(2))])
+    noise, none = noise_of(harmonics), np.zeros((1, 6, len(harmonics), 0))
+    gains = []
+    for _ in range(50):
+        y, x = random.normal(size=(1, 6, len(harmonics))), random.normal(size=(1, 6, len(harmonics), 1))
+        gains.append(fit(y, none, np.zeros(0), noise).deviance - fit(y, x, np.array([1.0]), noise).deviance)
+    assert np.mean(gains) < -2.0
+
+
+def test_white_noise_of_coordinates_is_measured_by_its_growth_with_frequency():
+    random = np.random.default_rng(2)
+    harmonics = np.array([0, *(h for h in range(1, 8) for _ in range(2))])
+    jitter = np.broadcast_to((harmonics / 4.0) ** 4 + 1e-6, (6, len(harmonics)))
+    y = 3.0 * np.sqrt(jitter) * random.normal(size=(4, 6, len(harmonics))) + 0.5 * random.normal(size=(4, 6, 15))
+    level, std, saved = white_level(y, noise_of(harmonics), jitter)
+    assert abs(level - 3.0) < 3.0 * std + 0.2
+    assert saved > 20.0
+    quiet = white_level(0.5 * random.normal(size=(4, 6, 15)), noise_of(harmonics), jitter)
+    assert quiet[0] < 0.6
