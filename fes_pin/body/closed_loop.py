@@ -114,7 +114,13 @@ def close_the_loop(
     for _ in range(round(positive(seconds, "seconds") / PULSE_S)):
         now = plans
         if moving_arms:
-            now = replace(plans, inputs=_acting(inputs, linear, q))
+            try:
+                now = replace(plans, inputs=_acting(inputs, linear, q))
+            except InputError as error:
+                if not given_inputs:  # what was asked is at fault, not where the body went
+                    raise
+                lost = error.message
+                break
         stimulation = _first_input(now, q - linear.q, v)
         if stimulation is None:
             lost = "no input within the bounds brings it back"

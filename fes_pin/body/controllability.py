@@ -16,7 +16,7 @@ from scipy import linalg
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Modes, modes
-from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import positive
 
 RELATIVE_TOLERANCE = 1e-9
 """Below this part of the largest gain, an input does not act on a mode: rounding, not muscle."""
@@ -107,8 +107,7 @@ def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> Control
     InputError
         Inputs that are none, or a horizon that is not positive.
     """
-    if not (np.isfinite(horizon) and horizon > 0.0):
-        raise InputError(f"the horizon must be positive, got {horizon}", column="horizon")
+    horizon = positive(horizon, "horizon")
     inputs = Inputs.of(inputs, linear)
     found = modes(linear)
     torque = inputs.on(linear)

@@ -73,7 +73,11 @@ class Inputs:
     def pulling(cls, names: Sequence[str], matrix, joint_names: Sequence[str] = JOINT_NAMES) -> Inputs:
         """Muscles or nerves: u is 0 to 1, `matrix` the torque at full recruitment, N m."""
         count = len(names)
-        return cls(tuple(names), tuple(joint_names), np.asarray(matrix, float), np.zeros(count), np.ones(count))
+        try:
+            values = np.asarray(matrix, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"the input matrix must be numbers, got {type(matrix).__name__}") from None
+        return cls(tuple(names), tuple(joint_names), values, np.zeros(count), np.ones(count))
 
     @classmethod
     def of(cls, thing, linear: LinearBody) -> Inputs:

@@ -162,7 +162,10 @@ def angles_array(angles: Mapping[str, float] | Sequence[float] | np.ndarray, ord
         except (TypeError, ValueError):
             raise InputError("a joint's value must be a number") from None
     else:
-        values = np.asarray(angles, dtype=float)
+        try:
+            values = np.asarray(angles, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{len(order)} joint values were expected, got {type(angles).__name__}") from None
         if values.shape != (len(order),):
             raise InputError(f"{len(order)} joint values were expected, got an array of shape {values.shape}")
     if not np.all(np.isfinite(values)):

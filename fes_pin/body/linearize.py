@@ -23,6 +23,7 @@ from fes_pin.body.ground import second_foot
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.passive import Passive
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number
 
 
 def ground_normal(slope: Sequence[float]) -> np.ndarray:
@@ -98,7 +99,7 @@ def linearize(
         Unknown posture or joint, posture outside limits, no such slope; a second foot that is not flat on the ground,
         or moves.
     """
-    q = body.angles(posture, check)
+    q, gravity = body.angles(posture, check), number(gravity, "gravity")
     name = posture if isinstance(posture, str) else ""
     model = model_on_slope(body, slope, gravity)
     data = model.createData()
@@ -156,7 +157,10 @@ def linearize_batch(
     InputError
         Wrong shape, or an angle that is not finite.
     """
-    q = np.ascontiguousarray(postures, dtype=float)
+    try:
+        q = np.ascontiguousarray(postures, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"postures must be numbers, got {type(postures).__name__}") from None
     model = pin.Model(model_on_slope(body, slope))
     model.gravity.linear = -model.gravity.linear  # so that Pinocchio writes -g and -dg/dq, which are C and B
     n = model.nv

@@ -237,18 +237,26 @@ def _serve(scene) -> None:
 
 
 def _walking(body, path: Path):
+    import warnings
+    from io import StringIO
+
     import numpy as np
 
     from fes_pin.body.gait import pelvis_turns, postures_of_walk
     from fes_pin.body.joints import JOINT_NAMES
+    from fes_pin.data.files import read_text
     from fes_pin.view.viewer import show_walk
 
+    text = read_text(path)
     try:
-        table = np.atleast_1d(np.genfromtxt(path, delimiter=",", names=True))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # numpy warns of an empty file, and of rows of another length
+            table = np.atleast_1d(np.genfromtxt(StringIO(text), delimiter=",", names=True))
         columns = {name: table[name] for name in table.dtype.names or ()}
         time = columns["time"] if "time" in columns else columns["time_s"]
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        raise InputError(f"cannot be read as coordinates: {str(error).splitlines()[0]}", file=path) from None
+    except (ValueError, TypeError, KeyError, IndexError, Warning) as error:
+        reason = " ".join(str(error).split())[:100] or "no columns"
+        raise InputError(f"cannot be read as coordinates with a column time_s: {reason}", file=path) from None
     if len(time) < 2 or not (np.diff(time) > 0.0).all():
         raise InputError("needs two or more samples, and times that rise", file=path)
     try:

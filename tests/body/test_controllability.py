@@ -12,7 +12,7 @@ from scipy import integrate, linalg
 from fes_pin.body.build import Body
 from fes_pin.body.controllability import controllability, gramian, mode_price, pbh, stabilizing_price
 from fes_pin.body.inputs import Inputs
-from fes_pin.body.linearize import linearize
+from fes_pin.body.linearize import linearize, linearize_batch
 from fes_pin.body.modes import NEUTRAL_RATE
 from fes_pin.body.observability import LOOK_S, NOISE_DEG, RATE_HZ, fewest_goniometers, observability
 from fes_pin.body.passive import ElasticJoints
@@ -227,6 +227,13 @@ def test_observability_is_controllability_of_the_transpose(body, standing):
         (lambda s: controllability(s, ["knee"]), "unknown joint"),
         (lambda s: controllability(s, 3), "inputs must be"),
         (lambda s: controllability(s, Nerves(), horizon=0.0), "horizon"),
+        (lambda s: controllability(s, Nerves(), horizon="x"), "horizon"),
+        (lambda s: linearize(s.body, ["a"] * 19), "joint values"),
+        (lambda s: linearize(s.body, "neutral", gravity="x"), "gravity"),
+        (lambda s: linearize_batch(s.body, [["a"] * 19]), "must be numbers"),
+        (lambda s: Inputs.pulling(["a"], [["x"]] * 19), "must be numbers"),
+        (lambda s: Inputs.torques(limit_nm="x"), "limit_nm"),
+        (lambda s: fewest_goniometers(s, within_deg=0.0), "within_deg"),
         (lambda s: Inputs.torques(limit_nm=-1.0), "limit"),
         (lambda s: Inputs.pulling(["a"], np.zeros((19, 2))), "shape"),
         (lambda s: Inputs.pulling(["a", "a"], np.zeros((19, 2))), "twice"),

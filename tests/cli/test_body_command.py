@@ -114,6 +114,14 @@ def test_a_spoilt_walk_is_one_line_and_no_page(walk, tmp_path, spoil, says):
     assert len(result.output.strip().splitlines()) == 1 and not page.exists()
 
 
+@pytest.mark.parametrize("content", [b"", b"\n", bytes(range(128, 255)), b"time,q_hip_flexion_r\n0,1\n1\n", b"a"])
+def test_a_walk_that_is_no_table_is_one_line(tmp_path, content):
+    (tmp_path / "walk.csv").write_bytes(content)
+    result = run("view", str(tmp_path / "page.html"), "--walk", str(tmp_path / "walk.csv"))
+    assert result.exit_code == 2 and "walk.csv" in result.output and not (tmp_path / "page.html").exists()
+    assert len(result.output.strip().splitlines()) == 1
+
+
 def test_a_map_that_cannot_be_written_is_one_line(tmp_path):
     for path in (tmp_path / "none" / "map.png", tmp_path / "map.unknown"):
         result = run("nerves", "right_femoral", "--map", str(path))
