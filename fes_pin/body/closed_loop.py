@@ -110,7 +110,8 @@ def close_the_loop(
     plans = plans_of(linear, Inputs.of(inputs, linear), settle_deg, balance)
     plant = _Plant(linear)
     q, v = linear.q + start, np.zeros(linear.n)
-    deviations, given_inputs, outside, lost = [start], [], -np.inf, ""
+    deviations, outside, lost = [start], -np.inf, ""
+    given_inputs: list[np.ndarray] = []
     for _ in range(round(positive(seconds, "seconds") / PULSE_S)):
         now = plans
         if moving_arms:
