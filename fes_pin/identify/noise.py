@@ -100,6 +100,11 @@ def estimate_noise(
         Time step of the residuals, if they are averages.
     longest, least
         Highest and lowest order that is tried; the highest that the trials are long enough for, if that is lower.
+
+    Raises
+    ------
+    FloatingPointError
+        For residuals whose squares are not finite.
     """
     total = sum(len(r) for r in residuals)
     shortest = min(len(r) for r in residuals)
@@ -111,6 +116,8 @@ def estimate_noise(
         lagged = [_lags(r, 0) for r in residuals]
     gram = np.sum([m.T @ m for m in lagged], axis=0)
     count = max(sum(len(m) for m in lagged), 1)
+    if not np.isfinite(gram).all():
+        raise FloatingPointError("residuals whose squares are not finite")
     if not gram[0, 0] > 0.0:  # a channel that is met exactly
         orders = [0]
     best: tuple[float, int, np.ndarray, float] | None = None

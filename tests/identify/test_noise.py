@@ -132,3 +132,10 @@ def test_whitening_is_the_filter_of_the_coefficients(length, order):
 def test_a_low_pass_is_the_recursion():
     values = np.random.default_rng(0).standard_normal(100)
     np.testing.assert_allclose(low_pass(values, 0.9), scipy.signal.lfilter([0.1], [1.0, -0.9], values), rtol=1e-12)
+
+
+def test_noise_of_what_is_too_short_exact_or_not_finite():
+    assert estimate_noise([np.ones(2), np.ones(1)]).ar == ()
+    assert estimate_noise([np.zeros(100)]).innovation_std == 1e-12
+    with pytest.raises(FloatingPointError, match="not finite"):
+        estimate_noise([np.full(100, np.inf)])
