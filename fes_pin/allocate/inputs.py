@@ -107,7 +107,10 @@ def number(value: Any, what: str) -> float:
     InputError
         Text, nothing, several numbers, or not a number.
     """
-    array = numbers(value, what)
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
     if array.ndim or np.isnan(array):
         raise InputError(f"{what} must be a number, got {value!r:.40}")
     return float(array)
