@@ -201,8 +201,7 @@ for panel in axes.ravel():
     panel.spines[["top", "right"]].set_visible(False)
 figure.savefig(OUT / "walk_claims.png", dpi=130)
 cost = rms(np.concatenate(standing))[2] / rms(left[singles])[2]
-print(
-    f"\nA resting forefoot costs {cost:.1f} times the vertical residual; free feet gain {none - whole:.1f} N of {none:.1f} N; "
-    f"one posture leaves {total['one posture']:.0f} % of the torques, four with rates "
-    f"{total['four, with E and a0']:.1f} %"
-)
+print(f"\nA resting forefoot costs {cost:.1f} times the vertical residual;")
+print(f"free feet gain {none - whole:.1f} N of {none:.1f} N;")
+print(f"one posture leaves {total['one posture']:.0f} % of the torques,")
+print(f"four with rates {total['four, with E and a0']:.1f} %")
