@@ -183,6 +183,7 @@ def _judged(study: Study, search: Search, best: Set, nulls: np.ndarray, seed: in
     left = refused or p_value < LEFT_LEVEL
     order = sorted(named, key=lambda c: -(c.gain_held_out or c.gain_fit).percent)
     none = search.fit(())
+    in_a_set = {n for c in named for n in (c.name, *c.equivalents)}  # these may be what is there
     return WalkDiagnosis(
         study=study,
         verdict="causes_found" if named else ("unexplained" if left else "adequate"),
@@ -190,7 +191,7 @@ def _judged(study: Study, search: Search, best: Set, nulls: np.ndarray, seed: in
         unexplained=left,
         left_p_value=p_value,
         left_where=where if left else None,
-        absorbed=tuple(unseen(search, best)),
+        absorbed=tuple(n for n in unseen(search, best) if n not in in_a_set),
         nominal_error=(error_percent(search, none, False), error_percent(search, none, True) if many else None),
         extended_error=(error_percent(search, best, False), error_percent(search, best, True) if many else None),
         ceiling_percent=floor_percent(search),

@@ -61,6 +61,28 @@ def test_the_report_is_a_whole_page(heavy):
     assert heavy.causes[0].name in text and "<svg" in text and "<script" not in text
 
 
+def test_one_who_stands_still_tells_no_gain_from_mass_and_calls_neither_untestable(tmp_path):
+    """A reading 6 % above the weight: whatever is named, its twins stand beside it and not among the untestable."""
+    from fes_pin.data.motion import REQUIRED
+
+    random, time = np.random.default_rng(0), np.arange(0.0, 4.0, 0.01)
+    coordinates = {f"q_{n}": (n == "pelvis_ty") + 1e-4 * random.normal(size=len(time)) for n in REQUIRED}
+    plates = {f"{s}_{k}{c}": 0.0 * time for s in "rl" for k in ("F", "cop", "T") for c in "xyz"}
+    plates |= {"r_Fy": 1.06 * 72.6 * 9.80665 + random.normal(size=len(time)), "r_copx": -0.09 + 0.0 * time}
+    for name, columns in (("c.csv", coordinates), ("g.csv", plates)):
+        table = np.stack([time, *columns.values()], axis=1)
+        np.savetxt(tmp_path / name, table, delimiter=",", header=",".join(["time_s", *columns]), comments="")
+    (tmp_path / "study.toml").write_text(
+        '[study]\nname = "stand"\nrig = "body"\n[rig]\nmass_kg = 72.6\nheight_m = 1.8\n'
+        '[[trial]]\ncoordinates = "c.csv"\nground_reaction = "g.csv"\n'
+    )
+    found = diagnose_walk(read_study(tmp_path))
+    sets = [{c.name, *c.equivalents} for c in found.causes]
+    assert any({"segment_mass", "plate_gain", "external_force"} <= one for one in sets)
+    assert not set(found.absorbed) & set.union(*sets)
+    assert found.next_experiment is not None
+
+
 def test_late_plates_are_found(gait, tmp_path):
     found = hidden(gait, tmp_path, 5, "clock_offset", "", 0.03)
     first = found.causes[0]
