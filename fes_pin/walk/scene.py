@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from fes_pin.walk.dynamics import about, centre_of_mass, required, segment_parameters, segment_regressors
+from fes_pin.walk.misfit import segment_poses
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import Plates, plates_of
 from fes_pin.walk.recording import Recording
@@ -72,6 +73,11 @@ class Scene:
     def parameters(self) -> dict[str, np.ndarray]:
         """By segment, (10,): what is believed."""
         return segment_parameters(self.motion)
+
+    @cached_property
+    def poses(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Every segment's orientation and origin; see `segment_poses`."""
+        return segment_poses(self.motion)
 
     @property
     def dt(self) -> float:

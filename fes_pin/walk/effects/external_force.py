@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from fes_pin.walk.effect import AXES, Form, WalkEffect
-from fes_pin.walk.misfit import segment_poses
 from fes_pin.walk.scene import Scene
 
 PLACES = {
@@ -42,11 +41,16 @@ class ExternalForce(WalkEffect):
                 yield Form(cls.name, f"{place}, {words}", names, ("N",) * len(axes), (50.0,) * len(axes), columns)
 
 
-def _pushed(scene: Scene, place: str, axes: tuple[int, ...]) -> np.ndarray:
+def place_of(scene: Scene, place: str) -> np.ndarray:
+    """Where a force acts that is named by a place of `PLACES`: (n, 3) m."""
     segment, offset = PLACES[place]
-    turn, origin = segment_poses(scene.motion)[segment]
-    point = origin + turn @ np.array(offset)
-    if segment == "pelvis":  # the pelvis's link begins at one hip
-        poses = segment_poses(scene.motion)
-        point = 0.5 * (poses["left_thigh"][1] + poses["right_thigh"][1]) + turn @ np.array(offset)
+    turn, origin = scene.poses[segment]
+    if segment == "pelvis":  # links begin at the joint towards the ground: the pelvis's at the stance hip
+        other = "left" if scene.motion.body.stance == "right" else "right"
+        origin = 0.5 * (origin + scene.poses[f"{other}_thigh"][1])
+    return origin + turn @ np.array(offset)
+
+
+def _pushed(scene: Scene, place: str, axes: tuple[int, ...]) -> np.ndarray:
+    point = place_of(scene, place)
     return np.stack([-scene.force_at(point, np.eye(3)[a]) for a in axes], axis=2)
