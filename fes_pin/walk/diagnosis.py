@@ -216,7 +216,7 @@ def _causes(search: Search, best: Set, nulls: np.ndarray, seed: int) -> list[tup
         instead = [search.forms[k] for r in rivals[i] for k in r.forms if k not in best.forms]
         others = tuple(sorted({f.cause for f in instead} - {form.cause}))
         sites = tuple(dict.fromkeys(f.site for f in instead if f.cause == form.cause))
-        either = not form.site.startswith(("left", "right"))
+        either = not form.site.startswith(("left", "right")) and not form.shifts  # a clock is of no leg
         out.append(
             (
                 i,

@@ -84,11 +84,15 @@ def test_one_who_stands_still_tells_no_gain_from_mass_and_calls_neither_untestab
 
 
 def test_late_plates_are_found(gait, tmp_path):
-    found = hidden(gait, tmp_path, 5, "clock_offset", "", 0.03)
-    first = found.causes[0]
+    from walking_matrix.plan import drawn
+    from walking_matrix.synthetic import make
+
+    wrong = drawn("clock_offset", 514)  # 47 ms: far beyond what is linear
+    make(gait, tmp_path, wrong, 514)
+    first = diagnose_walk(read_study(tmp_path)).causes[0]
     assert first.name == "clock_offset"
     value, std, unit = first.parameters["late_s"]
-    assert unit == "s" and value == pytest.approx(0.03, abs=max(3 * std, 0.003))
+    assert unit == "s" and value == pytest.approx(wrong.size, abs=max(3 * std, 0.003))
 
 
 def test_soft_tissue_alone_names_nothing(gait, tmp_path):
