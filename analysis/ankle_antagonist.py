@@ -12,9 +12,9 @@ import numpy as np
 
 from fes_pin.paper.antagonist import carried_covariance, fit_antagonist, with_antagonist
 from fes_pin.paper.constants import ANGLE_NOISE_RAD, paper_trial, paper_twin
+from fes_pin.paper.equation_1 import GRAVITY
 from fes_pin.paper.error_region import profile_intervals
 from fes_pin.paper.ratios import RATIOS, RatioProblem, ankle_of, least_error
-from fes_pin.paper.twin import GRAVITY
 
 OUT = Path(__file__).parents[1] / "out"
 OUT.mkdir(exist_ok=True)

@@ -1,9 +1,13 @@
-# %% [markdown]
-# Three claims of the paper on measured walking: 19 degrees of freedom suffice, the foot's division matters, and the
-# linear equations hold "although the total displacements may be large". Two strides of one adult.
+"""Do three claims of the paper hold on measured walking?
 
-# %%
+They are: 19 degrees of freedom suffice, the foot's division matters, and the linear equations hold "although the total
+displacements may be large". Two strides of one adult.
+Run the cells, or `python analysis/walk_claims.py`; the picture goes to out/walk_claims.png.
+"""
+
+# %% Two strides: motion, and plates
 import json
+import sys
 from pathlib import Path
 
 import matplotlib
@@ -15,6 +19,7 @@ import numpy as np
 from fes_pin.body.build import Body
 from fes_pin.body.measured_walk import data_folder
 from fes_pin.body.passive import PassiveLegs
+from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
 from fes_pin.walk.dynamics import about, centre_of_mass, joint_torques, required
 from fes_pin.walk.linear import TERMS, along
@@ -22,7 +27,11 @@ from fes_pin.walk.motion import motion_of, pelvis_to_hip, rooted_motion
 from fes_pin.walk.plates import plates_of
 
 OUT = Path("out")
-WALK = data_folder()
+try:
+    WALK = data_folder()
+except InputError as error:
+    print(f"walk_claims: {error}", file=sys.stderr)
+    raise SystemExit(2) from None
 SEGMENTS = WALK / "reference/subject01_model.json"
 BODIES = {side: Body.from_segments(SEGMENTS, side) for side in ("left", "right")}
 HIP = pelvis_to_hip(BODIES["right"], json.loads(SEGMENTS.read_text()))
@@ -65,10 +74,7 @@ def without_motion(*joints):
     return time, columns
 
 
-# %% [markdown]
-# ## Required against measured, and the tree that stands on its forefoot
-
-# %%
+# %% Required against measured, and the tree that stands on its forefoot
 motion, own, plates = walk(free)
 left = residual(motion, plates)
 singles = np.isin(plates.support(), ("left", "right"))
@@ -93,10 +99,7 @@ for side in ("left", "right"):
             standing.append(about(pressed.total[rows], centre) - about(required(rooted), centre))
 row("19 joints on a resting forefoot", np.concatenate(standing))
 
-# %% [markdown]
-# ## The foot in two parts
-
-# %%
+# %% The foot in two parts
 cases = {
     "rigid feet (IK with both held)": locked,
     "free feet": free,
@@ -123,10 +126,7 @@ print(
 )
 print("whether those markers were right is not told by this: that needs inverse kinematics without them")
 
-# %% [markdown]
-# ## Linear equations along the stance
-
-# %%
+# %% Linear equations along the stance
 side, rows = next((s, r) for s, r in plates.single_supports() if s == "right")
 rooted = rooted_motion(motion, own, HIP, rows)
 one = along(rooted, 1)
@@ -148,12 +148,9 @@ for k, name in enumerate(TERMS):
 total = {n: 100 * np.linalg.norm(e.full - e.linear) / np.linalg.norm(e.full) for n, e in variants.items()}
 print("all joints together, percent: " + ", ".join(f"{n} {v:.1f}" for n, v in total.items()))
 
-# %% [markdown]
-# ## Passive torques
+# %% Passive torques
 # Muscles were not recorded: where they pull, nothing tells their torque from the passive one. What can be said is how
 # much of the measured torque the published passive legs would be.
-
-# %%
 torque, _ = joint_torques(motion, plates.feet)
 names = list(motion.joint_names)
 passive = np.array([PassiveLegs().torque(q, names) for q in motion.q[:, 7:]])
@@ -171,7 +168,7 @@ print(
     "no joint is known to be passive here: stiffness and damping of single joints are not identifiable from this walk"
 )
 
-# %%
+# %% The picture
 OUT.mkdir(exist_ok=True)
 figure, axes = plt.subplots(2, 2, figsize=(11, 6.4), layout="constrained")
 centre = centre_of_mass(motion)

@@ -14,7 +14,7 @@ def _either(symbolic: Any, numeric: Any) -> Any:
     def function(*x: Any) -> Any:
         return symbolic(*x) if any(isinstance(v, _SYMBOLIC) for v in x) else numeric(*x)
 
-    function.__doc__ = numeric.__doc__
+    function.__doc__ = f"NumPy's `{numeric.__name__}` of numbers and arrays, CasADi's of its expressions."
     return function
 
 

@@ -29,7 +29,7 @@ class Rig:
     A subclass writes its equations on `Signals`: `s.x` states, `s.m` memories, `s.u` inputs, `s.c` constants of rig
     and trial, `s.initial` per-trial unknowns, `s.time`, `s.step` (no integration step is longer), and
     `s.delayed(now, before)` for what is held between samples and may come late.
-    Each method serves all `kind`s of trial.
+    Each method serves every `kind` of trial.
     """
 
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict, kw_only=True)

@@ -1,0 +1,227 @@
+"""Pages that are written at build time from the package itself: the study format's tables, the causes, the API.
+
+Nothing here imports Sphinx: `write` makes files below `docs/_generated` and `docs/api`, and the tests read the texts.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Iterable, Sequence
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+import fes_pin
+from fes_pin.data.schema import Number, RigSchema, known_rigs
+from fes_pin.models.catalogue import shipped
+from fes_pin.models.describe import equation, remark, sentence
+from fes_pin.models.parameters import ROTARY
+from fes_pin.models.stage import Effect, Stage
+
+ROOMS = {
+    "data": "Studies, trials, readers",
+    "models": "Models: rigs, effects, simulation",
+    "identify": "Fits, noise",
+    "diagnose": "Diagnosis",
+    "paper": "The paper's ankle",
+    "body": "The walking body",
+    "walk": "Measured walking",
+    "muscles": "Muscles and nerves",
+    "allocate": "Allocation",
+    "control": "Position control",
+    "view": "Reports and pictures",
+}
+"""The packages of the API reference, with their headings; `cli` is the command line, which says itself what it does."""
+
+KNOWN = "known"
+FITTED = "start value, fitted"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines) + "\n"
+
+
+def bound(number: Number) -> str:
+    """The bound of a number in words."""
+    if not math.isfinite(number.lower):
+        return "finite"
+    return f"{'above' if number.strict else 'at least'} {number.lower:g}"
+
+
+def rig_text(name: str, schema: RigSchema) -> str:
+    """What a study of one rig holds: columns by kind of trial, keys by table."""
+    doc = inspect.cleandoc(schema.owner.__doc__ or "").split("\n", 1) if schema.owner else [""]
+    parts = [f"### Rig `{name}`\n"]
+    if doc[0]:
+        parts.append(doc[0] + "\n")
+        if block := equations(schema.owner):
+            parts.append(f"```text\n{block}\n```\n")
+    if len(schema.recordings) == 1:
+        parts.append(_columns(schema))
+    else:
+        parts.append(f"Each trial names {' and '.join(f'`{n}`' for n in schema.recordings)}, two files; see below.\n")
+    parts.append(table(("table", "key", "unit", "number", "needed", "role in the model"), keys(schema)))
+    if schema.start_may_be_known:
+        parts.append("A key of `[start]` may stand in `[rig]` instead: it is known then, and not fitted.\n")
+    if schema.either:
+        needed = " and ".join(f"`{n}`" for n in schema.either)
+        parts.append(f"Either {needed}, or one of the files.\n")
+    return "\n".join(parts)
+
+
+def _columns(schema: RigSchema) -> str:
+    inputs = " or ".join(f"`{n}`" for n in schema.inputs)
+    also = ", ".join(f"`{n}`" for n in schema.optional)
+    rows = [
+        (
+            f"`{kind}`" + (" (default)" if kind == schema.default_kind else ""),
+            inputs + ("" if schema.inputs_required else ", or none"),
+            f"`{output}`",
+            also or "none",
+        )
+        for kind, output in schema.outputs.items()
+    ]
+    return table(("kind of trial", "input column", "output column", "further columns"), rows)
+
+
+def keys(schema: RigSchema) -> list[tuple[str, ...]]:
+    """Every key of every table of a rig's studies: table, key, unit, bound, whether it must be there, what it is."""
+    rows = []
+    for key, must in schema.files.items():
+        rows.append(("`[rig]`", f"`{key}`", "file", "a path inside the study", "yes" if must else "no", KNOWN))
+    for where, numbers, role in (
+        ("`[rig]`", schema.constants, KNOWN),
+        ("`[rig.passive]`", schema.passive, KNOWN),
+        ("`[start]`", schema.start, FITTED),
+        ("`[[trial]]`", schema.conditions, "condition of the trial"),
+    ):
+        for key, number in numbers.items():
+            rows.append((where, f"`{key}`", number.unit or "1", bound(number), _needed(schema, key, number), role))
+    return rows
+
+
+def _needed(schema: RigSchema, key: str, number: Number) -> str:
+    kinds = [kind for kind, needed in schema.needed.items() if key in needed]
+    if kinds:
+        return f"in {' and '.join(kinds)} trials" + (" only" if key in schema.only else "")
+    return "yes" if number.required else "no"
+
+
+def equations(owner: type) -> str:
+    """The equations of a rig, as its docstring has them: the first indented block."""
+    return equation(owner)
+
+
+def rigs_text() -> str:
+    """What a study of each rig holds, rig by rig."""
+    return "\n".join(rig_text(name, schema) for name, schema in known_rigs().items() if _ours(schema))
+
+
+def _ours(schema: RigSchema) -> bool:
+    return schema.owner is None or schema.owner.__module__.startswith("fes_pin.")
+
+
+def causes() -> list[type[Effect]]:
+    """The causes that are written in the package, by stage and name."""
+    order = list(Stage)
+    return sorted(shipped().effects, key=lambda e: (order.index(Stage(e.stage)), e.name))
+
+
+def cause_text(effect: type[Effect]) -> str:
+    """One cause: what it is, its equation, how one sees it, its parameters, where it comes from."""
+    rows = []
+    for name, info in effect.parameters().items():
+        absent = "a shape: none" if info.null is None else f"{info.null:g}"
+        unit = info.in_units(ROTARY).unit or "1"
+        rows.append((f"`{name}`", unit, f"{info.lower:g} to {info.upper:g}", absent, "yes" if info.optional else "no"))
+    parts = [
+        f"### `{effect.name}`\n",
+        f"{sentence(effect)} Rigs: {', '.join(effect.rigs)}.\n",
+        f"```text\n{equation(effect)}\n```\n" if equation(effect) else "",
+        f"*Tell-tale*: {remark(effect, 'Tell-tale:')}\n" if remark(effect, "Tell-tale:") else "",
+        table(("parameter", "unit (rotary)", "range", "absent at", "refinement"), rows) if rows else "",
+        f"*Source*: {remark(effect, 'Source:')}\n" if remark(effect, "Source:") else "",
+    ]
+    return "\n".join(part for part in parts if part)
+
+
+def causes_text() -> str:
+    """Every cause, under its stage."""
+    parts, stage = [], None
+    for effect in causes():
+        if effect.stage != stage:
+            stage = effect.stage
+            parts.append(f"## Stage: {stage}\n")
+        parts.append(cause_text(effect))
+    return "\n".join(parts)
+
+
+def modules(room: str) -> list[str]:
+    """Names of a room's public modules, in the order of their paths."""
+    package = import_module(f"fes_pin.{room}")
+    return _modules(package.__name__, package.__path__)
+
+
+def _modules(name: str, paths: Iterable[str]) -> list[str]:
+    out = []
+    for one in sorted(iter_modules(paths), key=lambda m: m.name):
+        full = f"{name}.{one.name}"
+        out.append(full)
+        if one.ispkg:
+            out += _modules(full, import_module(full).__path__)
+    return out
+
+
+def room_text(room: str, heading: str) -> str:
+    """The page of one room: its modules with everything public in them."""
+    package = import_module(f"fes_pin.{room}")
+    title = f"{heading}: ``fes_pin.{room}``"
+    lines = [title, "=" * len(title), "", inspect.cleandoc(package.__doc__ or ""), ""]
+    for name in modules(room):
+        head = f"``{name.removeprefix('fes_pin.')}``"
+        lines += [head, "-" * len(head), "", f".. automodule:: {name}", "   :members:", ""]
+    return "\n".join(lines)
+
+
+def resolve(path: str) -> object:
+    """What stands at a dotted path: a module, or a class or function in one."""
+    try:
+        return import_module(path)
+    except ModuleNotFoundError:
+        module, _, name = path.rpartition(".")
+        return getattr(import_module(module), name)
+
+
+def public_names() -> dict[str, str]:
+    """Where each public name of `fes_pin` is written: a dotted path, in the order in which the package lists them."""
+    chapters = {name: getattr(fes_pin, name).__name__ for name in fes_pin._CHAPTERS}
+    return {**{name: f"{module}.{name}" for name, module in fes_pin._WHERE.items()}, **chapters}
+
+
+def public_text() -> str:
+    """The public names with their first sentences, each with a link to where it is described."""
+    rows = []
+    for name, where in public_names().items():
+        one = resolve(where)
+        summary = " ".join(inspect.cleandoc(one.__doc__ or "").split("\n\n")[0].split())
+        role = "py:mod" if inspect.ismodule(one) else "py:obj"
+        rows.append((f"{{{role}}}`fes_pin.{name} <{where}>`", summary))
+    return table(("name", "what it is"), rows)
+
+
+def write(docs: Path) -> None:
+    """Write every generated page below a folder of documentation; files that would not change are left alone."""
+    pages = {
+        "_generated/rigs.md": rigs_text(),
+        "_generated/causes.md": causes_text(),
+        "_generated/public.md": public_text(),
+        **{f"api/{room}.rst": room_text(room, heading) for room, heading in ROOMS.items()},
+    }
+    for name, text in pages.items():
+        path = docs / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists() or path.read_text() != text:
+            path.write_text(text)

@@ -1,0 +1,164 @@
+"""The documentation says what is there: links, paths, commands, examples, and a docstring for every public name."""
+
+import ast
+import inspect
+import re
+import sys
+import tomllib
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import fes_pin as fp
+from fes_pin.data.schema import known_rigs
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+sys.path.insert(0, str(DOCS))
+
+import stories  # noqa: E402
+import tables  # noqa: E402
+
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md")), DOCS / "api" / "index.md"]
+WRITTEN = ("_generated/", "stories/", "api/")
+"""Below `docs`, what a build writes."""
+STORIES = sorted((ROOT / "analysis").glob("*.py"))
+
+
+def name(path):
+    return str(path.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text()):
+        if not target.startswith(("http://", "https://")):
+            assert (page.parent / target).exists() or target.startswith(WRITTEN), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_paths_of_the_repository_are_there(page):
+    shown = re.findall(r"(?<![\w./-])((?:fes_pin|analysis|scripts|tests|docs|urdf)/[\w./]*\w)", page.read_text())
+    wild = [path for path in shown if not path.endswith("_") and not (ROOT / path).exists()]
+    assert not [path for path in wild if not list(ROOT.glob(f"{path}*"))]
+
+
+def test_every_page_is_in_the_table_of_contents():
+    listed = set(re.findall(r"^([\w/]+)$", (DOCS / "index.md").read_text(), re.MULTILINE))
+    assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed
+    assert {"api/index", "stories/index"} <= listed
+    assert set(tables.ROOMS) <= set(re.findall(r"^(\w+)$", (DOCS / "api" / "index.md").read_text(), re.MULTILINE))
+
+
+def test_every_package_is_in_the_api_reference():
+    packages = {path.parent.name for path in (ROOT / "fes_pin").glob("*/__init__.py")}
+    assert packages - {"cli"} == set(tables.ROOMS)
+
+
+@pytest.mark.parametrize("public", sorted(set(fp.__all__) - {"__version__"}))
+def test_every_public_name_is_described_and_in_the_api_reference(public):
+    where = tables.public_names()[public]
+    one = tables.resolve(where)
+    assert inspect.getdoc(one)
+    assert f"fes_pin.{public} <{where}>" in tables.public_text()
+    module = where if inspect.ismodule(one) else where.rpartition(".")[0]
+    assert f".. automodule:: {module}\n" in tables.room_text(where.split(".")[1], "")
+
+
+@pytest.mark.parametrize("room", tables.ROOMS)
+def test_everything_public_has_a_docstring(room):
+    missing = []
+    for module in map(import_module, tables.modules(room)):
+        assert module.__doc__, module.__name__
+        for public, one in vars(module).items():
+            own = inspect.isclass(one) or inspect.isfunction(one)
+            if own and not public.startswith("_") and one.__module__ == module.__name__ and not inspect.getdoc(one):
+                missing.append(f"{module.__name__}.{public}")
+    assert not missing
+
+
+@pytest.mark.parametrize("rig", sorted(known_rigs()))
+def test_the_study_format_has_every_key_and_column(rig):
+    schema, text = known_rigs()[rig], tables.rig_text(rig, known_rigs()[rig])
+    keys = [*schema.files, *schema.constants, *schema.passive, *schema.start, *schema.conditions]
+    columns = [*schema.inputs, *schema.optional]
+    if len(schema.recordings) == 1:
+        columns += [*schema.outputs, *schema.outputs.values()]
+    assert all(f"`{key}`" in text for key in (*keys, *columns))
+
+
+def test_the_causes_page_has_every_cause_and_parameter():
+    text = tables.causes_text()
+    for effect in tables.causes():
+        assert f"### `{effect.name}`" in text
+        assert all(f"| `{parameter}` |" in text for parameter in effect.parameters())
+
+
+def test_bars_within_cells_do_not_break_a_table():
+    assert tables.table(("a",), [("|v|",)]).splitlines()[-1] == r"| \|v\| |"
+
+
+@pytest.mark.parametrize("path", STORIES, ids=lambda p: p.stem)
+def test_a_story_has_a_title_and_imports_what_there_is(path):
+    text = stories.as_gallery(path.read_text())
+    title, line = text.split("\n")[1:3]
+    assert len(title) == len(line) and set(line) == {"="}
+    assert "__file__" not in text
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fes_pin"):
+            module = import_module(node.module)
+            for alias in node.names:
+                assert hasattr(module, alias.name) or import_module(f"{node.module}.{alias.name}")
+
+
+def test_a_story_that_is_not_run_says_so_and_has_its_picture():
+    others = stories.shown(walk=False)
+    assert set(others) <= {path.stem for path in STORIES}
+    for story, why in others.items():
+        text = stories.as_gallery((ROOT / "analysis" / f"{story}.py").read_text(), why)
+        assert ".. note::" in text and why.command in text
+        assert story in stories.LONG or f".. image:: /_generated/figures/{why.picture}\n" in text
+        assert (ROOT / why.command).exists()
+
+
+def blocks(page, language):
+    return re.findall(rf"```{language}\n(.*?)```", (DOCS / page).read_text(), re.DOTALL)
+
+
+def test_getting_started_is_a_study_that_can_be_read_and_fitted(tmp_path, monkeypatch):
+    folder = tmp_path / "my_pendulum"
+    (folder / "trials").mkdir(parents=True)
+    (folder / "pendulum.urdf").write_text(blocks("getting_started.md", "xml")[0])
+    (folder / "study.toml").write_text(blocks("getting_started.md", "toml")[0])
+    header = blocks("getting_started.md", "text")[1].splitlines()[0]
+    time = np.arange(0.0, 4.0, 0.005)
+    inertia, damping = 0.002 + 0.5 * 0.2**2, 0.02
+    for trial, begin in (("a", 0.6), ("b", -0.9), ("c", 0.3)):
+        run = solve_ivp(
+            lambda t, x: [x[1], (-0.5 * 9.81 * 0.2 * np.sin(x[0]) - damping * x[1]) / inertia],
+            (0.0, 4.0),
+            [begin, 0.0],
+            t_eval=time,
+            rtol=1e-9,
+        )
+        rows = "".join(f"{t:.3f},{q:.6f}\n" for t, q in zip(time, run.y[0], strict=True))
+        (folder / "trials" / f"{trial}.csv").write_text(f"{header}\n{rows}")
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(compile(blocks("getting_started.md", "python")[0], "getting_started.md", "exec"), names)
+    assert names["fitted"].values["damping"] == pytest.approx(damping, rel=1e-2)
+
+
+def test_the_study_format_shows_toml():
+    first, walking = blocks("study_format.md", "toml")
+    assert tomllib.loads(first)["trial"][0]["role"] == "fit"
+    assert set(tomllib.loads(walking)["trial"][0]) <= {"coordinates", "ground_reaction", "belt_speed_mps"}
+
+
+def test_what_the_documentation_needs_is_pinned():
+    wanted = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["docs"]
+    pinned = {line.split("==")[0].lower() for line in (DOCS / "requirements.lock").read_text().splitlines()}
+    assert {re.split(r"[<>=]", one)[0] for one in wanted} <= pinned
