@@ -37,7 +37,7 @@ def _walk_is_there() -> bool:
 READS_WALK = "from fes_pin.body.measured_walk import"
 WALK = "It needs measured walking, which is not shipped: it runs where `FES_PIN_DATA` names a folder that holds it"
 MINUTES = "It takes minutes: it does not run when this documentation is built"
-LONG = ("confounded_pair",)
+LONG = ("body_which_nerves", "confounded_pair")
 
 
 def shown(walk: bool | None = None) -> dict[str, Shown]:
