@@ -29,7 +29,8 @@ myst_enable_extensions = ["colon_fence"]
 
 html_theme = "furo"
 html_title = f"fes_pin {release}"
-html_static_path: list[str] = []
+html_static_path = ["static"]
+html_css_files = ["wide.css"]
 html_show_sourcelink = False
 html_copy_source = False
 
@@ -47,7 +48,7 @@ sphinx_gallery_conf = {
     "capture_repr": (),
     "download_all_examples": False,
     "show_signature": False,
-    "min_reported_time": 0,
+    "write_computation_times": False,  # its page would load scripts from the network
     "plot_gallery": True,
 }
 
