@@ -46,6 +46,12 @@ def test_paths_of_the_repository_are_there(page):
     assert not [path for path in wild if not list(ROOT.glob(f"{path}*"))]
 
 
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_no_line_of_text_begins_with_a_percent_sign(page):
+    """MyST takes such a line for a comment and leaves it out."""
+    assert not re.findall(r"^%.*", page.read_text(), re.MULTILINE)
+
+
 def test_every_page_is_in_the_table_of_contents():
     listed = set(re.findall(r"^([\w/]+)$", (DOCS / "index.md").read_text(), re.MULTILINE))
     assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed
@@ -156,6 +162,12 @@ def test_the_study_format_shows_toml():
     first, walking = blocks("study_format.md", "toml")
     assert tomllib.loads(first)["trial"][0]["role"] == "fit"
     assert set(tomllib.loads(walking)["trial"][0]) <= {"coordinates", "ground_reaction", "belt_speed_mps"}
+
+
+def test_the_benchmarks_that_are_listed_are_those_that_can_be_run():
+    listed = set(re.findall(r"`scripts/benchmark (\w+)`", (DOCS / "benchmarks.md").read_text()))
+    files = (ROOT / "scripts" / "benchmarks").glob("*.py")
+    assert listed == {path.stem for path in files if "\ndef run(" in path.read_text()}
 
 
 def test_what_the_documentation_needs_is_pinned():
