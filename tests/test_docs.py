@@ -170,6 +170,16 @@ def test_the_benchmarks_that_are_listed_are_those_that_can_be_run():
     assert listed == {path.stem for path in files if "\ndef run(" in path.read_text()}
 
 
+def test_the_study_format_has_every_key_of_a_diagnosis():
+    text = (DOCS / "study_format.md").read_text()
+    made = ast.walk(ast.parse((ROOT / "fes_pin" / "diagnose" / "record.py").read_text()))
+    keys = {
+        key.value for node in made if isinstance(node, ast.Dict) for key in node.keys if isinstance(key, ast.Constant)
+    }
+    assert {"verdict", "equivalents", "ci95"} <= keys
+    assert not [key for key in keys if f"`{key}`" not in text]
+
+
 def test_what_the_documentation_needs_is_pinned():
     wanted = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["docs"]
     pinned = {line.split("==")[0].lower() for line in (DOCS / "requirements.lock").read_text().splitlines()}
