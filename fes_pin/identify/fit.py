@@ -16,6 +16,7 @@ from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
 from fes_pin.workers import one_thread_each
+from fes_pin.models.predictor import Doubt
 
 MAX_ITERATIONS = 60
 CONFIDENCE_95 = normal_quantile(0.975)
@@ -57,6 +58,8 @@ class Fit:
         Of each trial.
     parts
         Whitened residuals and sensitivities at the optimum, by trial.
+    doubt
+        What is random, of a fit by `identify.likelihood`: its `sse` holds the log-determinant.
     """
 
     model: Model
@@ -71,6 +74,7 @@ class Fit:
     unknowns: Unknowns
     at_bound: tuple[str, ...]
     parts: tuple[Linearized, ...] = field(repr=False)
+    doubt: Doubt | None = None
 
     @property
     def values(self) -> dict[str, float]:

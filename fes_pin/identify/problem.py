@@ -35,11 +35,14 @@ class Linearized:
         Shape (m, parameters): derivative of the simulation, so the residual falls along it.
     local
         Shape (m, unknowns of the trial).
+    log_determinant
+        Logarithms of the variances that the residuals were whitened with; 0 where they are given.
     """
 
     residual: np.ndarray
     jacobian: np.ndarray
     local: np.ndarray
+    log_determinant: float = 0.0
 
 
 class Problem:
@@ -241,8 +244,8 @@ def _solved(own: np.ndarray, right: np.ndarray, damping: float) -> np.ndarray:
 
 
 def whitened_sse(parts: Sequence[Linearized]) -> float:
-    """Sum of squared whitened residuals; infinite where the simulation or its sensitivities run away."""
+    """Sum of squared whitened residuals and log-determinants; infinite where the simulation or its sensitivities run away."""
     with np.errstate(over="ignore", invalid="ignore"):
-        total = float(sum(p.residual @ p.residual for p in parts))
+        total = float(sum(p.residual @ p.residual + p.log_determinant for p in parts))
     tame = all(float(np.abs(x).max(initial=0.0)) < STEEPEST for p in parts for x in (p.jacobian, p.local))
     return total if math.isfinite(total) and tame else math.inf

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.models.compile.layout import WIDTH
+from fes_pin.models.compile.layout import WIDTH, Layout
 from fes_pin.models.compile.program import Program, program
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
@@ -226,7 +226,7 @@ class _Block:
         self.substeps = substeps(model, first.dt, max_step_s)
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
-        constants = [{**rig.trial_constants(t), **_timing(t, self.substeps)} for t in padded]
+        constants = [{**rig.trial_constants(t), **timing(t, self.substeps)} for t in padded]
         self.constants = np.array([[c[n] for c in constants] for n in self.layout.constants]).reshape(-1, WIDTH)
         self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
         self._shifted: tuple[tuple[int, ...] | None, np.ndarray] = None, np.empty(0)
@@ -239,22 +239,12 @@ class _Block:
         known, u = self._shifted
         if known == shift:
             return u
-        u = np.zeros((self.count, len(self.inputs), WIDTH))
-        for lane, trial in enumerate(self.trials):
-            for j, name in enumerate(self.inputs):
-                late = min(shift[lane], len(trial))
-                u[late : len(trial), j, lane] = trial[name][: len(trial) - late]
+        u = lane_inputs(self.trials, self.inputs, self.count, shift)
         self._shifted = shift, u
         return u
 
     def run(self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]], delay: float) -> Abreast:
-        p = np.empty((len(self.layout.values), WIDTH))
-        for k, name in enumerate(self.layout.values):
-            if name in self.layout.unknowns:
-                own = [unknowns[i][name] for i in self.lanes]
-                p[k] = own + [own[-1]] * (WIDTH - len(own))
-            else:
-                p[k] = values[name]
+        p = lane_values(self.layout, values, [unknowns[i] for i in self.lanes])
         shift = tuple(math.floor(delay / t.dt + 1e-9) for t in self.trials)
         constants = self.constants
         if delay:
@@ -277,7 +267,30 @@ def substeps(model: Model, dt: float, max_step_s: float) -> int:
     return max(1, math.ceil(dt / max_step_s - 1e-6)) + is_delayed(model)
 
 
-def _timing(trial: Trial, steps: int) -> dict[str, float]:
+def lane_inputs(trials: Sequence[Trial], inputs: Sequence[str], count: int, shift: Sequence[int]) -> np.ndarray:
+    """Inputs of trials side by side, shape (count, inputs, WIDTH), each later by whole samples; zero before."""
+    u = np.zeros((count, len(inputs), WIDTH))
+    for lane, trial in enumerate(trials):
+        for j, name in enumerate(inputs):
+            late = min(shift[lane], len(trial))
+            u[late : len(trial), j, lane] = trial[name][: len(trial) - late]
+    return u
+
+
+def lane_values(layout: Layout, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]]) -> np.ndarray:
+    """Values of a program's parameters side by side, shape (values, WIDTH); spare lanes are as the last trial."""
+    p = np.empty((len(layout.values), WIDTH))
+    for k, name in enumerate(layout.values):
+        if name in layout.unknowns:
+            own = [u[name] for u in unknowns]
+            p[k] = own + [own[-1]] * (WIDTH - len(own))
+        else:
+            p[k] = values[name]
+    return p
+
+
+def timing(trial: Trial, steps: int) -> dict[str, float]:
+    """Constants that every program reads."""
     return {"t0": float(trial.time[0]), "dt": trial.dt, "step": trial.dt / steps, "shift": 0.0}
 
 

@@ -44,6 +44,8 @@ class Effect:
         What it changes: see the rig's equations for the names.
     rigs
         The rigs it can be part of.
+    random
+        Names of processes that drive its states at random, one for each state; see `models.disturbance`.
     dissipative
         True if it can only take energy from the joint.
     max_step_s
@@ -61,6 +63,7 @@ class Effect:
     rigs: ClassVar[tuple[str, ...]]
     states: ClassVar[tuple[str, ...]] = ()
     memories: ClassVar[tuple[str, ...]] = ()
+    random: ClassVar[tuple[str, ...]] = ()
     dissipative: ClassVar[bool] = False
     max_step_s: ClassVar[float] = math.inf
     varies: ClassVar[bool] = False

@@ -39,11 +39,19 @@ class Equations:
     sample: ca.Function
     rates: ca.Function
     output: ca.Function
+    correct: ca.Function | None = None
+    settle: ca.Function | None = None
+
+    def functions(self) -> dict[str, ca.Function]:
+        """Every function that a program is made of, by name."""
+        names = ("rest", "start", "sample", "rates", "output", "correct", "settle")
+        return {n: f for n in names if (f := getattr(self, n)) is not None}
 
     @property
     def sizes(self) -> Sizes:
         """Lengths of the vectors of states, memories and readings, each with its sensitivities."""
-        return Sizes(self.start.numel_out(0), self.start.numel_out(1), self.output.numel_out(0))
+        reading = self.output.numel_out(0) if self.correct is None else self.correct.numel_out(1)
+        return Sizes(self.start.numel_out(0), self.start.numel_out(1), reading)
 
 
 class _Symbols:
@@ -146,70 +154,101 @@ class _Symbols:
         return [memories[n] for n in self.memories], [rates[n] for n in self.states], list(readings)
 
 
-def derive(model: Model, layout: Layout) -> Equations:
-    """Write out a model's equations and sensitivities."""
-    sym = _Symbols(model, layout)
-    x, m, p, c, u = (sym.vector(v) for v in (sym.x, sym.m, sym.p, sym.c, sym.u))
-    states, memories, residual = sym.at_rest()
-    x0, m0 = _column(list(states.values())), _column(list(memories.values()))
-    g = _column([residual])
-    after, rates, readings = (_column(v) for v in sym.running())
-    wanted = ca.DM(len(layout.values), len(layout.columns))
-    for k, name in enumerate(layout.columns):
-        wanted[layout.values.index(name), k] = 1.0
+class Tangents:
+    """A model's expressions, and how sensitivities go through them.
 
-    def tangent(f: Any, *inner: tuple[Any, Any]) -> Any:
-        total = ca.mtimes(ca.jacobian(f, p), ca.sparsify(wanted))
+    Attributes
+    ----------
+    x, m, p, c, u, t, since, into, z
+        Symbols of states, memories, parameters, constants, inputs, times and the unknown of the static equilibrium.
+    x0, m0, after, rates, readings, g
+        Where a trial begins, next memories, rates, readings, and what is zero at rest.
+    """
+
+    def __init__(self, model: Model, layout: Layout) -> None:
+        self.layout, self.sym = layout, (sym := _Symbols(model, layout))
+        self.x, self.m, self.p, self.c, self.u = (sym.vector(v) for v in (sym.x, sym.m, sym.p, sym.c, sym.u))
+        self.t, self.since, self.into, self.z = sym.t, sym.since, sym.into, sym.z
+        states, memories, residual = sym.at_rest()
+        self.x0, self.m0 = column(list(states.values())), column(list(memories.values()))
+        self.g = column([residual])
+        self.after, self.rates, self.readings = (column(v) for v in sym.running())
+        self._wanted = self.chosen(layout.columns)
+        self.g_z = ca.jacobian(self.g, self.z)
+
+    def chosen(self, names: tuple[str, ...]) -> Any:
+        """The directions of some values in the space of all, shape (values, names)."""
+        out = ca.DM(len(self.layout.values), len(names))
+        for k, name in enumerate(names):
+            out[self.layout.values.index(name), k] = 1.0
+        return ca.sparsify(out)
+
+    def through(self, f: Any, *inner: tuple[Any, Any], along: Any = None) -> Any:
+        """Sensitivities of an expression, from those of the variables inside it."""
+        total = ca.mtimes(ca.jacobian(f, self.p), self._wanted if along is None else along)
         for variable, sensitivity in inner:
             total = total + ca.mtimes(ca.jacobian(f, variable), sensitivity)
         return ca.sparsify(total)
 
-    g_z = ca.jacobian(g, sym.z)
-    dz = -tangent(g) / g_z
-    start_s, start_r = tangent(x0, (sym.z, dz)), tangent(m0, (sym.z, dz))
-    s_pattern, r_pattern = start_s.sparsity(), start_r.sparsity()
-    while True:
-        s, r = ca.SX.sym("S", s_pattern), ca.SX.sym("R", r_pattern)
-        s_rates = tangent(rates, (x, s), (m, r))
-        r_after = tangent(after, (x, s), (m, r))
-        wider_s, wider_r = s_pattern.unite(s_rates.sparsity()), r_pattern.unite(r_after.sparsity())
-        if wider_s.nnz() == s_pattern.nnz() and wider_r.nnz() == r_pattern.nnz():
-            break
-        s_pattern, r_pattern = wider_s, wider_r
-    dy = ca.densify(tangent(readings, (x, s), (m, r)))
-    state = ca.vertcat(x, _nonzeros(s, s_pattern))
-    memory = ca.vertcat(m, _nonzeros(r, r_pattern))
-    t, since, into, z = sym.t, sym.since, sym.into, sym.z
-    y = ca.vertcat(readings, ca.vec(dy.T) if layout.columns else ca.SX(0, 1))
+    def at_start(self, f: Any, along: Any = None) -> Any:
+        """Sensitivities of what a trial begins with, the static equilibrium moving along."""
+        return self.through(f, (self.z, -self.through(self.g, along=along) / self.g_z), along=along)
 
-    def function(name: str, ins: list[Any], outs: list[Any]) -> ca.Function:
-        return ca.Function(name, ins, ca.cse([ca.densify(o) for o in outs]))
+    def patterns(self) -> tuple[Any, Any]:
+        """Entries of the sensitivities of states and memories that can be other than zero."""
+        s_pattern, r_pattern = self.at_start(self.x0).sparsity(), self.at_start(self.m0).sparsity()
+        while True:
+            s, r = ca.SX.sym("S", s_pattern), ca.SX.sym("R", r_pattern)
+            wider_s = s_pattern.unite(self.through(self.rates, (self.x, s), (self.m, r)).sparsity())
+            wider_r = r_pattern.unite(self.through(self.after, (self.x, s), (self.m, r)).sparsity())
+            if wider_s.nnz() == s_pattern.nnz() and wider_r.nnz() == r_pattern.nnz():
+                return s_pattern, r_pattern
+            s_pattern, r_pattern = wider_s, wider_r
 
+
+def derive(model: Model, layout: Layout) -> Equations:
+    """Write out a model's equations and sensitivities."""
+    if layout.measured:
+        from fes_pin.models.compile.predictor import derive_predictor  # noqa: PLC0415 - it builds on this module
+
+        return derive_predictor(model, layout)
+    d = Tangents(model, layout)
+    s_pattern, r_pattern = d.patterns()
+    s, r = ca.SX.sym("S", s_pattern), ca.SX.sym("R", r_pattern)
+    inner = ((d.x, s), (d.m, r))
+    dy = ca.densify(d.through(d.readings, *inner))
+    state = ca.vertcat(d.x, nonzeros(s, s_pattern))
+    memory = ca.vertcat(d.m, nonzeros(r, r_pattern))
+    y = ca.vertcat(d.readings, ca.vec(dy.T) if layout.columns else ca.SX(0, 1))
+    x0 = ca.vertcat(d.x0, nonzeros(d.at_start(d.x0), s_pattern))
+    m0 = ca.vertcat(d.m0, nonzeros(d.at_start(d.m0), r_pattern))
+    after = ca.vertcat(d.after, nonzeros(d.through(d.after, *inner), r_pattern))
+    rates = ca.vertcat(d.rates, nonzeros(d.through(d.rates, *inner), s_pattern))
     return Equations(
         layout=layout,
-        rest=function("rest", [z, p, c], [g, g_z]),
-        start=function(
-            "start",
-            [z, p, c],
-            [ca.vertcat(x0, _nonzeros(start_s, s_pattern)), ca.vertcat(m0, _nonzeros(start_r, r_pattern))],
-        ),
-        sample=function("sample", [state, memory, u, t, p, c], [ca.vertcat(after, _nonzeros(r_after, r_pattern))]),
-        rates=function(
-            "rates", [state, memory, u, t, since, into, p, c], [ca.vertcat(rates, _nonzeros(s_rates, s_pattern))]
-        ),
-        output=function("output", [state, memory, u, t, p, c], [y]),
+        rest=function("rest", [d.z, d.p, d.c], [d.g, d.g_z]),
+        start=function("start", [d.z, d.p, d.c], [x0, m0]),
+        sample=function("sample", [state, memory, d.u, d.t, d.p, d.c], [after]),
+        rates=function("rates", [state, memory, d.u, d.t, d.since, d.into, d.p, d.c], [rates]),
+        output=function("output", [state, memory, d.u, d.t, d.p, d.c], [y]),
     )
+
+
+def function(name: str, ins: list[Any], outs: list[Any]) -> ca.Function:
+    """A function whose outputs are dense and share their common terms."""
+    return ca.Function(name, ins, ca.cse([ca.densify(o) for o in outs]))
 
 
 def _symbols(prefix: str, names: Any) -> dict[str, ca.SX]:
     return {n: ca.SX.sym(f"{prefix}_{n.replace('.', '_')}") for n in names}
 
 
-def _column(values: list[Any]) -> ca.SX:
+def column(values: list[Any]) -> ca.SX:
+    """Expressions as a column."""
     return ca.vertcat(*[ca.SX(v) for v in values]) if values else ca.SX(0, 1)
 
 
-def _nonzeros(matrix: Any, pattern: ca.Sparsity) -> ca.SX:
+def nonzeros(matrix: Any, pattern: ca.Sparsity) -> ca.SX:
     """The entries of `matrix` at `pattern`, as a column."""
     dense = ca.densify(matrix)
     rows, columns = pattern.get_triplet()

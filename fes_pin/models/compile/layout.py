@@ -32,6 +32,18 @@ class Layout:
     """Parameters and unknowns with respect to which the program gives sensitivities."""
     fixed: tuple[tuple[str, float], ...]
     """Parameters of forms that are switched off, with the values that are compiled in: such forms cost nothing."""
+    measured: tuple[str, ...] = ()
+    """Outputs whose measurement corrects the states; none of a simulation. See `compile.predictor`."""
+
+    @property
+    def reported(self) -> int:
+        """Leading entries of what a program gives of each sample: readings, or innovations and their variances."""
+        return 2 * len(self.measured) if self.measured else len(self.outputs)
+
+    @property
+    def channels(self) -> int:
+        """Outputs that have sensitivities."""
+        return len(self.measured) if self.measured else len(self.outputs)
 
     @property
     def values(self) -> tuple[str, ...]:
@@ -53,17 +65,40 @@ class Sizes:
         return 4 * (self.state + 1) + 2 * (self.memory + 1)
 
 
-def make_layout(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...]) -> Layout:
+def reading_inputs(measured: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the inputs that carry what was measured, and whether it was."""
+    return (*(f"measured.{n}" for n in measured), *(f"seen.{n}" for n in measured))
+
+
+def doubt_constants(model: Model, kind: str, measured: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the constants of a predictor: deviations of reading noise and initial states, of random states too."""
+    random = [n for e in model.effects for n in e.random]
+    return (
+        *(f"white.{n}" for n in measured),
+        *(f"prior.{n}" for n in model.rig.unknowns(kind)),
+        *(f"{what}.{n}" for n in random for what in ("std", "time")),
+    )
+
+
+def make_layout(
+    model: Model,
+    kind: str,
+    inputs: tuple[str, ...],
+    columns: tuple[str, ...],
+    measured: tuple[str, ...] = (),
+) -> Layout:
     """The layout of a model's program for trials of a kind with these input columns."""
     rig = model.rig
+    doubt = doubt_constants(model, kind, measured) if measured else ()
     fixed = {n: value for n, value in model.unused_parameters().items() if n not in columns}
     return Layout(
         kind=kind,
-        inputs=inputs,
+        inputs=(*inputs, *reading_inputs(measured)),
         parameters=tuple(n for n in model.parameters() if n not in fixed),
         unknowns=model.unknowns(kind),
-        constants=(*rig.constant_names(kind), *TIMING),
+        constants=(*rig.constant_names(kind), *TIMING, *doubt),
         outputs=rig.outputs(kind),
         columns=columns,
         fixed=tuple(fixed.items()),
+        measured=measured,
     )

@@ -32,13 +32,13 @@ class NativeProgram:
         self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """Simulate WIDTH lanes; see `Program`."""
-        n, outputs = inputs.shape[0], len(self.layout.outputs)
+        n, lead, channels = inputs.shape[0], self.layout.reported, self.layout.channels
         out = np.empty((n, self.sizes.reading, WIDTH))
         given = [np.ascontiguousarray(a, dtype=float) for a in (inputs, values, constants)]
         rest, scratch = np.array(guess, dtype=float), np.zeros((self.sizes.scratch, WIDTH))
         memory = (*given, rest, out, scratch)  # a name for each: they must live until the machine code returns
         self._run(n, substeps, *[a.ctypes.data for a in memory])
-        return out[:, :outputs], out[:, outputs:].reshape(n, outputs, len(self.layout.columns), WIDTH)
+        return out[:, :lead], out[:, lead:].reshape(n, channels, len(self.layout.columns), WIDTH)
 
 
 def compile_equations(equations: Equations) -> bytes:
@@ -50,7 +50,7 @@ def emit(equations: Equations) -> str:
     """LLVM assembly of a program: static equilibrium, then samples of Runge-Kutta steps."""
     module = ir.Module(name="fes_pin")
     lowering = Lowering(module)
-    parts = {n: lowering.lower(getattr(equations, n)) for n in ("rest", "start", "sample", "rates", "output")}
+    parts = {n: lowering.lower(function) for n, function in equations.functions().items()}
     return str(_Loop(module, equations, parts).module)
 
 
@@ -137,10 +137,22 @@ class _Loop:
             y = self._at(self.y, b.mul(n, ir.Constant(INT64, self.sizes.reading)))
             b.call(self.parts["sample"], [self.state, self.memory, u, self.t, self.p, self.c, self.after])
             self._copy(self.after, self.memory, self.sizes.memory)
-            b.call(self.parts["output"], [self.state, self.memory, u, self.t, self.p, self.c, y])
-            self._count(self.substeps, lambda j: self._runge_kutta(j, u))
+            given = [self.state, self.memory, u, self.t, self.p, self.c]
+            if "correct" in self.parts:
+                b.call(self.parts["correct"], [*given, self.stage, y])
+                self._copy(self.stage, self.state, self.sizes.state)
+            else:
+                b.call(self.parts["output"], [*given, y])
+            self._count(self.substeps, lambda j: self._step(j, u))
 
         self._count(self.n, sample)
+
+    def _step(self, j: ir.Value, u: ir.Value) -> None:
+        """From one integration step to the next."""
+        self._runge_kutta(j, u)
+        if "settle" in self.parts:
+            self.b.call(self.parts["settle"], [self.state, self.p, self.c, self.stage])
+            self._copy(self.stage, self.state, self.sizes.state)
 
     def _copy(self, source: ir.Value, target: ir.Value, size: int) -> None:
         self._count(ir.Constant(INT64, size), lambda i: self._store(self._load(source, i), target, i))

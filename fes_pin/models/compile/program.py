@@ -45,9 +45,9 @@ class Program(Protocol):
         Returns
         -------
         readings
-            Shape (n, outputs, WIDTH).
+            Shape (n, outputs, WIDTH); of a predictor (n, 2 measured, WIDTH): innovations, then their variances.
         sensitivities
-            Shape (n, outputs, columns, WIDTH).
+            Shape (n, outputs, columns, WIDTH); of a predictor those of the innovations, for gains as they are.
         """
 
 
@@ -55,7 +55,9 @@ _LOCK = threading.Lock()  # CasADi's expressions are not made for two threads
 _PROGRAMS: dict[tuple[str, str, tuple[type, ...], Layout], Program] = {}
 
 
-def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...]) -> Program:
+def program(
+    model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...], measured: tuple[str, ...] = ()
+) -> Program:
     """The program of a model, compiled if it was not before.
 
     Parameters
@@ -66,13 +68,15 @@ def program(model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str
         Input columns of the trials.
     columns
         Parameters and unknowns to give sensitivities for.
+    measured
+        Outputs whose measurement corrects the states, for a predictor.
 
     Raises
     ------
     InputError
         If FES_PIN_ENGINE names no engine, or FES_PIN_CPU no processor.
     """
-    layout, engine = make_layout(model, kind, inputs, columns), settings.engine()
+    layout, engine = make_layout(model, kind, inputs, columns, measured), settings.engine()
     key = (engine, settings.processor(), _classes(model), layout)
     if key not in _PROGRAMS:
         with _LOCK:

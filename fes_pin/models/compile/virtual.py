@@ -23,7 +23,7 @@ class VirtualProgram:
         self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """Simulate WIDTH lanes; see `Program`."""
-        n, outputs = inputs.shape[0], len(self.layout.outputs)
+        n, lead, channels = inputs.shape[0], self.layout.reported, self.layout.channels
         out = np.empty((n, self.equations.sizes.reading, WIDTH))
         for lane in range(WIDTH):
             p, c = values[:, lane], constants[:, lane]
@@ -32,7 +32,7 @@ class VirtualProgram:
             times = self._times(c, n)
             ended = trajectory(state, memory, inputs[:, :, lane].T, times, ca.repmat(p, 1, n), ca.repmat(c, 1, n))
             out[:, :, lane] = np.array(ended[2]).T
-        return out[:, :outputs], out[:, outputs:].reshape(n, outputs, len(self.layout.columns), WIDTH)
+        return out[:, :lead], out[:, lead:].reshape(n, channels, len(self.layout.columns), WIDTH)
 
     def _times(self, constants: np.ndarray, n: int) -> np.ndarray:
         """Time of every sample, shape (1, n)."""
@@ -57,7 +57,10 @@ class VirtualProgram:
         sizes = (e.sizes.state, e.sizes.memory, len(layout.inputs), 1, len(layout.values), len(layout.constants))
         state, memory, u, t, p, c = given = [ca.MX.sym(n, k) for n, k in zip(names, sizes, strict=True)]
         held = e.sample(state, memory, u, t, p, c)
-        y = e.output(state, held, u, t, p, c)
+        if e.correct is None:
+            y = e.output(state, held, u, t, p, c)
+        else:
+            state, y = e.correct(state, held, u, t, p, c)
         h = c[layout.constants.index("step")]
         for j in range(substeps):
 
@@ -69,4 +72,5 @@ class VirtualProgram:
             third = rates(state + 0.5 * h * second, 0.5)
             fourth = rates(state + h * third, 1.0)
             state = state + h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+            state = state if e.settle is None else e.settle(state, p, c)
         return ca.Function("sample", given, [state, held, y])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -171,6 +171,11 @@ class Rig:
 
     def read_first(self, trial: Trial) -> Mapping[str, str]:
         """The unknowns of a trial that its first sample tells, with the column that they are read in."""
+        return {}
+
+    def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
+        """Root mean square of what drives the rig in these trials, by random process: "effort" (at the joint) or
+        "force" (of a held muscle); about, from the measured columns and start values alone."""
         return {}
 
     def guess(self, trial: Trial) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -140,6 +140,15 @@ class Joint(Rig):
             "initial_position": float(conditions.get("position0", position)),
             "initial_velocity": float(conditions.get("velocity0", rate)),
         }
+
+    def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
+        driven = [t["effort"] for t in trials if "effort" in t.columns]
+        weight = [
+            self.gravity_scale * (self.constants["gravity_cos"] * np.cos(q) + self.constants["gravity_sin"] * np.sin(q))
+            for q in (t["position"] for t in trials if "position" in t.columns and self.constants["revolute"])
+        ]
+        size = math.sqrt(max((float(np.nanmean(x**2)) for many in (driven, weight) for x in many), default=0.0))
+        return {"effort": max(size, 1e-9 * self.constants["inertia"])}
 
     def unmeasured(self, trial: Trial) -> tuple[str, ...]:
         told = "velocity" in trial.columns or "velocity0" in trial.conditions

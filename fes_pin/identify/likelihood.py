@@ -1,0 +1,249 @@
+"""The likelihood of measured trials under a model, a random effort and reading noise; its maximum.
+
+Twice the negative log-likelihood of the innovations r_k of an extended Kalman filter with variances V_k,
+
+    cost = sum r_k^2 / V_k + log V_k,
+
+depends on the model's parameters and on what is random (`Doubt`) alone. Parameters move by Gauss-Newton steps with the
+filter's gains as they are (`identify.descent`), what is random by Fisher scoring on logarithms with differences:
+
+    g_i = sum r r_i / V + (1 - r^2 / V) V_i / (2 V),    I_ij = sum r_i r_j / V + V_i V_j / (2 V^2),
+
+r_i and V_i the derivatives. Both go on by turns until neither gains. What is random begins small: begun large it takes
+all that the model gets wrong.
+
+Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.descent import TOLERANCE
+from fes_pin.identify.fit import Fit, fit_problem, rough_noise
+from fes_pin.identify.noise import Noise
+from fes_pin.identify.problem import Linearized, Unknowns, limits_of
+from fes_pin.models.model import Model
+from fes_pin.models.predictor import Doubt, Innovations, Predictor
+
+ROUNDS = 12
+"""Turns of parameters and randomness, at most."""
+LOG_STEP = 1e-3
+"""Step of the differences in logarithms."""
+LONGEST_MOVE = 1.5
+"""Longest step of a logarithm: randomness changes by a factor of 4.5 at most before parameters move again."""
+FIRST_SHARE = 0.003
+"""Random effort that a fit begins with, as a share of what drives the rig; see the module."""
+FIRST_TIME_S = 0.1
+"""Time constant that it begins with."""
+SMALLEST = 1e-6
+"""Smallest random part, as a share of what drives the rig or of a reading's range: it counts as none."""
+SLOWEST = 0.5
+"""Longest time constant of a random process, as a share of the longest trial: a slower one is an offset."""
+
+
+class LikelihoodProblem:
+    """A model structure on trials under what is random about them; a `Problem` to `Descent`.
+
+    Parameters
+    ----------
+    model
+        Its structure; values are given to the methods.
+    trials
+        What was measured; NaN where nothing was.
+    doubt
+        What is random.
+    free
+        The parameters that move; the model's fitted ones by default.
+    """
+
+    def __init__(
+        self, model: Model, trials: Sequence[Trial], doubt: Doubt, free: tuple[str, ...] | None = None
+    ) -> None:
+        self.model, self.trials, self.doubt = model, tuple(trials), doubt
+        self.free = model.fitted_parameters() if free is None else free
+        self.limits = limits_of(model, self.trials)
+        self.unknown_names = model.own_unknowns()
+        self.begins = [model.rig.initial_unknowns(t) for t in self.trials]
+        self.priors = [first_doubt(model, t) for t in self.trials]
+        self._predictors: dict[tuple[str, ...], Predictor] = {}
+
+    @property
+    def noise(self) -> dict[str, Noise]:
+        """The white noise of the readings, by column."""
+        return {n: Noise(std, (), std) for n, std in self.doubt.white.items()}
+
+    def predictor(self, columns: tuple[str, ...]) -> Predictor:
+        """The compiled predictor with sensitivities to these columns."""
+        if columns not in self._predictors:
+            self._predictors[columns] = Predictor(
+                self.model, self.trials, columns, self.doubt.processes, self.priors
+            )
+        return self._predictors[columns]
+
+    def start_unknowns(self) -> Unknowns:
+        """What effects have of each trial's own, as known before: at their nulls."""
+        return [{n: u[n] for n in self.unknown_names} for u in (self.model.initial_unknowns(t) for t in self.trials)]
+
+    def completed(self, unknowns: Unknowns) -> Unknowns:
+        """Unknowns of another model on these trials with what this one has besides, without what it has not."""
+        both = zip(self.start_unknowns(), unknowns, strict=True)
+        return [{n: known.get(n, value) for n, value in start.items()} for start, known in both]
+
+    def innovations(
+        self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None, slopes: bool = False
+    ) -> list[Innovations]:
+        """Every trial as foretold; with sensitivities to `free` and the effects' unknowns where wanted."""
+        columns = (*self.free, *self.unknown_names) if slopes else ()
+        own = [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)]
+        with np.errstate(all="ignore"):
+            return self.predictor(columns).run(values, doubt or self.doubt, own)
+
+    def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
+        """Innovations over their deviations, and sensitivities, at a parameter value."""
+        return [self._whitened(one) for one in self.innovations(values, unknowns, slopes=True)]
+
+    def _whitened(self, one: Innovations) -> Linearized:
+        with np.errstate(all="ignore"):
+            scale = 1.0 / np.sqrt(one.variances[one.seen])
+            residual = one.values[one.seen] * scale
+            moved = -one.sensitivities[one.seen] * scale[:, None]
+            logs = -2.0 * float(np.sum(np.log(scale)))
+        split = len(self.free)
+        return Linearized(residual, moved[:, :split], moved[:, split:], logs)
+
+    def cost(self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None) -> float:
+        """Twice the negative log-likelihood."""
+        return sum(one.cost() for one in self.innovations(values, unknowns, doubt))
+
+
+def first_doubt(model: Model, trial: Trial) -> dict[str, float]:
+    """How far the start of a trial may be from what its first samples say: nothing is known of it beforehand.
+
+    A position as far as it ever is from another, a rate as fast as the trial moves.
+    """
+    if not model.rig.unknowns(trial.kind):
+        return {}
+    column = trial[model.rig.output(trial.kind)]
+    reach = max(float(np.nanmax(column) - np.nanmin(column)), 1e-9)
+    lag = max(1, round(0.05 / trial.dt))
+    moved = column[lag:] - column[:-lag] if len(column) > lag else column
+    rate = max(float(np.sqrt(np.nanmean(moved**2))) / (lag * trial.dt), reach / max(trial.duration, trial.dt))
+    return {n: (rate if "velocity" in n else reach) for n in model.rig.unknowns(trial.kind)}
+
+
+def driving_size(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
+    """Root mean square of what drives the rig, by random process: the reference that random efforts are a share of.
+
+    The effort at a joint is that of the nominal equations along the measured motion, inertia's and gravity's parts
+    included, so that a rig without an input has one too.
+    """
+    return {n: value for n, value in model.rig.driving_sizes(trials).items() if value > 0.0}
+
+
+def first_guess(model: Model, trials: Sequence[Trial]) -> Doubt:
+    """Randomness that a fit begins with: reading noise from second differences, and a small random effort."""
+    white = {n: noise.std for n, noise in rough_noise(model, trials).items()}
+    sizes = driving_size(model, trials)
+    return Doubt(white, {n: FIRST_SHARE * v for n, v in sizes.items()}, dict.fromkeys(sizes, FIRST_TIME_S))
+
+
+def doubt_limits(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, float]]:
+    """Bounds of everything that is random, by name."""
+    step, longest = max(t.dt for t in trials), max(t.duration for t in trials)
+    out: dict[str, tuple[float, float]] = {}
+    for name, noise in rough_noise(model, trials).items():
+        values = np.concatenate([t[name] for t in trials if name in t.columns])
+        spread = max(float(np.nanmax(values) - np.nanmin(values)), 1e-9)
+        out[f"white.{name}"] = (min(SMALLEST * spread, noise.std), spread)
+        out["std.reading"] = (SMALLEST * spread, spread)
+    for name, size in driving_size(model, trials).items():
+        out[f"std.{name}"] = (SMALLEST * size, 10.0 * size)
+    for name in ("effort", "force", "reading"):
+        out[f"time.{name}"] = (step, max(SLOWEST * longest, 2.0 * step))
+    return out
+
+
+def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknowns: Unknowns, steps: int = 4) -> float:
+    """Improve what is random about a problem by Fisher scoring, in place; returns the cost."""
+    limits = doubt_limits(problem.model, problem.trials)
+    names = tuple(problem.doubt.values())
+    low, high = (np.log([limits[n][k] for n in names]) for k in (0, 1))
+    z = np.clip(np.log([problem.doubt.values()[n] for n in names]), low, high)
+
+    def at(z: np.ndarray) -> Doubt:
+        return problem.doubt.with_values(dict(zip(names, (float(v) for v in np.exp(z)), strict=True)))
+
+    def joined(z: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        run = problem.innovations(values, unknowns, at(z))
+        parts = [(one.values[one.seen], one.variances[one.seen]) for one in run]
+        return sum(one.cost() for one in run), *(np.concatenate([p[k] for p in parts]) for k in (0, 1))
+
+    cost, r, v = joined(z)
+    damping = 1e-3
+    for _ in range(steps):
+        if not math.isfinite(cost):
+            break
+        moved = [joined(z + LOG_STEP * one) for one in np.eye(len(z))]
+        dr = np.stack([(m[1] - r) / LOG_STEP for m in moved], axis=1)
+        dv = np.stack([(m[2] - v) / LOG_STEP for m in moved], axis=1) / v[:, None]
+        gradient = (r / v) @ dr + 0.5 * (1.0 - r * r / v) @ dv
+        information = (dr / v[:, None]).T @ dr + 0.5 * dv.T @ dv
+        better = False
+        for _ in range(8):
+            held = ((z <= low) & (gradient > 0)) | ((z >= high) & (gradient < 0))
+            step = _damped_step(information, gradient, ~held, damping)
+            after = np.clip(z - step, low, high)
+            new = joined(after)
+            if new[0] < cost:
+                better = True
+                break
+            damping *= 10.0
+        if not better:
+            break
+        gained, (cost, r, v), z = cost - new[0], new, after
+        damping = max(damping * 0.3, 1e-6)
+        if gained < TOLERANCE:
+            break
+    problem.doubt = at(z)
+    return cost
+
+
+def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray, damping: float) -> np.ndarray:
+    step = np.zeros(len(gradient))
+    if free.any():
+        inner = information[np.ix_(free, free)]
+        inner = inner + np.diag(damping * np.diag(inner) + 1e-9)
+        step[free] = np.linalg.lstsq(inner, gradient[free], rcond=1e-12)[0]
+    longest = float(np.abs(step).max(initial=0.0))
+    return step * min(1.0, LONGEST_MOVE / max(longest, 1e-300))
+
+
+def maximise(
+    problem: LikelihoodProblem,
+    start: Mapping[str, float],
+    unknowns: Unknowns | None = None,
+    rounds: int = ROUNDS,
+    iterations: int = 15,
+) -> Fit:
+    """Fit parameters and randomness by turns.
+
+    Returns
+    -------
+    Fit
+        `sse` is twice the negative log-likelihood, `doubt` what is random. `converged` is False where turns ran out.
+    """
+    fitted = fit_problem(problem, start, unknowns, iterations)  # type: ignore[arg-type]
+    for _ in range(rounds):
+        before = fitted.sse
+        score_doubt(problem, fitted.values, fitted.unknowns)
+        fitted = fit_problem(problem, fitted.values, fitted.unknowns, iterations)  # type: ignore[arg-type]
+        if not fitted.sse < before - 10.0 * TOLERANCE:
+            return replace(fitted, doubt=problem.doubt)
+    return replace(fitted, doubt=problem.doubt, converged=False)
+

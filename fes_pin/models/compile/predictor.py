@@ -1,0 +1,156 @@
+"""A model's one-step-ahead predictor, an extended Kalman filter, and the sensitivities of its innovations.
+
+Between samples, with F = df/dx and h the integration step, the transition of one step is carried with the states:
+
+    x' = f(x, m, u, p),   S' = f_x S + f_m R + f_p,   M' = F M,  M = 1 when the step begins
+    P <- M P M' + h (M G M' + G) / 2,                 G the intensities of what drives states at random
+
+At a sample, for each measured output y_k in turn, with H = dh_k/dx where it was foretold:
+
+    r = y_k - h_k,   V = H P H' + white_k^2,   K = P H' / V
+    x <- x + K r,    P <- P - K V K',    dr/dp = -(H S + h_m R + h_p),   S <- S + K dr/dp
+
+The gains K are taken as they are when sensitivities are formed: what a parameter does to them acts through past
+innovations alone, which are white and independent of what is foretold where the model is right (Ljung, System
+Identification, 2nd ed., section 7.4). A sample that was not seen corrects nothing. What a trial begins with is known as
+its unknowns are: P = X diag(prior^2) X', X the sensitivities of the first states to them.
+
+Source: Jazwinski, Stochastic Processes and Filtering Theory, 1970, section 8.3; Kristensen, Madsen and Jorgensen,
+Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from fes_pin.models.compile.equations import Equations, Tangents, column, function, nonzeros
+from fes_pin.models.compile.layout import Layout
+from fes_pin.models.model import Model
+
+
+class _Doubt:
+    """Covariance of the states, and the transition of one integration step, as symbols."""
+
+    def __init__(self, d: Tangents, model: Model) -> None:
+        self.d, self.count = d, d.x.numel()
+        self.spread = self._intensities(model)
+        self.lower = ca.SX.sym("P", ca.Sparsity.lower(self.count))
+        self.covariance = ca.tril2symm(self.lower)
+        self.slope = ca.jacobian(d.rates, d.x)
+        self.pattern = self._reached()
+        self.transition = ca.SX.sym("M", self.pattern)
+
+    def _intensities(self, model: Model) -> Any:
+        """Diagonal of G: 2 std^2 / time of each first-order process that drives a state."""
+        at = {n: k for k, n in enumerate(self.d.sym.states)}
+        out, c = ca.SX(self.count, 1), self.d.sym.c
+        for e in model.effects:
+            for state, process in zip(e.states, e.random, strict=False):
+                out[at[f"{e.name}.{state}"]] = 2.0 * c[f"std.{process}"] ** 2 / c[f"time.{process}"]
+        return ca.diag(out)
+
+    def _reached(self) -> Any:
+        """Entries of the transition that can be other than zero."""
+        pattern = ca.Sparsity.diag(self.count)
+        while True:
+            wider = pattern.unite(ca.mtimes(self.slope, ca.SX.sym("M", pattern)).sparsity())
+            if wider.nnz() == pattern.nnz():
+                return pattern
+            pattern = wider
+
+    def at_start(self, model: Model) -> Any:
+        """Covariance of the first states."""
+        d, layout, c = self.d, self.d.layout, self.d.sym.c
+        unknowns = model.rig.unknowns(layout.kind)
+        moved = ca.densify(d.at_start(d.x0, d.chosen(unknowns)))
+        priors = ca.vertcat(*[c[f"prior.{n}"] ** 2 for n in unknowns]) if unknowns else ca.SX(0, 1)
+        out = ca.mtimes([moved, ca.diag(priors), moved.T]) if unknowns else ca.SX(self.count, self.count)
+        at = {n: k for k, n in enumerate(d.sym.states)}
+        for e in model.effects:
+            for state, process in zip(e.states, e.random, strict=False):
+                k = at[f"{e.name}.{state}"]
+                out[k, k] = out[k, k] + c[f"std.{process}"] ** 2
+        return out
+
+
+def derive_predictor(model: Model, layout: Layout) -> Equations:
+    """Write out a model's predictor; see the module."""
+    d = Tangents(model, layout)
+    doubt = _Doubt(d, model)
+    count, width = doubt.count, len(layout.columns)
+    whole = ca.Sparsity.dense(count, width)
+    _, r_pattern = d.patterns()
+    s, r = ca.SX.sym("S", whole), ca.SX.sym("R", r_pattern)
+    r_pattern = _wider(d, s, r_pattern)
+    r = ca.SX.sym("R", r_pattern)
+    inner = ((d.x, s), (d.m, r))
+    lower = ca.Sparsity.lower(count)
+    state = ca.vertcat(d.x, nonzeros(s, whole), nonzeros(doubt.transition, doubt.pattern), nonzeros(doubt.lower, lower))
+    memory = ca.vertcat(d.m, nonzeros(r, r_pattern))
+    unmoved = nonzeros(ca.SX.eye(count), doubt.pattern)
+
+    def packed(x: Any, sensitivities: Any, covariance: Any) -> Any:
+        return ca.vertcat(x, nonzeros(sensitivities, whole), unmoved, nonzeros(covariance, lower))
+
+    x0 = packed(d.x0, d.at_start(d.x0), doubt.at_start(model))
+    m0 = ca.vertcat(d.m0, nonzeros(d.at_start(d.m0), r_pattern))
+    after = ca.vertcat(d.after, nonzeros(d.through(d.after, *inner), r_pattern))
+    rates = ca.vertcat(
+        d.rates,
+        nonzeros(d.through(d.rates, *inner), whole),
+        nonzeros(ca.mtimes(doubt.slope, doubt.transition), doubt.pattern),
+        ca.SX.zeros(lower.nnz()),
+    )
+    given = [state, memory, d.u, d.t, d.p, d.c]
+    return Equations(
+        layout=layout,
+        rest=function("rest", [d.z, d.p, d.c], [d.g, d.g_z]),
+        start=function("start", [d.z, d.p, d.c], [x0, m0]),
+        sample=function("sample", given, [after]),
+        rates=function("rates", [state, memory, d.u, d.t, d.since, d.into, d.p, d.c], [rates]),
+        output=function("output", given, [d.readings]),
+        correct=function("correct", given, _corrected(d, doubt, s, inner, packed)),
+        settle=function("settle", [state, d.p, d.c], [packed(d.x, s, _ahead(d, doubt))]),
+    )
+
+
+def _wider(d: Tangents, s: Any, pattern: Any) -> Any:
+    """Entries of the memories' sensitivities that can be other than zero where all of the states' can."""
+    while True:
+        wider = pattern.unite(d.through(d.after, (d.x, s), (d.m, ca.SX.sym("R", pattern))).sparsity())
+        if wider.nnz() == pattern.nnz():
+            return pattern
+        pattern = wider
+
+
+def _ahead(d: Tangents, doubt: _Doubt) -> Any:
+    """Covariance after an integration step."""
+    through, spread = doubt.transition, doubt.spread
+    grown = ca.mtimes([through, doubt.covariance, through.T])
+    return grown + 0.5 * d.sym.c["step"] * (ca.mtimes([through, spread, through.T]) + spread)
+
+
+def _corrected(d: Tangents, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packed: Any) -> list[Any]:
+    """State after the measurements of a sample; innovations, their variances, sensitivities of the innovations."""
+    x, covariance, moved = d.x, doubt.covariance, s
+    u, c = d.sym.u, d.sym.c
+    innovations, variances, slopes = [], [], []
+    for name in d.layout.measured:
+        reading = d.readings[d.layout.outputs.index(name)]
+        row = ca.jacobian(reading, d.x)
+        foretold = reading + ca.mtimes(row, x - d.x)
+        innovation = u[f"measured.{name}"] - foretold
+        toward = ca.mtimes(covariance, row.T)
+        variance = ca.mtimes(row, toward) + c[f"white.{name}"] ** 2
+        gain = u[f"seen.{name}"] * toward / variance
+        slope = -d.through(reading, (d.x, moved), *inner[1:])
+        x, covariance = x + gain * innovation, covariance - ca.mtimes(gain, toward.T)
+        moved = moved + ca.mtimes(gain, slope)
+        innovations.append(innovation)
+        variances.append(variance)
+        slopes.append(ca.densify(slope))
+    dr = ca.vertcat(*slopes)
+    y = ca.vertcat(column(innovations), column(variances), ca.vec(dr.T) if d.layout.columns else ca.SX(0, 1))
+    return [packed(x, moved, covariance), y]

@@ -1,0 +1,80 @@
+"""What acts on a rig at random: an effort that no cause explains, and slow wandering of a reading.
+
+Both are first-order processes, e' = -e / time + white noise, of stationary deviation std. They are effects like any
+other, but of no library: nobody is told that noise is a cause. Their deviations and times are no parameters of a model;
+they are constants of a predictor (`models.predictor.Doubt`), as reading noise is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect, Stage
+
+
+@dataclass(frozen=True)
+class RandomEffort(Effect):
+    """A random effort at the joint.
+
+        torque + e,   e' = -e / time + noise
+    """
+
+    name, stage, signal, rigs = "random_effort", Stage.JOINT, "torque", ("ankle", "joint")
+    states, random = ("effort",), ("effort",)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value + s.own.effort
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        return {"effort": -s.own.effort / getattr(s.c, "time.effort")}
+
+
+@dataclass(frozen=True)
+class RandomForce(Effect):
+    """A random force of a muscle that is held.
+
+        force + e,   e' = -e / time + noise
+    """
+
+    name, stage, signal, rigs = "random_force", Stage.MUSCLE, "force", ("ankle", "muscle")
+    states, random = ("force",), ("force",)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value + s.own.force
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        return {"force": -s.own.force / getattr(s.c, "time.force")}
+
+
+@dataclass(frozen=True)
+class WanderingReading(Effect):
+    """A slow random part of the first reading.
+
+        y + e,   e' = -e / time + noise
+    """
+
+    name, stage, signal, rigs = "wandering_reading", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
+    states, random = ("reading",), ("reading",)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value + s.own.reading
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        return {"reading": -s.own.reading / getattr(s.c, "time.reading")}
+
+
+DISTURBANCES = (RandomEffort, RandomForce, WanderingReading)
+"""Every random process, in the order of the signal path."""
+
+
+def disturbed(model: Model, kind: str, processes: tuple[str, ...]) -> Model:
+    """The model with those of the processes that a kind of trial can feel; a random force only where no joint moves."""
+    signals = model.rig.signals(kind)
+    for one in DISTURBANCES:
+        moves = one is RandomForce and RandomEffort.signal in signals
+        if set(one.random) <= set(processes) and one.signal in signals and not moves and model.rig.name in one.rigs:
+            model = model + one()
+    return model

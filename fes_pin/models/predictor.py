@@ -1,0 +1,236 @@
+"""One-step-ahead prediction of measured trials, with sensitivities: innovations and their variances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.models.compile.layout import WIDTH, doubt_constants
+from fes_pin.models.compile.program import program
+from fes_pin.models.disturbance import disturbed
+from fes_pin.models.model import Model
+from fes_pin.models.simulate import is_delayed, lane_inputs, lane_values, max_step, substeps, timing, total_delay
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What is random about a rig and its readings.
+
+    Attributes
+    ----------
+    white
+        Standard deviation of the white noise of each output, in its unit, by column name.
+    std, time
+        Stationary standard deviation and time constant (s) of each first-order random process that acts, by its name:
+        "effort" at the joint, "force" of a held muscle, "reading" of the first output.
+    """
+
+    white: Mapping[str, float]
+    std: Mapping[str, float] = field(default_factory=dict)
+    time: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def processes(self) -> tuple[str, ...]:
+        """The random processes that act."""
+        return tuple(self.std)
+
+    def with_values(self, values: Mapping[str, float]) -> Doubt:
+        """The same with other values, by name as in `values`."""
+        parts = {part: dict(getattr(self, part)) for part in ("white", "std", "time")}
+        for name, value in values.items():
+            part, _, which = name.partition(".")
+            parts[part][which] = value
+        return Doubt(**parts)
+
+    def values(self) -> dict[str, float]:
+        """Every value by name: white.position, std.effort, time.effort."""
+        return {f"{part}.{n}": v for part in ("white", "std", "time") for n, v in getattr(self, part).items()}
+
+
+@dataclass(frozen=True)
+class Innovations:
+    """One trial as it was foretold, sample by sample.
+
+    Attributes
+    ----------
+    outputs
+        The measured columns, in the order of the arrays.
+    values
+        Shape (n, outputs): measured minus foretold one sample ahead; 0 where nothing was measured.
+    variances
+        Shape (n, outputs).
+    seen
+        Shape (n, outputs): True where something was measured.
+    sensitivities
+        Shape (n, outputs, columns): derivatives of `values`, for gains as they are.
+    """
+
+    outputs: tuple[str, ...]
+    values: np.ndarray
+    variances: np.ndarray
+    seen: np.ndarray
+    sensitivities: np.ndarray
+
+    def cost(self) -> float:
+        """Twice the negative log-likelihood, but for n log(2 pi); infinite where the prediction does not stay finite."""
+        v, variance = self.values[self.seen], self.variances[self.seen]
+        with np.errstate(all="ignore"):
+            total = float(np.sum(v * v / variance + np.log(variance)))
+        return total if math.isfinite(total) and bool((variance > 0).all()) else math.inf
+
+
+class Predictor:
+    """A model structure on measured trials, ready to foretell them for any values of its parameters.
+
+    Parameters
+    ----------
+    model
+        Its structure and constants are used; the values of its parameters are given to `run`.
+    trials
+        What was measured; a sample that is NaN was not.
+    columns
+        Parameters, and unknowns of effects, to give sensitivities for.
+    processes
+        Names of the random processes that act; see `Doubt`.
+    priors
+        Of each trial, standard deviation of each unknown of its start about what its first samples say.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        columns: tuple[str, ...],
+        processes: tuple[str, ...],
+        priors: Sequence[Mapping[str, float]],
+    ) -> None:
+        self.model, self.trials, self.columns = model, tuple(trials), columns
+        self.max_step_s = max_step(model)
+        self._delayed = is_delayed(model)
+        self._blocks = [
+            _Block(model, self.trials, lanes, columns, processes, priors, self.max_step_s) for lanes in self._groups()
+        ]
+
+    def _groups(self) -> Iterator[list[int]]:
+        groups: dict[tuple, list[int]] = {}
+        for i, trial in enumerate(self.trials):
+            rig = self.model.rig
+            steps = substeps(self.model, trial.dt, self.max_step_s)
+            groups.setdefault((trial.kind, rig.input_columns(trial), _measured(self.model, trial), steps), []).append(i)
+        for members in groups.values():
+            members.sort(key=lambda i: len(self.trials[i]))
+            for start in range(0, len(members), WIDTH):
+                yield members[start : start + WIDTH]
+
+    def run(
+        self, values: Mapping[str, float], doubt: Doubt, unknowns: Sequence[Mapping[str, float]]
+    ) -> list[Innovations]:
+        """Foretell every trial.
+
+        Parameters
+        ----------
+        values
+            Every parameter of the model, by name.
+        doubt
+            Of every output that a trial has.
+        unknowns
+            For each trial its start, and what effects have of each trial's own.
+        """
+        delay = total_delay(self.model, values) if self._delayed else 0.0
+        out: dict[int, Innovations] = {}
+        for block in self._blocks:
+            out.update(zip(block.lanes, block.run(values, doubt, unknowns, delay, len(self.columns)), strict=True))
+        return [out[i] for i in range(len(self.trials))]
+
+
+def _measured(model: Model, trial: Trial) -> tuple[str, ...]:
+    return tuple(n for n in model.rig.outputs(trial.kind) if n in trial.columns)
+
+
+class _Block:
+    """Up to WIDTH trials that are foretold side by side."""
+
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        lanes: list[int],
+        columns: tuple[str, ...],
+        processes: tuple[str, ...],
+        priors: Sequence[Mapping[str, float]],
+        max_step_s: float,
+    ) -> None:
+        first, self.lanes = trials[lanes[0]], lanes
+        rig, self.inputs = model.rig, model.rig.input_columns(first)
+        self.outputs = _measured(model, first)
+        model = disturbed(model.acting(first.kind, self.inputs), first.kind, processes)
+        available = set(model.parameters()) | set(model.unknowns(first.kind))
+        chosen = tuple(c for c in columns if c in available)
+        self.program = program(model, first.kind, self.inputs, chosen, self.outputs)
+        self.layout = self.program.layout
+        self.places = [columns.index(n) for n in self.layout.columns]
+        self.substeps = substeps(model, first.dt, max_step_s)
+        self.trials = [trials[i] for i in lanes]
+        self.count = max(len(t) for t in self.trials)
+        padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
+        known = [{**rig.trial_constants(t), **timing(t, self.substeps)} for t in padded]
+        own = [priors[i] for i in lanes] + [priors[lanes[-1]]] * (WIDTH - len(lanes))
+        for constants, prior in zip(known, own, strict=True):
+            constants.update({f"prior.{n}": prior[n] for n in rig.unknowns(first.kind)})
+        self.doubtful = [n for n in doubt_constants(model, first.kind, self.outputs) if not n.startswith("prior.")]
+        self.constants = np.array(
+            [[c.get(n, 0.0) for c in known] for n in self.layout.constants], dtype=float
+        ).reshape(-1, WIDTH)
+        self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
+        self.seen = np.zeros((self.count, len(self.outputs), WIDTH), dtype=bool)
+        self.measured = np.zeros((self.count, len(self.outputs), WIDTH))
+        for lane, trial in enumerate(self.trials):
+            for k, name in enumerate(self.outputs):
+                column = trial[name]
+                finite = np.isfinite(column)
+                self.seen[: len(trial), k, lane] = finite
+                self.measured[: len(trial), k, lane] = np.where(finite, column, 0.0)
+        self._given: tuple[tuple[int, ...], np.ndarray] | None = None
+
+    def _driven(self, shift: tuple[int, ...]) -> np.ndarray:
+        """Inputs of all lanes, later by whole samples, beside what was measured and whether it was."""
+        if self._given is None or self._given[0] != shift:
+            driven = lane_inputs(self.trials, self.inputs, self.count, shift)
+            self._given = (shift, np.concatenate([driven, self.measured, self.seen.astype(float)], axis=1))
+        return self._given[1]
+
+    def run(
+        self,
+        values: Mapping[str, float],
+        doubt: Doubt,
+        unknowns: Sequence[Mapping[str, float]],
+        delay: float,
+        width: int,
+    ) -> list[Innovations]:
+        p = lane_values(self.layout, values, [unknowns[i] for i in self.lanes])
+        shift = tuple(math.floor(delay / t.dt + 1e-9) for t in self.trials)
+        constants, known = self.constants.copy(), doubt.values()
+        for name in self.doubtful:
+            constants[self.layout.constants.index(name)] = known[name]
+        constants[self.layout.constants.index("shift"), : len(shift)] = shift
+        y, s = self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
+        out, k = [], len(self.outputs)
+        for lane, trial in enumerate(self.trials):
+            n = len(trial)
+            seen = self.seen[:n, :, lane]
+            sensitivities = np.zeros((n, k, width))
+            sensitivities[..., self.places] = s[:n, ..., lane]
+            innovations = np.where(seen, y[:n, :k, lane], 0.0)
+            out.append(Innovations(self.outputs, innovations, y[:n, k:, lane], seen, sensitivities))
+        return out
+
+
+def masked(trial: Trial, outputs: Sequence[str], upto: int) -> Trial:
+    """The trial with its outputs unmeasured from sample `upto` on."""
+    rows = np.arange(len(trial)) >= upto
+    columns = {n: np.where(rows & (n in outputs), np.nan, v) for n, v in trial.columns.items()}
+    return replace(trial, columns=columns)
