@@ -69,21 +69,21 @@ class Library:
         influence on another effect's sensitivity is of second order.
         """
         nominal = Model(fitted.model.rig)
-        wanted = [e for e in self.effects if e.name not in exclude and self._felt(e)]
+        wanted = [e for e in self.effects if e.name not in exclude and self.felt(e)]
         return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
 
     def silent(self) -> tuple[str, ...]:
         """Names of the effects that act in none of the trials: of a joint, where all are isometric."""
-        return tuple(e.name for e in self.effects if not self._felt(e))
+        return tuple(e.name for e in self.effects if not self.felt(e))
 
-    def _felt(self, effect: type[Effect]) -> list[int]:
+    def felt(self, effect: type[Effect]) -> list[int]:
         """The trials in which an effect acts."""
         rig = self.model.rig
         return [i for i, t in enumerate(self.trials) if effect.signal in rig.changeable(t.kind, rig.input_columns(t))]
 
     def _probe(self, effect: type[Effect], nominal: Model, fitted: Fit, noise: NoiseModel) -> list[Probe]:
         """The effect with every choice of its shapes; only the trials in which it acts are simulated."""
-        felt = self._felt(effect)
+        felt = self.felt(effect)
         if effect.name not in self._problems:
             free = tuple(f"{effect.name}.{n}" for n in effect.amplitudes())
             self._problems[effect.name] = Problem(
