@@ -60,31 +60,38 @@ class LikelihoodProblem:
         What is random.
     free
         The parameters that move; the model's fitted ones by default.
+    starts
+        Trials whose first samples say where each begins, where those of `trials` are not all measured.
     """
 
     def __init__(
-        self, model: Model, trials: Sequence[Trial], doubt: Doubt, free: tuple[str, ...] | None = None
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        doubt: Doubt,
+        free: tuple[str, ...] | None = None,
+        starts: Sequence[Trial] | None = None,
     ) -> None:
         self.model, self.trials, self.doubt = model, tuple(trials), doubt
         self.free = model.fitted_parameters() if free is None else free
         self.limits = limits_of(model, self.trials)
         self.unknown_names = model.own_unknowns()
-        self.begins = [model.rig.initial_unknowns(t) for t in self.trials]
-        self.priors = [first_doubt(model, t) for t in self.trials]
-        self._predictors: dict[tuple[str, ...], Predictor] = {}
+        self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
+        self.priors = [first_doubt(model, t) for t in starts or self.trials]
+        self._predictor: Predictor | None = None
 
     @property
     def noise(self) -> dict[str, Noise]:
         """The white noise of the readings, by column."""
         return {n: Noise(std, (), std) for n, std in self.doubt.white.items()}
 
-    def predictor(self, columns: tuple[str, ...]) -> Predictor:
-        """The compiled predictor with sensitivities to these columns."""
-        if columns not in self._predictors:
-            self._predictors[columns] = Predictor(
-                self.model, self.trials, columns, self.doubt.processes, self.priors
-            )
-        return self._predictors[columns]
+    @property
+    def predictor(self) -> Predictor:
+        """The compiled predictor, with sensitivities to `free` and to the effects' unknowns."""
+        if self._predictor is None:
+            columns = (*self.free, *self.unknown_names)
+            self._predictor = Predictor(self.model, self.trials, columns, self.doubt.processes, self.priors)
+        return self._predictor
 
     def start_unknowns(self) -> Unknowns:
         """What effects have of each trial's own, as known before: at their nulls."""
@@ -96,17 +103,22 @@ class LikelihoodProblem:
         return [{n: known.get(n, value) for n, value in start.items()} for start, known in both]
 
     def innovations(
-        self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None, slopes: bool = False
+        self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None
     ) -> list[Innovations]:
-        """Every trial as foretold; with sensitivities to `free` and the effects' unknowns where wanted."""
-        columns = (*self.free, *self.unknown_names) if slopes else ()
+        """Every trial as foretold, with sensitivities to `free` and to the effects' unknowns."""
         own = [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)]
         with np.errstate(all="ignore"):
-            return self.predictor(columns).run(values, doubt or self.doubt, own)
+            return self.predictor.run(values, doubt or self.doubt, own)
+
+    def foretold(self, values: Mapping[str, float]) -> list[dict[str, np.ndarray]]:
+        """What is foretold of each output of each trial, shape (n,), also where nothing was measured."""
+        own = [{**begin, **u} for begin, u in zip(self.begins, self.start_unknowns(), strict=True)]
+        with np.errstate(all="ignore"):
+            return self.predictor.foretell(values, self.doubt, own)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Innovations over their deviations, and sensitivities, at a parameter value."""
-        return [self._whitened(one) for one in self.innovations(values, unknowns, slopes=True)]
+        return [self._whitened(one) for one in self.innovations(values, unknowns)]
 
     def _whitened(self, one: Innovations) -> Linearized:
         with np.errstate(all="ignore"):
@@ -182,7 +194,8 @@ def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknown
     def joined(z: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         run = problem.innovations(values, unknowns, at(z))
         parts = [(one.values[one.seen], one.variances[one.seen]) for one in run]
-        return sum(one.cost() for one in run), *(np.concatenate([p[k] for p in parts]) for k in (0, 1))
+        cost = float(sum(one.cost() for one in run))
+        return cost, np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
 
     cost, r, v = joined(z)
     damping = 1e-3
@@ -246,4 +259,3 @@ def maximise(
         if not fitted.sse < before - 10.0 * TOLERANCE:
             return replace(fitted, doubt=problem.doubt)
     return replace(fitted, doubt=problem.doubt, converged=False)
-

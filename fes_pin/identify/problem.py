@@ -244,7 +244,7 @@ def _solved(own: np.ndarray, right: np.ndarray, damping: float) -> np.ndarray:
 
 
 def whitened_sse(parts: Sequence[Linearized]) -> float:
-    """Sum of squared whitened residuals and log-determinants; infinite where the simulation or its sensitivities run away."""
+    """Sum of squared whitened residuals and log-determinants; infinite where a simulation or its slopes run away."""
     with np.errstate(over="ignore", invalid="ignore"):
         total = float(sum(p.residual @ p.residual + p.log_determinant for p in parts))
     tame = all(float(np.abs(x).max(initial=0.0)) < STEEPEST for p in parts for x in (p.jacobian, p.local))

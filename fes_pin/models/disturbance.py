@@ -19,7 +19,7 @@ from fes_pin.models.stage import Effect, Stage
 class RandomEffort(Effect):
     """A random effort at the joint.
 
-        torque + e,   e' = -e / time + noise
+    torque + e,   e' = -e / time + noise
     """
 
     name, stage, signal, rigs = "random_effort", Stage.JOINT, "torque", ("ankle", "joint")
@@ -36,7 +36,7 @@ class RandomEffort(Effect):
 class RandomForce(Effect):
     """A random force of a muscle that is held.
 
-        force + e,   e' = -e / time + noise
+    force + e,   e' = -e / time + noise
     """
 
     name, stage, signal, rigs = "random_force", Stage.MUSCLE, "force", ("ankle", "muscle")
@@ -53,7 +53,7 @@ class RandomForce(Effect):
 class WanderingReading(Effect):
     """A slow random part of the first reading.
 
-        y + e,   e' = -e / time + noise
+    y + e,   e' = -e / time + noise
     """
 
     name, stage, signal, rigs = "wandering_reading", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")

@@ -76,7 +76,7 @@ class Innovations:
     sensitivities: np.ndarray
 
     def cost(self) -> float:
-        """Twice the negative log-likelihood, but for n log(2 pi); infinite where the prediction does not stay finite."""
+        """Twice the negative log-likelihood, but for n log(2 pi); infinite where the prediction runs away."""
         v, variance = self.values[self.seen], self.variances[self.seen]
         with np.errstate(all="ignore"):
             total = float(np.sum(v * v / variance + np.log(variance)))
@@ -118,9 +118,10 @@ class Predictor:
     def _groups(self) -> Iterator[list[int]]:
         groups: dict[tuple, list[int]] = {}
         for i, trial in enumerate(self.trials):
-            rig = self.model.rig
             steps = substeps(self.model, trial.dt, self.max_step_s)
-            groups.setdefault((trial.kind, rig.input_columns(trial), _measured(self.model, trial), steps), []).append(i)
+            groups.setdefault(
+                (trial.kind, self.model.input_columns(trial), _measured(self.model, trial), steps), []
+            ).append(i)
         for members in groups.values():
             members.sort(key=lambda i: len(self.trials[i]))
             for start in range(0, len(members), WIDTH):
@@ -140,11 +141,24 @@ class Predictor:
         unknowns
             For each trial its start, and what effects have of each trial's own.
         """
-        delay = total_delay(self.model, values) if self._delayed else 0.0
         out: dict[int, Innovations] = {}
         for block in self._blocks:
-            out.update(zip(block.lanes, block.run(values, doubt, unknowns, delay, len(self.columns)), strict=True))
+            y, s = block.run(values, doubt, unknowns, self._delay(values))
+            out.update(zip(block.lanes, block.innovations(y, s, len(self.columns)), strict=True))
         return [out[i] for i in range(len(self.trials))]
+
+    def foretell(
+        self, values: Mapping[str, float], doubt: Doubt, unknowns: Sequence[Mapping[str, float]]
+    ) -> list[dict[str, np.ndarray]]:
+        """What is foretold of every output of every trial, shape (n,) by name, measured or not; see `run`."""
+        out: dict[int, dict[str, np.ndarray]] = {}
+        for block in self._blocks:
+            y, _ = block.run(values, doubt, unknowns, self._delay(values))
+            out.update(zip(block.lanes, block.foretold(y), strict=True))
+        return [out[i] for i in range(len(self.trials))]
+
+    def _delay(self, values: Mapping[str, float]) -> float:
+        return total_delay(self.model, values) if self._delayed else 0.0
 
 
 def _measured(model: Model, trial: Trial) -> tuple[str, ...]:
@@ -165,9 +179,9 @@ class _Block:
         max_step_s: float,
     ) -> None:
         first, self.lanes = trials[lanes[0]], lanes
-        rig, self.inputs = model.rig, model.rig.input_columns(first)
+        rig, self.inputs = model.rig, model.input_columns(first)
         self.outputs = _measured(model, first)
-        model = disturbed(model.acting(first.kind, self.inputs), first.kind, processes)
+        model = disturbed(model.acting(first.kind, rig.input_columns(first)), first.kind, processes)
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         chosen = tuple(c for c in columns if c in available)
         self.program = program(model, first.kind, self.inputs, chosen, self.outputs)
@@ -182,9 +196,9 @@ class _Block:
         for constants, prior in zip(known, own, strict=True):
             constants.update({f"prior.{n}": prior[n] for n in rig.unknowns(first.kind)})
         self.doubtful = [n for n in doubt_constants(model, first.kind, self.outputs) if not n.startswith("prior.")]
-        self.constants = np.array(
-            [[c.get(n, 0.0) for c in known] for n in self.layout.constants], dtype=float
-        ).reshape(-1, WIDTH)
+        self.constants = np.array([[c.get(n, 0.0) for c in known] for n in self.layout.constants], dtype=float).reshape(
+            -1, WIDTH
+        )
         self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
         self.seen = np.zeros((self.count, len(self.outputs), WIDTH), dtype=bool)
         self.measured = np.zeros((self.count, len(self.outputs), WIDTH))
@@ -204,29 +218,32 @@ class _Block:
         return self._given[1]
 
     def run(
-        self,
-        values: Mapping[str, float],
-        doubt: Doubt,
-        unknowns: Sequence[Mapping[str, float]],
-        delay: float,
-        width: int,
-    ) -> list[Innovations]:
+        self, values: Mapping[str, float], doubt: Doubt, unknowns: Sequence[Mapping[str, float]], delay: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What the program gives of all lanes; see `Program`."""
         p = lane_values(self.layout, values, [unknowns[i] for i in self.lanes])
         shift = tuple(math.floor(delay / t.dt + 1e-9) for t in self.trials)
         constants, known = self.constants.copy(), doubt.values()
         for name in self.doubtful:
             constants[self.layout.constants.index(name)] = known[name]
         constants[self.layout.constants.index("shift"), : len(shift)] = shift
-        y, s = self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
-        out, k = [], len(self.outputs)
+        return self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
+
+    def innovations(self, y: np.ndarray, s: np.ndarray, width: int) -> Iterator[Innovations]:
+        """The innovations of each lane, with sensitivities to `width` columns."""
+        k = len(self.outputs)
         for lane, trial in enumerate(self.trials):
             n = len(trial)
             seen = self.seen[:n, :, lane]
             sensitivities = np.zeros((n, k, width))
             sensitivities[..., self.places] = s[:n, ..., lane]
-            innovations = np.where(seen, y[:n, :k, lane], 0.0)
-            out.append(Innovations(self.outputs, innovations, y[:n, k:, lane], seen, sensitivities))
-        return out
+            yield Innovations(self.outputs, np.where(seen, y[:n, :k, lane], 0.0), y[:n, k:, lane], seen, sensitivities)
+
+    def foretold(self, y: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+        """What is foretold in each lane, by output: what was given as measured less the innovation."""
+        for lane, trial in enumerate(self.trials):
+            n = len(trial)
+            yield {o: self.measured[:n, k, lane] - y[:n, k, lane] for k, o in enumerate(self.outputs)}
 
 
 def masked(trial: Trial, outputs: Sequence[str], upto: int) -> Trial:

@@ -97,7 +97,7 @@ class Simulator:
         """Trials that can share a block: same kind, inputs and integration steps per sample, of similar length."""
         groups: dict[tuple, list[int]] = {}
         for i, trial in enumerate(self.trials):
-            key = (trial.kind, self.model.rig.input_columns(trial), substeps(self.model, trial.dt, self.max_step_s))
+            key = (trial.kind, self.model.input_columns(trial), substeps(self.model, trial.dt, self.max_step_s))
             groups.setdefault(key, []).append(i)
         for members in groups.values():
             members.sort(key=lambda i: len(self.trials[i]))
@@ -216,9 +216,9 @@ class _Block:
         self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...], max_step_s: float
     ) -> None:
         first = trials[lanes[0]]
+        self.inputs = model.input_columns(first)
         rig, model = model.rig, model.acting(first.kind, model.rig.input_columns(first))
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
-        self.inputs = rig.input_columns(first)
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         self.program: Program = program(model, first.kind, self.inputs, tuple(c for c in columns if c in available))
         self.layout = self.program.layout

@@ -46,6 +46,8 @@ class Effect:
         The rigs it can be part of.
     random
         Names of processes that drive its states at random, one for each state; see `models.disturbance`.
+    inputs
+        Columns of a trial that it reads beside those that drive the rig, as `s.u.<name>`.
     dissipative
         True if it can only take energy from the joint.
     max_step_s
@@ -64,6 +66,7 @@ class Effect:
     states: ClassVar[tuple[str, ...]] = ()
     memories: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[tuple[str, ...]] = ()
+    inputs: ClassVar[tuple[str, ...]] = ()
     dissipative: ClassVar[bool] = False
     max_step_s: ClassVar[float] = math.inf
     varies: ClassVar[bool] = False

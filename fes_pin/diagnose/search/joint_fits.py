@@ -242,7 +242,7 @@ class JointFits:
         at = np.cumsum([0, *map(len, refinements)])
         best = [min(looks[a:b], key=lambda f: f.sse) for a, b in itertools.pairwise(at)]
         fitted = in_parallel(lambda f: f if f.converged else self._go_on(f, MAX_ITERATIONS), best)
-        return min(filter(_is_told, fitted), key=lambda f: f.price, default=None)
+        return min(filter(is_told, fitted), key=lambda f: f.price, default=None)
 
     def ranked(self, size: int) -> list[Names]:
         """Sets of a size, cheapest first."""
@@ -285,7 +285,7 @@ def _refined(model: Model, effect: Effect) -> list[list[Model]]:
     return out
 
 
-def _is_told(fitted: Fit) -> bool:
+def is_told(fitted: Fit) -> bool:
     """True if the data tell every parameter that has a null from it, within its bounds, in all refined effects."""
     for one in fitted.model.effects:
         if not one.refined():

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.search.joint_fits import is_told
 from fes_pin.diagnose.search.library import Library, Probe, near_null
 from fes_pin.diagnose.search.promise import Projection, Scored, Scores, best_by_effect
-from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood import LikelihoodProblem, first_guess, maximise
+from fes_pin.identify.fit import Fit, fit_problem
+from fes_pin.identify.likelihood import ROUNDS, LikelihoodProblem, first_guess, maximise
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
@@ -23,6 +24,10 @@ Names = tuple[str, ...]
 
 STARTS = 2
 """Shapes that a fit of a set starts from, most promising first."""
+GLANCE = 6
+"""Steps of a first look at a set, at what is random in a smaller one."""
+PURSUED = 6
+"""Best sets of a size that go on until they converge."""
 FIRST_DOUBTS = (1.0, 30.0)
 """Sizes of random effort that the nominal fit begins with, in units of the smallest: a likelihood can have two optima,
 one in which the model explains and one in which randomness does."""
@@ -44,6 +49,7 @@ class Sets:
         self.library = Library(self.model, trials)
         self.fits: dict[Names, Fit] = {}
         self._scores: dict[int, tuple[Fit, Scores]] = {}
+        self._pursued: set[Names] = set()
         self._probing: dict[str, LikelihoodProblem] = {}
 
     def nominal(self) -> Fit:
@@ -53,8 +59,14 @@ class Sets:
         self.fits[()] = min(in_parallel(lambda d: self._maximised(self.model, d), starts), key=lambda f: f.sse)
         return self.fits[()]
 
-    def _maximised(self, model: Model, doubt: Doubt, unknowns: list[dict[str, float]] | None = None) -> Fit:
-        return maximise(LikelihoodProblem(model, self.trials, doubt), model.parameters(), unknowns)
+    def _maximised(
+        self, model: Model, doubt: Doubt, unknowns: list[dict[str, float]] | None = None, rounds: int = ROUNDS
+    ) -> Fit:
+        return maximise(LikelihoodProblem(model, self.trials, doubt), model.parameters(), unknowns, rounds)
+
+    def _go_on(self, fitted: Fit) -> Fit:
+        assert fitted.doubt is not None
+        return self._maximised(fitted.model, fitted.doubt, fitted.unknowns)
 
     def scores(self, base: Fit) -> Scores:
         """Promise of every effect that a fit does not have, at what is random in it."""
@@ -70,36 +82,49 @@ class Sets:
         Causes that the fit has are left out: the predictor follows what was measured with them or without.
         """
         nominal = Model(base.model.rig)
-        free = tuple(f"{effect.name}.{n}" for n in effect.amplitudes())
         assert base.doubt is not None
-        if effect.name not in self._probing:
-            self._probing[effect.name] = LikelihoodProblem(nominal + effect.absent(), self.trials, base.doubt, free)
+        if effect.name not in self._probing:  # its columns are those of a fit, which shares the program
+            self._probing[effect.name] = LikelihoodProblem(nominal + effect.absent(), self.trials, base.doubt)
         problem = self._probing[effect.name]
+        places = [problem.free.index(f"{effect.name}.{n}") for n in effect.amplitudes()]
         out = []
         for one in self.library.grid(effect):
-            run = problem.innovations((nominal + one).parameters(), problem.start_unknowns(), base.doubt, slopes=True)
-            columns = [-i.sensitivities[i.seen] / np.sqrt(i.variances[i.seen])[:, None] for i in run]
+            run = problem.innovations((nominal + one).parameters(), problem.start_unknowns(), base.doubt)
+            columns = [-i.sensitivities[i.seen][:, places] / np.sqrt(i.variances[i.seen])[:, None] for i in run]
             out.append(Probe(one, np.nan_to_num(np.concatenate(columns))))
         return out
 
     def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:
-        """Fit a base with one more effect, from its most promising shapes, at their linear estimate and at their null."""
-        assert base.doubt is not None
+        """A first look at a base with one more effect, from its most promising shapes."""
         starts = [base.model + started(s.probe.effect, s.amplitudes) for s in scored[:STARTS]]
-        fitted = [self._maximised(one, base.doubt, base.unknowns) for one in starts]
-        return min(fitted, key=lambda f: f.price)
+        return min((self._look(s, base) for s in starts), key=lambda f: f.price)
+
+    def extend_with_both(self, base: Fit, pair: tuple[Scored, Scored]) -> Fit:
+        """Fit a base with two more effects at once, from their linear estimates."""
+        model = base.model
+        for one in pair:
+            model = model + started(one.probe.effect, one.amplitudes)
+        return self._look(model, base)
 
     def add(self, made: Mapping[Names, Callable[[], Fit]]) -> None:
         """Fit sets side by side; of two fits of a set the better stays."""
         for names, fitted in zip(made, in_parallel(lambda make: make(), made.values()), strict=True):
             if names not in self.fits or fitted.price < self.fits[names].price:
                 self.fits[names] = fitted
+        for size in sorted({len(n) for n in made}):
+            self._pursue(size)
 
-    def extend_all(self, base: Names, only: Sequence[str] | None = None) -> list[Names]:
-        """Fit a set with each further cause beside it; returns the names of what is fitted now."""
+    def _pursue(self, size: int) -> None:
+        """Let the best of a size converge."""
+        while slow := [n for n in self.ranked(size)[:PURSUED] if n not in self._pursued]:
+            self.fits.update(zip(slow, in_parallel(lambda n: self._go_on(self.fits[n]), slow), strict=True))
+            self._pursued.update(slow)
+
+    def extend_all(self, base: Names, most: int | None = None) -> list[Names]:
+        """Fit a set with each further cause beside it, or with those of most promise; returns their names."""
         fitted = self.fits[base]
         by_effect = best_by_effect(self.scores(fitted).scored)
-        chosen = [n for n in by_effect if only is None or n in only]
+        chosen = sorted(by_effect, key=lambda n: (-by_effect[n][0].gain, n))[:most]
         keys = {tuple(sorted((*base, n))): by_effect[n] for n in chosen}
         missing = {k: v for k, v in keys.items() if k not in self.fits}
         self.add({k: lambda v=v: self.extend(fitted, v) for k, v in missing.items()})  # type: ignore[misc]
@@ -115,13 +140,19 @@ class Sets:
         return self.fits[rest]
 
     def refined(self, names: Names) -> Fit | None:
-        """The best fit of a set with the form of one of its effects refined; None where no form is."""
+        """The best fit of a set with the form of one of its effects refined; None where no form is, or none is told."""
         base = self.fits[names]
-        assert base.doubt is not None
         starts = [s for effect in base.model.effects for s in refinements(base.model, effect)]
-        doubt = base.doubt
-        fitted = in_parallel(lambda s: self._maximised(s, doubt, base.unknowns), starts)
-        return min(fitted, key=lambda f: f.price, default=None)
+        looks = in_parallel(lambda s: self._look(s, base), starts)
+        best = sorted(looks, key=lambda f: f.price)[:STARTS]
+        return min(filter(is_told, in_parallel(self._go_on, best)), key=lambda f: f.price, default=None)
+
+    def _look(self, start: Model, base: Fit) -> Fit:
+        """A few steps from a start, at what is random in another fit."""
+        assert base.doubt is not None
+        problem = LikelihoodProblem(start, self.trials, base.doubt)
+        found = fit_problem(problem, start.parameters(), base.unknowns, GLANCE)  # type: ignore[arg-type]
+        return replace(found, doubt=base.doubt)
 
     def ranked(self, size: int) -> list[Names]:
         """Sets of a size, cheapest first."""
@@ -146,12 +177,10 @@ def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
 
 
 def refinements(model: Model, effect: Effect) -> list[Model]:
-    """Starts with one refinement of an effect switched on; none if one is on already."""
-    if effect.refined():
-        return []
-    out, info = [], effect.parameters()
+    """Starts with one more refinement of an effect switched on."""
+    out, info, refined = [], effect.parameters(), effect.refined()
     for names in effect.refinements():
-        if model.rig.name not in (info[names[0]].rigs or effect.rigs):
+        if names[0] in refined or model.rig.name not in (info[names[0]].rigs or effect.rigs):
             continue
         paths = [f"{effect.name}.{n}" for n in names]
         for values in itertools.product(*(info[n].grid for n in names)):

@@ -13,6 +13,8 @@ STIFFEST = 2.5
 """Largest rate of decay times step that it may show; RK4 is stable to 2.78: Hairer, Wanner, Solving ODEs II, IV.2."""
 CORNER = 0.01
 """Width of its corners, as a share of the friction torque: the joint breaks away within 1 % of it."""
+CREEP = 0.004
+"""Speed at which a joint creeps under half its friction until data show another, rad/s: 0.2 degrees a second."""
 UNLOADED = 1e-3
 """Load below which its sign no longer shows, in units of the weight at rest: it keeps derivatives finite."""
 
@@ -42,14 +44,13 @@ class CoulombFriction(Effect):
     """
 
     torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=0.0, upper=100.0, scale=0.01)
-    stiction: float = parameter(0.0, null=0.0, lower=-1.0, upper=10.0, scale=0.1, optional=True, grid=(0.3, 1.0))
+    stiction: float = parameter(0.0, null=0.0, lower=0.0, upper=10.0, scale=0.1, optional=True, grid=(0.3, 1.0))
     stribeck_speed: float = parameter(
         1.0, unit="{q}/s", lower=1e-2, upper=30.0, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
     )
     creep_speed: float = parameter(
-        0.004, unit="{q}/s", lower=1e-4, upper=0.1, scale=0.002, optional=True, grid=(0.004,)
+        CREEP, unit="{q}/s", null=CREEP, lower=1e-4, upper=0.5, scale=0.002, optional=True, grid=(0.02,)
     )
-
     load_exponent: float = parameter(
         0.0, null=0.0, lower=0.0, upper=2.0, scale=1.0, optional=True, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5)
     )

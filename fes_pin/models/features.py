@@ -1,0 +1,115 @@
+"""Functions of a rig's own state, input and time as efforts and as errors of the reading, to seek a remainder by.
+
+They are effects like any other, of no library. What they are functions of is what the model itself holds at each
+instant; in a predictor that is what was known before the sample that it foretells, so that features share nothing with
+the noise that they are judged against.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from types import SimpleNamespace
+from typing import Any
+
+from fes_pin.models.maths import cos, sin, sqrt
+from fes_pin.models.maths import tanh as smooth_sign
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+SHARP = 10.0
+"""Of a smoothed sign: it turns within a tenth of the range."""
+
+Function = Callable[[Any], Any]
+
+MOTION: Mapping[str, Function] = {
+    "offset: 1": lambda f: 1.0,
+    "time: t": lambda f: f.t,
+    "time: t2": lambda f: f.t * f.t,
+    "angle: q": lambda f: f.q,
+    "angle: q2": lambda f: f.q * f.q,
+    "angle: q3": lambda f: f.q * f.q * f.q,
+    "rate: v": lambda f: f.v,
+    "rate: sign v": lambda f: smooth_sign(SHARP * f.v),
+    "rate: v|v|": lambda f: f.v * sqrt(f.v * f.v + 1e-6),
+    "rate: v3": lambda f: f.v * f.v * f.v,
+    "rate: v2": lambda f: f.v * f.v,
+    "angle: q v": lambda f: f.q * f.v,
+    "angle: q2 v": lambda f: f.q * f.q * f.v,
+    "angle: q sign v": lambda f: f.q * smooth_sign(SHARP * f.v),
+    "time: q t": lambda f: f.q * f.t,
+    "time: v t": lambda f: f.v * f.t,
+    "time: sign v t": lambda f: smooth_sign(SHARP * f.v) * f.t,
+    "stimulus: u": lambda f: f.u,
+    "stimulus: u|u|": lambda f: f.u * sqrt(f.u * f.u + 1e-6),
+    "stimulus: u q": lambda f: f.u * f.q,
+    "stimulus: u v": lambda f: f.u * f.v,
+    "stimulus: u t": lambda f: f.u * f.t,
+    "activation: act": lambda f: f.act,
+    "activation: act2": lambda f: f.act * f.act,
+    "activation: act q": lambda f: f.act * f.q,
+    "activation: act v": lambda f: f.act * f.v,
+    "activation: act t": lambda f: f.act * f.t,
+}
+WAVES = (1, 2, 4, 8)
+"""Waves over a trial, and half waves over the range of the angle."""
+
+
+def _waves() -> dict[str, Function]:
+    out: dict[str, Function] = {}
+    for k in WAVES:
+        out[f"time: sin {k}"] = lambda f, k=k: sin(2.0 * math.pi * k * f.t)  # type: ignore[misc]
+        out[f"time: cos {k}"] = lambda f, k=k: cos(2.0 * math.pi * k * f.t)  # type: ignore[misc]
+        out[f"angle: sin {k} q"] = lambda f, k=k: sin(math.pi * k * f.q)  # type: ignore[misc]
+        out[f"angle: cos {k} q"] = lambda f, k=k: cos(math.pi * k * f.q)  # type: ignore[misc]
+    return out
+
+
+EFFORTS: Mapping[str, Function] = {**MOTION, **_waves()}
+"""Features as an effort, by "variable: function"."""
+READINGS: Mapping[str, Function] = {
+    n: MOTION[n] for n in ("offset: 1", "time: t", "time: t2", "rate: v", "rate: sign v", "angle: q2", "angle: q3")
+}
+"""Features as a part of the reading."""
+SCALES = ("centre", "reach", "speed", "drive", "duration")
+"""What the variables are counted from and in: see `_Features.scaled`."""
+
+
+class _Features(Effect):
+    """A sum of features, each with an amplitude; subclasses are dataclasses made below."""
+
+    functions: Mapping[str, Function]
+    rigs = ("ankle", "joint", "muscle")
+
+    def apply(self, value: Any, s: Any) -> Any:
+        f = self.scaled(s)
+        for k, one in enumerate(self.functions.values()):
+            value = value + getattr(self, f"a{k:02d}") * one(f)
+        return value
+
+    def scaled(self, s: Any) -> SimpleNamespace:
+        """Angle, rate, drive, activation and time, each from about -1 to 1."""
+        drive = next((getattr(s.u, n) for n in ("effort", "pulse_width_us", "stim") if hasattr(s.u, n)), 0.0)
+        return SimpleNamespace(
+            q=(getattr(s.x, "q", 0.0) - self.centre) / self.reach,  # type: ignore[attr-defined]
+            v=getattr(s.x, "v", 0.0) / self.speed,  # type: ignore[attr-defined]
+            u=drive / self.drive,  # type: ignore[attr-defined]
+            act=getattr(s.x, "act", 0.0),
+            t=s.time / self.duration,  # type: ignore[attr-defined]
+        )
+
+
+def _made(name: str, stage: Stage, signal: str, functions: Mapping[str, Function]) -> type[_Features]:
+    scales = [(n, float, parameter(1.0, fitted=False)) for n in SCALES]
+    amplitudes = [(f"a{k:02d}", float, parameter(0.0, null=0.0)) for k in range(len(functions))]
+    title = "".join(part.capitalize() for part in name.split("_"))
+    made = dataclasses.make_dataclass(title, [*amplitudes, *scales], bases=(_Features,), frozen=True)
+    made.__module__, made.__qualname__ = __name__, title
+    made.name, made.stage, made.signal, made.functions = name, stage, signal, functions  # type: ignore[attr-defined]
+    return made
+
+
+EffortFeatures = _made("effort_features", Stage.JOINT, "torque", EFFORTS)
+ForceFeatures = _made("force_features", Stage.MUSCLE, "force", EFFORTS)
+ReadingFeatures = _made("reading_features", Stage.SENSOR, "reading", READINGS)
