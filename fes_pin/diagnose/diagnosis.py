@@ -15,12 +15,15 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.doubts import doubts, with_error
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, HeldOut, cross_validate, errors_of, gain, separate
+from fes_pin.diagnose.driven import AheadErrors, RandomPart, judge_driven
 from fes_pin.diagnose.experiment import SEPARABLE, NextExperiment, next_experiment
 from fes_pin.diagnose.long_records import searched_part, thinned
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.open_set import Remainder, remainder
 from fes_pin.diagnose.search.promise import best_by_effect
 from fes_pin.diagnose.search.search import Search, Searched, Unfit
+from fes_pin.diagnose.search.set_search import Found, SetSearch
+from fes_pin.diagnose.search.sets import Sets
 from fes_pin.diagnose.search.unfinished import alike
 from fes_pin.identify.fit import Fit, rough_noise
 from fes_pin.identify.noise import NoiseModel
@@ -114,8 +117,8 @@ class Diagnosis:
     absorbed: tuple[str, ...]
     nominal: Fit
     extended: Fit
-    nominal_error: tuple[float, float | None]
-    extended_error: tuple[float, float | None]
+    nominal_error: tuple[float | None, float | None]
+    extended_error: tuple[float | None, float | None]
     ceiling_percent: float
     next_experiment: NextExperiment | None
     ranking: dict[str, tuple[Ranked, ...]]
@@ -125,6 +128,8 @@ class Diagnosis:
     warnings: tuple[str, ...] = ()
     reason: str | None = None
     catalogue: Catalogue = field(default_factory=installed, compare=False)
+    random: tuple[RandomPart, ...] = ()
+    ahead: AheadErrors | None = None
 
     @property
     def model(self) -> Model:
@@ -134,8 +139,12 @@ class Diagnosis:
     def explained_percent(self) -> float:
         """Share of the nominal model's squared error above the noise that all causes together remove, 0 to 100.
 
-        On trials that took no part, where there are such.
+        On trials that took no part, where there are such; of a driven rig of the errors over the horizon.
         """
+        if self.ahead is not None:
+            held = self.ahead.nominal_held_out, self.ahead.extended_held_out
+            one, other = held if held[0] and held[1] else (self.ahead.nominal, self.ahead.extended)
+            return float(np.clip(100.0 * (one.horizon - other.horizon) / max(one.horizon, 1e-300), 0.0, 100.0))
         outside = self.nominal_error[1] is not None and self.extended_error[1] is not None
         before, after = (e[1] if outside else e[0] for e in (self.nominal_error, self.extended_error))
         assert before is not None
@@ -196,16 +205,22 @@ def diagnose(
     train, test = split(study)
     train, spared, said = searched_part(train)
     test, warnings = test or spared, warnings + said
+    effects = catalogue.effects_for(nominal.rig)
     with one_thread_each():
-        recorded = [t for t in study.trials if t.role != "held_out"]
-        if said:
-            recorded = train
-        search = Search(nominal, train, recorded, seed, tell, catalogue.effects_for(nominal.rig))
+        recorded = train if said else [t for t in study.trials if t.role != "held_out"]
+        search: Search | SetSearch
+        if nominal.rig.is_driven(train):
+            search = SetSearch(Sets(nominal, train, effects), seed, tell)
+        else:
+            search = Search(nominal, train, recorded, seed, tell, effects)
         try:
             with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
                 searched = search.run()
             tell(0.88, "held-out gain")
-            diagnosis = _judge(study, search, searched, test, seed)
+            if isinstance(search, SetSearch):
+                diagnosis = _of_driven(study, search, searched, (train, test), seed)  # type: ignore[arg-type]
+            else:
+                diagnosis = _judge(study, search, searched, test, seed)  # type: ignore[arg-type]
         except Unfit as problem:
             diagnosis = _unfitted(study, problem.nominal, str(problem), test)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
@@ -217,6 +232,60 @@ def diagnose(
         warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
     found = replace(diagnosis, left_out=left_out, warnings=tuple(warnings), catalogue=catalogue)
     return replace(found, wall_s=time.perf_counter() - began)
+
+
+def _of_driven(
+    study: Study, search: SetSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
+) -> Diagnosis:
+    """The diagnosis of a rig that a recorded effort drives; see `diagnose.driven`."""
+    judged = judge_driven(search, found, *trials, seed)
+    found, left = judged.found, judged.left
+    best = found.best
+    searched = Searched(
+        nominal=found.nominal,
+        best=best,
+        p_values=found.p_values,
+        rivals=found.rivals,
+        judged=best,
+        without=found.without,
+        family=found.family,
+        scored=found.scored,
+        floor=best.noise,
+    )
+    causes = [
+        Cause(
+            name=one.name,
+            stage=str(one.stage),
+            parameters=_estimates(best, one.name),
+            equivalents=_equivalents(searched, one.name, left),
+            p_value=found.p_values[one.name],
+            gain_fit=judged.gain_fit(one.name),
+            gain_held_out=gain(judged.nominal, judged.without[one.name], judged.extended, seed),
+            evidence=judged.evidence.get(one.name),
+        )
+        for one in best.model.effects
+    ]
+    causes.sort(key=lambda c: -c.gain_held_out.percent)
+    fitted, held = judged.ahead, judged.held_out_ahead
+    return Diagnosis(
+        study=study,
+        verdict="causes_found" if causes else ("unexplained" if left.unexplained else "adequate"),
+        causes=tuple(causes),
+        remainder=left,
+        absorbed=_absorbed(searched, found.silent),
+        nominal=found.nominal,
+        extended=best,
+        nominal_error=(fitted[0].free, held[0].free if held else None),
+        extended_error=(fitted[1].free, held[1].free if held else None),
+        ceiling_percent=judged.ceiling_percent,
+        next_experiment=_experiment(searched, causes, study),
+        ranking=_ranking(searched),
+        held_out_by="the study's held-out trials" if trials[1] else "cross-validation over trials",
+        left_out={},
+        wall_s=0.0,
+        random=judged.random,
+        ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
+    )
 
 
 def despiked_study(study: Study) -> tuple[Study, dict[str, dict[str, tuple[int, ...]]]]:

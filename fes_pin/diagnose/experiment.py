@@ -9,9 +9,12 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Linearized, NormalEquations, Problem, measured_columns, normal_equations
 from fes_pin.models.nominal import rig_of
+from fes_pin.models.simulate import Simulator
 
 SEPARABLE = 2.71
 """Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: 1.645 squared (DESIGN 6.5)."""
@@ -117,6 +120,10 @@ def next_experiment(best: Fit, rivals: Mapping[str, Fit], name: str, study: Stud
     study
         What the rig is and has been run under.
     """
+    if best.doubt is not None and falls(best.model, best.trials):
+        pair = (name, next(iter(rivals)))
+        why = f"{' and '.join(pair)}: the rig falls unless its controller holds it, and no effort is proposed"
+        return NextExperiment(f"{why}; move it further, or another way, and diagnose again", pair, None)
     found = _best(best, rivals, list(candidates(study)), study)
     if found is None:
         pair = (name, next(iter(rivals)))
@@ -144,11 +151,10 @@ def _often(repeats: int | None) -> str:
 
 def promises(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study) -> list[Promise | None]:
     """What each trial promises; None for one that leaves what the study has measured, or is not finite."""
-    problem = Problem(best.model, trials, best.noise, best.free)
     own = {n: v for n, v in best.unknowns[0].items() if n in best.model.own_unknowns()}
     begin = [{**best.model.initial_unknowns(t), **own} for t in trials]
     measured = []
-    for trial, one in zip(trials, problem.simulator.run(best.values, begin), strict=True):
+    for trial, one in zip(trials, Simulator(best.model, trials).run(best.values, begin), strict=True):
         names = best.model.rig.outputs(trial.kind)
         measured.append(trial.with_columns(**{n: one.readings[:, k] for k, n in enumerate(names)}))
     ranges = _ranges(measured_columns(best.model, study.trials))
@@ -157,15 +163,20 @@ def promises(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study) -> li
     if not inside:
         return [None] * len(trials)
     begin = [u for u, keep in zip(begin, kept, strict=True) if keep]
-    if_best = Problem(rival.model, inside, best.noise, rival.free).linearize(
-        rival.values, [rival.model.initial_unknowns(t) for t in inside]
-    )
-    slopes = Problem(best.model, inside, best.noise, best.free).linearize(best.values, begin)
+    if_best = _problem(rival, inside, best).linearize(rival.values, [rival.model.initial_unknowns(t) for t in inside])
+    slopes = _problem(best, inside, best).linearize(best.values, begin)
     if_rival = [Linearized(-r.residual, b.jacobian, b.local) for r, b in zip(if_best, slopes, strict=True)]
     known = (normal_equations(rival.parts).hessian, normal_equations(best.parts).hessian)
     lead = rival.price - best.price
     found = iter(zip(if_best, if_rival, strict=True))
     return [Promise(lead, _equations(*next(found)), known) if keep else None for keep in kept]
+
+
+def _problem(fitted: Fit, trials: Sequence[Trial], judge: Fit) -> Problem | LikelihoodProblem:
+    """A fit's model on other trials, under the noise, or all that is random, of the fit that judges."""
+    if judge.doubt is not None:
+        return LikelihoodProblem(fitted.model, trials, judge.doubt, fitted.free)
+    return Problem(fitted.model, trials, judge.noise, fitted.free)
 
 
 def _equations(one: Linearized, other: Linearized) -> tuple[NormalEquations, NormalEquations]:

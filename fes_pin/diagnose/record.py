@@ -36,8 +36,8 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
             "where": diagnosis.remainder.where,
         },
         "absorbed": list(diagnosis.absorbed),
-        "nominal": {"parameters": _parameters(diagnosis.nominal), "error_percent": _errors(diagnosis.nominal_error)},
-        "extended": {"parameters": _parameters(diagnosis.extended), "error_percent": _errors(diagnosis.extended_error)},
+        "nominal": {"parameters": _parameters(diagnosis.nominal), "error_percent": _errors(diagnosis, "nominal")},
+        "extended": {"parameters": _parameters(diagnosis.extended), "error_percent": _errors(diagnosis, "extended")},
         "noise": {
             n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in diagnosis.extended.noise.items()
         },
@@ -46,6 +46,7 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
         **_left_out(diagnosis),
         **({"reason": diagnosis.reason} if diagnosis.reason else {}),
         **_library(diagnosis),
+        **_driven(diagnosis),
         "warnings": list(diagnosis.warnings),
         "wall_s": round(diagnosis.wall_s, 2),
     }
@@ -94,8 +95,30 @@ def _parameters(fitted: Fit) -> dict[str, Any]:
     return {n: {"value": shown(fitted.values[n]), "std": shown(fitted.std(n))} for n in fitted.free}
 
 
-def _errors(errors: tuple[float, float | None]) -> dict[str, float | None]:
-    return {"fit": shown(errors[0]), "held_out": shown(errors[1])}
+def _errors(diagnosis: Diagnosis, which: str) -> dict[str, float | None]:
+    """E of one of the two models: free, fitted and held out; of a driven rig one sample and a horizon ahead as well."""
+    free = getattr(diagnosis, f"{which}_error")
+    out = {"fit": shown(free[0]), "held_out": shown(free[1])}
+    if diagnosis.ahead is not None:
+        held, fitted = getattr(diagnosis.ahead, f"{which}_held_out"), getattr(diagnosis.ahead, which)
+        told = held or fitted
+        out.update({n: shown(getattr(told, n)) for n in ("one_step", "horizon", "free")})
+    return out
+
+
+def _driven(diagnosis: Diagnosis) -> dict[str, Any]:
+    """What a driven study's record holds besides."""
+    if diagnosis.ahead is None:
+        return {}
+    random = {
+        r.name: {
+            "std": shown(r.std),
+            "time_constant_s": shown(r.time_constant_s),
+            "share_percent": shown(100.0 * r.share),
+        }
+        for r in diagnosis.random
+    }
+    return {"horizon_s": shown(diagnosis.ahead.horizon_s), "random": random}
 
 
 def _experiment(diagnosis: Diagnosis) -> dict[str, Any] | None:

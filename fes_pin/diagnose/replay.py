@@ -10,9 +10,11 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import RUNAWAY, within
 from fes_pin.diagnose.diagnosis import Diagnosis
+from fes_pin.diagnose.driven import AheadErrors
+from fes_pin.identify.ahead import over_horizon
+from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
-from fes_pin.models.model import Model
 
 
 @dataclass(frozen=True)
@@ -40,8 +42,8 @@ class Replay:
 def replay(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     """Every trial of the study as both models of a diagnosis predict it, in the order of the study."""
     trials, noise = diagnosis.study.trials, diagnosis.extended.noise
-    nominal = _predicted(diagnosis.nominal.model, trials, noise)
-    extended = _predicted(diagnosis.model, trials, noise)
+    nominal = _predicted(diagnosis.nominal, trials, noise, diagnosis.ahead)
+    extended = _predicted(diagnosis.extended, trials, noise, diagnosis.ahead)
     made = []
     for trial, before, after in zip(trials, nominal, extended, strict=True):
         outputs = tuple(n for n in diagnosis.model.rig.outputs(trial.kind) if n in trial)
@@ -50,8 +52,12 @@ def replay(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     return tuple(made)
 
 
-def _predicted(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> list[Trial]:
-    out = []
+def _predicted(fitted: Fit, trials: Sequence[Trial], noise: NoiseModel, ahead: AheadErrors | None) -> list[Trial]:
+    """Trials as predicted from their inputs; where a rig falls by itself, over the horizon from what was measured."""
+    model, out = fitted.model, []
+    if ahead is not None and ahead.extended.free is None:
+        assert fitted.doubt is not None
+        return [t.with_columns(**over_horizon(model, t, fitted.doubt, ahead.horizon_s)) for t in trials]
     for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
         names = model.rig.outputs(trial.kind)
         out.append(trial.with_columns(**{n: _shown(readings[:, k], trial, n) for k, n in enumerate(names)}))

@@ -58,7 +58,8 @@ def footnotes(diagnosis: Diagnosis) -> list[str]:
         for b, a, where in zip(before, after, ("fitted", "held out"), strict=True)
         if a is not None and b is not None
     ]
-    lines = [f"error E {', '.join(shown)}; noise floor {diagnosis.ceiling_percent:.2f} %"]
+    lines = [f"error E {', '.join(shown)}; noise floor {diagnosis.ceiling_percent:.2g} %"] if shown else []
+    lines += driven_notes(diagnosis)
     left = diagnosis.remainder
     where = f", most on {left.where}" if left.where else ""
     if diagnosis.reason is None:
@@ -78,6 +79,30 @@ def footnotes(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.next_experiment:
         lines.append(f"next experiment: {diagnosis.next_experiment.why}")
     return [*lines, *(f"warning: {words}" for words in diagnosis.warnings)]
+
+
+def driven_notes(diagnosis: Diagnosis) -> list[str]:
+    """What is said of a rig that a recorded effort drives: errors ahead, and what acts at random."""
+    if diagnosis.ahead is None:
+        return []
+    ahead = diagnosis.ahead
+    pairs = [("fitted", ahead.nominal, ahead.extended)]
+    if ahead.nominal_held_out and ahead.extended_held_out:
+        pairs.append(("held out", ahead.nominal_held_out, ahead.extended_held_out))
+    unit = diagnosis.model.rig.units()["effort"]
+    lines = [
+        f"error E {ahead.horizon_s:g} s ahead {b.horizon:.2g} -> {a.horizon:.2g} %, "
+        f"one sample ahead {b.one_step:.2g} -> {a.one_step:.2g} % {where}"
+        for where, b, a in pairs
+    ]
+    if ahead.extended.free is None:
+        lines.append("the rig falls by itself: a free simulation of it says nothing of the model")
+    lines += [
+        f"a random {r.name} of {r.std:.3g} {unit} acts, {100.0 * r.share:.2g} % of what drives the rig, "
+        f"changing within {r.time_constant_s:.2g} s"
+        for r in diagnosis.random
+    ]
+    return lines
 
 
 def left_out_text(diagnosis: Diagnosis) -> str:

@@ -6,7 +6,7 @@ with the best of models; over a horizon in between a model is tried for what it 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from fes_pin.models.simulate import Simulator
 
 HORIZON_S = 0.3
 """How far ahead a horizon looks by default, s, or a tenth of the shortest trial if that is less."""
-STRIDE = 0.1
+STRIDE = 0.25
 """Of the horizon: how much older than asked the newest sample that a prediction uses may be."""
 AT_ONCE = 64
 """Predictions that are made side by side: a bound on memory."""
@@ -44,7 +44,7 @@ def over_horizon(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> 
     Parameters
     ----------
     horizon_s
-        s; the newest sample that is used may be older by a tenth of it. Before that much time has passed, predictions
+        s; the newest sample that is used may be older by a quarter of it. Before that much time has passed, predictions
         begin at the first sample.
 
     Returns
@@ -82,8 +82,3 @@ def falls(model: Model, trials: Sequence[Trial]) -> bool:
         run = simulator.run(model.parameters(), simulator.start(model.parameters()))
         largest = max(float(np.abs(one.sensitivities[:, 0, 0]).max()) for one in run)
     return not largest < GROWTH
-
-
-def squares(measured: Mapping[str, np.ndarray], foretold: Mapping[str, np.ndarray], doubt: Doubt) -> np.ndarray:
-    """Squared errors of every sample in units of the reading noise, all columns together, shape (n,)."""
-    return np.sum([((measured[n] - foretold[n]) / doubt.white[n]) ** 2 for n in foretold], axis=0)

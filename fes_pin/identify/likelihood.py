@@ -181,7 +181,7 @@ def doubt_limits(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float
     return out
 
 
-def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknowns: Unknowns, steps: int = 4) -> float:
+def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknowns: Unknowns, steps: int = 2) -> float:
     """Improve what is random about a problem by Fisher scoring, in place; returns the cost."""
     limits = doubt_limits(problem.model, problem.trials)
     names = tuple(problem.doubt.values())
@@ -242,7 +242,7 @@ def maximise(
     start: Mapping[str, float],
     unknowns: Unknowns | None = None,
     rounds: int = ROUNDS,
-    iterations: int = 15,
+    iterations: int = 6,
 ) -> Fit:
     """Fit parameters and randomness by turns.
 

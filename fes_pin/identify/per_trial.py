@@ -93,7 +93,8 @@ def amplitude(fitted: Fit, effect: Effect) -> tuple[float, float]:
     The mean is over the trials of the kind that comes first among those that feel the effect, as a motion and a force
     have no unit in common; what the uncertainty of the single values adds to their squares is taken off.
     """
-    names = (*fitted.model.rig.unknowns(fitted.trials[0].kind), *fitted.model.own_unknowns())
+    initial = fitted.model.rig.unknowns(fitted.trials[0].kind) if fitted.doubt is None else ()
+    names = (*initial, *fitted.model.own_unknowns())
     own = np.array([names.index(f"{effect.name}.{n}") for n in effect.unknowns()])
     slopes = [slope for _, slope in normal_equations(fitted.parts).eliminated]
     squares, spread, kind = [], [], None

@@ -166,10 +166,10 @@ class Problem:
 
 
 def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
-    """Every measured output, all trials end to end, by column name; `time` since each trial began, s."""
+    """Every measured output and effort, all trials end to end, by column name; `time` since each trial began, s."""
     out: dict[str, list[np.ndarray]] = {"time": [t.time - t.time[0] for t in trials]}
     for trial in trials:
-        for name in model.rig.outputs(trial.kind):
+        for name in (*model.rig.outputs(trial.kind), "effort"):
             if name in trial.columns:
                 out.setdefault(name, []).append(trial[name])
     return {n: np.concatenate(v) for n, v in out.items()}

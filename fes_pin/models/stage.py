@@ -206,6 +206,19 @@ def places(measured: Mapping[str, np.ndarray]) -> tuple[float, ...]:
     return (1.0, 0.0, 2.0) if "position" in measured else (0.0,)
 
 
+def reading_range(measured: Mapping[str, np.ndarray]) -> float:
+    """Largest difference between readings of the first output that is there; 0 where none is."""
+    for name in ("position", "angle_rad", "force_n"):
+        if name in measured:
+            return float(np.nanmax(measured[name]) - np.nanmin(measured[name]))
+    return 0.0
+
+
+def symmetric(size: float) -> tuple[float, float]:
+    """From -size to size, or no bounds for no size."""
+    return (-size, size) if size > 0.0 else (-math.inf, math.inf)
+
+
 def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, Any]:
     """First-order low pass of `target` that is exact at time constant 0 and never stiff.
 

@@ -8,14 +8,17 @@ effort, so that what stands beside a cause must earn its place against that.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.search.promise import Scored, best_pairs
 from fes_pin.diagnose.search.sets import Names, Sets
+from fes_pin.diagnose.search.search import Unfit
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
+from fes_pin.workers import OutOfTime, time_limit
 
 CLAIM_LEVEL = 0.01
 """Family-wise error of each round of claims; with the remainder's 0.02 a diagnosis stays below 5 %."""
@@ -48,6 +51,10 @@ class Found:
         For each cause, the fit without it.
     scored
         Promise of every effect beside the nominal model, and of those that the best set has not beside that.
+    family
+        Of tests.
+    silent
+        Names of causes that act in none of the trials.
     """
 
     nominal: Fit
@@ -56,6 +63,8 @@ class Found:
     rivals: dict[str, list[Fit]]
     without: dict[str, Fit]
     scored: list[Scored]
+    family: Family
+    silent: tuple[str, ...]
 
 
 class SetSearch:
@@ -63,21 +72,37 @@ class SetSearch:
 
     def __init__(self, sets: Sets, seed: int, progress: Progress) -> None:
         self.sets, self.seed, self.progress = sets, seed, progress
+        self.was_stopped = False
 
     def run(self) -> Found:
-        """Search."""
-        sets = self.sets
+        """Search, as long as the limit of time lets it; the nominal model is fitted and scored anyway."""
         self.progress(0.05, "nominal model")
-        nominal = sets.nominal()
-        self.family = Family(sets.scores(nominal), self.seed)
-        best: Names = ()
+        with time_limit(math.inf):
+            nominal = self.sets.nominal()
+            if not math.isfinite(nominal.sse):
+                raise Unfit("the nominal model foretells nothing finite from its start values on", nominal)
+            self.family = Family(self.sets.scores(nominal), self.seed)
+        self._reached: Names = ()
+        try:
+            return self._search()
+        except OutOfTime:
+            self.was_stopped = True
+            with time_limit(math.inf):
+                return self._told(self._reached)
+
+    def nominal(self) -> Fit:
+        """The nominal model."""
+        return self.sets.fits[()]
+
+    def _search(self) -> Found:
+        sets, best = self.sets, self._reached
         for size in range(1, MOST_CAUSES + 1):
             self.progress(0.1 + 0.2 * size, f"sets of {size}")
             self._extend(size)
             first = self._refine_first(size)
             if not self.p_value(sets.fits[first], sets.fits[best]) < CLAIM_LEVEL:
                 break
-            best = first
+            best = self._reached = first
         return self.settle(self._backward(best))
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
@@ -128,17 +153,25 @@ class SetSearch:
     def settle(self, names: Names) -> Found:
         """Everything that is to be said of a set of causes: its rivals, and each cause's part in it."""
         self.progress(0.75, "rivals")
+        for name in names:
+            rest = tuple(n for n in names if n != name)
+            self.sets.without(names, name)
+            self.sets.extend_all(rest, None if len(names) == 1 else JOINT_FITS)
+        return self._told(names)
+
+    def _told(self, names: Names) -> Found:
+        """What the sets that are fitted say of one of them."""
         sets, rivals, without = self.sets, {}, {}
         for name in names:
             rest = tuple(n for n in names if n != name)
             without[name] = sets.without(names, name)
-            sets.extend_all(rest, None if len(names) == 1 else JOINT_FITS)
             others = [k for k in sets.fits if len(k) == len(names) and set(rest) <= set(k) and name not in k]
-            rivals[name] = sorted((sets.fits[k] for k in others), key=lambda f: f.price)
+            finite = (f for k in others if math.isfinite((f := sets.fits[k]).sse))
+            rivals[name] = sorted(finite, key=lambda f: f.price)
         none, best = sets.fits[()], sets.fits[names]
         p_values = {n: self.p_value(best, without[n]) for n in names}
         scored = sets.scores(none).scored + (sets.scores(best).scored if names else [])
-        return Found(none, best, p_values, rivals, without, scored)
+        return Found(none, best, p_values, rivals, without, scored, self.family, sets.library.silent())
 
 
 __all__ = ["Found", "SetSearch"]

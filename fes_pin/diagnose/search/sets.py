@@ -23,10 +23,10 @@ from fes_pin.workers import in_parallel
 Names = tuple[str, ...]
 
 STARTS = 2
-"""Shapes that a fit of a set starts from, most promising first."""
-GLANCE = 6
+"""Shapes that a fit of a set starts from, most promising first, if they promise half as much."""
+GLANCE = 4
 """Steps of a first look at a set, at what is random in a smaller one."""
-PURSUED = 6
+PURSUED = 4
 """Best sets of a size that go on until they converge."""
 FIRST_DOUBTS = (1.0, 30.0)
 """Sizes of random effort that the nominal fit begins with, in units of the smallest: a likelihood can have two optima,
@@ -42,11 +42,13 @@ class Sets:
         The nominal model with its start values.
     trials
         What was measured.
+    effects
+        The causes that are looked for; by default all that are known of the rig.
     """
 
-    def __init__(self, model: Model, trials: Sequence[Trial]) -> None:
+    def __init__(self, model: Model, trials: Sequence[Trial], effects: Sequence[type[Effect]] | None = None) -> None:
         self.model, self.trials = Model(model.rig), tuple(trials)
-        self.library = Library(self.model, trials)
+        self.library = Library(self.model, trials, effects)
         self.fits: dict[Names, Fit] = {}
         self._scores: dict[int, tuple[Fit, Scores]] = {}
         self._pursued: set[Names] = set()
@@ -96,7 +98,8 @@ class Sets:
 
     def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:
         """A first look at a base with one more effect, from its most promising shapes."""
-        starts = [base.model + started(s.probe.effect, s.amplitudes) for s in scored[:STARTS]]
+        worth = [s for s in scored[:STARTS] if s.gain >= 0.5 * scored[0].gain]
+        starts = [base.model + started(s.probe.effect, s.amplitudes) for s in worth]
         return min((self._look(s, base) for s in starts), key=lambda f: f.price)
 
     def extend_with_both(self, base: Fit, pair: tuple[Scored, Scored]) -> Fit:
@@ -142,7 +145,7 @@ class Sets:
     def refined(self, names: Names) -> Fit | None:
         """The best fit of a set with the form of one of its effects refined; None where no form is, or none is told."""
         base = self.fits[names]
-        starts = [s for effect in base.model.effects for s in refinements(base.model, effect)]
+        starts = [s for effect in base.model.effects for s in refinements(base.model, effect, self.library.measured)]
         looks = in_parallel(lambda s: self._look(s, base), starts)
         best = sorted(looks, key=lambda f: f.price)[:STARTS]
         return min(filter(is_told, in_parallel(self._go_on, best)), key=lambda f: f.price, default=None)
@@ -176,13 +179,13 @@ def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
     return replace(effect, **values)
 
 
-def refinements(model: Model, effect: Effect) -> list[Model]:
+def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
     """Starts with one more refinement of an effect switched on."""
-    out, info, refined = [], effect.parameters(), effect.refined()
+    out, info, refined, grids = [], effect.parameters(), effect.refined(), effect.grids(measured)
     for names in effect.refinements():
         if names[0] in refined or model.rig.name not in (info[names[0]].rigs or effect.rigs):
             continue
         paths = [f"{effect.name}.{n}" for n in names]
-        for values in itertools.product(*(info[n].grid for n in names)):
+        for values in itertools.product(*(grids[n] for n in names)):
             out.append(model.with_parameters(dict(zip(paths, values, strict=True))))
     return out

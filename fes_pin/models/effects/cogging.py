@@ -35,11 +35,11 @@ class Cogging(Effect):
     the angle, of few terms.
     """
 
-    in_phase: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1000.0, upper=1000.0, scale=0.01)
-    quadrature: float = parameter(0.0, unit="{effort}", null=0.0, lower=-1000.0, upper=1000.0, scale=0.01)
+    in_phase: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.01)
+    quadrature: float = parameter(0.0, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.01)
     waves: float = parameter(12.0, unit="1/{q}", lower=0.0, upper=1e5, scale=1.0)
     second: float = parameter(
-        0.0, unit="{effort}", null=0.0, lower=0.0, upper=1000.0, scale=0.01, optional=True, grid=(0.005,)
+        0.0, unit="{effort}", null=0.0, lower=0.0, upper=1e6, scale=0.01, optional=True, grid=(0.005,)
     )
     phase_rad: float = parameter(
         0.0, unit="rad", lower=-TURN, upper=TURN, scale=0.5, optional=True, grid=(0.0, TURN / 4, TURN / 2, -TURN / 4)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from fes_pin.models.maths import exp, log, sqrt
 from fes_pin.models.parameters import parameter
@@ -15,6 +18,8 @@ CORNER = 0.01
 """Width of its corners, as a share of the friction torque: the joint breaks away within 1 % of it."""
 CREEP = 0.004
 """Speed at which a joint creeps under half its friction until data show another, rad/s: 0.2 degrees a second."""
+SPAN_S = 0.05
+"""Time over which a speed is read off measured positions, s: an encoder's counts are small beside what is moved."""
 UNLOADED = 1e-3
 """Load below which its sign no longer shows, in units of the weight at rest: it keeps derivatives finite."""
 
@@ -43,13 +48,13 @@ class CoulombFriction(Effect):
     Asymmetry: Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, whose offset holds it.
     """
 
-    torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=0.0, upper=100.0, scale=0.01)
+    torque_nm: float = parameter(0.01, unit="{effort}", null=0.0, lower=0.0, upper=1e6, scale=0.01)
     stiction: float = parameter(0.0, null=0.0, lower=0.0, upper=10.0, scale=0.1, optional=True, grid=(0.3, 1.0))
     stribeck_speed: float = parameter(
-        1.0, unit="{q}/s", lower=1e-2, upper=30.0, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
+        1.0, unit="{q}/s", lower=1e-4, upper=30.0, scale=0.5, optional=True, grid=(1.0, 0.2, 4.0)
     )
     creep_speed: float = parameter(
-        CREEP, unit="{q}/s", null=CREEP, lower=1e-4, upper=0.5, scale=0.002, optional=True, grid=(0.02,)
+        CREEP, unit="{q}/s", null=CREEP, lower=1e-5, upper=0.5, scale=0.002, optional=True, grid=(0.02,)
     )
     load_exponent: float = parameter(
         0.0, null=0.0, lower=0.0, upper=2.0, scale=1.0, optional=True, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5)
@@ -60,6 +65,14 @@ class CoulombFriction(Effect):
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
     dissipative = True
+
+    @classmethod
+    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """Of a joint, speeds in the measure of its own: those that it is at in a slow quarter of the time, and less."""
+        grids, speed = super().grids(measured), _usual_speed(measured)
+        if not speed > 0.0:
+            return grids
+        return {**grids, "stribeck_speed": (speed, 0.2 * speed, 4.0 * speed), "creep_speed": (0.1 * speed, 0.5 * speed)}
 
     def apply(self, value: Any, s: Any) -> Any:
         ratio = s.v / self.stribeck_speed
@@ -77,6 +90,16 @@ class CoulombFriction(Effect):
         beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
         x = y / (beyond * beyond) + stopping * s.v / scale
         return 0.5 * (_length(x + 1.0) - _length(x - 1.0))
+
+
+def _usual_speed(measured: Mapping[str, np.ndarray]) -> float:
+    """Median speed of a joint over SPAN_S, rad/s or m/s; 0 where no position was measured."""
+    if "position" not in measured:
+        return 0.0
+    dt = float(np.median(np.diff(measured["time"])))
+    lag = max(1, round(SPAN_S / dt))
+    moved = np.abs(measured["position"][lag:] - measured["position"][:-lag])
+    return float(np.nanmedian(moved)) / (lag * dt) if len(moved) else 0.0
 
 
 def _length(x: Any) -> Any:

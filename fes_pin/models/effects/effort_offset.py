@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
@@ -20,9 +23,14 @@ class EffortOffset(Effect):
     loop.
     """
 
-    offset: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1000.0, upper=1000.0, scale=0.01)
+    offset: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.01)
 
     name, stage, signal, rigs = "effort_offset", Stage.JOINT, "effort", ("joint",)
+
+    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+        """No more than the largest effort that was commanded: more would be another rig."""
+        largest = float(np.max(np.abs(measured.get("effort", np.zeros(1)))))
+        return {"offset": (-largest, largest)} if largest > 0.0 else {}
 
     def apply(self, value: Any, s: Any) -> Any:
         return value + self.offset

@@ -23,7 +23,7 @@ class JointStop(Effect):
     Source: Dombre, Fournier and Coiffet, section I, which names it among what must be identified.
     """
 
-    stiffness: float = parameter(0.1, unit="{effort}/{q}", null=0.0, lower=0.0, upper=1000.0, scale=0.1)
+    stiffness: float = parameter(0.1, unit="{effort}/{q}", null=0.0, lower=0.0, upper=1e8, scale=0.1)
     angle_rad: float = parameter(1.9, unit="{q}", scale=0.05)
     side: float = parameter(1.0, grid=(1.0, -1.0), fitted=False)
 

@@ -21,7 +21,7 @@ class PassiveRelaxation(Effect):
     Source: Maxwell's element; for muscle Proske and Morgan, J. Biomech. 32 (1999), thixotropy and passive tension.
     """
 
-    stiffness_nm_per_rad: float = parameter(0.05, unit="{effort}/{q}", null=0.0, lower=0.0, upper=1000.0, scale=0.05)
+    stiffness_nm_per_rad: float = parameter(0.05, unit="{effort}/{q}", null=0.0, lower=0.0, upper=1e8, scale=0.05)
     relaxation_s: float = parameter(0.3, unit="s", lower=0.02, upper=30.0, scale=0.1, grid=(0.3, 0.08, 1.2, 5.0))
 
     name, stage, signal, rigs = "passive_relaxation", Stage.JOINT, "torque", ("ankle", "joint")

@@ -29,8 +29,8 @@ class PeriodicTorque(Effect):
     to 0.8 Hz; the phase is that of the trial's first sample. A trial that does not begin with a breath has its own.
     """
 
-    in_phase: float = parameter(0.01, unit="{effort}", null=0.0, lower=-100.0, upper=100.0, scale=0.005)
-    quadrature: float = parameter(0.0, unit="{effort}", null=0.0, lower=-100.0, upper=100.0, scale=0.005)
+    in_phase: float = parameter(0.01, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.005)
+    quadrature: float = parameter(0.0, unit="{effort}", null=0.0, lower=-1e6, upper=1e6, scale=0.005)
     frequency_hz: float = parameter(
         0.4,
         unit="Hz",

@@ -20,7 +20,7 @@ class QuadraticDamping(Effect):
     Source: Newton's drag; for a swinging body see Nelson and Olsson, Am. J. Phys. 54 (1986).
     """
 
-    coefficient: float = parameter(0.01, unit="{effort} s2/{q}2", null=0.0, lower=0.0, upper=100.0, scale=0.01)
+    coefficient: float = parameter(0.01, unit="{effort} s2/{q}2", null=0.0, lower=0.0, upper=1e8, scale=0.01)
 
     name, stage, signal, rigs = "quadratic_damping", Stage.JOINT, "torque", ("ankle", "joint")
     dissipative = True

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Effect, Stage, reading_range, symmetric
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,12 @@ class SensorDrift(Effect):
     )
 
     name, stage, signal, rigs = "sensor_drift", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
+
+    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+        """Within a trial the sensor drifts by no more than its readings differ."""
+        low, high = symmetric(reading_range(measured))
+        longest = float(np.max(measured.get("time", np.zeros(1))))
+        return {"rate_per_s": (low / longest, high / longest)} if longest > 0.0 and high > 0.0 else {}
 
     def apply(self, value: Any, s: Any) -> Any:
         return value + self.rate_per_s * s.time / (1.0 + self.settling_per_s * s.time)

@@ -21,11 +21,13 @@ class SensorGain(Effect):
     On a joint y_rest is where a trial begins (`place` 0), where the joint hangs (1), or the zero of its URDF (2),
     whichever fits.
 
+    An error beyond a factor of two is another unit, not a gain.
+
     Tell-tale: every excursion is too large or too small by the same factor, rest angles are right.
     Source: a potentiometer's supply or an amplifier's gain that is off.
     """
 
-    error: float = parameter(0.05, null=0.0, lower=-0.9, upper=9.0, scale=0.02)
+    error: float = parameter(0.05, null=0.0, lower=-0.5, upper=1.0, scale=0.02)
     place: float = parameter(0.0, lower=0.0, upper=2.0, grid=(0.0, 1.0, 2.0), fitted=False)
 
     name, stage, signal, rigs = "sensor_gain", Stage.SENSOR, "reading", ("ankle", "joint")

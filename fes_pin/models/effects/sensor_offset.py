@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Effect, Stage, reading_range, symmetric
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,10 @@ class SensorOffset(Effect):
     offset: float = parameter(0.01, unit="{y}", null=0.0, lower=-1000.0, upper=1000.0, scale=0.005)
 
     name, stage, signal, rigs = "sensor_offset", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
+
+    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+        """No more than the sensor's readings differ by: more would be another place."""
+        return {"offset": symmetric(reading_range(measured))}
 
     def apply(self, value: Any, s: Any) -> Any:
         return value + self.offset

@@ -173,6 +173,10 @@ class Rig:
         """The unknowns of a trial that its first sample tells, with the column that they are read in."""
         return {}
 
+    def is_driven(self, trials: Sequence[Trial]) -> bool:
+        """True if a recorded effort drives the rig: it may answer what is read, so that errors come back as input."""
+        return False
+
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         """Root mean square of what drives the rig in these trials, by random process: "effort" (at the joint) or
         "force" (of a held muscle); about, from the measured columns and start values alone."""

@@ -141,6 +141,9 @@ class Joint(Rig):
             "initial_velocity": float(conditions.get("velocity0", rate)),
         }
 
+    def is_driven(self, trials: Sequence[Trial]) -> bool:
+        return any("effort" in t.columns for t in trials)
+
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         driven = [t["effort"] for t in trials if "effort" in t.columns]
         weight = [

@@ -1,0 +1,301 @@
+"""The diagnosis of rigs that a recorded effort drives, by one likelihood.
+
+What drives such a rig mostly answers what was read: errors come back as input, and a free simulation of the best of
+models runs away. Every set of causes is judged by the likelihood of its one-step-ahead predictions, with a random
+effort at the joint; see `identify.likelihood`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.decide.held_out import Errors, Evidence, folds_of
+from fes_pin.diagnose.remainder.driven import driven_remainder
+from fes_pin.diagnose.remainder.open_set import Remainder
+from fes_pin.diagnose.search.set_search import Found, SetSearch
+from fes_pin.identify.ahead import default_horizon, falls, one_step, over_horizon
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import LikelihoodProblem, driving_size, maximise
+from fes_pin.models.simulate import Simulator
+from fes_pin.workers import in_parallel
+
+LARGE_SHARE = 0.1
+"""Random effort, as a share of what drives the rig, from which something acts that no cause explains."""
+BLOCK_S = 0.5
+"""Stretches of a trial that count as independent in what held-out trials say of a cause, s."""
+CONTENDERS = 6
+"""Sets that each fold chooses among anew."""
+
+
+@dataclass(frozen=True)
+class RandomPart:
+    """What acts at random on a rig.
+
+    Attributes
+    ----------
+    name
+        "effort" or "force".
+    std
+        Stationary standard deviation, in the rig's unit of effort.
+    time_constant_s
+        s.
+    share
+        `std` over the root mean square of what drives the rig.
+    """
+
+    name: str
+    std: float
+    time_constant_s: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """Errors E of one model, percent: one sample ahead, over the horizon, free (None where the rig falls)."""
+
+    one_step: float
+    horizon: float
+    free: float | None
+
+
+@dataclass(frozen=True)
+class AheadErrors:
+    """Errors over time, of both models: on the trials that were fitted, and on trials held out if there were any."""
+
+    horizon_s: float
+    nominal: Ahead
+    extended: Ahead
+    nominal_held_out: Ahead | None
+    extended_held_out: Ahead | None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A driven study, judged.
+
+    Attributes
+    ----------
+    found
+        Of the search.
+    left
+        What is left.
+    refused
+        Causes that were certain in the fit, but that held-out trials did not bear out, with their p-values.
+    evidence
+        Of each cause, from trials held out.
+    nominal, without, extended
+        Squared errors over the horizon on held-out trials; in sample where nothing could be held out.
+    ahead
+        Errors of the nominal and of the extended model on the trials that were fitted.
+    held_out_ahead
+        The same on trials held out; None where none could be.
+    """
+
+    found: Found
+    left: Remainder
+    refused: dict[str, float]
+    evidence: dict[str, Evidence]
+    nominal: Errors
+    without: dict[str, Errors]
+    extended: Errors
+    ahead: tuple[Ahead, Ahead]
+    held_out_ahead: tuple[Ahead, Ahead] | None
+    horizon_s: float
+    random: tuple[RandomPart, ...]
+    ceiling_percent: float
+
+    def gain_fit(self, name: str) -> float:
+        """Share, in percent, of what the extended model adds to the log-likelihood that is lost without a cause."""
+        none, best, without = self.found.nominal.sse, self.found.best.sse, self.found.without[name].sse
+        return 100.0 * (without - best) / max(none - best, 1e-9)
+
+
+def judge_driven(
+    search: SetSearch, found: Found, train: Sequence[Trial], test: Sequence[Trial], seed: int
+) -> Judged:
+    """Hold out, and judge what is left.
+
+    Parameters
+    ----------
+    search, found
+        A search that has run, and what it found.
+    train, test
+        Trials that were fitted, and those that the study itself holds out.
+    seed
+        Of critical values.
+    """
+    refused: dict[str, float] = {}
+    while True:
+        folds = _folds(found, train, test)
+        evidence = {n: _evidence(folds, n) for n in found.without} if folds else {}
+        weak = [n for n, e in evidence.items() if not e.low > 0.0]
+        if not weak:
+            break
+        weakest = min(weak, key=lambda n: evidence[n].low)
+        refused[weakest] = found.p_values[weakest]
+        found = search.settle(tuple(sorted(n for n in found.without if n != weakest)))
+    random = random_parts(found.best)
+    left = _left(driven_remainder(found.best, seed), random, refused, search)
+    horizon = default_horizon(train)
+    whole = folds or [_Fold(found.nominal, found.best, found.without, tuple(train))]
+    falling = falls(found.best.model, train)
+    return Judged(
+        found=found,
+        left=left,
+        refused=refused,
+        evidence=evidence,
+        nominal=_errors([(f.nominal, f.test) for f in whole], horizon),
+        without={n: _errors([(f.without[n], f.test) for f in whole], horizon) for n in found.without},
+        extended=_errors([(f.best, f.test) for f in whole], horizon),
+        ahead=tuple(_ahead([(f, train)], horizon, falling) for f in (found.nominal, found.best)),  # type: ignore[arg-type]
+        held_out_ahead=_held_ahead(folds, horizon, falling),
+        horizon_s=horizon,
+        random=random,
+        ceiling_percent=_ceiling(found.best),
+    )
+
+
+def _ceiling(fitted: Fit) -> float:
+    """E of the reading noise alone, percent."""
+    assert fitted.doubt is not None
+    rig = fitted.model.rig
+    columns = [(t[rig.output(t.kind)], fitted.doubt.white[rig.output(t.kind)]) for t in fitted.trials]
+    noise = sum(float(np.isfinite(y).sum()) * std**2 for y, std in columns)
+    return 100.0 * noise / max(sum(float(np.nansum((y - np.nanmean(y)) ** 2)) for y, _ in columns), 1e-300)
+
+
+def random_parts(fitted: Fit) -> tuple[RandomPart, ...]:
+    """The random efforts of a fit, with their share of what drives the rig."""
+    assert fitted.doubt is not None
+    sizes = driving_size(fitted.model, fitted.trials)
+    return tuple(
+        RandomPart(n, std, fitted.doubt.time[n], std / sizes[n]) for n, std in fitted.doubt.std.items() if n in sizes
+    )
+
+
+def _left(left: Remainder, random: Sequence[RandomPart], refused: dict[str, float], search: SetSearch) -> Remainder:
+    """What is left: by the features, or a random effort that is too large, or a cause that was refused."""
+    if left.unexplained:
+        return left
+    large = [r for r in random if r.share > LARGE_SHARE]
+    if large:
+        return replace(left, unexplained=True, where="effort")
+    certain = {n: p for n, p in refused.items() if p < 1e-6}
+    if certain:
+        surest = min(certain, key=lambda n: certain[n])
+        stage = next(str(e.stage) for e in search.sets.library.effects if e.name == surest)
+        return replace(left, unexplained=True, p_value=certain[surest], where=stage)
+    return left
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """Fits without some trials, and those trials."""
+
+    nominal: Fit
+    best: Fit
+    without: dict[str, Fit]
+    test: tuple[Trial, ...]
+
+
+def _folds(found: Found, train: Sequence[Trial], test: Sequence[Trial]) -> list[_Fold]:
+    """The study's own held-out trials, or every trial in its turn; none where there is but one."""
+    if test:
+        return [_Fold(found.nominal, found.best, found.without, tuple(test))]
+    if len(train) < 2:
+        return []
+    held = folds_of(train)
+    fits = {"": found.nominal, "+": found.best, **found.without}
+    wanted = [(k, n) for k in range(len(held)) for n in fits]
+    again = dict(zip(wanted, in_parallel(lambda w: _without(fits[w[1]], held[w[0]]), wanted), strict=True))
+    return [
+        _Fold(again[k, ""], again[k, "+"], {n: again[k, n] for n in found.without}, tuple(train[i] for i in out))
+        for k, out in enumerate(held)
+    ]
+
+
+def _without(fitted: Fit, held: Sequence[int]) -> Fit:
+    """A fit again, without the trials that are held out."""
+    assert fitted.doubt is not None
+    kept = [i for i in range(len(fitted.trials)) if i not in held]
+    problem = LikelihoodProblem(fitted.model, [fitted.trials[i] for i in kept], fitted.doubt)
+    return maximise(problem, fitted.values, [fitted.unknowns[i] for i in kept])
+
+
+def _costs(fitted: Fit, trials: Sequence[Trial]) -> np.ndarray:
+    """Twice the negative log-likelihood of stretches of trials that took no part."""
+    assert fitted.doubt is not None
+    problem = LikelihoodProblem(fitted.model, trials, fitted.doubt, ())
+    out = []
+    for trial, one in zip(trials, problem.innovations(fitted.values, problem.start_unknowns()), strict=True):
+        with np.errstate(all="ignore"):
+            each = np.where(one.seen, one.values**2 / one.variances + np.log(one.variances), 0.0).sum(axis=1)
+        count = max(1, round(trial.duration / BLOCK_S))
+        out += [float(b.sum()) for b in np.array_split(each, count)]
+    return np.array(out)
+
+
+def _evidence(folds: Sequence[_Fold], name: str) -> Evidence:
+    """What a cause adds to the likelihood of held-out trials; its interval from the spread between stretches."""
+    added = np.concatenate([_costs(f.without[name], f.test) - _costs(f.best, f.test) for f in folds])
+    if not np.isfinite(added).all():
+        return Evidence(float(np.sum(np.sign(added[~np.isfinite(added)]))), 0.0)
+    spread = float(np.std(added, ddof=1)) * np.sqrt(len(added)) if len(added) > 1 else 0.0
+    return Evidence(float(added.sum()), (0.5 * spread) ** 2)
+
+
+def _errors(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float) -> Errors:
+    """Squared errors over the horizon, by seconds of each trial."""
+    work = [(fitted, trial) for fitted, trials in pairs for trial in trials]
+    found = in_parallel(lambda w: _squares(w[0], w[1], horizon_s), work)
+    squares, spread, counts = (np.concatenate([f[k] for f in found]) for k in range(3))
+    return Errors(squares, spread, counts)
+
+
+def _squares(fitted: Fit, trial: Trial, horizon_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    assert fitted.doubt is not None
+    foretold = over_horizon(fitted.model, trial, fitted.doubt, horizon_s)
+    total, around = np.zeros(len(trial)), np.zeros(len(trial))
+    for name, values in foretold.items():
+        variance = fitted.doubt.white[name] ** 2
+        total += np.nan_to_num(trial[name] - values, posinf=0.0, neginf=0.0) ** 2 / variance
+        around += np.nan_to_num(trial[name] - np.nanmean(trial[name])) ** 2 / variance
+    pieces = [np.array_split(x, max(1, round(trial.duration))) for x in (total, around)]
+    sizes = np.array([float(len(foretold) * len(p)) for p in pieces[0]])
+    return np.array([p.sum() for p in pieces[0]]), np.array([p.sum() for p in pieces[1]]), sizes
+
+
+def _ahead(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float, falling: bool) -> Ahead:
+    """E of the first output one sample ahead, over the horizon, and free."""
+    missed = {"one_step": 0.0, "horizon": 0.0, "free": 0.0}
+    around = 0.0
+    for fitted, trials in pairs:
+        assert fitted.doubt is not None
+        for trial in trials:
+            name = fitted.model.rig.output(trial.kind)
+            measured = trial[name]
+            free = Simulator(fitted.model, [trial]).run(fitted.values)[0].readings[:, 0]
+            errors = {
+                "one_step": one_step(fitted.model, trial, fitted.doubt)[name],
+                "horizon": measured - over_horizon(fitted.model, trial, fitted.doubt, horizon_s)[name],
+                "free": measured - free,
+            }
+            with np.errstate(all="ignore"):
+                for key, values in errors.items():
+                    missed[key] += float(np.nansum(values**2))
+            around += float(np.nansum((measured - np.nanmean(measured)) ** 2))
+    percent = {n: 100.0 * v / max(around, 1e-300) for n, v in missed.items()}
+    return Ahead(percent["one_step"], percent["horizon"], None if falling else percent["free"])
+
+
+def _held_ahead(folds: Sequence[_Fold], horizon_s: float, falling: bool) -> tuple[Ahead, Ahead] | None:
+    if not folds:
+        return None
+    return (
+        _ahead([(f.nominal, f.test) for f in folds], horizon_s, falling),
+        _ahead([(f.best, f.test) for f in folds], horizon_s, falling),
+    )
