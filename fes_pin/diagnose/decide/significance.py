@@ -13,6 +13,9 @@ from fes_pin.identify.fit import Fit
 DRAWS = 4000
 """Simulated score vectors; the 5 % quantile of the smallest p-value then has a standard error of 7 %."""
 
+SMALLEST_P = 1e-300
+"""What a p-value that double precision cannot tell from 0 is given as."""
+
 MIN_UNITS = 8
 """Units of evidence that coherence is judged on, at least."""
 
@@ -38,7 +41,7 @@ class Family:
 
     def adjusted(self, single: float) -> float:
         """Family-wise p-value of the smallest of the family's p-values."""
-        return float(-np.expm1(self.tests * np.log1p(-min(single, 1 - 1e-16))))
+        return max(float(-np.expm1(self.tests * np.log1p(-min(single, 1 - 1e-16)))), SMALLEST_P)
 
 
 def coherence_p_value(smaller: Fit, larger: Fit, degrees: int) -> float:

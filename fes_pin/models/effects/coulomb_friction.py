@@ -36,7 +36,8 @@ class CoulombFriction(Effect):
     there x is torque / S, and k v brings the joint there within a step. A torque beyond T only turns the motion: y
     falls out of x then, and friction changes its sign where the velocity does. Under a torque below T the joint still
     creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of small steps
-    x = v / creep_speed. `load` is the bearing's: see the rig. one_way = asymmetry sign(x), x without it.
+    x = v / creep_speed. The corners of clip are rounded over `softness` of the friction. `load` is the bearing's: see
+    the rig. one_way = asymmetry sign(x), x without it.
     Sliding contacts lose in proportion to the load; rolling ones by elastic hysteresis, the load times the width of the
     contact: to the power 4/3 for balls, 3/2 for rollers. Friction that differs by the direction is, moving and at rest,
     symmetric friction beside a constant torque: a joint has `effort_offset` for that, and no asymmetry.
@@ -56,6 +57,7 @@ class CoulombFriction(Effect):
     creep_speed: float = parameter(
         CREEP, unit="{q}/s", null=CREEP, lower=1e-5, upper=0.5, scale=0.002, optional=True, grid=(0.02,)
     )
+    softness: float = parameter(CORNER, null=CORNER, lower=1e-3, upper=2.0, scale=0.1, optional=True, grid=(0.5,))
     load_exponent: float = parameter(
         0.0, null=0.0, lower=0.0, upper=2.0, scale=1.0, optional=True, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5)
     )
@@ -72,7 +74,12 @@ class CoulombFriction(Effect):
         grids, speed = super().grids(measured), _usual_speed(measured)
         if not speed > 0.0:
             return grids
-        return {**grids, "stribeck_speed": (speed, 0.2 * speed, 4.0 * speed), "creep_speed": (0.1 * speed, 0.5 * speed)}
+        return {**grids, "stribeck_speed": (0.3 * speed, 0.1 * speed, speed), "creep_speed": (0.1 * speed, 0.5 * speed)}
+
+    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+        """A fall of friction with speed ends among the speeds that a joint is mostly at; else it is less damping."""
+        speed = _usual_speed(measured)
+        return {"stribeck_speed": (0.0, 2.0 * speed)} if speed > 0.0 else {}
 
     def apply(self, value: Any, s: Any) -> Any:
         ratio = s.v / self.stribeck_speed
@@ -89,7 +96,7 @@ class CoulombFriction(Effect):
         y = value / scale
         beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
         x = y / (beyond * beyond) + stopping * s.v / scale
-        return 0.5 * (_length(x + 1.0) - _length(x - 1.0))
+        return 0.5 * (_length(x + 1.0, self.softness) - _length(x - 1.0, self.softness))
 
 
 def _usual_speed(measured: Mapping[str, np.ndarray]) -> float:
@@ -102,6 +109,6 @@ def _usual_speed(measured: Mapping[str, np.ndarray]) -> float:
     return float(np.nanmedian(moved)) / (lag * dt) if len(moved) else 0.0
 
 
-def _length(x: Any) -> Any:
+def _length(x: Any, corner: Any = CORNER) -> Any:
     """|x| with a rounded corner: sums and differences of two make max(1, |x|) and clip(x)."""
-    return sqrt(x * x + CORNER * CORNER)
+    return sqrt(x * x + corner * corner)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage, counted_from, places, reading_range, symmetric
+from fes_pin.models.stage import Effect, Stage, counted_from, places
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,6 @@ class SensorNonlinearity(Effect):
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
         """Deviations are counted from any place that the rig has."""
         return {**super().grids(measured), "place": places(measured)}
-
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
-        """A sensor reads more where there is more: over the range that it has read its curve does not turn back."""
-        low, high = symmetric(reading_range(measured))
-        return {"curvature": (0.5 / low, 0.5 / high)} if high > 0.0 else {}
 
     def apply(self, value: Any, s: Any) -> Any:
         x = value - counted_from(s, self.place)

@@ -1,0 +1,1 @@
+"""Rigs that a controller drives, with known causes hidden, and how often each is named."""

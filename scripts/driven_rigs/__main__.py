@@ -1,0 +1,138 @@
+"""Draw driven rigs with known causes hidden, diagnose them, and count."""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from driven_rigs.draw import CAUSES, OUTSIDE, draw
+from fes_pin.data.study import read_study
+from fes_pin.diagnose.diagnosis import Diagnosis, diagnose
+
+PAIRS = (
+    ("coulomb_friction", "quadratic_damping"),
+    ("coulomb_friction", "effort_offset"),
+    ("coulomb_friction", "sensor_lag"),
+    ("coulomb_friction", "periodic_torque"),
+    ("coulomb_friction", "parallel_stiffness"),
+)
+
+
+def items(count: int) -> Iterator[tuple[str, ...]]:
+    """What is hidden in each of so many studies: nothing, every cause in turn, pairs, and something else."""
+    rows = [(), *((c,) for c in CAUSES[:5]), (), *((c,) for c in CAUSES[5:]), *PAIRS[:2], (), OUTSIDE, *PAIRS[2:]]
+    for k in range(count):
+        yield rows[k % len(rows)]
+
+
+def judged(causes: tuple[str, ...], size: float, seed: int) -> dict[str, Any]:
+    """Make a study, diagnose it, and say how the answer compares with the truth."""
+    with tempfile.TemporaryDirectory(prefix="driven") as folder:
+        drawn = draw(causes, size, seed, Path(folder))
+        began = time.perf_counter()
+        try:
+            found = diagnose(read_study(drawn.study))
+        except Exception as error:
+            return {"seed": seed, "causes": causes, "error": f"{type(error).__name__}: {error}"}
+        seconds = time.perf_counter() - began
+    named = [(c.name, *c.equivalents) for c in found.causes]
+    return {
+        "seed": seed,
+        "rig": drawn.base,
+        "causes": causes,
+        "size": size,
+        "verdict": found.verdict,
+        "named": named,
+        "left": found.remainder.unexplained,
+        "share": [r.share for r in found.random],
+        "deviations": deviations(found, drawn.truth),
+        "seconds": round(seconds, 1),
+    }
+
+
+def deviations(found: Diagnosis, truth: dict[str, float]) -> dict[str, float]:
+    """Of inertia and damping, in standard deviations, where the model is as the truth is."""
+    fitted = found.extended
+    return {
+        n: (fitted.values[n] - truth[n]) / fitted.std(n)
+        for n in ("inertia_scale", "damping")
+        if n in fitted.free and math.isfinite(fitted.std(n)) and fitted.std(n) > 0.0
+    }
+
+
+def table(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """The counts."""
+    good = [r for r in rows if "error" not in r]
+    lines = [f"{len(rows)} studies, {len(rows) - len(good)} ended in an error"]
+    nulls = [r for r in good if not r["causes"]]
+    if nulls:
+        adequate, alarms = (sum(f(r) for r in nulls) for f in (_adequate, lambda r: bool(r["named"])))
+        lines.append(f"nothing hidden: {adequate} of {len(nulls)} adequate, {alarms} with a name")
+    for count in (1, 2):
+        many = [r for r in good if len(r["causes"]) == count and r["causes"][0] not in OUTSIDE]
+        if many:
+            first = sum(_all_named(r) for r in many)
+            alone = sum(sorted(n[0] for n in r["named"]) == sorted(r["causes"]) for r in many)
+            lines.append(f"{count} hidden: all in their sets {first} of {len(many)}, named exactly {alone}")
+            lines += [
+                f"    missed: {r['seed']} {r['rig']} {r['causes']} -> {r['verdict']} {r['named']}"
+                for r in many
+                if not _all_named(r)
+            ]
+    outside = [r for r in good if r["causes"] and r["causes"][0] in OUTSIDE]
+    if outside:
+        lines.append(f"outside the library: {sum(r['left'] for r in outside)} of {len(outside)} with a remainder")
+    exact = [r for r in good if sorted(n[0] for n in r["named"]) == sorted(r["causes"])]
+    off = [abs(d) for r in exact for d in r["deviations"].values()]
+    if off:
+        lines.append(
+            f"95 % intervals of inertia and damping cover {100.0 * sum(d < 1.96 for d in off) / len(off):.1f} % of {len(off)}"
+        )
+    seconds = sorted(r["seconds"] for r in good)
+    lines.append(f"a diagnosis takes {seconds[len(seconds) // 2]:.1f} s in the median, {seconds[-1]:.1f} at most")
+    return lines
+
+
+def _missed(row: dict[str, Any]) -> str:
+    return f"    missed: {row['seed']} {row['rig']} {row['causes']} -> {row['verdict']} {row['named']}"
+
+
+def _adequate(row: dict[str, Any]) -> bool:
+    return row["verdict"] == "adequate"
+
+
+def _all_named(row: dict[str, Any]) -> bool:
+    return all(any(c in names for names in row["named"]) for c in row["causes"])
+
+
+def main(
+    count: Annotated[int, typer.Option(help="How many studies.")] = 40,
+    size: Annotated[float, typer.Option(help="Torque of what is hidden, as a share of the effort.")] = 0.3,
+    seed: Annotated[int, typer.Option(help="Of the first; each next one has the next seed.")] = 0,
+    nulls: Annotated[bool, typer.Option(help="Hide nothing in any.")] = False,
+    results: Annotated[
+        Path | None, typer.Option(help="A file of one line a study, with which a run can go on.")
+    ] = None,
+) -> None:
+    """Hide known causes in rigs that a controller drives, and count what the diagnosis makes of them."""
+    rows = [json.loads(x) for x in results.read_text().splitlines()] if results and results.exists() else []
+    done = {r["seed"] for r in rows}
+    for k, causes in enumerate(items(count)):
+        if seed + k in done:
+            continue
+        rows.append(judged(() if nulls else causes, size, seed + k))
+        if results:
+            with results.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(rows[-1]) + "\n")
+    typer.echo("\n".join(table(rows)))
+
+
+if __name__ == "__main__":
+    typer.run(main)
