@@ -156,7 +156,8 @@ def promises(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study) -> li
     measured = []
     for trial, one in zip(trials, Simulator(best.model, trials).run(best.values, begin), strict=True):
         names = best.model.rig.outputs(trial.kind)
-        measured.append(trial.with_columns(**{n: one.readings[:, k] for k, n in enumerate(names)}))
+        read = {n: one.readings[:, k] for k, n in enumerate(names) if best.doubt is None or n in best.doubt.white}
+        measured.append(trial.with_columns(**read))
     ranges = _ranges(measured_columns(best.model, study.trials))
     kept = [all(_inside(t[n], r) for n, r in ranges.items() if n in t) for t in measured]
     inside = [t for t, keep in zip(measured, kept, strict=True) if keep]

@@ -15,6 +15,7 @@ import typer
 from driven_rigs.draw import CAUSES, OUTSIDE, draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.diagnosis import Diagnosis, diagnose
+from fes_pin.identify.fit import CONFIDENCE_95
 
 PAIRS = (
     ("coulomb_friction", "quadratic_damping"),
@@ -92,9 +93,8 @@ def table(rows: Sequence[dict[str, Any]]) -> list[str]:
     exact = [r for r in good if sorted(n[0] for n in r["named"]) == sorted(r["causes"])]
     off = [abs(d) for r in exact for d in r["deviations"].values()]
     if off:
-        lines.append(
-            f"95 % intervals of inertia and damping cover {100.0 * sum(d < 1.96 for d in off) / len(off):.1f} % of {len(off)}"
-        )
+        covered = 100.0 * sum(d < CONFIDENCE_95 for d in off) / len(off)
+        lines.append(f"95 % intervals of inertia and damping cover {covered:.1f} % of {len(off)}")
     seconds = sorted(r["seconds"] for r in good)
     lines.append(f"a diagnosis takes {seconds[len(seconds) // 2]:.1f} s in the median, {seconds[-1]:.1f} at most")
     return lines
