@@ -1,0 +1,106 @@
+"""The likelihood: what is random is found, gains as they are lead to its maximum, and small randomness stays small."""
+
+import numpy as np
+import pytest
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.ahead import falls, one_step, over_horizon
+from fes_pin.identify.likelihood import LikelihoodProblem, driving_size, first_guess, maximise
+from fes_pin.models.model import Model
+from fes_pin.models.rigs import Joint
+
+DT, N = 0.004, 2000
+TRUE = {"inertia": 0.05, "damping": 0.06, "weight": 0.9}
+
+
+def held(seed: int, torque: float, tau: float = 0.1, weight: float = TRUE["weight"], noise: float = 4e-4) -> Trial:
+    """A pendulum under feedback with a random torque: Euler steps of a twentieth of a sample."""
+    rng = np.random.default_rng(seed)
+    q = v = lagged = 0.0
+    e, h = torque * rng.normal(), DT / 20
+    effort, position = np.empty(N), np.empty(N)
+    last = 0.0
+    for k in range(N):
+        position[k] = q + noise * rng.normal()
+        lagged = 0.8 * lagged + 0.2 * (position[k] - last) / DT
+        last = position[k]
+        wanted = 0.5 * np.sin(2.0 * k * DT + seed) + 0.3 * np.sin(5.1 * k * DT)
+        effort[k] = 6.0 * (wanted - position[k]) - 0.5 * lagged
+        for _ in range(20):
+            a = (effort[k] + e - TRUE["damping"] * v - weight * np.sin(q)) / TRUE["inertia"]
+            q, v = q + h * v, v + h * a
+            e += -e * h / tau + torque * np.sqrt(2.0 * h / tau) * rng.normal()
+    return Trial(f"t{seed}", "motion", {"effort": effort, "position": position}, np.arange(N) * DT)
+
+
+def believed(weight: float = TRUE["weight"]) -> Model:
+    constants = {"inertia": TRUE["inertia"], "gravity_cos": 0.0, "gravity_sin": weight, "revolute": 1.0}
+    return Model(Joint(constants=constants, inertia_scale=1.3, damping=0.03))
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    trials = [held(k, 0.06) for k in range(3)]
+    return maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)), believed().parameters())
+
+
+def test_the_rig_and_what_is_random_are_found(fitted):
+    truth = {"inertia_scale": 1.0, "damping": TRUE["damping"], "gravity_scale": 1.0}
+    for name, value in truth.items():
+        assert abs(fitted.values[name] - value) < 4.0 * fitted.std(name), name
+    assert fitted.std("inertia_scale") < 0.02
+    assert fitted.doubt.std["effort"] == pytest.approx(0.06, rel=0.25)
+    assert fitted.doubt.time["effort"] == pytest.approx(0.1, rel=0.5)
+    assert fitted.doubt.white["position"] == pytest.approx(4e-4, rel=0.05)
+
+
+def test_gains_as_they_are_lead_to_the_maximum_of_the_whole_likelihood(fitted):
+    """Differences of the cost itself, gains moving: no parameter's step would gain more than a tenth of a deviation."""
+    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt)
+    for name in fitted.free:
+        step = 0.5 * fitted.std(name)
+        up, down = (
+            problem.cost({**fitted.values, name: fitted.values[name] + s * step}, fitted.unknowns) for s in (1.0, -1.0)
+        )
+        slope, bend = (up - down) / (2.0 * step), (up + down - 2.0 * fitted.sse) / step**2
+        assert bend > 0.0
+        assert abs(slope / bend) < 0.1 * fitted.std(name), name
+
+
+def test_innovations_are_white_at_the_maximum(fitted):
+    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt)
+    for part in problem.linearize(fitted.values, fitted.unknowns):
+        r = part.residual[20:]
+        assert np.std(r) == pytest.approx(1.0, abs=0.06)
+        for lag in (1, 2, 5, 20):
+            assert abs(float(np.mean(r[lag:] * r[:-lag]))) < 4.0 / np.sqrt(len(r))
+
+
+def test_without_a_random_torque_none_is_found():
+    trials = [held(k, 0.0) for k in range(2)]
+    found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)), believed().parameters())
+    assert found.doubt.std["effort"] < 0.01 * driving_size(believed(), trials)["effort"]
+
+
+def test_three_errors_of_a_rig_that_falls():
+    """On its head free simulation says nothing, a tenth of a second ahead a little, one sample ahead nothing but noise."""
+    trials = [held(k, 0.02, weight=-TRUE["weight"]) for k in range(2)]
+    model = believed(-TRUE["weight"])
+    found = maximise(LikelihoodProblem(model, trials, first_guess(model, trials)), model.parameters())
+    assert falls(found.model, trials)
+    near = one_step(found.model, trials[0], found.doubt)["position"]
+    missed = trials[0]["position"] - over_horizon(found.model, trials[0], found.doubt, 0.1)["position"]
+    assert np.std(near[5:]) < 1.3 * 4e-4
+    assert 2.0 * np.std(near[5:]) < np.std(missed) < 0.05
+
+
+def test_a_horizon_uses_nothing_younger():
+    """What is foretold of a sample does not change when the samples within the horizon before it do."""
+    trials = [held(7, 0.03)]
+    found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)), believed().parameters())
+    column = np.array(trials[0]["position"])
+    column[1000 - 24 : 1000] += 0.05  # 0.1 s are 25 samples
+    changed = trials[0].with_columns(position=column)
+    before, after = (over_horizon(found.model, t, found.doubt, 0.1)["position"] for t in (trials[0], changed))
+    assert after[1000] == before[1000]
+    assert after[1060] != before[1060]

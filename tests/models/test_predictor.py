@@ -1,0 +1,129 @@
+"""The one-step-ahead predictor against an exact Kalman filter, the virtual machine, and the free simulation."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from fes_pin.data.trial import Trial
+from fes_pin.models.effects import effect
+from fes_pin.models.model import Model
+from fes_pin.models.predictor import Doubt, Predictor
+from fes_pin.models.rigs import Joint
+from fes_pin.models.simulate import Simulator
+
+MASS, DAMPING, DT = 2.0, 3.0, 0.005
+SLIDE = Joint(
+    constants={"inertia": MASS, "gravity_cos": 0.0, "gravity_sin": 0.0, "revolute": 0.0},
+    fitted=("inertia_scale", "damping"),
+    damping=DAMPING,
+)
+PENDULUM = Joint(constants={"inertia": 0.05, "gravity_cos": 0.1, "gravity_sin": 1.0, "revolute": 1.0}, damping=0.05)
+PRIOR = {"initial_position": 0.5, "initial_velocity": 2.0}
+DOUBT = Doubt({"position": 2e-3}, {"effort": 0.8}, {"effort": 0.12})
+
+
+def driven(seed: int, n: int = 400, size: float = 1.0) -> Trial:
+    rng = np.random.default_rng(seed)
+    time = np.arange(n) * DT
+    effort = size * np.repeat(rng.normal(size=-(-n // 20)), 20)[:n]
+    position = 0.1 * np.sin(3.0 * time + seed) + 2e-3 * rng.normal(size=n)
+    return Trial(f"t{seed}", "motion", {"effort": effort, "position": position}, time)
+
+
+def exact(trial: Trial, doubt: Doubt) -> tuple[np.ndarray, np.ndarray]:
+    """Innovations and variances of the slide by matrix exponentials (Van Loan) and the textbook's filter."""
+    tau, std = doubt.time["effort"], doubt.std["effort"]
+    a = np.array([[0.0, 1.0, 0.0], [0.0, -DAMPING / MASS, 1.0 / MASS], [0.0, 0.0, -1.0 / tau]])
+    b = np.array([[0.0], [1.0 / MASS], [0.0]])
+    whole = scipy.linalg.expm(DT * np.block([[a, b], [np.zeros((1, 4))]]))
+    phi, gamma = whole[:3, :3], whole[:3, 3]
+    spread = np.diag([0.0, 0.0, 2.0 * std**2 / tau])
+    loan = scipy.linalg.expm(DT * np.block([[-a, spread], [np.zeros((3, 3)), a.T]]))
+    noise = loan[3:, 3:].T @ loan[:3, 3:]
+    x = np.array([trial["position"][0], 0.3, 0.0])
+    p = np.diag([PRIOR["initial_position"] ** 2, PRIOR["initial_velocity"] ** 2, std**2])
+    out, variances = [], []
+    for u, y in zip(trial["effort"], trial["position"], strict=True):
+        variance = p[0, 0] + doubt.white["position"] ** 2
+        out.append(y - x[0] if np.isfinite(y) else 0.0)
+        variances.append(variance)
+        if np.isfinite(y):
+            gain = p[:, 0] / variance
+            x = x + gain * out[-1]
+            p = p - np.outer(gain, p[0])
+        x = phi @ x + gamma * u
+        p = phi @ p @ phi.T + noise
+    return np.array(out), np.array(variances)
+
+
+def foretold(model, trials, doubt=DOUBT, columns=(), velocity=0.3):
+    predictor = Predictor(model, trials, columns, doubt.processes, [PRIOR] * len(trials))
+    begin = [{"initial_position": float(t["position"][0]), "initial_velocity": velocity} for t in trials]
+    return predictor.run(model.parameters(), doubt, begin)
+
+
+@pytest.mark.parametrize("count", [1, 3, 5])
+def test_on_a_linear_rig_it_is_the_exact_kalman_filter(count):
+    trials = [driven(k, 200 + 37 * k) for k in range(count)]
+    for trial, found in zip(trials, foretold(Model(SLIDE), trials), strict=True):
+        innovations, variances = exact(trial, DOUBT)
+        assert np.allclose(found.values[:, 0], innovations, rtol=0.0, atol=1e-6)
+        assert np.allclose(found.variances[:, 0], variances, rtol=2e-3)
+
+
+def test_what_was_not_measured_corrects_nothing_and_counts_for_nothing():
+    trial = driven(3)
+    column = np.array(trial["position"])
+    column[50:120] = np.nan
+    column[200] = np.nan
+    (found,) = foretold(Model(SLIDE), [trial.with_columns(position=column)])
+    innovations, variances = exact(trial.with_columns(position=column), DOUBT)
+    assert np.allclose(found.values[:, 0], innovations, rtol=0.0, atol=1e-6)
+    seen = np.isfinite(column)
+    cost = np.sum(innovations[seen] ** 2 / variances[seen] + np.log(variances[seen]))
+    assert found.cost() == pytest.approx(cost, rel=1e-4)
+
+
+def test_without_randomness_it_is_the_free_simulation():
+    trial, model = driven(1), Model(PENDULUM)
+    begin = {"initial_position": float(trial["position"][0]), "initial_velocity": 0.3}
+    predictor = Predictor(model, [trial], (), (), [dict.fromkeys(PRIOR, 0.0)])
+    (found,) = predictor.run(model.parameters(), Doubt({"position": 1e-3}), [begin])
+    (free,) = Simulator(model, [trial]).run(model.parameters(), [begin])
+    assert np.allclose(found.values[:, 0], trial["position"] - free.readings[:, 0], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("names", [(), ("coulomb_friction",), ("sensor_lag", "passive_relaxation")])
+def test_machine_code_and_virtual_machine_agree(names, monkeypatch):
+    model = Model(PENDULUM)
+    for name in names:
+        model = model + effect(name)()
+    trials, columns = [driven(1, 60), driven(2, 80)], model.fitted_parameters()
+    fast = foretold(model, trials, columns=columns)
+    monkeypatch.setenv("FES_PIN_ENGINE", "casadi")
+    slow = foretold(model, trials, columns=columns)
+    for one, other in zip(fast, slow, strict=True):
+        assert np.allclose(one.values, other.values, rtol=0.0, atol=1e-11)
+        assert np.allclose(one.variances, other.variances, rtol=1e-9)
+        scale = np.abs(other.sensitivities).max(axis=(0, 1)) + 1e-12
+        assert np.abs((one.sensitivities - other.sensitivities) / scale).max() < 1e-8
+
+
+def test_sensitivities_are_derivatives_where_the_gains_do_not_move():
+    """On a slide neither the offset of its effort nor of its sensor moves the gains: differences are the truth."""
+    model = Model(SLIDE) + effect("effort_offset")(offset=0.2) + effect("sensor_offset")(offset=0.01)
+    columns = ("effort_offset.offset", "sensor_offset.offset")
+    trial, values, step = driven(4), model.parameters(), 1e-4
+    (found,) = foretold(model, [trial], columns=columns)
+    for k, name in enumerate(columns):
+        ends = [model.with_parameters({**values, name: values[name] + s * step}) for s in (1.0, -1.0)]
+        up, down = (foretold(one, [trial])[0].values for one in ends)
+        assert np.allclose(found.sensitivities[:, :, k], (up - down) / (2.0 * step), rtol=0.0, atol=1e-7)
+
+
+def test_lags_shorter_than_a_step_do_not_blow_up():
+    model = Model(PENDULUM) + effect("sensor_lag")(lag_s=0.0)
+    (found,) = foretold(model, [driven(5, 2000)], columns=model.fitted_parameters())
+    (without,) = foretold(Model(PENDULUM), [driven(5, 2000)])
+    assert np.isfinite(found.sensitivities).all()
+    assert found.cost() == pytest.approx(without.cost(), rel=1e-3)
