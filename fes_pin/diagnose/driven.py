@@ -25,6 +25,9 @@ from fes_pin.workers import in_parallel
 
 LARGE_SHARE = 0.1
 """Random effort, as a share of what drives the rig, from which something acts that no cause explains."""
+AVERAGED_S = 0.05
+"""Time over which a random effort is averaged before it is compared, s: what is faster moves no limb, and of what is much
+faster than the rig data tell the intensity 2 std^2 time alone, not deviation and time one by one."""
 BLOCK_S = 0.5
 """Stretches of a trial that count as independent in what held-out trials say of a cause, s."""
 CONTENDERS = 6
@@ -44,7 +47,7 @@ class RandomPart:
     time_constant_s
         s.
     share
-        `std` over the root mean square of what drives the rig.
+        Deviation of its means over `AVERAGED_S`, over the root mean square of what drives the rig.
     """
 
     name: str
@@ -172,9 +175,17 @@ def random_parts(fitted: Fit) -> tuple[RandomPart, ...]:
     """The random efforts of a fit, with their share of what drives the rig."""
     assert fitted.doubt is not None
     sizes = driving_size(fitted.model, fitted.trials)
-    return tuple(
-        RandomPart(n, std, fitted.doubt.time[n], std / sizes[n]) for n, std in fitted.doubt.std.items() if n in sizes
-    )
+    parts = ((n, std, fitted.doubt.time[n]) for n, std in fitted.doubt.std.items() if n in sizes)
+    return tuple(RandomPart(n, std, time, _averaged(std, time) / sizes[n]) for n, std, time in parts)
+
+
+def _averaged(std: float, time: float) -> float:
+    """Deviation of the means over `AVERAGED_S` of a first-order process.
+
+    With x = time / AVERAGED_S, std sqrt(2 x (1 - x (1 - exp(-1 / x)))).
+    """
+    x = time / AVERAGED_S
+    return std * float(np.sqrt(max(2.0 * x * (1.0 - x * (1.0 - np.exp(-1.0 / x))), 0.0)))
 
 
 def _left(left: Remainder, random: Sequence[RandomPart], refused: dict[str, float], search: SetSearch) -> Remainder:

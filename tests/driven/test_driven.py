@@ -46,7 +46,9 @@ def test_what_no_cause_explains_is_said(tmp_path):
     study = read_study(drawn.study)
     rng = np.random.default_rng(0)
     trials = tuple(t.with_columns(effort=rng.permutation(t["effort"])) for t in study.trials)
-    found = diagnose(type(study)(study.name, study.rig, study.constants, study.start, trials, study.folder, study.files))
+    found = diagnose(
+        type(study)(study.name, study.rig, study.constants, study.start, trials, study.folder, study.files)
+    )
     assert found.verdict != "adequate"
     assert found.remainder.unexplained
     assert found.random[0].share > 0.1
