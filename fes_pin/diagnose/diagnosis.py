@@ -142,8 +142,8 @@ class Diagnosis:
         On trials that took no part, where there are such; of a driven rig of the errors over the horizon.
         """
         if self.ahead is not None:
-            held = self.ahead.nominal_held_out, self.ahead.extended_held_out
-            one, other = held if held[0] and held[1] else (self.ahead.nominal, self.ahead.extended)
+            one = self.ahead.nominal_held_out or self.ahead.nominal
+            other = self.ahead.extended_held_out or self.ahead.extended
             return float(np.clip(100.0 * (one.horizon - other.horizon) / max(one.horizon, 1e-300), 0.0, 100.0))
         outside = self.nominal_error[1] is not None and self.extended_error[1] is not None
         before, after = (e[1] if outside else e[0] for e in (self.nominal_error, self.extended_error))
@@ -248,7 +248,6 @@ def _of_driven(
         rivals=found.rivals,
         judged=best,
         without=found.without,
-        family=found.family,
         scored=found.scored,
         floor=best.noise,
     )

@@ -26,8 +26,8 @@ from fes_pin.workers import in_parallel
 LARGE_SHARE = 0.1
 """Random effort, as a share of what drives the rig, from which something acts that no cause explains."""
 AVERAGED_S = 0.05
-"""Time over which a random effort is averaged before it is compared, s: what is faster moves no limb, and of what is much
-faster than the rig data tell the intensity 2 std^2 time alone, not deviation and time one by one."""
+"""Time over which a random effort is averaged before it is compared, s: what is faster moves no limb, and of what is
+much faster than the rig data tell the intensity 2 std^2 time alone, not deviation and time one by one."""
 BLOCK_S = 0.5
 """Stretches of a trial that count as independent in what held-out trials say of a cause, s."""
 CONTENDERS = 6
@@ -117,9 +117,7 @@ class Judged:
         return 100.0 * (without - best) / max(none - best, 1e-9)
 
 
-def judge_driven(
-    search: SetSearch, found: Found, train: Sequence[Trial], test: Sequence[Trial], seed: int
-) -> Judged:
+def judge_driven(search: SetSearch, found: Found, train: Sequence[Trial], test: Sequence[Trial], seed: int) -> Judged:
     """Hold out, and judge what is left.
 
     Parameters

@@ -15,8 +15,8 @@ from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
-from fes_pin.workers import one_thread_each
 from fes_pin.models.predictor import Doubt
+from fes_pin.workers import one_thread_each
 
 MAX_ITERATIONS = 60
 CONFIDENCE_95 = normal_quantile(0.975)

@@ -83,7 +83,7 @@ def test_without_a_random_torque_none_is_found():
 
 
 def test_three_errors_of_a_rig_that_falls():
-    """On its head free simulation says nothing, a tenth of a second ahead a little, one sample ahead nothing but noise."""
+    """On its head free simulation says nothing; 0.1 s ahead errors are small, one sample ahead they are noise."""
     trials = [held(k, 0.02, weight=-TRUE["weight"]) for k in range(2)]
     model = believed(-TRUE["weight"])
     found = maximise(LikelihoodProblem(model, trials, first_guess(model, trials)), model.parameters())

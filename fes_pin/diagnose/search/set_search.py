@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.search.promise import Scored, best_pairs
-from fes_pin.diagnose.search.sets import Names, Sets
 from fes_pin.diagnose.search.search import Unfit
+from fes_pin.diagnose.search.sets import Names, Sets
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.workers import OutOfTime, time_limit
