@@ -256,7 +256,7 @@ def _of_driven(
             name=one.name,
             stage=str(one.stage),
             parameters=_estimates(best, one.name),
-            equivalents=_equivalents(searched, one.name, left),
+            equivalents=_alike(best, found.rivals[one.name], one.name),
             p_value=found.p_values[one.name],
             gain_fit=judged.gain_fit(one.name),
             gain_held_out=gain(judged.nominal, judged.without[one.name], judged.extended, seed),
@@ -467,6 +467,16 @@ def _equivalents(searched: Searched, name: str, left: Remainder) -> tuple[str, .
         if rival.price - best.price < margin:
             out.append(instead)
     return tuple(sorted(set(out)))
+
+
+def _alike(best: Fit, rivals: Sequence[Fit], name: str) -> tuple[str, ...]:
+    """Causes that could stand in the place of one: the price chooses which is named, the likelihood what is told apart.
+
+    A rival that fits as well with more parameters, as a spring does in the place of a constant torque, is not excluded.
+    """
+    others = {e.name for e in best.model.effects} - {name}
+    near = [f for f in rivals if min(f.price - best.price, f.sse - best.sse) < SEPARABLE]
+    return tuple(sorted({e.name for f in near for e in f.model.effects} - others - {name}))
 
 
 def _absorbed(searched: Searched, silent: Sequence[str]) -> tuple[str, ...]:

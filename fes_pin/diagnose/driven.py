@@ -20,6 +20,7 @@ from fes_pin.diagnose.search.set_search import Found, SetSearch
 from fes_pin.identify.ahead import default_horizon, falls, one_step, over_horizon
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem, driving_size, maximise
+from fes_pin.identify.problem import normal_equations
 from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel
 
@@ -28,10 +29,8 @@ LARGE_SHARE = 0.1
 AVERAGED_S = 0.05
 """Time over which a random effort is averaged before it is compared, s: what is faster moves no limb, and of what is
 much faster than the rig data tell the intensity 2 std^2 time alone, not deviation and time one by one."""
-BLOCK_S = 0.5
-"""Stretches of a trial that count as independent in what held-out trials say of a cause, s."""
-CONTENDERS = 6
-"""Sets that each fold chooses among anew."""
+WIDE = 10.0
+"""Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +131,7 @@ def judge_driven(search: SetSearch, found: Found, train: Sequence[Trial], test: 
     refused: dict[str, float] = {}
     while True:
         folds = _folds(found, train, test)
-        evidence = {n: _evidence(folds, n) for n in found.without} if folds else {}
+        evidence = {n: _evidence(folds, found, n) for n in found.without} if folds else {}
         weak = [n for n, e in evidence.items() if not e.low > 0.0]
         if not weak:
             break
@@ -209,12 +208,14 @@ class _Fold:
     best: Fit
     without: dict[str, Fit]
     test: tuple[Trial, ...]
+    within: bool = True
+    """False if the trials were held out by the study itself, and are in no fit."""
 
 
 def _folds(found: Found, train: Sequence[Trial], test: Sequence[Trial]) -> list[_Fold]:
     """The study's own held-out trials, or every trial in its turn; none where there is but one."""
     if test:
-        return [_Fold(found.nominal, found.best, found.without, tuple(test))]
+        return [_Fold(found.nominal, found.best, found.without, tuple(test), within=False)]
     if len(train) < 2:
         return []
     held = folds_of(train)
@@ -229,32 +230,46 @@ def _folds(found: Found, train: Sequence[Trial], test: Sequence[Trial]) -> list[
 
 def _without(fitted: Fit, held: Sequence[int]) -> Fit:
     """A fit again, without the trials that are held out."""
+    return _refitted(fitted, [t for i, t in enumerate(fitted.trials) if i not in held])
+
+
+def _refitted(fitted: Fit, trials: Sequence[Trial]) -> Fit:
+    """A fit again, to other trials."""
     assert fitted.doubt is not None
-    kept = [i for i in range(len(fitted.trials)) if i not in held]
-    problem = LikelihoodProblem(fitted.model, [fitted.trials[i] for i in kept], fitted.doubt)
-    return maximise(problem, fitted.values, [fitted.unknowns[i] for i in kept])
+    known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
+    problem = LikelihoodProblem(fitted.model, trials, fitted.doubt)
+    unknowns = [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
+    return maximise(problem, fitted.values, unknowns)
 
 
-def _costs(fitted: Fit, trials: Sequence[Trial]) -> np.ndarray:
-    """Twice the negative log-likelihood of stretches of trials that took no part."""
-    assert fitted.doubt is not None
-    problem = LikelihoodProblem(fitted.model, trials, fitted.doubt, ())
-    out = []
-    for trial, one in zip(trials, problem.innovations(fitted.values, problem.start_unknowns()), strict=True):
-        with np.errstate(all="ignore"):
-            each = np.where(one.seen, one.values**2 / one.variances + np.log(one.variances), 0.0).sum(axis=1)
-        count = max(1, round(trial.duration / BLOCK_S))
-        out += [float(b.sum()) for b in np.array_split(each, count)]
-    return np.array(out)
+def _evidence(folds: Sequence[_Fold], found: Found, name: str) -> Evidence:
+    """What a cause adds to twice the log-likelihood of held-out trials, foretold by fits to the others.
+
+    By Bayes' rule p(held | others) = p(all) / p(others), each the integral over the parameters about its fit (Laplace):
+
+        -2 log p(trials) = cost + log det(1 + H S^2),   H the information, S the widths of a prior,
+
+    so that what the others leave in doubt of a parameter is doubt about the held trials as well. The ratio of
+    likelihoods of a true cause scatters by twice the root of its mean.
+    """
+    total = 0.0
+    for fold in folds:
+        for sign, everywhere, elsewhere in (
+            (1.0, found.without[name], fold.without[name]),
+            (-1.0, found.best, fold.best),
+        ):
+            both = everywhere if fold.within else _refitted(everywhere, (*elsewhere.trials, *fold.test))
+            total += sign * (_weight(both) - _weight(elsewhere))
+    return Evidence(total, max(total, 0.0)) if np.isfinite(total) else Evidence(0.0, 0.0)
 
 
-def _evidence(folds: Sequence[_Fold], name: str) -> Evidence:
-    """What a cause adds to the likelihood of held-out trials; its interval from the spread between stretches."""
-    added = np.concatenate([_costs(f.without[name], f.test) - _costs(f.best, f.test) for f in folds])
-    if not np.isfinite(added).all():
-        return Evidence(float(np.sum(np.sign(added[~np.isfinite(added)]))), 0.0)
-    spread = float(np.std(added, ddof=1)) * np.sqrt(len(added)) if len(added) > 1 else 0.0
-    return Evidence(float(added.sum()), (0.5 * spread) ** 2)
+def _weight(fitted: Fit) -> float:
+    """Twice the negative log of the probability of a fit's trials; see `_evidence`."""
+    system = normal_equations(fitted.parts)
+    info = fitted.model.parameter_info()
+    widths = [WIDE * max(abs(fitted.values[n]), info[n].scale) for n in fitted.free]
+    scaled = system.hessian * np.outer(widths, widths)
+    return fitted.sse + float(np.linalg.slogdet(np.eye(len(widths)) + scaled)[1])
 
 
 def _errors(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float) -> Errors:
