@@ -25,6 +25,7 @@ from fes_pin.diagnose.search.search import Search, Searched, Unfit
 from fes_pin.diagnose.search.set_search import Found, SetSearch
 from fes_pin.diagnose.search.sets import Sets
 from fes_pin.diagnose.search.unfinished import alike
+from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.fit import Fit, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import amplitude
@@ -209,7 +210,7 @@ def diagnose(
     with one_thread_each():
         recorded = train if said else [t for t in study.trials if t.role != "held_out"]
         search: Search | SetSearch
-        if nominal.rig.is_driven(train):
+        if is_fed_back(nominal.rig, train):
             search = SetSearch(Sets(nominal, train, effects), seed, tell)
         else:
             search = Search(nominal, train, recorded, seed, tell, effects)
@@ -237,7 +238,7 @@ def diagnose(
 def _of_driven(
     study: Study, search: SetSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
-    """The diagnosis of a rig that a recorded effort drives; see `diagnose.driven`."""
+    """The diagnosis of a rig whose effort answers what is read; see `diagnose.driven`."""
     judged = judge_driven(search, found, *trials, seed)
     found, left = judged.found, judged.left
     best = found.best

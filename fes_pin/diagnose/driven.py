@@ -1,8 +1,8 @@
-"""The diagnosis of rigs that a recorded effort drives, by one likelihood.
+"""The diagnosis of rigs whose effort answers what is read of them, by one likelihood.
 
-What drives such a rig mostly answers what was read: errors come back as input, and a free simulation of the best of
-models runs away. Every set of causes is judged by the likelihood of its one-step-ahead predictions, with a random
-effort at the joint; see `identify.likelihood`.
+Errors come back as input there (`identify.feedback`), and a free simulation of the best of models runs away. Every set
+of causes is judged by the likelihood of its one-step-ahead predictions, with a random effort at the joint; see
+`identify.likelihood`.
 """
 
 from __future__ import annotations

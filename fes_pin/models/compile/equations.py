@@ -208,10 +208,6 @@ class Tangents:
 
 def derive(model: Model, layout: Layout) -> Equations:
     """Write out a model's equations and sensitivities."""
-    if layout.measured:
-        from fes_pin.models.compile.predictor import derive_predictor  # noqa: PLC0415 - it builds on this module
-
-        return derive_predictor(model, layout)
     d = Tangents(model, layout)
     s_pattern, r_pattern = d.patterns()
     s, r = ca.SX.sym("S", s_pattern), ca.SX.sym("R", r_pattern)

@@ -13,8 +13,9 @@ import numpy as np
 
 from fes_pin import settings
 from fes_pin.models.compile.disk_cache import read_cached, write_cached
-from fes_pin.models.compile.equations import derive
+from fes_pin.models.compile.equations import Equations, derive
 from fes_pin.models.compile.layout import Layout, make_layout
+from fes_pin.models.compile.predictor import derive_predictor
 from fes_pin.models.compile.virtual import VirtualProgram
 from fes_pin.models.model import Model
 
@@ -82,7 +83,7 @@ def program(
         with _LOCK:
             if key not in _PROGRAMS:
                 made = _native(model, layout) if engine == "llvm" else None
-                _PROGRAMS[key] = made or VirtualProgram(derive(model, layout))
+                _PROGRAMS[key] = made or VirtualProgram(derived(model, layout))
     return _PROGRAMS[key]
 
 
@@ -91,6 +92,11 @@ def forget_programs() -> None:
     with _LOCK:
         _PROGRAMS.clear()
         _say_slow.cache_clear()
+
+
+def derived(model: Model, layout: Layout) -> Equations:
+    """The equations of a simulation, or of a predictor where the layout has measured outputs."""
+    return derive_predictor(model, layout) if layout.measured else derive(model, layout)
 
 
 def _classes(model: Model) -> tuple[type, ...]:
@@ -106,11 +112,11 @@ def _native(model: Model, layout: Layout) -> Program | None:
 
         classes = [f"{c.__module__}.{c.__qualname__}" for c in _classes(model)]
         if not all(name.startswith("fes_pin.") for name in classes):  # the signature knows only our own source
-            return native.NativeProgram(layout, native.compile_equations(derive(model, layout)))
+            return native.NativeProgram(layout, native.compile_equations(derived(model, layout)))
         key = machine.made_for() + json.dumps([source_signature(), classes, asdict(layout)])
         stored = read_cached(key)
         if stored is None:
-            stored = native.compile_equations(derive(model, layout))
+            stored = native.compile_equations(derived(model, layout))
             write_cached(key, stored)
         return native.NativeProgram(layout, stored)
     except (ImportError, OSError, RuntimeError, NotImplementedError) as problem:

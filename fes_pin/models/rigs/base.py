@@ -174,7 +174,7 @@ class Rig:
         return {}
 
     def is_driven(self, trials: Sequence[Trial]) -> bool:
-        """True if a recorded effort drives the rig: it may answer what is read, so that errors come back as input."""
+        """True if a recorded effort drives the rig in these trials."""
         return False
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:

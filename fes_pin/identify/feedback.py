@@ -1,0 +1,70 @@
+"""Whether what drives a rig answers what is read of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.distributions import chi2_tail, f_tail
+from fes_pin.models.rigs.base import Rig
+
+LAGS = 4
+"""Samples that a controller's answer is sought in: it acts in the sample in which it reads, or a few later."""
+JUMP = 5.0
+"""Deviations beyond which a second difference is a jump, not noise."""
+CERTAIN = 1e-9
+"""Level of the test: the noise of a reading comes back through a controller in thousands of samples."""
+
+
+def is_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
+    """True if the effort of a rig answers its reading.
+
+    Granger's question, asked of the second differences u'' of the effort and y'' of the reading, mostly noise: are the
+    last readings any help to foretell the effort, beside the last efforts? Trials are combined as Fisher does.
+
+        u''_t = a_1 u''_(t-1) + ... + b_0 y''_t + b_1 y''_(t-1) + ...
+
+    An effort that was chosen beforehand knows nothing of the noise.
+
+    Source: Granger, Investigating causal relations by econometric models and cross-spectral methods, Econometrica 37
+    (1969); Fisher, Statistical Methods for Research Workers, 1932, section 21.1.
+    """
+    logs = [math.log(max(p, 1e-300)) for p in _p_values(rig, trials)]
+    return bool(logs) and float(chi2_tail(-2.0 * sum(logs), 2 * len(logs))) < CERTAIN
+
+
+def _p_values(rig: Rig, trials: Sequence[Trial]) -> Iterator[float]:
+    for trial in trials:
+        output = rig.output(trial.kind)
+        if rig.is_driven([trial]) and output in trial.columns:
+            yield from (_granger(trial[n], trial[output]) for n in rig.input_columns(trial))
+
+
+def _granger(effort: np.ndarray, reading: np.ndarray) -> float:
+    """p-value of the readings' part in what foretells the effort."""
+    u, y = (_without_jumps(np.diff(x, 2)) for x in (effort, reading))
+    n = len(u) - LAGS
+    if n < 20 * LAGS or not u.any() or not y.any():
+        return 1.0
+    past = np.stack([u[LAGS - k : LAGS - k + n] for k in range(1, LAGS + 1)], axis=1) / u.std()
+    read = np.stack([y[LAGS - k : LAGS - k + n] for k in range(LAGS + 1)], axis=1) / y.std()
+    target = u[LAGS:] / u.std()
+    few, many = (_left(columns, target) for columns in (past, np.concatenate([past, read], axis=1)))
+    free = n - past.shape[1] - read.shape[1]
+    gain = (few - many) / read.shape[1]
+    return float(f_tail(gain / max(many / free, 1e-30), read.shape[1], free))
+
+
+def _without_jumps(x: np.ndarray) -> np.ndarray:
+    """Second differences cut at `JUMP` of their robust deviations: a wanted position that jumps is no noise."""
+    x = np.where(np.isfinite(x), x, 0.0)
+    most = JUMP * 1.4826 * float(np.median(np.abs(x)))
+    return np.clip(x, -most, most)
+
+
+def _left(columns: np.ndarray, target: np.ndarray) -> float:
+    missed = target - columns @ np.linalg.lstsq(columns, target, rcond=1e-10)[0]
+    return float(missed @ missed)

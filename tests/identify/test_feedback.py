@@ -1,0 +1,41 @@
+"""Whether an effort answers what is read: rigs under feedback and efforts that were chosen beforehand."""
+
+import numpy as np
+import pytest
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.feedback import is_fed_back
+from fes_pin.models.rigs import Joint
+
+RIG = Joint(constants={"inertia": 0.05, "gravity_cos": 0.0, "gravity_sin": 1.0, "revolute": 1.0}, damping=0.05)
+DT = 0.005
+
+
+def trial(seed: int, feedback: float, count: float = 0.0, n: int = 1500) -> Trial:
+    rng = np.random.default_rng(seed)
+    q = v = 0.0
+    chosen = np.repeat(rng.normal(size=-(-n // 60)), 60)[:n] + np.sin(2.0 * np.arange(n) * DT)
+    effort, position = np.empty(n), np.empty(n)
+    for k in range(n):
+        reading = q + 3e-4 * rng.normal()
+        position[k] = np.round(reading / count) * count if count else reading
+        effort[k] = 0.5 * chosen[k] - feedback * position[k]
+        for _ in range(5):
+            v += DT / 5 * (effort[k] - 0.05 * v - np.sin(q)) / 0.05
+            q += DT / 5 * v
+    return Trial(f"t{seed}", "motion", {"effort": effort, "position": position}, np.arange(n) * DT)
+
+
+@pytest.mark.parametrize("count", [0.0, 1e-3])
+def test_a_controller_is_seen(count):
+    assert is_fed_back(RIG, [trial(k, 2.0, count) for k in range(2)])
+
+
+def test_efforts_that_were_chosen_beforehand_are_not_taken_for_answers():
+    """The level is 1e-9: in forty rigs there is none, however the rig answers its effort."""
+    assert not any(is_fed_back(RIG, [trial(20 * k + j, 0.0) for j in range(2)]) for k in range(20))
+    assert not any(is_fed_back(RIG, [trial(900 + 20 * k + j, 0.0, 1e-3) for j in range(2)]) for k in range(20))
+
+
+def test_free_motion_has_no_effort_that_could_answer():
+    assert not is_fed_back(RIG, [trial(1, 2.0).without("effort")])
