@@ -15,10 +15,9 @@ from fes_pin.models.disturbance import disturbed
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import is_delayed, lane_inputs, lane_values, max_step, substeps, timing, total_delay
 
-
 STEP_S = 1.25e-3
-"""Longest integration step of any predictor, s, as short as an effect with a fast lag needs: models that are compared by
-their likelihood are integrated alike."""
+"""Longest integration step of any predictor, s, as short as an effect with a fast lag needs: models that are compared
+by their likelihood are integrated alike."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import scipy.linalg
 from fes_pin.data.trial import Trial
 from fes_pin.models.effects import effect
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt, Predictor
+from fes_pin.models.predictor import STEP_S, Doubt, Predictor
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import Simulator
 
@@ -89,7 +89,7 @@ def test_without_randomness_it_is_the_free_simulation():
     begin = {"initial_position": float(trial["position"][0]), "initial_velocity": 0.3}
     predictor = Predictor(model, [trial], (), (), [dict.fromkeys(PRIOR, 0.0)])
     (found,) = predictor.run(model.parameters(), Doubt({"position": 1e-3}), [begin])
-    (free,) = Simulator(model, [trial]).run(model.parameters(), [begin])
+    (free,) = Simulator(model, [trial], max_step_s=STEP_S).run(model.parameters(), [begin])
     assert np.allclose(found.values[:, 0], trial["position"] - free.readings[:, 0], rtol=0.0, atol=1e-12)
 
 

@@ -67,7 +67,8 @@ class JointFits:
 
     def problem(self, model: Model) -> Problem:
         """The problem of a model's structure, under the present noise."""
-        key = (model.structure(), model.fitted_parameters(), _choices(model))
+        unused = tuple(model.unused_parameters().items())  # compiled in, with the values that this model has
+        key = (model.structure(), model.fitted_parameters(), _choices(model), unused)
         if key not in self._problems:
             self._problems[key] = Problem(model, self.trials, self.noise)
         self._problems[key].noise = self.noise
