@@ -61,7 +61,8 @@ def _granger(effort: np.ndarray, reading: np.ndarray) -> float:
 def _without_jumps(x: np.ndarray) -> np.ndarray:
     """Second differences cut at `JUMP` of their robust deviations: a wanted position that jumps is no noise."""
     x = np.where(np.isfinite(x), x, 0.0)
-    most = JUMP * 1.4826 * float(np.median(np.abs(x)))
+    size = np.abs(x[x != 0.0])  # an encoder at rest, or a sample that is held, says nothing of the noise
+    most = JUMP * 1.4826 * float(np.median(size)) if len(size) else 0.0
     return np.clip(x, -most, most)
 
 

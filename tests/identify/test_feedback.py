@@ -11,13 +11,13 @@ RIG = Joint(constants={"inertia": 0.05, "gravity_cos": 0.0, "gravity_sin": 1.0, 
 DT = 0.005
 
 
-def trial(seed: int, feedback: float, count: float = 0.0, n: int = 1500) -> Trial:
+def trial(seed: int, feedback: float, count: float = 0.0, n: int = 1500, noise: float = 3e-4) -> Trial:
     rng = np.random.default_rng(seed)
     q = v = 0.0
     chosen = np.repeat(rng.normal(size=-(-n // 60)), 60)[:n] + np.sin(2.0 * np.arange(n) * DT)
     effort, position = np.empty(n), np.empty(n)
     for k in range(n):
-        reading = q + 3e-4 * rng.normal()
+        reading = q + noise * rng.normal()
         position[k] = np.round(reading / count) * count if count else reading
         effort[k] = 0.5 * chosen[k] - feedback * position[k]
         for _ in range(5):
@@ -29,6 +29,13 @@ def trial(seed: int, feedback: float, count: float = 0.0, n: int = 1500) -> Tria
 @pytest.mark.parametrize("count", [0.0, 1e-3])
 def test_a_controller_is_seen(count):
     assert is_fed_back(RIG, [trial(k, 2.0, count) for k in range(2)])
+
+
+def test_a_controller_of_an_encoder_that_mostly_stands_is_seen():
+    """Without noise most second differences of coarse counts are zero; what is left of them comes back."""
+    trials = [trial(k, 2.0, 8e-2, noise=0.0) for k in range(2)]
+    assert all(np.median(np.abs(np.diff(t["position"], 2))) == 0.0 for t in trials)
+    assert is_fed_back(RIG, trials)
 
 
 def test_efforts_that_were_chosen_beforehand_are_not_taken_for_answers():
