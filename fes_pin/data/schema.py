@@ -233,7 +233,7 @@ def check_conditions(
     numbers = {}
     for key, value in conditions.items():
         if key not in known:
-            raise error(key, unknown(key, [*known, "file", "kind", "role"]))
+            raise error(key, unknown(key, [*known, "file", "kind", "role", "group"]))
         try:
             numbers[key] = known[key].check(value)
         except ValueError as problem:

@@ -264,17 +264,20 @@ class _Reader:
                 one_of(role, ROLES)
             except ValueError as problem:
                 raise error("role", str(problem)) from None
-        rest = {key: value for key, value in table.items() if key not in (*named, "kind", "role")}
+        group = table.get("group")
+        if group is not None and not (isinstance(group, str) and group.strip() and group.isprintable()):
+            raise error("group", "expected a label, one line of text")
+        rest = {key: value for key, value in table.items() if key not in (*named, "kind", "role", "group")}
         numbers = check_conditions(self.schema, kind, rest, error)
         if len(named) == 1:
             path = self.document.path_of(f"{where}.{named[0]}", table[named[0]])
-            return read_trial(path, rig=self.schema, kind=kind, conditions=numbers, role=role, name=name)
+            return read_trial(path, rig=self.schema, kind=kind, conditions=numbers, role=role, name=name, group=group)
         for key in named:
             if key not in table:
                 raise error(key, "missing; expected the path of a file inside the study")
             files[f"{name}.{key}"] = self.document.path_of(f"{where}.{key}", table[key])
         moves, pushes = (files[f"{name}.{key}"] for key in named)
-        return read_body_trial(moves, pushes, name=name, conditions=numbers, role=role)
+        return read_body_trial(moves, pushes, name=name, conditions=numbers, role=role, group=group)
 
     def _check_together(self, trials: list[Trial], constants: Mapping[str, float]) -> None:
         """What only all trials together show: the same inputs in each, and a recruitment curve for pulse widths."""
@@ -318,9 +321,9 @@ def write_study(study: Study, folder: str | Path) -> None:
     for trial in study.trials:
         named = _trial_files(schema, trial)
         contents |= named
-        role = {"role": trial.role} if trial.role else {}
+        labels = {n: label for n, label in (("role", trial.role), ("group", trial.group)) if label}
         conditions = {key: float(value) for key, value in trial.conditions.items()}
-        tables.append({**dict(zip(schema.recordings, named, strict=True)), "kind": trial.kind, **conditions, **role})
+        tables.append({**dict(zip(schema.recordings, named, strict=True)), "kind": trial.kind, **conditions, **labels})
     document = {"study": {"name": study.name, "rig": study.rig}, "rig": rig, "start": dict(study.start)}
     contents["study.toml"] = tomli_w.dumps({**document, "trial": tables})
     write_files(folder, contents)

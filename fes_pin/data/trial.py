@@ -45,6 +45,8 @@ class Trial:
         Numbers of this trial by name: `load_kg`, `angle_rad`, `start_s`, `belt_speed_mps`.
     role
         "fit", "held_out", or None: not decided by the study.
+    group
+        A label of the condition that it was measured under, or None.
 
     Raises
     ------
@@ -58,6 +60,7 @@ class Trial:
     time: np.ndarray
     conditions: Mapping[str, float] = field(default_factory=dict)
     role: str | None = None
+    group: str | None = None
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)
@@ -70,7 +73,15 @@ class Trial:
         object.__setattr__(self, "conditions", MappingProxyType(dict(self.conditions)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Trial, (self.name, self.kind, dict(self.columns), self.time, dict(self.conditions), self.role)
+        return Trial, (
+            self.name,
+            self.kind,
+            dict(self.columns),
+            self.time,
+            dict(self.conditions),
+            self.role,
+            self.group,
+        )
 
     def __len__(self) -> int:
         return len(self.time)
@@ -99,7 +110,7 @@ class Trial:
         if count >= len(self):
             return self
         columns = {n: v[:count] for n, v in self.columns.items()}
-        return Trial(self.name, self.kind, columns, self.time[:count], self.conditions, self.role)
+        return replace(self, columns=columns, time=self.time[:count])
 
     def with_columns(self, **columns: np.ndarray) -> Trial:
         """The same trial with columns added or replaced, each of shape (n,)."""
@@ -158,6 +169,7 @@ def read_trial(
     role: str | None = None,
     inputs_only: bool = False,
     name: str | None = None,
+    group: str | None = None,
 ) -> Trial:
     """Read one trial from its CSV file.
 
@@ -169,7 +181,7 @@ def read_trial(
         Its name ("ankle", "muscle", "joint", "body" ...), or what its studies must and may hold.
     kind
         Of those that the rig has, "motion" or "isometric"; without it the rig's default.
-    conditions, role
+    conditions, role, group
         As a `[[trial]]` table gives them.
     inputs_only
         Do not require the measured outputs, to predict them; they are kept if they are there.
@@ -196,7 +208,7 @@ def read_trial(
     numbers = check_conditions(schema, kind, conditions or {}, error)
     whole = len(schema.recordings) == 1
     columns, time = _columns(path, schema, kind, inputs_only) if whole else _body_columns(path, inputs_only)
-    return Trial(name or path.stem, kind, columns, time, numbers, role)
+    return Trial(name or path.stem, kind, columns, time, numbers, role, group)
 
 
 def checked_kind(schema: RigSchema, kind: object, error: Callable[[str, str], InputError]) -> str:
@@ -271,7 +283,13 @@ def _body_columns(path: Path, inputs_only: bool) -> tuple[dict[str, np.ndarray],
 
 
 def read_body_trial(
-    coordinates: Path, ground_reaction: Path, *, name: str, conditions: Mapping[str, float], role: str | None
+    coordinates: Path,
+    ground_reaction: Path,
+    *,
+    name: str,
+    conditions: Mapping[str, float],
+    role: str | None,
+    group: str | None = None,
 ) -> Trial:
     """Read a walking trial from its two files, on the coordinates' times.
 
@@ -288,7 +306,7 @@ def read_body_trial(
     if len(time) < MIN_ROWS:
         message = f"expected at least {MIN_ROWS} samples in the time of {coordinates.name}, found {len(time)}"
         raise pushes.error(message, pushes.names[0], 0)
-    return Trial(name, "motion", columns, time, conditions, role)
+    return Trial(name, "motion", columns, time, conditions, role, group)
 
 
 def write_trial(trial: Trial, path: str | Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def thinned(trial: Trial) -> Trial:
     """Means of samples in a row, at the time step that noise is modelled at."""
     count = thinning(trial.dt, noise_step([trial.dt]))
     columns = {n: thin(values, count) for n, values in trial.columns.items()}
-    return Trial(trial.name, trial.kind, columns, thin(trial.time, count), trial.conditions, trial.role)
+    return replace(trial, columns=columns, time=thin(trial.time, count))
 
 
 def _size(trials: Sequence[Trial]) -> int:

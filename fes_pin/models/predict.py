@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fes_pin.data.errors import InputError
@@ -30,7 +32,7 @@ def predict(model: Model, trial: Trial) -> Trial:
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values)))
             raise InputError(f"the prediction of {name} is not finite from sample {row} on: the model is unstable here")
-    return Trial(trial.name, trial.kind, outputs, trial.time, trial.conditions, trial.role)
+    return replace(trial, columns=outputs)
 
 
 def _check(model: Model, trial: Trial) -> None:

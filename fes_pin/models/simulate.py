@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -320,11 +320,4 @@ def simulate(model: Model, trial: Trial) -> Trial:
     rig = model.rig
     columns = {name: trial[name] for name in rig.input_columns(trial)}
     columns.update({n: simulated.readings[:, k].copy() for k, n in enumerate(rig.outputs(trial.kind))})
-    return Trial(
-        name=trial.name,
-        kind=trial.kind,
-        columns=columns,
-        time=trial.time,
-        conditions=trial.conditions,
-        role=trial.role,
-    )
+    return replace(trial, columns=columns)

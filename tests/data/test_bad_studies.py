@@ -71,6 +71,8 @@ TOML = {  # old text, new text, row, key, words
     "fifo": ("trials/10.csv", "pipe", 31, "trial[1].file", "special file"),
     "unknown_kind": ('"isometric"', '"isotonic"', 32, "trial[1].kind", "motion, isometric"),
     "unknown_role": ('"fit"', '"test"', 28, "trial[0].role", "fit, held_out"),
+    "group_is_a_number": ('role = "fit"', "group = 1", 28, "trial[0].group", "expected a label"),
+    "group_is_empty": ('role = "fit"', 'group = " "', 28, "trial[0].group", "expected a label"),
     "no_load": ("load_kg = 1.0\n", "", 24, "trial[0].load_kg", "missing"),
     "load_in_gram": ("load_kg = 1.0", "load_g = 1000", 27, "trial[0].load_g", "expected load_kg"),
     "negative_load": ("load_kg = 1.0", "load_kg = -1", 27, "trial[0].load_kg", "at least 0"),

@@ -128,10 +128,11 @@ def test_trial_round_trip(tmp_path, values, step, start):
     start=st.fixed_dictionaries({"gain": st.floats(1e-6, 1e6), "time_constant_s": st.floats(1e-6, 1e3)}),
     role=st.sampled_from([None, "fit", "held_out"]),
     start_s=numbers,
+    group=st.none() | names,
 )
-def test_study_round_trip(tmp_path_factory, name, files, start, role, start_s):
+def test_study_round_trip(tmp_path_factory, name, files, start, role, start_s, group):
     columns = {"stim": np.array([1.0, 0.0, 0.0]), "force_n": np.array([0.0, start["gain"], -0.0])}
-    trials = [Trial(f, "isometric", columns, np.arange(3) * 0.1, {"start_s": start_s}, role) for f in files]
+    trials = [Trial(f, "isometric", columns, np.arange(3) * 0.1, {"start_s": start_s}, role, group) for f in files]
     folder = tmp_path_factory.mktemp("round") / "study"
     study = Study(name, "muscle", {}, start, tuple(trials), folder)
     write_study(study, folder)
@@ -194,7 +195,7 @@ def assert_same(one, other):
 
 
 def assert_same_trial(one, other):
-    assert (one.name, one.kind, one.role) == (other.name, other.kind, other.role)
+    assert (one.name, one.kind, one.role, one.group) == (other.name, other.kind, other.role, other.group)
     assert dict(one.conditions) == dict(other.conditions)
     assert list(one.columns) == list(other.columns)
     np.testing.assert_array_equal(one.time, other.time)
