@@ -19,8 +19,8 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.data.trial import Trial as Trial
     from fes_pin.data.trial import read_trial as read_trial
     from fes_pin.data.trial import write_trial as write_trial
-    from fes_pin.diagnose.diagnosis import Diagnosis as Diagnosis
     from fes_pin.diagnose.diagnosis import diagnose as diagnose
+    from fes_pin.diagnose.result import Diagnosis as Diagnosis
     from fes_pin.identify.fit import Fit as Fit
     from fes_pin.identify.fit import fit as fit
     from fes_pin.models import effects as effects
@@ -59,7 +59,7 @@ _WHERE = {
     "fit": "fes_pin.identify.fit",
     "Fit": "fes_pin.identify.fit",
     "diagnose": "fes_pin.diagnose.diagnosis",
-    "Diagnosis": "fes_pin.diagnose.diagnosis",
+    "Diagnosis": "fes_pin.diagnose.result",
     "diagnose_walk": "fes_pin.walk.diagnosis",
     "report": "fes_pin.view.report",
     "Body": "fes_pin.body.build",

@@ -16,7 +16,7 @@ from fes_pin.cli.group import Commands
 from fes_pin.cli.walk import diagnose_walking, print_effects
 
 if TYPE_CHECKING:
-    from fes_pin.diagnose.diagnosis import Diagnosis
+    from fes_pin.diagnose.result import Diagnosis
     from fes_pin.models.catalogue import Catalogue
 
 app = typer.Typer(cls=Commands, pretty_exceptions_enable=False)
@@ -170,10 +170,10 @@ def _print_verdict(diagnosis: Diagnosis) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from fes_pin.diagnose.text import cause_row, footnotes, headline
+    from fes_pin.diagnose.text import cause_row
 
     console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=not sys.stdout.isatty(), highlight=False)
-    console.print(Text(f"{diagnosis.study.name}: {headline(diagnosis)}", style="bold"))
+    console.print(Text(f"{diagnosis.study.name}: {diagnosis.headline()}", style="bold"))
     if diagnosis.causes:
         table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
         for title in ("cause", "stage", "parameters", "held-out gain", "cannot be told from"):
@@ -181,7 +181,7 @@ def _print_verdict(diagnosis: Diagnosis) -> None:
         for cause in diagnosis.causes:
             table.add_row(*(Text(cell) for cell in cause_row(cause)))
         console.print(table)
-    for note in footnotes(diagnosis):
+    for note in diagnosis.footnotes():
         console.print(Text(note))
 
 

@@ -12,67 +12,34 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.decide.held_out import Errors, Evidence, folds_of
+from fes_pin.diagnose.cause import Cause
+from fes_pin.diagnose.decide.held_out import Errors, Evidence, folds_of, gain
+from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
+from fes_pin.diagnose.errors_ahead import (
+    Ahead,
+    AheadErrors,
+    RandomPart,
+    errors_ahead,
+    errors_over_horizon,
+    random_parts,
+)
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.remainder.open_set import Remainder
+from fes_pin.diagnose.result import Diagnosis
+from fes_pin.diagnose.search.search import Searched
 from fes_pin.diagnose.search.set_search import Found, SetSearch
-from fes_pin.identify.ahead import default_horizon, falls, one_step, over_horizon
+from fes_pin.identify.ahead import default_horizon, falls
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood import LikelihoodProblem, driving_size, maximise
+from fes_pin.identify.likelihood import LikelihoodProblem, maximise
 from fes_pin.identify.problem import normal_equations
-from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel
 
 LARGE_SHARE = 0.1
 """Random effort, as a share of what drives the rig, from which something acts that no cause explains."""
-AVERAGED_S = 0.05
-"""Time over which a random effort is averaged before it is compared, s: what is faster moves no limb, and of what is
-much faster than the rig data tell the intensity 2 std^2 time alone, not deviation and time one by one."""
 WIDE = 10.0
 """Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size."""
-
-
-@dataclass(frozen=True)
-class RandomPart:
-    """What acts at random on a rig.
-
-    Attributes
-    ----------
-    name
-        "effort" or "force".
-    std
-        Stationary standard deviation, in the rig's unit of effort.
-    time_constant_s
-        s.
-    share
-        Deviation of its means over `AVERAGED_S`, over the root mean square of what drives the rig.
-    """
-
-    name: str
-    std: float
-    time_constant_s: float
-    share: float
-
-
-@dataclass(frozen=True)
-class Ahead:
-    """Errors E of one model, percent: one sample ahead, over the horizon, free (None where the rig falls)."""
-
-    one_step: float
-    horizon: float
-    free: float | None
-
-
-@dataclass(frozen=True)
-class AheadErrors:
-    """Errors over time, of both models: on the trials that were fitted, and on trials held out if there were any."""
-
-    horizon_s: float
-    nominal: Ahead
-    extended: Ahead
-    nominal_held_out: Ahead | None
-    extended_held_out: Ahead | None
 
 
 @dataclass(frozen=True)
@@ -148,10 +115,10 @@ def judge_driven(search: SetSearch, found: Found, train: Sequence[Trial], test: 
         left=left,
         refused=refused,
         evidence=evidence,
-        nominal=_errors([(f.nominal, f.test) for f in whole], horizon),
-        without={n: _errors([(f.without[n], f.test) for f in whole], horizon) for n in found.without},
-        extended=_errors([(f.best, f.test) for f in whole], horizon),
-        ahead=tuple(_ahead([(f, train)], horizon, falling) for f in (found.nominal, found.best)),  # type: ignore[arg-type]
+        nominal=errors_over_horizon([(f.nominal, f.test) for f in whole], horizon),
+        without={n: errors_over_horizon([(f.without[n], f.test) for f in whole], horizon) for n in found.without},
+        extended=errors_over_horizon([(f.best, f.test) for f in whole], horizon),
+        ahead=tuple(errors_ahead([(f, train)], horizon, falling) for f in (found.nominal, found.best)),  # type: ignore[arg-type]
         held_out_ahead=_held_ahead(folds, horizon, falling),
         horizon_s=horizon,
         random=random,
@@ -166,23 +133,6 @@ def _ceiling(fitted: Fit) -> float:
     columns = [(t[rig.output(t.kind)], fitted.doubt.white[rig.output(t.kind)]) for t in fitted.trials]
     noise = sum(float(np.isfinite(y).sum()) * std**2 for y, std in columns)
     return 100.0 * noise / max(sum(float(np.nansum((y - np.nanmean(y)) ** 2)) for y, _ in columns), 1e-300)
-
-
-def random_parts(fitted: Fit) -> tuple[RandomPart, ...]:
-    """The random efforts of a fit, with their share of what drives the rig."""
-    assert fitted.doubt is not None
-    sizes = driving_size(fitted.model, fitted.trials)
-    parts = ((n, std, fitted.doubt.time[n]) for n, std in fitted.doubt.std.items() if n in sizes)
-    return tuple(RandomPart(n, std, time, _averaged(std, time) / sizes[n]) for n, std, time in parts)
-
-
-def _averaged(std: float, time: float) -> float:
-    """Deviation of the means over `AVERAGED_S` of a first-order process.
-
-    With x = time / AVERAGED_S, std sqrt(2 x (1 - x (1 - exp(-1 / x)))).
-    """
-    x = time / AVERAGED_S
-    return std * float(np.sqrt(max(2.0 * x * (1.0 - x * (1.0 - np.exp(-1.0 / x))), 0.0)))
 
 
 def _left(left: Remainder, random: Sequence[RandomPart], refused: dict[str, float], search: SetSearch) -> Remainder:
@@ -272,54 +222,63 @@ def _weight(fitted: Fit) -> float:
     return fitted.sse + float(np.linalg.slogdet(np.eye(len(widths)) + scaled)[1])
 
 
-def _errors(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float) -> Errors:
-    """Squared errors over the horizon, by seconds of each trial."""
-    work = [(fitted, trial) for fitted, trials in pairs for trial in trials]
-    found = in_parallel(lambda w: _squares(w[0], w[1], horizon_s), work)
-    squares, spread, counts = (np.concatenate([f[k] for f in found]) for k in range(3))
-    return Errors(squares, spread, counts)
-
-
-def _squares(fitted: Fit, trial: Trial, horizon_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    assert fitted.doubt is not None
-    foretold = over_horizon(fitted.model, trial, fitted.doubt, horizon_s)
-    total, around = np.zeros(len(trial)), np.zeros(len(trial))
-    for name, values in foretold.items():
-        variance = fitted.doubt.white[name] ** 2
-        total += np.nan_to_num(trial[name] - values, posinf=0.0, neginf=0.0) ** 2 / variance
-        around += np.nan_to_num(trial[name] - np.nanmean(trial[name])) ** 2 / variance
-    pieces = [np.array_split(x, max(1, round(trial.duration))) for x in (total, around)]
-    sizes = np.array([float(len(foretold) * len(p)) for p in pieces[0]])
-    return np.array([p.sum() for p in pieces[0]]), np.array([p.sum() for p in pieces[1]]), sizes
-
-
-def _ahead(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float, falling: bool) -> Ahead:
-    """E of the first output one sample ahead, over the horizon, and free."""
-    missed = {"one_step": 0.0, "horizon": 0.0, "free": 0.0}
-    around = 0.0
-    for fitted, trials in pairs:
-        assert fitted.doubt is not None
-        for trial in trials:
-            name = fitted.model.rig.output(trial.kind)
-            measured = trial[name]
-            free = Simulator(fitted.model, [trial]).run(fitted.values)[0].readings[:, 0]
-            errors = {
-                "one_step": one_step(fitted.model, trial, fitted.doubt)[name],
-                "horizon": measured - over_horizon(fitted.model, trial, fitted.doubt, horizon_s)[name],
-                "free": measured - free,
-            }
-            with np.errstate(all="ignore"):
-                for key, values in errors.items():
-                    missed[key] += float(np.nansum(values**2))
-            around += float(np.nansum((measured - np.nanmean(measured)) ** 2))
-    percent = {n: 100.0 * v / max(around, 1e-300) for n, v in missed.items()}
-    return Ahead(percent["one_step"], percent["horizon"], None if falling else percent["free"])
-
-
 def _held_ahead(folds: Sequence[_Fold], horizon_s: float, falling: bool) -> tuple[Ahead, Ahead] | None:
     if not folds:
         return None
     return (
-        _ahead([(f.nominal, f.test) for f in folds], horizon_s, falling),
-        _ahead([(f.best, f.test) for f in folds], horizon_s, falling),
+        errors_ahead([(f.nominal, f.test) for f in folds], horizon_s, falling),
+        errors_ahead([(f.best, f.test) for f in folds], horizon_s, falling),
+    )
+
+
+def driven_diagnosis(
+    study: Study, search: SetSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
+) -> Diagnosis:
+    """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
+    judged = judge_driven(search, found, *trials, seed)
+    found, left = judged.found, judged.left
+    best = found.best
+    searched = Searched(
+        nominal=found.nominal,
+        best=best,
+        p_values=found.p_values,
+        rivals=found.rivals,
+        judged=best,
+        without=found.without,
+        scored=found.scored,
+        floor=best.noise,
+    )
+    causes = [
+        Cause(
+            name=one.name,
+            stage=str(one.stage),
+            parameters=estimates(best, one.name),
+            equivalents=alternatives(best, found.rivals[one.name], one.name),
+            p_value=found.p_values[one.name],
+            gain_fit=judged.gain_fit(one.name),
+            gain_held_out=gain(judged.nominal, judged.without[one.name], judged.extended, seed),
+            evidence=judged.evidence.get(one.name),
+        )
+        for one in best.model.effects
+    ]
+    causes.sort(key=lambda c: -c.gain_held_out.percent)
+    fitted, held = judged.ahead, judged.held_out_ahead
+    return Diagnosis(
+        study=study,
+        verdict="causes_found" if causes else ("unexplained" if left.unexplained else "adequate"),
+        causes=tuple(causes),
+        remainder=left,
+        absorbed=absorbed(searched, found.silent),
+        nominal=found.nominal,
+        extended=best,
+        nominal_error=(fitted[0].free, held[0].free if held else None),
+        extended_error=(fitted[1].free, held[1].free if held else None),
+        ceiling_percent=judged.ceiling_percent,
+        next_experiment=experiment(searched, causes, study),
+        ranking=ranking(searched),
+        held_out_by="the study's held-out trials" if trials[1] else "cross-validation over trials",
+        left_out={},
+        wall_s=0.0,
+        random=judged.random,
+        ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
     )

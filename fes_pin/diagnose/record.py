@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from fes_pin.data.trial import trial_csv
-from fes_pin.diagnose.diagnosis import Cause, Diagnosis
+from fes_pin.diagnose.cause import Cause
+from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.fit import Fit
 from fes_pin.models.store import model_toml
 

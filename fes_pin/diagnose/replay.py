@@ -9,8 +9,8 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import RUNAWAY, within
-from fes_pin.diagnose.diagnosis import Diagnosis
-from fes_pin.diagnose.driven import AheadErrors
+from fes_pin.diagnose.errors_ahead import AheadErrors
+from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.ahead import over_horizon
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel

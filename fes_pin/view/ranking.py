@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fes_pin.diagnose.diagnosis import Cause, Diagnosis
+from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.experiment import SEPARABLE
+from fes_pin.diagnose.result import Diagnosis
 from fes_pin.models.catalogue import Catalogue
 from fes_pin.view.style import BAND, FAINT, INK, PANEL, STAGES, styled
 

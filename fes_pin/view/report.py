@@ -6,10 +6,10 @@ from collections import Counter
 from pathlib import Path
 
 from fes_pin.data.files import write_text
-from fes_pin.diagnose.diagnosis import Diagnosis
 from fes_pin.diagnose.record import NEXT_FILE
 from fes_pin.diagnose.replay import replay
-from fes_pin.diagnose.text import headline, left_out_text
+from fes_pin.diagnose.result import Diagnosis
+from fes_pin.diagnose.text import left_out_text
 from fes_pin.models.describe import sentence
 from fes_pin.models.outside import origin
 from fes_pin.view.page import (
@@ -69,7 +69,7 @@ def _head(diagnosis: Diagnosis) -> Markup:
     study = diagnosis.study
     kinds = " and ".join(f"{n} {kind}" for kind, n in Counter(t.kind for t in study.trials).items())
     seconds = sum(t.duration for t in study.trials)
-    words = headline(diagnosis)
+    words = diagnosis.headline()
     partly = " partly" if diagnosis.causes and diagnosis.remainder.unexplained else ""
     return element(
         "header",
@@ -92,7 +92,9 @@ def _facts(diagnosis: Diagnosis) -> Markup:
     rows.append(("noise floor of E", percent(diagnosis.ceiling_percent), "no model can be better"))
     if diagnosis.left_out:
         count = sum(len(k) for columns in diagnosis.left_out.values() for k in columns.values())
-        rows.append(("left out as spikes", f"{count} samples", left_out_text(diagnosis)))
+        rows.append(
+            ("left out as spikes", f"{count} samples", left_out_text(diagnosis.left_out, diagnosis.study.trials))
+        )
     state = "something" if left.unexplained else "nothing"
     rows.append(("left unexplained", state, probability(left.p_value)))
     for where, names in diagnosis.catalogue.origins().items():

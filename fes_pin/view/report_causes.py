@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fes_pin.diagnose.diagnosis import Cause, Diagnosis
-from fes_pin.diagnose.text import EACH_TRIAL
+from fes_pin.diagnose.cause import Cause
+from fes_pin.diagnose.result import EACH_TRIAL, Diagnosis
 from fes_pin.identify.fit import CONFIDENCE_95, Fit
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.page import Content, Markup, element, figure, probability, rounded, table, unit_text

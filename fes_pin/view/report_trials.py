@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fes_pin.diagnose.diagnosis import Diagnosis
 from fes_pin.diagnose.replay import Replay
+from fes_pin.diagnose.result import Diagnosis
 from fes_pin.view.missing import missing_input
 from fes_pin.view.page import Markup, element, figure, joined, key, percent, table
 from fes_pin.view.plots import by_kind, missing_figure, share, trial_figure

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from confusion_matrix.generator import Made
-from fes_pin.diagnose.diagnosis import Diagnosis, diagnose
+from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.per_trial import predictions
 
 

@@ -14,7 +14,8 @@ import typer
 
 from driven_rigs.draw import CAUSES, OUTSIDE, draw
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import Diagnosis, diagnose
+from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.fit import CONFIDENCE_95
 
 PAIRS = (

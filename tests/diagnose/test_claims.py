@@ -6,9 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.decide.claims import Claims
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, _evidence
-from fes_pin.diagnose.diagnosis import REFUSED_LEVEL, Cause, _with_refused
+from fes_pin.diagnose.free import REFUSED_LEVEL, with_refused
 from fes_pin.diagnose.remainder.open_set import Remainder
 
 
@@ -59,11 +60,11 @@ def test_held_out_trials_speak_by_likelihood_only_where_noise_is_all_that_is_lef
 def test_a_refused_certainty_is_a_remainder():
     nothing = Remainder(unexplained=False, p_value=0.4, where=None)
     certain = cause(p_value=REFUSED_LEVEL / 10.0, stage="muscle")
-    left = _with_refused(nothing, [cause(p_value=1e-4), certain])
+    left = with_refused(nothing, [cause(p_value=1e-4), certain])
     assert left.unexplained and left.where == "muscle" and left.p_value == certain.p_value
-    assert _with_refused(nothing, [cause(p_value=1e-4)]) is nothing
+    assert with_refused(nothing, [cause(p_value=1e-4)]) is nothing
     found = replace(nothing, unexplained=True, where="time")
-    assert _with_refused(found, [certain]) is found
+    assert with_refused(found, [certain]) is found
 
 
 @pytest.mark.parametrize(

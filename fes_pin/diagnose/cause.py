@@ -1,0 +1,49 @@
+"""A named cause as it is told: its parameters, its gain, and what it cannot be told from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fes_pin.diagnose.decide.held_out import Evidence, Gain
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """A value with its standard deviation (infinite: not identified) and unit."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One named cause; see contract: `equivalents` cannot be told from it by these data."""
+
+    name: str
+    stage: str
+    parameters: dict[str, ParameterEstimate]
+    equivalents: tuple[str, ...]
+    p_value: float
+    gain_fit: float
+    gain_held_out: Gain
+    evidence: Evidence | None = None
+
+    def helps(self, complete: bool, alone: bool) -> bool:
+        """True if trials that took no part speak for it.
+
+        By their likelihood where the model leaves only noise, by their open-loop errors where it does not; where other
+        causes stand beside it by both, for several flexible forms together come near to anything. A cause alone may
+        have no gain: if one trial of many reaches a stop, the others do not foretell it.
+        """
+        known = self.evidence if complete else None
+        likely = known is None or known.low > 0.0
+        return likely and (self.gain_held_out.low > 0.0 or (known is not None and alone))
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A candidate beside the others: how far the whole fit falls short of the best with it in the cause's place."""
+
+    names: tuple[str, ...]
+    shortfall: float

@@ -1,0 +1,148 @@
+"""The diagnosis of rigs that are judged by free simulation: from the inputs alone, each trial from its start."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.cause import Cause
+from fes_pin.diagnose.decide.doubts import doubts, with_error
+from fes_pin.diagnose.decide.held_out import HeldOut, cross_validate, errors_of, gain, separate
+from fes_pin.diagnose.decide.rivals import absorbed, equivalents, estimates, experiment, ranking
+from fes_pin.diagnose.remainder.open_set import Remainder, remainder
+from fes_pin.diagnose.result import Diagnosis
+from fes_pin.diagnose.search.search import Search, Searched
+from fes_pin.diagnose.search.unfinished import alike
+from fes_pin.identify.fit import Fit, rough_noise
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.models.model import Model
+
+REFUSED_LEVEL = 1e-6
+"""Level of a cause at which something is there even if held-out trials refuse the name."""
+CONTENDERS = 4
+"""Sets that each fold chooses among anew."""
+
+
+def judge_free(study: Study, search: Search, searched: Searched, test: Sequence[Trial], seed: int) -> Diagnosis:
+    """The verdict on what a search found: causes that trials held out bear out, and what is left."""
+    left = remainder(searched.best, seed)
+    causes, held = _causes(searched, left, test, seed)
+    refused: list[Cause] = []
+    if searched.stopped and not all(c.helps(False, True) for c in causes):
+        searched = search.stopped(())
+        left = remainder(searched.best, seed)
+        causes, held = [], None
+    while not searched.stopped and (weak := [c for c in causes if not c.helps(searched.complete, len(causes) == 1)]):
+        weakest = min(weak, key=lambda c: c.gain_held_out.low)
+        refused.append(weakest)
+        searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
+        left = remainder(searched.best, seed)
+        causes, held = _causes(searched, left, test, seed)
+    causes.sort(key=lambda c: -c.gain_held_out.percent)
+    left, reason = with_error(with_refused(left, refused), searched)
+    if searched.stopped and not causes:
+        left, reason = replace(left, unexplained=True), "the search was stopped before a cause earned its place"
+    if not causes and not searched.complete and not searched.stopped:
+        searched = search.for_prediction(searched)
+        held = _held_out(searched, test)
+    nominal, best = searched.nominal, searched.best
+    verdict = "causes_found" if causes else ("unexplained" if left.unexplained else "adequate")
+    in_sample = errors_of(best.model, best.trials, searched.floor)
+    return Diagnosis(
+        study=study,
+        verdict=verdict,
+        causes=tuple(causes),
+        remainder=left,
+        absorbed=absorbed(searched, search.library.silent()),
+        nominal=nominal,
+        extended=best,
+        nominal_error=(_error(nominal, searched.floor), held.nominal.error_percent() if held else None),
+        extended_error=(in_sample.error_percent(), held.chosen.error_percent() if held else None),
+        ceiling_percent=in_sample.ceiling_percent(),
+        next_experiment=experiment(searched, causes, study),
+        ranking=ranking(searched),
+        held_out_by="held-out trials" if test else "cross-validation over trials",
+        left_out={},
+        wall_s=0.0,
+        warnings=tuple(doubts(searched, len(causes))),
+        reason=reason,
+    )
+
+
+def unfitted(study: Study, nominal: Fit, reason: str, test: Sequence[Trial]) -> Diagnosis:
+    """What is said where no fit carries a verdict: that something is unexplained, and why."""
+    floor = rough_noise(Model(nominal.model.rig), nominal.trials)
+    inside = errors_of(nominal.model, nominal.trials, floor)
+    outside = errors_of(nominal.model, test, floor).error_percent() if test else None
+    return Diagnosis(
+        study=study,
+        verdict="unexplained",
+        causes=(),
+        remainder=Remainder(True, math.nan, None),
+        absorbed=(),
+        nominal=nominal,
+        extended=nominal,
+        nominal_error=(inside.error_percent(), outside),
+        extended_error=(inside.error_percent(), outside),
+        ceiling_percent=inside.ceiling_percent(),
+        next_experiment=None,
+        ranking={},
+        held_out_by="held-out trials" if test else "cross-validation over trials",
+        left_out={},
+        wall_s=0.0,
+        reason=reason,
+    )
+
+
+def with_refused(left: Remainder, refused: Sequence[Cause]) -> Remainder:
+    """A remainder also where a cause was certain, but trials that took no part did not bear out its form."""
+    certain = [c for c in refused if c.p_value < REFUSED_LEVEL]
+    if left.unexplained or not certain:
+        return left
+    surest = min(certain, key=lambda c: c.p_value)
+    return replace(left, unexplained=True, p_value=surest.p_value, where=surest.stage)
+
+
+def _error(fitted: Fit, floor: NoiseModel) -> float:
+    return errors_of(fitted.model, fitted.trials, floor).error_percent()
+
+
+def _held_out(searched: Searched, test: Sequence[Trial]) -> HeldOut | None:
+    if test:
+        return separate(searched.nominal, searched.best, searched.without, test, searched.floor)
+    if len(searched.nominal.trials) < 2 or searched.stopped:
+        return None
+    contenders = sorted((f for fits in searched.rivals.values() for f in fits), key=lambda f: f.sse)[:CONTENDERS]
+    if not searched.complete:
+        contenders = alike(contenders, searched.best.trials, searched.best.noise)
+    return cross_validate(searched.nominal, searched.best, searched.without, contenders, searched.floor)
+
+
+def _causes(
+    searched: Searched, left: Remainder, test: Sequence[Trial], seed: int
+) -> tuple[list[Cause], HeldOut | None]:
+    best, nominal = searched.best, searched.nominal
+    held = _held_out(searched, test)
+    inside = {n: errors_of(f.model, f.trials, searched.floor) for n, f in searched.without.items()}
+    inside_nominal = errors_of(nominal.model, nominal.trials, searched.floor)
+    inside_best = errors_of(best.model, best.trials, searched.floor)
+    out = []
+    for one in best.model.effects:
+        name = one.name
+        measured = held or HeldOut(inside_nominal, inside_best, inside, {}, inside_best)
+        out.append(
+            Cause(
+                name=name,
+                stage=str(one.stage),
+                parameters=estimates(best, name),
+                equivalents=equivalents(searched, name, left),
+                p_value=searched.p_values[name],
+                gain_fit=gain(inside_nominal, inside[name], inside_best, seed).percent,
+                gain_held_out=gain(measured.nominal, measured.without[name], measured.extended, seed),
+                evidence=measured.evidence.get(name),
+            )
+        )
+    return out, held

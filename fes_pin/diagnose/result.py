@@ -1,0 +1,143 @@
+"""The answer of a diagnosis: which causes are named, how sure, with what gain, what stays open; and it in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from fes_pin.data.study import Study
+from fes_pin.diagnose.cause import Cause, Ranked
+from fes_pin.diagnose.errors_ahead import AheadErrors, RandomPart
+from fes_pin.diagnose.experiment import NextExperiment
+from fes_pin.diagnose.remainder.open_set import Remainder
+from fes_pin.diagnose.text import ahead_notes, cause_table, left_out_text
+from fes_pin.identify.fit import Fit
+from fes_pin.models.catalogue import Catalogue, installed
+from fes_pin.models.model import Model
+
+HEADLINES = {
+    "adequate": "the model is adequate: these data justify no extension of it.",
+    "unexplained": "the model misses something, and nothing in the library explains it.",
+}
+
+EACH_TRIAL = (
+    "size and phase are each trial's own; in a held-out trial its other parts tell them, and a prediction from inputs "
+    "alone leaves the effect out"
+)
+"""What is said of effects whose amplitudes are each trial's own."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a simulation gets wrong.
+
+    Attributes
+    ----------
+    verdict
+        "adequate", "causes_found" or "unexplained".
+    causes
+        By held-out gain, largest first.
+    model
+        The extended model: it can be simulated, fitted and diagnosed again.
+    absorbed
+        Causes that these data could not show.
+    ranking
+        For each cause, its rivals by shortfall in twice the log-likelihood.
+    left_out
+        Samples taken for spikes, by trial and column; in `study` they hold what their neighbours say.
+    warnings
+        What is odd about the study, and what could not be done, one line each.
+    reason
+        Why something is unexplained, where it is no test of the remainder that says so: nothing could be fitted, or an
+        error stays that is no noise.
+    catalogue
+        The causes that were looked for, of which the rig can have some.
+    """
+
+    study: Study
+    verdict: str
+    causes: tuple[Cause, ...]
+    remainder: Remainder
+    absorbed: tuple[str, ...]
+    nominal: Fit
+    extended: Fit
+    nominal_error: tuple[float | None, float | None]
+    extended_error: tuple[float | None, float | None]
+    ceiling_percent: float
+    next_experiment: NextExperiment | None
+    ranking: dict[str, tuple[Ranked, ...]]
+    held_out_by: str
+    left_out: dict[str, dict[str, tuple[int, ...]]]
+    wall_s: float = field(compare=False)
+    warnings: tuple[str, ...] = ()
+    reason: str | None = None
+    catalogue: Catalogue = field(default_factory=installed, compare=False)
+    random: tuple[RandomPart, ...] = ()
+    ahead: AheadErrors | None = None
+
+    @property
+    def model(self) -> Model:
+        """The extended model."""
+        return self.extended.model
+
+    def explained_percent(self) -> float:
+        """Share of the nominal model's squared error above the noise that all causes together remove, 0 to 100.
+
+        On trials that took no part, where there are such; of a driven rig of the errors over the horizon.
+        """
+        if self.ahead is not None:
+            one = self.ahead.nominal_held_out or self.ahead.nominal
+            other = self.ahead.extended_held_out or self.ahead.extended
+            return float(np.clip(100.0 * (one.horizon - other.horizon) / max(one.horizon, 1e-300), 0.0, 100.0))
+        outside = self.nominal_error[1] is not None and self.extended_error[1] is not None
+        before, after = (e[1] if outside else e[0] for e in (self.nominal_error, self.extended_error))
+        assert before is not None
+        assert after is not None
+        excess = max(before - self.ceiling_percent, before - after, 1e-300)
+        return float(np.clip(100.0 * (before - after) / excess, 0.0, 100.0))
+
+    def headline(self) -> str:
+        """The verdict in one sentence, with how much is explained and how much is not."""
+        count = len(self.causes)
+        if not count:
+            return HEADLINES[self.verdict].removesuffix(".") + (f": {self.reason}." if self.reason else ".")
+        share = self.explained_percent()
+        named = "one cause explains" if count == 1 else f"{count} causes explain"
+        rest = ", and something is left" if self.remainder.unexplained else ""
+        return f"{named} {share:.0f} % of what the model gets wrong, {100.0 - share:.0f} % stays{rest}."
+
+    def footnotes(self) -> list[str]:
+        """What stands beneath the table."""
+        before, after = self.nominal_error, self.extended_error
+        shown = [
+            f"{b:.2f} -> {a:.2f} % {where}"
+            for b, a, where in zip(before, after, ("fitted", "held out"), strict=True)
+            if a is not None and b is not None
+        ]
+        lines = [f"error E {', '.join(shown)}; noise floor {self.ceiling_percent:.2g} %"] if shown else []
+        lines += ahead_notes(self.ahead, self.random, self.model.rig.units().get("effort", ""))
+        left = self.remainder
+        where = f", most on {left.where}" if left.where else ""
+        if self.reason is None:
+            state = "something is" if left.unexplained else "nothing"
+            lines.append(f"{state} left unexplained (p = {left.p_value:.2g}{where})")
+        elif self.causes:
+            lines.append(f"something is left unexplained: {self.reason}")
+        if self.left_out:
+            lines.append(f"left out as spikes: {left_out_text(self.left_out, self.study.trials)}")
+        own = [e.name for e in self.model.effects if e.each_trial]
+        if own:
+            lines.append(f"{', '.join(own)}: {EACH_TRIAL}")
+        for where, names in self.catalogue.origins().items():
+            lines.append(f"looked for as well: {', '.join(names)}, code of {Path(where).name}")
+        if self.absorbed:
+            lines.append(f"not testable here: {', '.join(self.absorbed)}")
+        if self.next_experiment:
+            lines.append(f"next experiment: {self.next_experiment.why}")
+        return [*lines, *(f"warning: {words}" for words in self.warnings)]
+
+    def __str__(self) -> str:
+        lines = [f"{self.study.name}: {self.headline()}", *cause_table(self.causes)]
+        return "\n".join(lines + [f" {note}" for note in self.footnotes()])
