@@ -18,9 +18,9 @@ from fes_pin.diagnose.free import judge_free, unfitted
 from fes_pin.diagnose.long_records import searched_part, thinned
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.result import Diagnosis
-from fes_pin.diagnose.search.search import Search, Unfit
-from fes_pin.diagnose.search.set_search import SetSearch
-from fes_pin.diagnose.search.sets import Sets
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnose.search.simulation_search import NominalFitError, SimulationSearch
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.models.catalogue import Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
@@ -76,20 +76,20 @@ def diagnose(
     effects = catalogue.effects_for(nominal.rig)
     with one_thread_each():
         recorded = train if said else [t for t in study.trials if t.role != "held_out"]
-        search: Search | SetSearch
+        search: SimulationSearch | LikelihoodSearch
         if is_fed_back(nominal.rig, train):
-            search = SetSearch(Sets(nominal, train, effects), seed, tell)
+            search = LikelihoodSearch(LikelihoodFits(nominal, train, effects), seed, tell)
         else:
-            search = Search(nominal, train, recorded, seed, tell, effects)
+            search = SimulationSearch(nominal, train, recorded, seed, tell, effects)
         try:
             with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
                 searched = search.run()
             tell(0.88, "held-out gain")
-            if isinstance(search, SetSearch):
+            if isinstance(search, LikelihoodSearch):
                 diagnosis = driven_diagnosis(study, search, searched, (train, test), seed)  # type: ignore[arg-type]
             else:
                 diagnosis = judge_free(study, search, searched, test, seed)  # type: ignore[arg-type]
-        except Unfit as problem:
+        except NominalFitError as problem:
             diagnosis = unfitted(study, problem.nominal, str(problem), test)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             reason = f"the search met numbers that cannot be calculated with ({problem})"

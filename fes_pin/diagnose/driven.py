@@ -28,8 +28,8 @@ from fes_pin.diagnose.errors_ahead import (
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.result import Diagnosis
-from fes_pin.diagnose.search.search import Searched
-from fes_pin.diagnose.search.set_search import Found, SetSearch
+from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
+from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem, maximise
@@ -83,7 +83,9 @@ class Judged:
         return 100.0 * (without - best) / max(none - best, 1e-9)
 
 
-def judge_driven(search: SetSearch, found: Found, train: Sequence[Trial], test: Sequence[Trial], seed: int) -> Judged:
+def judge_driven(
+    search: LikelihoodSearch, found: Found, train: Sequence[Trial], test: Sequence[Trial], seed: int
+) -> Judged:
     """Hold out, and judge what is left.
 
     Parameters
@@ -135,7 +137,9 @@ def _ceiling(fitted: Fit) -> float:
     return 100.0 * noise / max(sum(float(np.nansum((y - np.nanmean(y)) ** 2)) for y, _ in columns), 1e-300)
 
 
-def _left(left: Remainder, random: Sequence[RandomPart], refused: dict[str, float], search: SetSearch) -> Remainder:
+def _left(
+    left: Remainder, random: Sequence[RandomPart], refused: dict[str, float], search: LikelihoodSearch
+) -> Remainder:
     """What is left: by the features, or a random effort that is too large, or a cause that was refused."""
     if left.unexplained:
         return left
@@ -232,7 +236,7 @@ def _held_ahead(folds: Sequence[_Fold], horizon_s: float, falling: bool) -> tupl
 
 
 def driven_diagnosis(
-    study: Study, search: SetSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
+    study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
     judged = judge_driven(search, found, *trials, seed)

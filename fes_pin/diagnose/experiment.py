@@ -56,7 +56,7 @@ class NextExperiment:
 
 
 @dataclass(frozen=True)
-class Promise:
+class Discrimination:
     """What a trial is expected to add to the lead of the better of two models, in twice the log-likelihood.
 
     With r the whitened difference of the two predictions, J the sensitivities of the model that is wrong and H the
@@ -129,18 +129,18 @@ def next_experiment(best: Fit, rivals: Mapping[str, Fit], name: str, study: Stud
         pair = (name, next(iter(rivals)))
         why = f"no trial was found for {' and '.join(pair)} that stays near what has been measured"
         return NextExperiment(why, pair, None)
-    promised, trial = _refined(best, rivals, found, study)
-    closest = min(promised, key=lambda n: promised[n].worth)
-    pair, promise = (name, closest), promised[closest]
-    if promise.worth < 1.0:
-        most = f"{promise.worth:.2g} squared noise units at most" if promise.worth >= ALIKE else "nothing"
+    expected, trial = _refined(best, rivals, found, study)
+    closest = min(expected, key=lambda n: expected[n].worth)
+    pair, told = (name, closest), expected[closest]
+    if told.worth < 1.0:
+        most = f"{told.worth:.2g} squared noise units at most" if told.worth >= ALIKE else "nothing"
         why = f"no stimulus or load of this rig separates {name} and {closest}: the models differ by {most}"
         why = f"{why}; {best.model.rig.elsewhere}"
         return NextExperiment(why, pair, None)
     others = ", the other rivals by more" if len(rivals) > 1 else ""
-    differ = f"{name} and {closest} differ by {promise.worth:.3g} squared noise units{others}"
-    why = f"on this trial {differ}; {_often(promise.repeats())}"
-    return NextExperiment(why, pair, trial, (promise.distance(0), promise.distance(1)))
+    differ = f"{name} and {closest} differ by {told.worth:.3g} squared noise units{others}"
+    why = f"on this trial {differ}; {_often(told.repeats())}"
+    return NextExperiment(why, pair, trial, (told.distance(0), told.distance(1)))
 
 
 def _often(repeats: int | None) -> str:
@@ -149,8 +149,8 @@ def _often(repeats: int | None) -> str:
     return f"{'once decides' if repeats == 1 else f'{repeats} repeats decide'} 95 times in 100"
 
 
-def promises(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study) -> list[Promise | None]:
-    """What each trial promises; None for one that leaves what the study has measured, or is not finite."""
+def discriminations(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study) -> list[Discrimination | None]:
+    """What each trial tells of the two; None for one that leaves what the study has measured, or is not finite."""
     own = {n: v for n, v in best.unknowns[0].items() if n in best.model.own_unknowns()}
     begin = [{**best.model.initial_unknowns(t), **own} for t in trials]
     measured = []
@@ -170,7 +170,7 @@ def promises(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study) -> li
     known = (normal_equations(rival.parts).hessian, normal_equations(best.parts).hessian)
     lead = rival.price - best.price
     found = iter(zip(if_best, if_rival, strict=True))
-    return [Promise(lead, _equations(*next(found)), known) if keep else None for keep in kept]
+    return [Discrimination(lead, _equations(*next(found)), known) if keep else None for keep in kept]
 
 
 def _problem(fitted: Fit, trials: Sequence[Trial], judge: Fit) -> Problem | LikelihoodProblem:
@@ -194,12 +194,12 @@ def _inside(values: np.ndarray, limits: tuple[float, float]) -> bool:
     return bool(np.isfinite(values).all() and values.min() >= limits[0] and values.max() <= limits[1])
 
 
-Found = tuple[dict[str, Promise], Trial]
+Found = tuple[dict[str, Discrimination], Trial]
 
 
 def _best(best: Fit, rivals: Mapping[str, Fit], trials: Sequence[Trial], study: Study) -> Found | None:
-    """The trial that separates the closest rival best, and what it promises of each."""
-    each = {n: promises(best, rival, trials, study) for n, rival in rivals.items()}
+    """The trial that separates the closest rival best, and what it tells of each."""
+    each = {n: discriminations(best, rival, trials, study) for n, rival in rivals.items()}
     found: list[Found] = []
     for k, trial in enumerate(trials):
         of_trial = {n: p for n, many in each.items() if (p := many[k]) is not None and np.isfinite(p.worth)}

@@ -14,8 +14,8 @@ from fes_pin.diagnose.decide.held_out import HeldOut, cross_validate, errors_of,
 from fes_pin.diagnose.decide.rivals import absorbed, equivalents, estimates, experiment, ranking
 from fes_pin.diagnose.remainder.open_set import Remainder, remainder
 from fes_pin.diagnose.result import Diagnosis
-from fes_pin.diagnose.search.search import Search, Searched
-from fes_pin.diagnose.search.unfinished import alike
+from fes_pin.diagnose.search.misspecified import under_one_noise
+from fes_pin.diagnose.search.simulation_search import Searched, SimulationSearch
 from fes_pin.identify.fit import Fit, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
@@ -26,7 +26,9 @@ CONTENDERS = 4
 """Sets that each fold chooses among anew."""
 
 
-def judge_free(study: Study, search: Search, searched: Searched, test: Sequence[Trial], seed: int) -> Diagnosis:
+def judge_free(
+    study: Study, search: SimulationSearch, searched: Searched, test: Sequence[Trial], seed: int
+) -> Diagnosis:
     """The verdict on what a search found: causes that trials held out bear out, and what is left."""
     left = remainder(searched.best, seed)
     causes, held = _causes(searched, left, test, seed)
@@ -117,7 +119,7 @@ def _held_out(searched: Searched, test: Sequence[Trial]) -> HeldOut | None:
         return None
     contenders = sorted((f for fits in searched.rivals.values() for f in fits), key=lambda f: f.sse)[:CONTENDERS]
     if not searched.complete:
-        contenders = alike(contenders, searched.best.trials, searched.best.noise)
+        contenders = under_one_noise(contenders, searched.best.trials, searched.best.noise)
     return cross_validate(searched.nominal, searched.best, searched.without, contenders, searched.floor)
 
 

@@ -10,7 +10,7 @@ from fes_pin.diagnose.decide.doubts import with_error
 from fes_pin.diagnose.diagnosis import diagnose
 from fes_pin.diagnose.record import diagnosis_files, diagnosis_record
 from fes_pin.diagnose.remainder.open_set import Remainder
-from fes_pin.diagnose.search.search import Searched
+from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.fit import fit
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.nominal import nominal_model

@@ -5,7 +5,7 @@ import pytest
 from identify.rigs import WHITE, measured
 from models.cases import RIGS, trial
 
-from fes_pin.diagnose.search.joint_fits import ANOTHER_MINIMUM, JointFits
+from fes_pin.diagnose.search.simulation_fits import ANOTHER_MINIMUM, SimulationFits
 from fes_pin.identify.fit import fit_problem
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.effects.sensor_offset import SensorOffset
@@ -21,7 +21,7 @@ def sets():
     rng = np.random.default_rng(0)
     true = Model(RIGS["joint"]) + CoulombFriction(0.05) + SensorOffset(0.05)
     trials = [measured(true, trial("joint", "motion", rng, 600), rng) for _ in range(3)]
-    sets = JointFits(Model(RIGS["joint"]), trials)
+    sets = SimulationFits(Model(RIGS["joint"]), trials)
     sets.set_noise(WHITE)
     sets.fits[BOTH] = sets.fit_from([true], None)
     sets.fits[OFFSET] = sets.fit_from([Model(RIGS["joint"]) + SensorOffset(0.05)], None, 60)

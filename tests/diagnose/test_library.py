@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from fes_pin.diagnose.search.library import Probe
-from fes_pin.diagnose.search.promise import Scored, Scores, best_pairs
+from fes_pin.diagnose.search.score import Scored, Scores, best_pairs
 from fes_pin.models.effects import effects_for
 
 
@@ -19,7 +19,7 @@ def scores_of(seed):
     return Scores([Scored(p, 0.0, {}, 1.0) for p in probes], columns.T @ columns, columns.T @ residual, blocks)
 
 
-def joint_promise(scores, i, j):
+def joint_gain(scores, i, j):
     """Of two probes inside their bounds, or nothing."""
     rows = np.r_[scores.blocks[i], scores.blocks[j]]
     x = np.linalg.solve(scores.gram[np.ix_(rows, rows)], scores.along[rows])
@@ -34,9 +34,9 @@ def test_best_pairs_are_those_of_an_exhaustive_search():
     scores, best = scores_of(1), {}
     for i, j in itertools.combinations(range(len(scores.scored)), 2):
         names = tuple(sorted(scores.scored[k].probe.name for k in (i, j)))
-        promise = joint_promise(scores, i, j)
-        if names[0] != names[1] and promise is not None:
-            best[names] = max(promise, best.get(names, 0.0))
+        gain = joint_gain(scores, i, j)
+        if names[0] != names[1] and gain is not None:
+            best[names] = max(gain, best.get(names, 0.0))
     expected = sorted(best, key=lambda n: -best[n])[:6]
     found = [tuple(sorted((a.probe.name, b.probe.name))) for a, b in best_pairs(scores, 6)]
     assert found == expected

@@ -1,4 +1,4 @@
-"""The proposed trial: admissible, worth what it promises, and through the command line to a set of one."""
+"""The proposed trial: admissible, worth what is expected of it, and through the command line to a set of one."""
 
 import json
 import sys
@@ -14,7 +14,7 @@ from oracle.studies import _ankle
 from fes_pin.cli import main
 from fes_pin.data.study import write_study
 from fes_pin.data.trial import read_trial, trial_csv
-from fes_pin.diagnose.experiment import ROOM, candidates, next_experiment, promises
+from fes_pin.diagnose.experiment import ROOM, candidates, discriminations, next_experiment
 from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import measured_columns
 from fes_pin.models.effects import effect
@@ -73,20 +73,20 @@ def rivals():
     return study, best, fit(model + effect("quadratic_damping")(0.01), study.trials, WHITE)
 
 
-def test_a_promise_is_what_a_refit_cannot_take_up(rivals):
-    """D against fits to the same data and the noiseless trial: linear theory, so for a trial of modest promise."""
+def test_what_is_expected_is_what_a_refit_cannot_take_up(rivals):
+    """D against fits to the same data and the noiseless trial: linear theory, so for a trial that tells little."""
     study, best, rival = rivals
     many = list(candidates(study))
-    promised = promises(best, rival, many, study)
-    kept = [(p, t) for p, t in zip(promised, many, strict=True) if p is not None and p.worth > 1.0]
-    promise, trial = sorted(kept, key=lambda pair: pair[0].worth)[len(kept) // 2]
+    expected = discriminations(best, rival, many, study)
+    kept = [(p, t) for p, t in zip(expected, many, strict=True) if p is not None and p.worth > 1.0]
+    told, trial = sorted(kept, key=lambda pair: pair[0].worth)[len(kept) // 2]
     for way, (one, other) in enumerate(((best, rival), (rival, best))):
         column = one.model.rig.outputs(trial.kind)[0]
         answered = trial.with_columns(**{column: predict(one.model, trial)[column]})
         again = fit(other.model, [*study.trials, answered], WHITE)
-        assert again.sse - other.sse == pytest.approx(promise.distance(way), rel=0.1)
-        assert promise.distance(way, 4) <= 4 * promise.distance(way) * (1 + 1e-6)
-        assert promise.distance(way, 4) >= promise.distance(way)
+        assert again.sse - other.sse == pytest.approx(told.distance(way), rel=0.1)
+        assert told.distance(way, 4) <= 4 * told.distance(way) * (1 + 1e-6)
+        assert told.distance(way, 4) >= told.distance(way)
 
 
 def test_a_proposed_trial_stays_near_what_was_measured(rivals):
@@ -96,7 +96,7 @@ def test_a_proposed_trial_stays_near_what_was_measured(rivals):
     seen, y = measured_columns(best.model, study.trials)[column], predict(best.model, plan.trial)[column]
     room = ROOM * np.ptp(seen)
     assert seen.min() - room <= y.min() and y.max() <= seen.max() + room
-    fixed = [p.worth for p in promises(best, rival, list(candidates(study)), study) if p is not None]
+    fixed = [p.worth for p in discriminations(best, rival, list(candidates(study)), study) if p is not None]
     assert min(plan.promised) >= max(fixed)  # refined from the best of them
 
 

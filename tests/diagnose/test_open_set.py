@@ -18,7 +18,7 @@ from fes_pin.diagnose.remainder.open_set import FULL_NOISE, REMAINDER_LEVEL, rem
 from fes_pin.diagnose.remainder.play import play_p_value
 from fes_pin.diagnose.remainder.repeated import repeated_p_value
 from fes_pin.diagnose.remainder.slips import slip_p_value
-from fes_pin.diagnose.search.promise import Projection
+from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.fit import fit
 from fes_pin.identify.noise import Noise, estimate_noise
 from fes_pin.models.nominal import nominal_model

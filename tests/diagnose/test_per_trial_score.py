@@ -5,7 +5,7 @@ import pytest
 import scipy.stats
 
 from fes_pin.diagnose.search.library import Probe
-from fes_pin.diagnose.search.promise import Projection
+from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.fit import PARAMETER_PRICE
 from fes_pin.identify.problem import Linearized
 from fes_pin.models.effects.mains_hum import MainsHum
@@ -36,7 +36,7 @@ def left(columns, y):
 
 
 @pytest.mark.parametrize("unknowns", [0, 2])
-def test_the_promise_is_that_of_least_squares(unknowns):
+def test_the_score_is_that_of_least_squares(unknowns):
     parts, columns = parts_of(np.random.default_rng(unknowns), unknowns)
     common, own = Projection(parts).score([Probe(MainsHum.absent(), columns)]).scored
     assert own.probe.effect.each_trial and not common.probe.effect.each_trial

@@ -11,7 +11,7 @@ from identify.rigs import WHITE, trials_of
 from fes_pin.diagnose.decide.held_out import folds_of
 from fes_pin.diagnose.decide.significance import Family, coherence_p_value
 from fes_pin.diagnose.remainder.open_set import remainder
-from fes_pin.diagnose.search.promise import Scores
+from fes_pin.diagnose.search.score import Scores
 from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import Linearized
 from fes_pin.models.predict import predict

@@ -7,7 +7,7 @@ from diagnose.hidden import study_of
 
 from fes_pin.diagnose.diagnosis import diagnose
 from fes_pin.diagnose.record import diagnosis_files
-from fes_pin.diagnose.search.search import Search
+from fes_pin.diagnose.search.simulation_search import SimulationSearch
 from fes_pin.view.report import report_html
 from fes_pin.workers import OutOfTime, check_time, in_parallel, time_limit
 
@@ -41,7 +41,7 @@ def test_what_has_earned_its_place_is_told(study, monkeypatch):
     def out_of_time(search, size, every=False):
         raise OutOfTime
 
-    monkeypatch.setattr(Search, "_extend_beam", out_of_time)
+    monkeypatch.setattr(SimulationSearch, "_extend_beam", out_of_time)
     stopped = diagnose(study, limit=1e3)
     assert [c.name for c in stopped.causes] == ["coulomb_friction"]
     assert stopped.nominal_error[1] is None and any("limit of 1000 s" in w for w in stopped.warnings)

@@ -8,7 +8,7 @@ import pytest
 from cases import JOINT
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.search.joint_fits import JointFits
+from fes_pin.diagnose.search.simulation_fits import SimulationFits
 from fes_pin.identify.fit import rough_noise
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.model import Model
@@ -69,7 +69,7 @@ def test_the_load_is_told_from_swings(exponent):
         clean = swing(true, amplitude)
         measured = clean["position"] + 1e-3 * rng.standard_normal(len(TIME))
         trials.append(Trial("swing", "motion", {"position": measured}, TIME, clean.conditions))
-    sets = JointFits(nominal, trials)
+    sets = SimulationFits(nominal, trials)
     sets.set_noise(rough_noise(nominal, trials))
     names = ("coulomb_friction",)
     sets.fits[names] = sets.fit_from([nominal + CoulombFriction(0.8 * TORQUE)], None)

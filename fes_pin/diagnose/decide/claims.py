@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fes_pin.diagnose.decide.significance import Family, coherence_p_value
 from fes_pin.diagnose.remainder.open_set import smooth_remainder
-from fes_pin.diagnose.search.joint_fits import JointFits, Names
-from fes_pin.diagnose.search.promise import Scores
+from fes_pin.diagnose.search.score import Scores
+from fes_pin.diagnose.search.simulation_fits import Names, SimulationFits
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
 from fes_pin.identify.problem import Problem
@@ -18,10 +18,10 @@ room for noise that is not quite autoregressive."""
 FORM_SHARE = 0.0625
 """A further cause must explain at least this share of what all causes do: a real cause differs from its equation, and
 an error of a quarter in its form leaves a sixteenth of its likelihood to whatever else comes near."""
-HOPE_LEVEL = 0.1
-"""A round of joint fits is left out only if neither a linear promise nor smooth features reach this level."""
-PROMISING = 25.0
-"""Linear promise of a further cause, in twice the log-likelihood, that keeps a set from being complete: 5 sigma."""
+EXTEND_LEVEL = 0.1
+"""A round of joint fits is left out only if neither the score of a further cause nor smooth features reach this."""
+COMPLETE_BELOW = 25.0
+"""Score of a further cause, in twice the log-likelihood, below which a set is complete: 5 sigma."""
 SLOWEST_NOISE = 10.0
 """Standard deviation of a residual over that of its sample-to-sample part beyond which it counts as misfit. First-order
 autoregressive noise has 3.8 at a coefficient of 0.9, 5.5 at 0.95, 12 at 0.99; 270 studies without
@@ -43,15 +43,15 @@ class Claims:
         Of simulated critical values.
     """
 
-    def __init__(self, sets: JointFits, scores: Scores, seed: int) -> None:
+    def __init__(self, sets: SimulationFits, scores: Scores, seed: int) -> None:
         self.sets, self.family, self.seed = sets, Family(scores, seed), seed
         self._complete: dict[int, tuple[Fit, bool]] = {}
         self._p_values: dict[tuple[int, int], tuple[Fit, Fit, float]] = {}
 
     def complete(self, names: Names) -> bool:
-        """True if a set leaves only noise: no further cause promises anything, and neither do smooth features.
+        """True if a set leaves only noise: no further cause has a score, and neither do smooth features.
 
-        The promise is judged by the present noise; noise learned from the set itself can swallow a slow cause.
+        The score is judged by the present noise; noise learned from the set itself can swallow a slow cause.
         """
         fitted = self.sets.fits[names]
         if id(fitted) not in self._complete:
@@ -61,18 +61,18 @@ class Claims:
     def _leaves_noise(self, fitted: Fit) -> bool:
         if slow_misfit(fitted):
             return False
-        promise = max(s.gain for s in self.sets.scores(fitted).scored)
-        if promise > max(PROMISING, FORM_SHARE * (self.sets.fits[()].sse - fitted.sse)):
+        score = max(s.gain for s in self.sets.scores(fitted).scored)
+        if score > max(COMPLETE_BELOW, FORM_SHARE * (self.sets.fits[()].sse - fitted.sse)):
             return False
         return not smooth_remainder(_again(fitted, fitted), self.seed).unexplained
 
-    def hopeful(self, size: int, promise: float) -> bool:
-        """True unless both the linear promise and the smooth features say that the best smaller set is complete."""
+    def worth_extending(self, size: int, left: float) -> bool:
+        """True unless both the score of a further cause and the smooth features call the best smaller set complete."""
         best, none = self.sets.fits[self.sets.ranked(size - 1)[0]], self.sets.fits[()]
-        gain = best.sse - promise
-        if gain > 0.5 * FORM_SHARE * (none.sse - best.sse) and self.family.p_value(gain, 1) < HOPE_LEVEL:
+        gain = best.sse - left
+        if gain > 0.5 * FORM_SHARE * (none.sse - best.sse) and self.family.p_value(gain, 1) < EXTEND_LEVEL:
             return True
-        return smooth_remainder(best, self.seed).p_value < HOPE_LEVEL
+        return smooth_remainder(best, self.seed).p_value < EXTEND_LEVEL
 
     def better(self, names: Names, best: Names) -> bool:
         """True if a larger set earns its place beside the best smaller one."""

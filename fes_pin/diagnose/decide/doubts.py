@@ -7,7 +7,7 @@ from dataclasses import replace
 from fes_pin.diagnose.decide.claims import SLOWEST_NOISE, slowness
 from fes_pin.diagnose.decide.held_out import FOLDS, errors_of
 from fes_pin.diagnose.remainder.open_set import Remainder
-from fes_pin.diagnose.search.search import Searched
+from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.fit import rough_noise
 from fes_pin.models.model import Model
 

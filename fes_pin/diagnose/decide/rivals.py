@@ -8,8 +8,8 @@ from fes_pin.data.study import Study
 from fes_pin.diagnose.cause import Cause, ParameterEstimate, Ranked
 from fes_pin.diagnose.experiment import SEPARABLE, NextExperiment, next_experiment
 from fes_pin.diagnose.remainder.open_set import Remainder
-from fes_pin.diagnose.search.promise import best_by_effect
-from fes_pin.diagnose.search.search import Searched
+from fes_pin.diagnose.search.score import best_by_effect
+from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.per_trial import amplitude
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fes_pin.diagnose.search.promise import Scores
+from fes_pin.diagnose.search.score import Scores
 from fes_pin.identify.distributions import chi2_tail, f_tail
 from fes_pin.identify.fit import Fit
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.diagnose.remainder.open_set import SIGN_DRAWS, Remainder
-from fes_pin.diagnose.search.promise import Projection
+from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem

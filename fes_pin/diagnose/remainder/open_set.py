@@ -22,7 +22,7 @@ from fes_pin.diagnose.remainder.lines import LONGEST_NOISE, line_p_value
 from fes_pin.diagnose.remainder.play import play_p_value
 from fes_pin.diagnose.remainder.repeated import repeated_p_value
 from fes_pin.diagnose.remainder.slips import slip_p_value
-from fes_pin.diagnose.search.promise import Projection
+from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import Noise, NoiseModel, low_pass

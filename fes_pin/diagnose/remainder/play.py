@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from fes_pin.diagnose.remainder.innovations import Stretch, stretches
-from fes_pin.diagnose.search.promise import Projection
+from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import f_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.models.simulate import Simulator

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.fft
 
 from fes_pin.diagnose.remainder.innovations import CLIP, Stretch, stretches
-from fes_pin.diagnose.search.promise import Projection
+from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import pearson3_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import Noise

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.claims import Claims
-from fes_pin.diagnose.search.joint_fits import LOOK, PURSUED, JointFits, Names, subsets
-from fes_pin.diagnose.search.promise import Scored, best_by_effect, best_pairs
-from fes_pin.diagnose.search.unfinished import choose_by_prediction, fit_for_prediction
+from fes_pin.diagnose.search.misspecified import choose_by_prediction, fit_for_prediction
+from fes_pin.diagnose.search.score import Scored, best_by_effect, best_pairs
+from fes_pin.diagnose.search.simulation_fits import CONVERGED_SETS, FIRST_ITERATIONS, Names, SimulationFits, subsets
 from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
@@ -23,20 +23,20 @@ BEAM = 3
 SEEDS = 4
 """Pairs that the linear screen proposes by itself, for causes that do nothing alone."""
 JOINT_FITS = 8
-"""Extensions of a round that are fitted jointly, best linear promise first."""
+"""Extensions of a round that are fitted jointly, largest score first."""
 SWAPS = 5
-"""Causes that are tried in the place of another, best linear promise first."""
+"""Causes that are tried in the place of another, largest score first."""
 POOL = 6
 """Sets of each size that are compared by prediction."""
 
-HOPELESS = 1e3
+MISSPECIFIED = 1e3
 """Reduced chi-square, in the noise from sample to sample, of a nominal model so wrong that nothing follows from it:
 every cause is then fitted from afar."""
 
 Progress = Callable[[float, str], None]
 
 
-class Unfit(Exception):
+class NominalFitError(Exception):
     """A study to which not even the nominal model can be fitted.
 
     Parameters
@@ -69,7 +69,7 @@ class Searched:
     without
         For each cause, the fit without it.
     scored
-        Promise of every effect beside the nominal model, and of those that the best set has not beside that.
+        Score of every effect beside the nominal model, and of those that the best set has not beside that.
     floor
         The noise that no model can beat: as fitted, or, where the best set leaves more than noise, the sample-to-sample
         noise of the measurement.
@@ -92,7 +92,7 @@ class Searched:
     stopped: bool = False
 
 
-class Search:
+class SimulationSearch:
     """One search on one set of trials; `recorded` are the same trials before any thinning.
 
     Among `effects`; by default those that are written here or installed, of the rig.
@@ -107,7 +107,7 @@ class Search:
         progress: Progress,
         effects: Sequence[type[Effect]] | None = None,
     ) -> None:
-        self.sets, self.seed, self.progress = JointFits(model, trials, effects), seed, progress
+        self.sets, self.seed, self.progress = SimulationFits(model, trials, effects), seed, progress
         self.recorded, self.library = tuple(recorded), self.sets.library
         self._scored: list[Scored] = []
         self.was_stopped = False
@@ -121,7 +121,7 @@ class Search:
         except OutOfTime:
             self.was_stopped = True
             with time_limit(math.inf):
-                return self.stopped(self._reached[0])
+                return self.stopped(self._fallback[0])
 
     def _best_set(self) -> Searched:
         """The best set of causes, and everything that is to be said of it."""
@@ -139,7 +139,7 @@ class Search:
             if self.claims.better(first, best):
                 self._refine(first)
                 best = first
-            self._reach(best)
+            self._keep(best)
             if best == first and self.claims.complete(best):
                 ranked = self.sets.ranked
                 self.sets.refit([(), best, *ranked(1)[:6], *ranked(size)[:6], *subsets(best)], best)
@@ -153,14 +153,14 @@ class Search:
         self.sets.refit([(), best, *self._beside(best), *subsets(best)], best)
         return self.settle(best)
 
-    def _reach(self, best: Names) -> None:
+    def _keep(self, best: Names) -> None:
         """Keep what a search that is stopped falls back on."""
-        self._reached = (best, self.sets.noise, dict(self.sets.fits))
+        self._fallback = (best, self.sets.noise, dict(self.sets.fits))
 
     def stopped(self, names: Names) -> Searched:
         """What is known of a set of causes where the search was stopped, without another search for its rivals."""
         sets = self.sets
-        _, noise, fits = self._reached
+        _, noise, fits = self._fallback
         sets.set_noise(noise)
         sets.fits = dict(fits)
         without = {n: sets.base(tuple(m for m in names if m != n), names) for n in names}
@@ -205,18 +205,18 @@ class Search:
         self.progress(0.02, "nominal model")
         sets.set_noise(rough_noise(sets.model, sets.trials))
         with time_limit(math.inf):
-            first = fit_multistart(sets.problem(sets.model), sets.model.parameters(), None, LOOK)
+            first = fit_multistart(sets.problem(sets.model), sets.model.parameters(), None, FIRST_ITERATIONS)
         self._begun = first
-        self._reached = ((), first.noise, {(): first})
+        self._fallback = ((), first.noise, {(): first})
         if not math.isfinite(first.sse):
-            raise Unfit(
+            raise NominalFitError(
                 "the nominal model's simulation leaves the floating-point numbers from its start values on", first
             )
-        self._hopeless = first.reduced > HOPELESS
+        self._misspecified = first.reduced > MISSPECIFIED
         sets.first_noise(first)
         sets.fits[()] = sets.fit_from([first.model], first.unknowns)
         sets.finish(())
-        self._reach(())
+        self._keep(())
 
     def _singles(self) -> None:
         sets, base = self.sets, self.sets.fits[()]
@@ -227,34 +227,34 @@ class Search:
         self.progress(0.12, "every cause, fitted jointly")
         by_effect = best_by_effect(scores.scored)
         sets.add({(n,): lambda v=v: sets.extend(base, v) for n, v in by_effect.items()})  # type: ignore[misc]
-        if self._hopeless:
+        if self._misspecified:
             sets.restart_every()
         else:
-            sets.restart(list(dict.fromkeys([*sets.ranked(1)[:PURSUED], *sets.given_up()])))
+            sets.restart(list(dict.fromkeys([*sets.ranked(1)[:CONVERGED_SETS], *sets.at_null()])))
 
     def _extend_beam(self, size: int, every: bool = False) -> bool:
-        """Fit the most promising sets of a size, or every one; False if nothing at all is left to find."""
+        """Fit the sets of a size that score best, or every one; False if nothing at all is left to find."""
         sets = self.sets
-        promised: dict[Names, tuple[float, Names, list[Scored]]] = {}
+        scored_sets: dict[Names, tuple[float, Names, list[Scored]]] = {}
         for names in sets.ranked(size - 1)[:BEAM]:
             base = sets.fits[names]
             for name, scored in best_by_effect(sets.scores(base).scored).items():
                 key = tuple(sorted((*names, name)))
-                promise = base.sse - scored[0].gain
-                if key not in sets.fits and (key not in promised or promise < promised[key][0]):
-                    promised[key] = (promise, names, scored)
+                left = base.sse - scored[0].gain
+                if key not in sets.fits and (key not in scored_sets or left < scored_sets[key][0]):
+                    scored_sets[key] = (left, names, scored)
         if size == 2:
-            for key in self._plant():
-                promised.pop(key, None)
-        chosen = sorted(promised.items(), key=lambda item: (item[1][0], item[0]))
+            for key in self._fit_screened_pairs():
+                scored_sets.pop(key, None)
+        chosen = sorted(scored_sets.items(), key=lambda item: (item[1][0], item[0]))
         if not every:
             chosen = chosen[:JOINT_FITS]
-        if not chosen or not (every or self.claims.hopeful(size, chosen[0][1][0])):
+        if not chosen or not (every or self.claims.worth_extending(size, chosen[0][1][0])):
             return False
         sets.add({k: lambda n=n, v=v: sets.extend(sets.fits[n], v) for k, (_, n, v) in chosen})  # type: ignore[misc]
         return True
 
-    def _plant(self) -> list[Names]:
+    def _fit_screened_pairs(self) -> list[Names]:
         """Fit the pairs of the linear screen that no single leads to; returns their names."""
         sets, base = self.sets, self.sets.fits[()]
         wanted = {tuple(sorted((a.probe.name, b.probe.name))): (a, b) for a, b in self._seeds}
@@ -329,4 +329,4 @@ class Search:
         return [k for k in self.sets.fits if len(k) == len(names) and rest <= set(k) and name not in k]
 
 
-__all__ = ["Search", "Searched", "Unfit"]
+__all__ = ["NominalFitError", "Searched", "SimulationSearch"]

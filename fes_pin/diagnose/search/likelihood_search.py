@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fes_pin.diagnose.decide.significance import Family
-from fes_pin.diagnose.search.promise import Scored, best_pairs
-from fes_pin.diagnose.search.search import Unfit
-from fes_pin.diagnose.search.sets import Names, Sets
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names
+from fes_pin.diagnose.search.score import Scored, best_pairs
+from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.workers import OutOfTime, time_limit
@@ -28,7 +28,7 @@ MOST_CAUSES = 3
 BEAM = 3
 """Sets that each round extends; greedy search (1) loses 5 to 8 points of exact pairs (DESIGN section 6)."""
 JOINT_FITS = 8
-"""Causes that are fitted beside a set, those of most linear promise; beside nothing all are."""
+"""Causes that are fitted beside a set, those of largest score; beside nothing all are."""
 SEEDS = 4
 """Pairs that the linear screen proposes by itself, for causes that do nothing alone."""
 
@@ -50,7 +50,7 @@ class Found:
     without
         For each cause, the fit without it.
     scored
-        Promise of every effect beside the nominal model, and of those that the best set has not beside that.
+        Score of every effect beside the nominal model, and of those that the best set has not beside that.
     family
         Of tests.
     silent
@@ -67,10 +67,10 @@ class Found:
     silent: tuple[str, ...]
 
 
-class SetSearch:
+class LikelihoodSearch:
     """One search on the sets of one study."""
 
-    def __init__(self, sets: Sets, seed: int, progress: Progress) -> None:
+    def __init__(self, sets: LikelihoodFits, seed: int, progress: Progress) -> None:
         self.sets, self.seed, self.progress = sets, seed, progress
         self.was_stopped = False
 
@@ -80,29 +80,29 @@ class SetSearch:
         with time_limit(math.inf):
             nominal = self.sets.nominal()
             if not math.isfinite(nominal.sse):
-                raise Unfit("the nominal model foretells nothing finite from its start values on", nominal)
+                raise NominalFitError("the nominal model foretells nothing finite from its start values on", nominal)
             self.family = Family(self.sets.scores(nominal), self.seed)
-        self._reached: Names = ()
+        self._fallback: Names = ()
         try:
             return self._search()
         except OutOfTime:
             self.was_stopped = True
             with time_limit(math.inf):
-                return self._told(self._reached)
+                return self._told(self._fallback)
 
     def nominal(self) -> Fit:
         """The nominal model."""
         return self.sets.fits[()]
 
     def _search(self) -> Found:
-        sets, best = self.sets, self._reached
+        sets, best = self.sets, self._fallback
         for size in range(1, MOST_CAUSES + 1):
             self.progress(0.1 + 0.2 * size, f"sets of {size}")
             self._extend(size)
             first = self._refine_first(size)
             if not self.p_value(sets.fits[first], sets.fits[best]) < CLAIM_LEVEL:
                 break
-            best = self._reached = first
+            best = self._fallback = first
         return self.settle(self._backward(best))
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
@@ -174,4 +174,4 @@ class SetSearch:
         return Found(none, best, p_values, rivals, without, scored, self.family, sets.library.silent())
 
 
-__all__ = ["Found", "SetSearch"]
+__all__ = ["Found", "LikelihoodSearch"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library, near_null
-from fes_pin.diagnose.search.promise import Projection, Scored, Scores
+from fes_pin.diagnose.search.score import Projection, Scored, Scores
 from fes_pin.identify.fit import (
     CONFIDENCE_95,
     GROSS,
@@ -32,19 +32,19 @@ from fes_pin.workers import in_parallel
 
 STARTS = 2
 """Shapes that a joint fit starts from."""
-LOOK = 15
-"""Iterations of a first look. Most fits end in fewer; the others go on only while they are among the best."""
-GLANCE = 5
+FIRST_ITERATIONS = 15
+"""Iterations of a first fit. Most fits end in fewer; the others go on only while they are among the best."""
+SCREEN_ITERATIONS = 5
 """Iterations after which the best start of a refinement is chosen, which alone goes on."""
-PURSUED = 6
-"""Best sets of a size that go on until they converge."""
+CONVERGED_SETS = 6
+"""Best sets of a size that are fitted until they converge."""
 ANOTHER_MINIMUM = 1.0
 """Twice the log-likelihood between two fits of a set that have ended at different minima, at least."""
 
 Names = tuple[str, ...]
 
 
-class JointFits:
+class SimulationFits:
     """Fits of sets of causes to one set of trials, by the names of the causes.
 
     Attributes
@@ -61,7 +61,7 @@ class JointFits:
         self.noise: NoiseModel = {}
         self.fits: dict[Names, Fit] = {}
         self._problems: dict[tuple, Problem] = {}
-        self._looks: dict[Names, int] = {}
+        self._rounds: dict[Names, int] = {}
         self._scores: dict[int, tuple[Fit, Scores]] = {}
         self._refinements: dict[int, tuple[Fit, Fit | None]] = {}
 
@@ -74,13 +74,15 @@ class JointFits:
         self._problems[key].noise = self.noise
         return self._problems[key]
 
-    def fit_from(self, starts: Iterable[Model], unknowns: list[dict[str, float]] | None, iterations: int = LOOK) -> Fit:
+    def fit_from(
+        self, starts: Iterable[Model], unknowns: list[dict[str, float]] | None, iterations: int = FIRST_ITERATIONS
+    ) -> Fit:
         """The best of several fits of one structure, each of so many iterations at most."""
         fitted = [fit_problem(self.problem(s), s.parameters(), unknowns, iterations) for s in starts]
         return min(fitted, key=lambda f: f.price)
 
     def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:
-        """Fit a base with one more effect, from its most promising shapes.
+        """Fit a base with one more effect, from its shapes of largest score.
 
         Amplitudes start at their linear estimate; where that falls over (a stiffness below zero), at their nulls.
         """
@@ -102,9 +104,9 @@ class JointFits:
         for names, fitted in zip(made, in_parallel(lambda make: make(), made.values()), strict=True):
             if names not in self.fits or fitted.price < self.fits[names].price:
                 self.fits[names] = fitted
-        self._looks.update(dict.fromkeys(made, 1))
+        self._rounds.update(dict.fromkeys(made, 1))
         for size in sorted({len(n) for n in made}):
-            self._pursue(size)
+            self._converge(size)
 
     def restart(self, names: Sequence[Names]) -> None:
         """Fit sets from afar, too: a strong cause has dragged the fit without it away from its nominal values."""
@@ -128,7 +130,7 @@ class JointFits:
         self._restart(starts, as_white(self.noise))
 
     def _restart(self, starts: Sequence[tuple[Names, Model]], white: NoiseModel) -> None:
-        for (n, _), found in zip(starts, in_parallel(lambda s: self._from_afar(s[1], white), starts), strict=True):
+        for (n, _), found in zip(starts, in_parallel(lambda s: self._multistart(s[1], white), starts), strict=True):
             if found.price < self.fits[n].price:
                 self.fits[n] = found
 
@@ -141,34 +143,40 @@ class JointFits:
         values = itertools.product(*(grids[n] for n in chosen))
         return [self.model + replace(one, **{**start, **dict(zip(chosen, v, strict=True))}) for v in values]
 
-    def given_up(self) -> list[Names]:
+    def at_null(self) -> list[Names]:
         """Single causes whose fit ended where they are absent, at a bound: another amplitude has not been seen."""
         return [n for n in self.ranked(1) if _is_absent(self.fits[n], self.fits[n].model.effects[-1])]
 
-    def _from_afar(self, model: Model, white: NoiseModel) -> Fit:
+    def _multistart(self, model: Model, white: NoiseModel) -> Fit:
         """Fit a model from where it is: first for least errors, under white noise, then under the present one.
 
         Slow noise leaves the fast parts of an answer to a fit, and those of a late one meet only where they are near.
         """
-        near = fit_multistart(Problem(model, self.trials, white), model.parameters(), None, LOOK)
-        return fit_problem(self.problem(model), near.values, near.unknowns, LOOK)
+        near = fit_multistart(Problem(model, self.trials, white), model.parameters(), None, FIRST_ITERATIONS)
+        return fit_problem(self.problem(model), near.values, near.unknowns, FIRST_ITERATIONS)
 
-    def _pursue(self, size: int) -> None:
+    def _converge(self, size: int) -> None:
         """Go on with fits that have not converged, as long as they are among the best of their size."""
-        while slow := [n for n in self.ranked(size)[:PURSUED] if self._unfinished(n)]:
-            self.fits.update(zip(slow, in_parallel(lambda n: self._go_on(self.fits[n], LOOK), slow), strict=True))
+        while slow := [n for n in self.ranked(size)[:CONVERGED_SETS] if self._unconverged(n)]:
+            self.fits.update(
+                zip(slow, in_parallel(lambda n: self._go_on(self.fits[n], FIRST_ITERATIONS), slow), strict=True)
+            )
             for names in slow:
-                self._looks[names] += 1
+                self._rounds[names] += 1
 
-    def _unfinished(self, names: Names) -> bool:
+    def _unconverged(self, names: Names) -> bool:
         one = self.fits[names]
-        return not one.converged and bool(np.isfinite(one.sse)) and self._looks.get(names, 9) * LOOK < MAX_ITERATIONS
+        return (
+            not one.converged
+            and bool(np.isfinite(one.sse))
+            and self._rounds.get(names, 9) * FIRST_ITERATIONS < MAX_ITERATIONS
+        )
 
     def _go_on(self, fitted: Fit, iterations: int) -> Fit:
         return go_on(self.problem(fitted.model), fitted, iterations)
 
     def scores(self, base: Fit) -> Scores:
-        """Promise of every effect that a fit does not have."""
+        """Score of every effect that a fit does not have."""
         if id(base) not in self._scores:
             probes = self.library.probes(base, self.noise, exclude=names_of(base))
             self._scores[id(base)] = (base, Projection(base.parts).score(probes))
@@ -192,7 +200,7 @@ class JointFits:
         kept, old = [n for n in dict.fromkeys(names) if n in self.fits], self.fits
         self.set_noise(noise_of(old[noise_from]))
         self.fits = {}
-        self.add({n: lambda n=n: self._go_on(old[n], LOOK) for n in kept})  # type: ignore[misc]
+        self.add({n: lambda n=n: self._go_on(old[n], FIRST_ITERATIONS) for n in kept})  # type: ignore[misc]
         self.finish(noise_from)
 
     def finish(self, names: Names) -> None:
@@ -239,11 +247,12 @@ class JointFits:
 
     def _refinement(self, base: Fit) -> Fit | None:
         refinements = [starts for effect in base.model.effects for starts in _refined(base.model, effect)]
-        looks = in_parallel(lambda s: self.fit_from([s], base.unknowns, GLANCE), [s for r in refinements for s in r])
+        starts = [s for r in refinements for s in r]
+        tried = in_parallel(lambda s: self.fit_from([s], base.unknowns, SCREEN_ITERATIONS), starts)
         at = np.cumsum([0, *map(len, refinements)])
-        best = [min(looks[a:b], key=lambda f: f.sse) for a, b in itertools.pairwise(at)]
+        best = [min(tried[a:b], key=lambda f: f.sse) for a, b in itertools.pairwise(at)]
         fitted = in_parallel(lambda f: f if f.converged else self._go_on(f, MAX_ITERATIONS), best)
-        return min(filter(is_told, fitted), key=lambda f: f.price, default=None)
+        return min(filter(is_identified, fitted), key=lambda f: f.price, default=None)
 
     def ranked(self, size: int) -> list[Names]:
         """Sets of a size, cheapest first."""
@@ -286,7 +295,7 @@ def _refined(model: Model, effect: Effect) -> list[list[Model]]:
     return out
 
 
-def is_told(fitted: Fit) -> bool:
+def is_identified(fitted: Fit) -> bool:
     """True if the data tell every parameter that has a null from it, within its bounds, in all refined effects."""
     for one in fitted.model.effects:
         if not one.refined():

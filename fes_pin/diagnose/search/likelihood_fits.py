@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.search.joint_fits import is_told
 from fes_pin.diagnose.search.library import Library, Probe, near_null
-from fes_pin.diagnose.search.promise import Projection, Scored, Scores, best_by_effect
+from fes_pin.diagnose.search.score import Projection, Scored, Scores, best_by_effect
+from fes_pin.diagnose.search.simulation_fits import is_identified
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.likelihood import ROUNDS, LikelihoodProblem, first_guess, maximise
 from fes_pin.models.model import Model
@@ -23,17 +23,17 @@ from fes_pin.workers import in_parallel
 Names = tuple[str, ...]
 
 STARTS = 2
-"""Shapes that a fit of a set starts from, most promising first, if they promise half as much."""
-GLANCE = 4
-"""Steps of a first look at a set, at what is random in a smaller one."""
-PURSUED = 4
+"""Shapes that a fit of a set starts from, largest score first, if it is half the largest at least."""
+SCREEN_ITERATIONS = 4
+"""Steps of a first fit of a set, at what is random in a smaller one."""
+CONVERGED_SETS = 4
 """Best sets of a size that go on until they converge."""
 FIRST_DOUBTS = (1.0, 30.0)
 """Sizes of random effort that the nominal fit begins with, in units of the smallest: a likelihood can have two optima,
 one in which the model explains and one in which randomness does."""
 
 
-class Sets:
+class LikelihoodFits:
     """Fits of sets of causes to one set of trials, by the names of the causes; `()` is the nominal model.
 
     Parameters
@@ -51,7 +51,7 @@ class Sets:
         self.library = Library(self.model, trials, effects)
         self.fits: dict[Names, Fit] = {}
         self._scores: dict[int, tuple[Fit, Scores]] = {}
-        self._pursued: set[Names] = set()
+        self._converged: set[Names] = set()
         self._probing: dict[str, LikelihoodProblem] = {}
 
     def nominal(self) -> Fit:
@@ -97,17 +97,17 @@ class Sets:
         return out
 
     def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:
-        """A first look at a base with one more effect, from its most promising shapes."""
+        """A first fit of a base with one more effect, from its shapes of largest score."""
         worth = [s for s in scored[:STARTS] if s.gain >= 0.5 * scored[0].gain]
         starts = [base.model + started(s.probe.effect, s.amplitudes) for s in worth]
-        return min((self._look(s, base) for s in starts), key=lambda f: f.price)
+        return min((self._first_fit(s, base) for s in starts), key=lambda f: f.price)
 
     def extend_with_both(self, base: Fit, pair: tuple[Scored, Scored]) -> Fit:
         """Fit a base with two more effects at once, from their linear estimates."""
         model = base.model
         for one in pair:
             model = model + started(one.probe.effect, one.amplitudes)
-        return self._look(model, base)
+        return self._first_fit(model, base)
 
     def add(self, made: Mapping[Names, Callable[[], Fit]]) -> None:
         """Fit sets side by side; of two fits of a set the better stays."""
@@ -115,16 +115,16 @@ class Sets:
             if names not in self.fits or fitted.price < self.fits[names].price:
                 self.fits[names] = fitted
         for size in sorted({len(n) for n in made}):
-            self._pursue(size)
+            self._converge(size)
 
-    def _pursue(self, size: int) -> None:
+    def _converge(self, size: int) -> None:
         """Let the best of a size converge."""
-        while slow := [n for n in self.ranked(size)[:PURSUED] if n not in self._pursued]:
+        while slow := [n for n in self.ranked(size)[:CONVERGED_SETS] if n not in self._converged]:
             self.fits.update(zip(slow, in_parallel(lambda n: self._go_on(self.fits[n]), slow), strict=True))
-            self._pursued.update(slow)
+            self._converged.update(slow)
 
     def extend_all(self, base: Names, most: int | None = None) -> list[Names]:
-        """Fit a set with each further cause beside it, or with those of most promise; returns their names."""
+        """Fit a set with each further cause beside it, or with those of largest score; returns their names."""
         fitted = self.fits[base]
         by_effect = best_by_effect(self.scores(fitted).scored)
         chosen = sorted(by_effect, key=lambda n: (-by_effect[n][0].gain, n))[:most]
@@ -146,15 +146,15 @@ class Sets:
         """The best fit of a set with the form of one of its effects refined; None where no form is, or none is told."""
         base = self.fits[names]
         starts = [s for effect in base.model.effects for s in refinements(base.model, effect, self.library.measured)]
-        looks = in_parallel(lambda s: self._look(s, base), starts)
+        looks = in_parallel(lambda s: self._first_fit(s, base), starts)
         best = sorted(looks, key=lambda f: f.price)[:STARTS]
-        return min(filter(is_told, in_parallel(self._go_on, best)), key=lambda f: f.price, default=None)
+        return min(filter(is_identified, in_parallel(self._go_on, best)), key=lambda f: f.price, default=None)
 
-    def _look(self, start: Model, base: Fit) -> Fit:
+    def _first_fit(self, start: Model, base: Fit) -> Fit:
         """A few steps from a start, at what is random in another fit."""
         assert base.doubt is not None
         problem = LikelihoodProblem(start, self.trials, base.doubt)
-        found = fit_problem(problem, start.parameters(), base.unknowns, GLANCE)  # type: ignore[arg-type]
+        found = fit_problem(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)  # type: ignore[arg-type]
         return replace(found, doubt=base.doubt)
 
     def ranked(self, size: int) -> list[Names]:

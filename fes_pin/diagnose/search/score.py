@@ -1,4 +1,7 @@
-"""What linearized causes promise beside a fit, one at a time and in pairs."""
+"""Score tests of causes beside a fit, one at a time and in pairs: what each would gain if it were linear.
+
+C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ class Scored:
     Attributes
     ----------
     gain
-        Drop in the sum of squares that the linearized effect promises; where its amplitudes are each trial's own, less
+        Score: drop in the sum of squares by the linearized effect; where its amplitudes are each trial's own, less
         the price of each that it has beyond those of a common effect.
     amplitudes
         The linear estimate of its amplitudes.
@@ -69,7 +72,7 @@ class Projection:
         return [*own, self._basis[rows]]
 
     def score(self, probes: Sequence[Probe]) -> Scores:
-        """The promises of probes, and the Gram matrix of what is left of them, trial by trial.
+        """The scores of probes, and the Gram matrix of what is left of them, trial by trial.
 
         Those that can be other in each trial are scored both ways.
         """
@@ -193,10 +196,10 @@ def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
 
 
 def best_pairs(scores: Scores, count: int) -> list[tuple[Scored, Scored]]:
-    """Pairs of effects whose linearizations together promise most, best first, each pair of names once."""
+    """Pairs of effects of largest score together, best first, each pair of names once."""
     found: dict[tuple[str, str], tuple[Scored, Scored]] = {}
-    first, second, promise = _pair_promises(scores)
-    for k in np.argsort(-promise, kind="stable"):
+    first, second, gains = _pair_gains(scores)
+    for k in np.argsort(-gains, kind="stable"):
         i, j = int(first[k]), int(second[k])
         one, other = scores.scored[i], scores.scored[j]
         key = (other.probe.name, one.probe.name)
@@ -210,10 +213,10 @@ def best_pairs(scores: Scores, count: int) -> list[tuple[Scored, Scored]]:
     return list(found.values())
 
 
-def _pair_promises(scores: Scores) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Every pair of probes and what both promise together, bounds aside; each of shape (pairs,).
+def _pair_gains(scores: Scores) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Every pair of probes and what both gain together, bounds aside; each of shape (pairs,).
 
-    Blocks are filled up to one size with rows of the identity, which promise nothing.
+    Blocks are filled up to one size with rows of the identity, which gain nothing.
     """
     size, rows = max(b.stop - b.start for b in scores.blocks), len(scores.along)
     gram = np.eye(rows + 2 * size)

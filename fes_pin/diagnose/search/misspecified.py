@@ -10,7 +10,7 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.claims import FORM_SHARE
 from fes_pin.diagnose.decide.held_out import folds_of, foretold
-from fes_pin.diagnose.search.joint_fits import LOOK, JointFits, Names
+from fes_pin.diagnose.search.simulation_fits import FIRST_ITERATIONS, Names, SimulationFits
 from fes_pin.identify.fit import Fit, fit_problem, go_on, noise_of
 from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.problem import Problem
@@ -20,7 +20,7 @@ REFINED = 3
 """Best sets by prediction whose forms are tried refined."""
 
 
-def choose_by_prediction(sets: JointFits, names: Names, pool: Sequence[Names]) -> Names:
+def choose_by_prediction(sets: SimulationFits, names: Names, pool: Sequence[Names]) -> Names:
     """Choose by open-loop errors on trials left out.
 
     Where no set leaves only noise likelihoods compare wrong models, and a flexible one can win by what it does to
@@ -47,7 +47,7 @@ def choose_by_prediction(sets: JointFits, names: Names, pool: Sequence[Names]) -
 def open_loop(fitted: Fit) -> Fit:
     """The same model fitted for least open-loop error: its residuals are misfit, and not to be whitened."""
     problem = Problem(fitted.model, fitted.trials, as_white(fitted.noise))
-    return go_on(problem, fitted, 2 * LOOK)
+    return go_on(problem, fitted, 2 * FIRST_ITERATIONS)
 
 
 def predictive_error(near: Fit) -> float:
@@ -64,7 +64,7 @@ def predictive_error(near: Fit) -> float:
 
     def left_out(held: list[int]) -> list[np.ndarray]:
         train = [i for i in range(len(near.trials)) if i not in held]
-        again = go_on(Problem(near.model, [near.trials[i] for i in train], near.noise), near, 2 * LOOK)
+        again = go_on(Problem(near.model, [near.trials[i] for i in train], near.noise), near, 2 * FIRST_ITERATIONS)
         alone = [Problem(again.model, [near.trials[i]], near.noise, ()) for i in held]
         return [foretold(fit_problem(p, again.values, [near.unknowns[i]])) for p, i in zip(alone, held, strict=True)]
 
@@ -87,9 +87,9 @@ def fit_for_prediction(fits: Sequence[Fit], recorded: Sequence[Trial]) -> list[F
     Each trial's initial state is estimated, though a prediction takes its first sample: the noise of a first sample
     would go into the parameters.
     """
-    return alike(fits, recorded, as_white(noise_of(fits[0])))
+    return under_one_noise(fits, recorded, as_white(noise_of(fits[0])))
 
 
-def alike(fits: Sequence[Fit], trials: Sequence[Trial], noise: NoiseModel) -> list[Fit]:
+def under_one_noise(fits: Sequence[Fit], trials: Sequence[Trial], noise: NoiseModel) -> list[Fit]:
     """The same models fitted to the same trials under one noise, so that they can be compared."""
     return in_parallel(lambda f: fit_problem(Problem(f.model, trials, noise), f.values), fits)
