@@ -16,8 +16,10 @@ from fes_pin.cli.group import Commands
 from fes_pin.cli.walk import diagnose_walking, print_effects
 
 if TYPE_CHECKING:
+    from fes_pin.data.trial import Trial
     from fes_pin.diagnose.result import Diagnosis
     from fes_pin.models.catalogue import Catalogue
+    from fes_pin.models.model import Model
 
 app = typer.Typer(cls=Commands, pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
@@ -103,9 +105,17 @@ def predict(
     setting: Annotated[
         list[str] | None, typer.Option("--set", help="A condition of the trial: load_kg=1.5, kind=isometric ...")
     ] = None,
+    horizon: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            metavar="SECONDS",
+            help="Foretell each sample from what the trial measured up to so long before it.",
+        ),
+    ] = None,
     library: Libraries = None,
 ) -> None:
-    """Predict a trial from its inputs with a saved model."""
+    """Predict a trial from its inputs with a saved model, or so far ahead along a trial that has its outputs."""
     from fes_pin.data.trial import read_trial, write_trial
     from fes_pin.models.predict import predict as run
     from fes_pin.models.store import load_model
@@ -113,9 +123,26 @@ def predict(
     catalogue = _catalogue(library)
     loaded = load_model(model, library=catalogue)
     kind, conditions = _settings(setting or [])
-    given = read_trial(trial, rig=loaded.rig.described(), kind=kind, conditions=conditions, inputs_only=True)
-    write_trial(run(loaded, given), out)
+    inputs_only = horizon is None
+    given = read_trial(trial, rig=loaded.rig.described(), kind=kind, conditions=conditions, inputs_only=inputs_only)
+    write_trial(run(loaded, given) if horizon is None else _along(model, loaded, given, horizon), out)
     _say_whose_code(catalogue)
+
+
+def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
+    """A trial's outputs foretold from what was measured so long before."""
+    from dataclasses import replace
+
+    from fes_pin.data.errors import InputError
+    from fes_pin.identify.ahead import foretell
+    from fes_pin.identify.stored import load_random
+
+    random = load_random(path)
+    if random is None:
+        raise InputError(
+            "expected a table [random], as diagnose writes it: --horizon needs to know the noise", file=path
+        )
+    return replace(trial, columns=foretell(model, trial, random, horizon_s))
 
 
 @app.command()

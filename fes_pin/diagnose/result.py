@@ -78,6 +78,11 @@ class Diagnosis:
     ahead: AheadErrors | None = None
 
     @property
+    def is_driven(self) -> bool:
+        """True of a rig whose effort answers what is read: it is judged by what is foretold one sample ahead."""
+        return self.extended.doubt is not None
+
+    @property
     def model(self) -> Model:
         """The extended model."""
         return self.extended.model
@@ -87,7 +92,7 @@ class Diagnosis:
 
         On trials that took no part, where there are such; of a driven rig of the errors over the horizon.
         """
-        if self.ahead is not None:
+        if self.is_driven and self.ahead is not None:
             one = self.ahead.nominal_held_out or self.ahead.nominal
             other = self.ahead.extended_held_out or self.ahead.extended
             return float(np.clip(100.0 * (one.horizon - other.horizon) / max(one.horizon, 1e-300), 0.0, 100.0))
