@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import Errors
-from fes_pin.identify.ahead import Missed, missed, one_step, over_horizon
+from fes_pin.identify.ahead import Missed, missed, one_step, over_horizon, own_noise
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import driving_size
 from fes_pin.identify.noise import NoiseModel
@@ -102,7 +102,7 @@ def free_errors(
     held_out
         Squared errors of both on trials that took no part, if there are such.
     """
-    inside = [Ahead.of(missed(f.model, f.trials, f.noise, floor, horizon_s)) for f in (nominal, extended)]
+    inside = [Ahead.of(missed(f.model, f.trials, own_noise(f), floor, horizon_s)) for f in (nominal, extended)]
     outside = [Ahead.of(total) for total in held_out] if held_out else [None, None]
     return AheadErrors(horizon_s, inside[0], inside[1], outside[0], outside[1])
 

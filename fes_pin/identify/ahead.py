@@ -18,6 +18,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel, thin, thinning
 from fes_pin.identify.per_trial import predictions
@@ -83,6 +84,14 @@ def missed(model: Model, trials: Sequence[Trial], noise: NoiseModel, floor: Nois
             squares = [float(e @ e) / variance for e in (*errors, left, measured - measured.mean())]
             total += Missed(*squares)
     return total
+
+
+def own_noise(fitted: Fit) -> NoiseModel:
+    """The noise that the residuals of a fit show: what it gets wrong foretells itself as well."""
+    try:
+        return noise_of(fitted)
+    except (FloatingPointError, np.linalg.LinAlgError):  # a fit that does not stay finite
+        return fitted.noise
 
 
 def forecast(residual: np.ndarray, noise: Noise, dt: float, ahead_s: float) -> np.ndarray:

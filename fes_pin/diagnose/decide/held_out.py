@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import Missed, default_horizon, missed
+from fes_pin.identify.ahead import Missed, default_horizon, missed, own_noise
 from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem, go_on
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
@@ -235,7 +235,7 @@ def separate(
 
 
 def _missed(fitted: Fit, trials: Sequence[Trial], floor: NoiseModel, horizon_s: float) -> Missed:
-    return missed(fitted.model, trials, fitted.noise, floor, horizon_s)
+    return missed(fitted.model, trials, own_noise(fitted), floor, horizon_s)
 
 
 def _whitened(fitted: Fit, test: Sequence[Trial]) -> np.ndarray:
