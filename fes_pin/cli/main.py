@@ -16,10 +16,8 @@ from fes_pin.cli.group import Commands
 from fes_pin.cli.walk import diagnose_walking, print_effects
 
 if TYPE_CHECKING:
-    from fes_pin.data.trial import Trial
     from fes_pin.diagnose.result import Diagnosis
     from fes_pin.models.catalogue import Catalogue
-    from fes_pin.models.model import Model
 
 app = typer.Typer(cls=Commands, pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
@@ -77,7 +75,7 @@ def diagnose(
         typer.echo(f"{verdict}\nreport: {out / 'report.html'}")
         return
     from fes_pin.diagnose.diagnosis import diagnose as find
-    from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files
+    from fes_pin.diagnose.record import NEXT_FILE, by_this_command, diagnosis_files
     from fes_pin.view.report import report_html
 
     with _progress() as tell:
@@ -88,7 +86,7 @@ def diagnose(
                 _say_whose_code(to_be_said.pop())
             tell(DIAGNOSING * share, words)
 
-        diagnosis = find(measured, library=catalogue, seed=seed, limit=limit, progress=told)
+        diagnosis = by_this_command(find(measured, library=catalogue, seed=seed, limit=limit, progress=told))
         tell(DIAGNOSING, "report")
         files = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
         tell(1.0, "done")
@@ -105,17 +103,9 @@ def predict(
     setting: Annotated[
         list[str] | None, typer.Option("--set", help="A condition of the trial: load_kg=1.5, kind=isometric ...")
     ] = None,
-    horizon: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0,
-            metavar="SECONDS",
-            help="Foretell each sample from what the trial measured up to so long before it.",
-        ),
-    ] = None,
     library: Libraries = None,
 ) -> None:
-    """Predict a trial from its inputs with a saved model, or so far ahead along a trial that has its outputs."""
+    """Predict a trial from its inputs with a saved model."""
     from fes_pin.data.trial import read_trial, write_trial
     from fes_pin.models.predict import predict as run
     from fes_pin.models.store import load_model
@@ -123,26 +113,9 @@ def predict(
     catalogue = _catalogue(library)
     loaded = load_model(model, library=catalogue)
     kind, conditions = _settings(setting or [])
-    inputs_only = horizon is None
-    given = read_trial(trial, rig=loaded.rig.described(), kind=kind, conditions=conditions, inputs_only=inputs_only)
-    write_trial(run(loaded, given) if horizon is None else _along(model, loaded, given, horizon), out)
+    given = read_trial(trial, rig=loaded.rig.described(), kind=kind, conditions=conditions, inputs_only=True)
+    write_trial(run(loaded, given), out)
     _say_whose_code(catalogue)
-
-
-def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
-    """A trial's outputs foretold from what was measured so long before."""
-    from dataclasses import replace
-
-    from fes_pin.data.errors import InputError
-    from fes_pin.identify.ahead import foretell
-    from fes_pin.identify.stored import load_random
-
-    random = load_random(path)
-    if random is None:
-        raise InputError(
-            "expected a table [random], as diagnose writes it: --horizon needs to know the noise", file=path
-        )
-    return replace(trial, columns=foretell(model, trial, random, horizon_s))
 
 
 @app.command()

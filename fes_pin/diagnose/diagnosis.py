@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.provenance import provenance
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -66,7 +67,7 @@ def diagnose(
     """
     began = time.perf_counter()
     tell = progress or (lambda _share, _words: None)
-    catalogue = catalogue_of(library)
+    catalogue, made = catalogue_of(library), provenance(study, seed)
     study, left_out = despiked_study(study)
     nominal = nominal_model(study)
     warnings = check_study(study, nominal)
@@ -99,7 +100,7 @@ def diagnose(
     if limit is not None and search.was_stopped:
         warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
     found = replace(diagnosis, left_out=left_out, warnings=tuple(warnings), catalogue=catalogue)
-    return replace(found, wall_s=time.perf_counter() - began)
+    return replace(found, provenance=made, wall_s=time.perf_counter() - began)
 
 
 def despiked_study(study: Study) -> tuple[Study, dict[str, dict[str, tuple[int, ...]]]]:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from fes_pin.data.provenance import this_command
 from fes_pin.data.trial import trial_csv
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.stored import random_table
 from fes_pin.models.store import model_toml
 
 DIGITS = 6
 """Significant digits printed: the last that does not depend on how sums are ordered."""
+LEAST_P = 1e-300
+"""What stands for a p-value that is too small for a number: it is at most this."""
 NEXT_FILE = "next_trial.csv"
 
 
@@ -26,6 +29,11 @@ def shown(value: float | None) -> float | None:
     return float(f"{value:.{DIGITS}g}")
 
 
+def _p_shown(value: float) -> float | None:
+    """A p-value as printed: no chance is zero."""
+    return shown(max(value, LEAST_P)) if math.isfinite(value) else None
+
+
 def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
     """`diagnosis.json` as a dictionary."""
     return {
@@ -34,7 +42,7 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
         "causes": [_cause(c) for c in diagnosis.causes],
         "remainder": {
             "unexplained": diagnosis.remainder.unexplained,
-            "p_value": shown(diagnosis.remainder.p_value),
+            "p_value": _p_shown(diagnosis.remainder.p_value),
             "where": diagnosis.remainder.where,
         },
         "absorbed": list(diagnosis.absorbed),
@@ -48,17 +56,25 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
         **_left_out(diagnosis),
         **({"reason": diagnosis.reason} if diagnosis.reason else {}),
         **_library(diagnosis),
-        **_over_time(diagnosis),
+        **_driven(diagnosis),
         "warnings": list(diagnosis.warnings),
         "wall_s": round(diagnosis.wall_s, 2),
+        **({"provenance": diagnosis.provenance.record()} if diagnosis.provenance else {}),
     }
+
+
+def by_this_command(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis with the command line of this process in its provenance."""
+    if diagnosis.provenance is None:
+        return diagnosis
+    return replace(diagnosis, provenance=replace(diagnosis.provenance, command=this_command()))
 
 
 def diagnosis_files(diagnosis: Diagnosis) -> dict[str, str]:
     """Every file of a diagnosis but the report, by name."""
     files = {
         "diagnosis.json": json.dumps(diagnosis_record(diagnosis), indent=1, allow_nan=False) + "\n",
-        "model.toml": model_toml(diagnosis.model, random_table(diagnosis.extended)),
+        "model.toml": model_toml(diagnosis.model),
     }
     if diagnosis.next_experiment and diagnosis.next_experiment.trial is not None:
         files[NEXT_FILE] = trial_csv(diagnosis.next_experiment.trial)
@@ -72,7 +88,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "stage": cause.stage,
         "parameters": {n: {"value": shown(p.value), "std": shown(p.std)} for n, p in cause.parameters.items()},
         "equivalents": list(cause.equivalents),
-        "p_value": shown(cause.p_value),
+        "p_value": _p_shown(cause.p_value),
         "gain_percent": {
             "fit": shown(cause.gain_fit),
             "held_out": shown(held.percent),
@@ -98,7 +114,7 @@ def _parameters(fitted: Fit) -> dict[str, Any]:
 
 
 def _errors(diagnosis: Diagnosis, which: str) -> dict[str, float | None]:
-    """E of one of the two models: free, fitted and held out; on one of them one sample and a horizon ahead as well."""
+    """E of one of the two models: free, fitted and held out; of a driven rig one sample and a horizon ahead as well."""
     free = getattr(diagnosis, f"{which}_error")
     out = {"fit": shown(free[0]), "held_out": shown(free[1])}
     if diagnosis.ahead is not None:
@@ -108,13 +124,10 @@ def _errors(diagnosis: Diagnosis, which: str) -> dict[str, float | None]:
     return out
 
 
-def _over_time(diagnosis: Diagnosis) -> dict[str, Any]:
-    """How far ahead a horizon looks, and what acts on a driven rig at random."""
+def _driven(diagnosis: Diagnosis) -> dict[str, Any]:
+    """What a driven study's record holds besides."""
     if diagnosis.ahead is None:
         return {}
-    horizon = {"horizon_s": shown(diagnosis.ahead.horizon_s)}
-    if not diagnosis.is_driven:
-        return horizon
     random = {
         r.name: {
             "std": shown(r.std),
@@ -123,7 +136,7 @@ def _over_time(diagnosis: Diagnosis) -> dict[str, Any]:
         }
         for r in diagnosis.random
     }
-    return {**horizon, "random": random}
+    return {"horizon_s": shown(diagnosis.ahead.horizon_s), "random": random}
 
 
 def _experiment(diagnosis: Diagnosis) -> dict[str, Any] | None:

@@ -42,9 +42,8 @@ class Replay:
 def replay(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     """Every trial of the study as both models of a diagnosis predict it, in the order of the study."""
     trials, noise = diagnosis.study.trials, diagnosis.extended.noise
-    ahead = diagnosis.ahead if diagnosis.is_driven else None
-    nominal = _predicted(diagnosis.nominal, trials, noise, ahead)
-    extended = _predicted(diagnosis.extended, trials, noise, ahead)
+    nominal = _predicted(diagnosis.nominal, trials, noise, diagnosis.ahead)
+    extended = _predicted(diagnosis.extended, trials, noise, diagnosis.ahead)
     made = []
     for trial, before, after in zip(trials, nominal, extended, strict=True):
         outputs = tuple(n for n in diagnosis.model.rig.outputs(trial.kind) if n in trial)
@@ -54,9 +53,12 @@ def replay(diagnosis: Diagnosis) -> tuple[Replay, ...]:
 
 
 def _predicted(fitted: Fit, trials: Sequence[Trial], noise: NoiseModel, ahead: AheadErrors | None) -> list[Trial]:
-    """Trials as predicted from their inputs; where a rig falls by itself, over the horizon from what was measured."""
+    """Trials as predicted from their inputs; where the effort answers the reading, over the horizon.
+
+    A free simulation of such a rig integrates its errors, or falls: it says little of the model, or nothing.
+    """
     model, out = fitted.model, []
-    if ahead is not None and ahead.extended.free is None:
+    if ahead is not None:
         assert fitted.doubt is not None
         return [t.with_columns(**over_horizon(model, t, fitted.doubt, ahead.horizon_s)) for t in trials]
     for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from fes_pin.data.provenance import Provenance
 from fes_pin.data.study import Study
 from fes_pin.diagnose.cause import Cause, Ranked
 from fes_pin.diagnose.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnose.experiment import NextExperiment
 from fes_pin.diagnose.remainder.open_set import Remainder
-from fes_pin.diagnose.text import ahead_notes, cause_table, left_out_text
+from fes_pin.diagnose.text import ahead_notes, cause_table, left_out_text, percent, probability
 from fes_pin.identify.fit import Fit
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
@@ -54,6 +55,10 @@ class Diagnosis:
         error stays that is no noise.
     catalogue
         The causes that were looked for, of which the rig can have some.
+    random, ahead
+        Of a rig that a recorded effort drives: what acts on it at random, and its errors over time.
+    provenance
+        When, by which versions, from which files it was made.
     """
 
     study: Study
@@ -76,11 +81,7 @@ class Diagnosis:
     catalogue: Catalogue = field(default_factory=installed, compare=False)
     random: tuple[RandomPart, ...] = ()
     ahead: AheadErrors | None = None
-
-    @property
-    def is_driven(self) -> bool:
-        """True of a rig whose effort answers what is read: it is judged by what is foretold one sample ahead."""
-        return self.extended.doubt is not None
+    provenance: Provenance | None = field(default=None, compare=False)
 
     @property
     def model(self) -> Model:
@@ -92,7 +93,7 @@ class Diagnosis:
 
         On trials that took no part, where there are such; of a driven rig of the errors over the horizon.
         """
-        if self.is_driven and self.ahead is not None:
+        if self.ahead is not None:
             one = self.ahead.nominal_held_out or self.ahead.nominal
             other = self.ahead.extended_held_out or self.ahead.extended
             return float(np.clip(100.0 * (one.horizon - other.horizon) / max(one.horizon, 1e-300), 0.0, 100.0))
@@ -121,13 +122,13 @@ class Diagnosis:
             for b, a, where in zip(before, after, ("fitted", "held out"), strict=True)
             if a is not None and b is not None
         ]
-        lines = [f"error E {', '.join(shown)}; noise floor {self.ceiling_percent:.2g} %"] if shown else []
+        lines = [f"error E {', '.join(shown)}; noise floor {percent(self.ceiling_percent)}"] if shown else []
         lines += ahead_notes(self.ahead, self.random, self.model.rig.units().get("effort", ""))
         left = self.remainder
         where = f", most on {left.where}" if left.where else ""
         if self.reason is None:
             state = "something is" if left.unexplained else "nothing"
-            lines.append(f"{state} left unexplained (p = {left.p_value:.2g}{where})")
+            lines.append(f"{state} left unexplained ({probability(left.p_value)}{where})")
         elif self.causes:
             lines.append(f"something is left unexplained: {self.reason}")
         if self.left_out:

@@ -9,6 +9,25 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.errors_ahead import AheadErrors, RandomPart
 
+LEAST_P, LEAST_PERCENT = 1e-12, 1e-3
+"""Below these a p-value and a percentage are no longer told apart from zero when they are printed."""
+
+
+def probability(value: float) -> str:
+    """A p-value as printed; never zero."""
+    if math.isnan(value):
+        return "not tested"
+    return f"p < {LEAST_P:g}" if value < LEAST_P else f"p = {value:.2g}"
+
+
+def percent(value: float | None) -> str:
+    """A percentage as printed, "-" for none."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if 0.0 <= value < LEAST_PERCENT:
+        return f"below {LEAST_PERCENT:g} %"
+    return f"{value:.3g} %" if value >= 1.0 else f"{value:.2g} %"
+
 
 def quantity(value: float, std: float, unit: str) -> str:
     """A value with its standard deviation, rounded to what it means."""

@@ -26,6 +26,7 @@ from fes_pin.identify.noise import low_pass, thin
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Signals
+from fes_pin.models.tracking import measured_motion, tracking_effort
 
 MAX_POINTS = 1200
 """Instants of the estimate: a longer trial is averaged down to it first."""
@@ -93,6 +94,25 @@ def missing_input(model: Model, measured: Trial, simulated: Trial) -> Missing:
     against = {"angle": q + residual, "rate": v + rate, **against}
     force = rig.constants.get("revolute", 1.0) == 0.0
     return Missing(measured.name, "force" if force else "torque", "N" if force else "N m", value, against)
+
+
+def missing_along(model: Model, measured: Trial) -> Missing:
+    """The effort that a model, its effects included, lacks along the measured motion; see `models.tracking`.
+
+    Of rigs whose effort answers what is read: they integrate or fall over, and a free simulation of them is no
+    reference that a motion could be near to.
+    """
+    rig = model.rig
+    output = rig.output(measured.kind)
+    position, rate = measured_motion(measured, output)
+    value = tracking_effort(model, measured, position, rate)
+    count = max(1, math.ceil(len(measured) / MAX_POINTS))
+    shown = {n: thin(measured[n], count) for n in rig.input_columns(measured)}
+    motion = {"angle": position, "rate": rate, "time_s": measured.time - measured.time[0]}
+    against = {**{n: thin(v, count) for n, v in motion.items()}, **shown}
+    force = rig.constants.get("revolute", 1.0) == 0.0
+    kind, unit = ("force", "N") if force else ("torque", "N m")
+    return Missing(measured.name, kind, unit, thin(value, count), against)
 
 
 def activation(rig: Rig, trial: Trial) -> dict[str, np.ndarray]:

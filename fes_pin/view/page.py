@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
+from urllib.parse import quote
 
-POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
-"""Content security policy: the page loads nothing and runs nothing."""
+from fes_pin.view.chart import STYLE
+from fes_pin.view.drawing import Drawing
+
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src '{script}'"
+"""Content security policy: the page loads nothing, and runs the one script that it brings, by its hash."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +50,7 @@ def joined(parts: Sequence[Markup], between: str = "\n") -> Markup:
 def table(
     head: Sequence[str], rows: Sequence[Sequence[Content]], numbers: Sequence[int] = (), prose: bool = False
 ) -> Markup:
-    """A table that scrolls by itself where it is too wide.
+    """A table; on a narrow screen each row becomes a list of its cells with their titles.
 
     Parameters
     ----------
@@ -59,7 +65,12 @@ def table(
     """
 
     def cells(tag: str, row: Sequence[Content]) -> Markup:
-        made = [element(tag, c, **({"class_": "number"} if k in numbers else {})) for k, c in enumerate(row)]
+        made = []
+        for k, content in enumerate(row):
+            known = {"class_": "number"} if k in numbers else {}
+            if tag == "td":
+                known["data-title"] = head[k]  # stands before it on a narrow screen
+            made.append(element(tag, content, **known))
         return element("tr", joined(made, ""))
 
     body = joined([cells("td", row) for row in rows])
@@ -67,7 +78,6 @@ def table(
         "div",
         element("table", element("thead", cells("th", head)), element("tbody", body)),
         class_="scroll prose" if prose else "scroll",
-        tabindex="0",
     )
 
 
@@ -77,28 +87,35 @@ def section(title: str, *contents: Markup) -> Markup:
     return element("section", element("h2", title), joined(kept)) if kept else Markup("")
 
 
-def figure(drawing: str, caption: Content = "", class_: str = "") -> Markup:
-    """An inline drawing (SVG, trusted) with a caption."""
-    below = element("figcaption", caption) if caption else Markup("")
-    return element("figure", Markup(drawing), below, **({"class_": class_} if class_ else {}))
+def figure(drawing: Drawing | str, caption: Content = "", class_: str = "", file: str = "figure") -> Markup:
+    """An inline drawing (SVG, trusted) with a caption, and its data as CSV behind it."""
+    known = {"class_": class_} if class_ else {}
+    if isinstance(drawing, str):
+        return element("figure", Markup(drawing), element("figcaption", caption), **known)
+    words = f"data (CSV, {drawing.note})" if drawing.note else "data (CSV)"
+    link = element("a", words, class_="data", download=f"{file}.csv", href=f"data:text/csv,{quote(drawing.csv)}")
+    return element("figure", Markup(drawing.svg), element("figcaption", caption, " ", link), **known)
+
+
+def folded(summary: Content, *contents: Markup, is_open: bool = False, id_: str = "") -> Markup:
+    """What is behind a line that opens it; printed whole."""
+    known = {**({"open": ""} if is_open else {}), **({"id": id_} if id_ else {})}
+    return element("details", element("summary", summary), joined(contents), **known)
 
 
 def page(title: str, body: Markup) -> str:
     """A whole document with its style inside."""
-    style = resources.files("fes_pin.view").joinpath("report.css").read_text(encoding="utf-8")
+    files = resources.files("fes_pin.view")
+    style = files.joinpath("report.css").read_text(encoding="utf-8") + STYLE.replace("INK", "var(--ink)")
+    script = files.joinpath("report.js").read_text(encoding="utf-8")
+    allowed = "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY.format(script=allowed)}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"{element('title', title).text}\n<style>\n{style}</style>\n</head>\n<body>\n{body.text}\n</body>\n</html>\n"
+        f"{element('title', title).text}\n<style>\n{style}</style>\n</head>\n<body>\n{body.text}\n"
+        f"<script>{script}</script>\n</body>\n</html>\n"
     )
-
-
-def percent(value: float | None) -> str:
-    """A percentage as printed, "-" for none."""
-    if value is None or not math.isfinite(value):
-        return "-"
-    return f"{value:.3g} %" if value >= 1.0 else f"{value:.2g} %"
 
 
 def rounded(value: float, std: float) -> str:
@@ -113,15 +130,8 @@ def rounded(value: float, std: float) -> str:
 
 
 def unit_text(unit: str) -> str:
-    """A unit as printed: with its exponents and the micro sign; "1" for a pure number."""
-    return unit.replace("m2", "m²").replace("us", "µs") or "1"
-
-
-def probability(value: float) -> str:
-    """A p-value as printed."""
-    if math.isnan(value):
-        return "not tested"
-    return "p < 1e-12" if value < 1e-12 else f"p = {value:.2g}"
+    """A unit as printed: with its exponents and the micro sign; "-" for a pure number."""
+    return unit.replace("m2", "m²").replace("us", "µs") or "-"
 
 
 def key(*entries: tuple[str, str]) -> Markup:

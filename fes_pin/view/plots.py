@@ -1,7 +1,6 @@
-"""Figures of a diagnosis: trials with their residuals, missing torque, ranking of the causes.
+"""Figures of a diagnosis: trials with their residuals, missing torque, the inputs of a trial still to be run.
 
-Each takes results and returns a matplotlib `Figure` of its own, without pyplot's state. No text of the study stands in
-a figure: its words belong to the page around it.
+Each takes results and returns a `Drawing`. No text of the study stands in a figure but in its description.
 """
 
 from __future__ import annotations
@@ -9,42 +8,43 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path as MplPath
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.replay import Replay
+from fes_pin.diagnose.text import percent
 from fes_pin.identify.noise import NoiseModel
+from fes_pin.view.chart import Panel, svg, tick_text
+from fes_pin.view.drawing import Drawing, csv_of, every, rows_csv
 from fes_pin.view.missing import Missing, binned, explained, smoothed
-from fes_pin.view.style import (
-    BAND,
-    EXTENDED,
-    FAINT,
-    MEASURED,
-    NOMINAL,
-    PANEL,
-    STIMULUS,
-    WIDTH,
-    bare,
-    label,
-    legend_above,
-    milli,
-    styled,
-    thin_curve,
-    unit_of,
-)
+from fes_pin.view.style import label, milli, thin_curve, unit_of
 
 DOTS = 500
 """Dots of one panel."""
 PULSES = 400
 """Single pulses that are drawn; more of them become a grey band."""
+POINTS = 350
+"""Stretches of a curve that keep their extremes."""
+FEWEST = 60
+"""Of these, in a study of so many trials that the page would be too large."""
+ON_PAGE = 25_000
+"""Stretches of all trials of a study together."""
+WIDE, NARROW, LEFT, GAP = 420.0, 330.0, 66.0, 10.0
+"""Widths of a trial's figure and of a panel of the missing torque, room for the axis on the left and between panels."""
 
 
-def trial_figure(
-    one: Replay, noise: NoiseModel, position_unit: str = "rad", extended: bool = True, legend: bool = True
-) -> Figure:
+def points_of(trials: int) -> int:
+    """Stretches of each curve in a study of so many trials: the page stays within about 10 MB."""
+    return max(FEWEST, min(POINTS, ON_PAGE // max(trials, 1)))
+
+
+def trial_drawing(
+    one: Replay,
+    noise: NoiseModel,
+    position_unit: str = "rad",
+    extended: bool = True,
+    points: int = POINTS,
+    alone: bool = False,
+) -> Drawing:
     """One trial: measured over simulated, the residual (measured - simulated) beneath, the stimulus as a strip.
 
     The residual is drawn as it is, faint, and smoothed.
@@ -59,91 +59,125 @@ def trial_figure(
         "rad" or "m".
     extended
         False where the extended model is the nominal one.
-    legend
-        False where the page has one.
+    points
+        Stretches of each curve that keep their extremes.
+    alone
+        True for a file of its own.
     """
-    stimulus = [n for n in one.measured.columns if n not in one.outputs]
-    heights = [h for _ in one.outputs for h in (2.0, 1.2)] + [0.42] * len(stimulus)
-    with styled():
-        figure = Figure(figsize=(WIDTH, 0.65 + 0.3 * legend + 0.78 * sum(heights)))
-        total = figure.get_figheight()
-        margins = {"left": 0.165, "right": 0.985, "top": 1 - (0.08 + 0.24 * legend) / total, "bottom": 0.5 / total}
-        grid = figure.add_gridspec(len(heights), 1, height_ratios=heights, hspace=0.16, **margins)
-        rows = [figure.add_subplot(grid[k]) for k in range(len(heights))]
-        for k, name in enumerate(one.outputs):
-            _curves(rows[2 * k], one, name, extended)
-            rows[2 * k].set_ylabel(label(name, position_unit))
-            beneath = rows[2 * k + 1]
-            factor, unit = milli(one.measured.residual(one.nominal, name), unit_of(name, position_unit))
-            band = factor * 2.0 * noise[name].std if name in noise else 0.0
-            beneath.axhspan(-band, band, color=BAND, lw=0)
-            _residuals(beneath, one, name, extended, factor)
-            beneath.set_ylabel(f"residual\n({unit})")
-        for axes, name in zip(rows[2 * len(one.outputs) :], stimulus, strict=True):
-            _strip(axes, one.measured, name)
-            axes.set_ylabel(_short(label(name, position_unit)), rotation=0, ha="center", va="center", fontsize=9.0)
-        for axes in rows:
-            axes.set_xlim(one.measured.time[0], one.measured.time[-1])
-            axes.yaxis.set_label_coords(-0.125, 0.5)
-        for axes in rows[2 * len(one.outputs) :]:
-            axes.yaxis.set_label_coords(-0.145, 0.4)
-        for axes in rows[:-1]:
-            bare(axes)
-        rows[-1].set_xlabel("time (s)")
-        if legend:
-            handles, names = rows[0].get_legend_handles_labels()
-            legend_above(figure, handles[::-1], names[::-1])
-    return figure
+    time = one.measured.time
+    span, top, panels = (float(time[0]), float(time[-1])), 8.0, []
+    for name in one.outputs:
+        panel = Panel(LEFT, top, WIDE - LEFT - 8, 130, span, _limits(one, name, extended))
+        _curves(panel, one, name, extended, points)
+        panel.y_axis(label(name, position_unit))
+        factor, unit = milli(one.measured.residual(one.nominal, name), unit_of(name, position_unit))
+        beneath = _residuals(one, name, extended, factor, points, top + 130 + GAP)
+        band = factor * 2.0 * noise[name].std if name in noise else 0.0
+        beneath.box(span, (-band, band), "band")
+        beneath.parts.insert(0, beneath.parts.pop())
+        beneath.y_axis(f"residual\n({unit})", title_at=26)
+        panels += [panel, beneath]
+        top += 130 + GAP + 76 + GAP
+    for name in (n for n in one.measured.columns if n not in one.outputs):
+        panels.append(_strip(one.measured, name, top, position_unit, points))
+        top += 28 + GAP
+    panels[-1].x_axis("time (s)")
+    drawn = svg(panels, WIDE, top + 28, described(one, position_unit, extended), alone)
+    step = every(len(time), 2 * points)
+    return Drawing(drawn, csv_of(_columns(one, extended), step), f"one sample in {step}" if step > 1 else "")
 
 
-def _short(text: str) -> str:
-    return text.replace("pulse width", "width").replace(" (", "\n(")
+def described(one: Replay, position_unit: str, extended: bool) -> str:
+    """A trial in words: what was measured, and by how much each model misses it."""
+    trial, words = one.measured, []
+    for name in one.outputs:
+        what, unit = label(name, position_unit).partition(" (")[0], unit_of(name, position_unit)
+        low, high = _short(trial[name].min()), _short(trial[name].max())
+        missed = f"nominal model at most {_largest(one, one.nominal, name)} {unit} off"
+        if extended:
+            missed += f", extended model at most {_largest(one, one.extended, name)} {unit}"
+        words.append(f"{what} from {low} to {high} {unit}; {missed}")
+    errors = percent(one.nominal_error) + (f", extended {percent(one.extended_error)}" if extended else "")
+    return f"Trial {trial.name}, {trial.kind}, {trial.duration:.3g} s: {'. '.join(words)}. E nominal {errors}."
 
 
-def _curves(axes: Axes, one: Replay, name: str, extended: bool) -> None:
+def _short(value: float) -> str:
+    return f"{float(value):.3g}"
+
+
+def _largest(one: Replay, simulated: Trial, name: str) -> str:
+    return _short(np.abs(one.measured.residual(simulated, name)).max())
+
+
+def _columns(one: Replay, extended: bool) -> dict[str, np.ndarray]:
+    out = {"time_s": one.measured.time}
+    for name in one.outputs:
+        out[f"{name}_measured"], out[f"{name}_nominal"] = one.measured[name], one.nominal[name]
+        if extended:
+            out[f"{name}_extended"] = one.extended[name]
+    return out | {n: v for n, v in one.measured.columns.items() if n not in one.outputs}
+
+
+def _limits(one: Replay, name: str, extended: bool) -> tuple[float, float]:
+    many = [one.measured[name], one.nominal[name]] + [one.extended[name]] * extended
+    low, high = min(float(v.min()) for v in many), max(float(v.max()) for v in many)
+    room = 0.05 * (high - low) or 1.0
+    return low - room, high + room
+
+
+def _curves(panel: Panel, one: Replay, name: str, extended: bool, points: int) -> None:
     """Simulations behind, the measurement in front."""
     time = one.measured.time
     if extended:
-        axes.plot(*thin_curve(time, one.extended[name]), color=EXTENDED, lw=4.0, label="extended")
-    axes.plot(*thin_curve(time, one.nominal[name]), color=NOMINAL, lw=1.8, label="nominal")
-    axes.plot(*thin_curve(time, one.measured[name]), color=MEASURED, lw=0.9, label="measured")
+        panel.line(*thin_curve(time, one.extended[name], points), "extended", 4.0)
+    panel.line(*thin_curve(time, one.nominal[name], points), "nominal", 1.8)
+    panel.line(*thin_curve(time, one.measured[name], points), "measured", 0.9)
 
 
-def _residuals(axes: Axes, one: Replay, name: str, extended: bool, factor: float) -> None:
+def _residuals(one: Replay, name: str, extended: bool, factor: float, points: int, top: float) -> Panel:
     """Residuals of both models, as they are and smoothed."""
-    models = [(one.nominal, NOMINAL)] + [(one.extended, EXTENDED)] * extended
-    raw = [one.measured.residual(simulated, name) for simulated, _ in models]
-    axes.axhline(0.0, color=FAINT, lw=0.7)
+    time = one.measured.time
+    models = [(one.nominal, "nominal")] + [(one.extended, "extended")] * extended
+    raw = [factor * one.measured.residual(simulated, name) for simulated, _ in models]
+    limit = 1.1 * max(float(np.abs(r).max()) for r in raw) or 1.0
+    panel = Panel(LEFT, top, WIDE - LEFT - 8, 76, (float(time[0]), float(time[-1])), (-limit, limit))
+    panel.zero()
+    few = max(FEWEST, round(0.6 * points))
     for residual, (_, colour) in zip(raw, models, strict=True):
-        axes.plot(*thin_curve(one.measured.time, factor * residual, 220), color=colour, lw=0.6, alpha=0.4)
+        panel.line(*thin_curve(time, residual, few), colour, 0.6, 0.45)
     for residual, (_, colour) in zip(raw, models, strict=True):
-        axes.plot(*thin_curve(*smoothed(one.measured.time, factor * residual), 220), color=colour, lw=1.9)
-    limit = 1.1 * factor * max(float(np.abs(r).max()) for r in raw)
-    axes.set_ylim(-limit or -1.0, limit or 1.0)
-    axes.locator_params(axis="y", nbins=4)
+        panel.line(*thin_curve(*smoothed(time, residual), few), colour, 1.9)
+    return panel
 
 
-def _strip(axes: Axes, trial: Trial, name: str) -> None:
+def _strip(trial: Trial, name: str, top: float, position_unit: str, points: int) -> Panel:
     """The stimulus, thin and without a scale of its own but its end points."""
     time, values = trial.time, trial[name]
+    low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
+    limits = (low, high if high > low else low + 1.0)
+    panel = Panel(LEFT, top, WIDE - LEFT - 8, 28, (float(time[0]), float(time[-1])), limits)
     if name == "stim":
         times = time[values > 0.5]
-        axes.set_yticks([])
         if len(times) <= PULSES:
-            axes.vlines(times, 0.0, 1.0, color=STIMULUS, lw=0.6)
+            edges = np.repeat(times, 3)
+            panel.line(edges, np.tile([0.0, 1.0, np.nan], len(times)), "stimulus", 0.7)
         else:
-            axes.fill_between(*thin_curve(time, values), color=STIMULUS, lw=0)
-        return
-    axes.fill_between(*thin_curve(time, values), step="post", color=STIMULUS, alpha=0.55, lw=0)
-    low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
-    axes.set_ylim(low, high if high > low else low + 1.0)
+            panel.filled(*thin_curve(time, values, points), "stimulus", 0.6)
+        panel.y_axis("pulses", [], 30)
+        return panel
+    panel.filled(*thin_curve(time, values, points), "stimulus", 0.55)
     ends = [low, high] if low < 0.0 < high else [high if high > 0 else low]
-    axes.set_yticks(ends, [f"{v:.0f}" if abs(v) >= 100 else f"{v:.3g}" for v in ends], fontsize=8.5)
+    step = 1.0 if max(map(abs, ends)) >= 100 else 10.0 ** np.floor(np.log10(max(*map(abs, ends), 1e-9)) - 1)
+    panel.y_axis("", [(v, tick_text(v, step)) for v in ends])
+    words = label(name, position_unit).replace("pulse width", "width").replace(" (", "\n(").split("\n")
+    for k, line in enumerate(words):
+        panel.text(2, top + 11 + 12 * k, line)
+    return panel
 
 
-def missing_figure(
-    before: Sequence[Missing], after: Sequence[Missing], name: str, position_unit: str = "rad", legend: bool = True
-) -> Figure:
+def missing_drawing(
+    before: Sequence[Missing], after: Sequence[Missing], name: str, position_unit: str = "rad"
+) -> Drawing:
     """Missing torque (or force) against one variable.
 
     Dots are instants of all trials; the lines join the medians of bins of equal width. The percentage says how much of
@@ -157,22 +191,37 @@ def missing_figure(
         Of the extended model; empty where it is the nominal one.
     name
         Of the variable.
-    position_unit, legend
-        As in `trial_figure`.
+    position_unit
+        As in `trial_drawing`.
     """
-    with styled():
-        figure = Figure(figsize=(PANEL, 2.5 + 0.25 * legend))
-        axes = figure.add_axes((0.19, 0.19, 0.77, 0.72 - 0.08 * legend))
-        factor, unit = milli(np.concatenate([m.value for m in before]), before[0].unit)
-        _against(axes, before, after, name, factor)
-        limit = factor * _limit(before)
-        axes.set(ylim=(-limit, limit), xlabel=label(name, position_unit))
-        axes.set_ylabel(f"missing {before[0].kind} ({unit})")
-        axes.yaxis.set_label_coords(-0.17, 0.5)
-        axes.locator_params(axis="both", nbins=5)
-        if legend:
-            legend_above(figure, *axes.get_legend_handles_labels())
-    return figure
+    x, value = _joined(before, name)
+    factor, unit = milli(value, before[0].unit)
+    limit, room = factor * _limit(before), 0.03 * float(np.ptp(x)) or 1.0
+    panel = Panel(58, 22, NARROW - 66, 150, (float(x.min()) - room, float(x.max()) + room), (-limit, limit))
+    panel.zero()
+    chosen = _spread(x, value)
+    panel.dots(x[chosen], factor * value[chosen], "nominal", opacity=0.6)
+    at, middle = _medians(x, value)
+    panel.line(at, factor * middle, "measured", 1.8)
+    rows: list[tuple[str | float, ...]] = [("instant", a, b) for a, b in zip(x[chosen], value[chosen], strict=True)]
+    rows += [("median_nominal", a, b) for a, b in zip(at, middle, strict=True)]
+    left = ""
+    if after:
+        there, stays = _medians(*_joined(after, name))
+        panel.line(there, factor * stays, "extended", 2.8)
+        rows += [("median_extended", a, b) for a, b in zip(there, stays, strict=True)]
+        left = f"; of the extended model from {_short(stays.min())} to {_short(stays.max())} {before[0].unit}"
+    share_of = explained(value, x)
+    panel.text(NARROW - 8, 14, f"{100 * share_of:.0f} % of its variance", "end")
+    panel.x_axis(label(name, position_unit))
+    panel.y_axis(f"missing {before[0].kind} ({unit})")
+    words = (
+        f"Missing {before[0].kind} against {label(name, position_unit)}: its median in bins runs from "
+        f"{_short(middle.min())} to {_short(middle.max())} {before[0].unit}{left}. "
+        f"{100 * share_of:.0f} % of its variance is a function of this alone."
+    )
+    head = ("what", label(name, position_unit).replace(",", ""), f"missing {before[0].kind} ({before[0].unit})")
+    return Drawing(svg([panel], NARROW, 212, words), rows_csv(head, rows))
 
 
 def share(before: Sequence[Missing], name: str) -> float:
@@ -191,18 +240,6 @@ def _limit(many: Sequence[Missing]) -> float:
     return max(1.15 * float(np.quantile(values, 0.995)), 1e-12)
 
 
-def _against(axes: Axes, before: Sequence[Missing], after: Sequence[Missing], name: str, factor: float) -> None:
-    x, value = _joined(before, name)
-    axes.axhline(0.0, color=FAINT, lw=0.7)
-    chosen = _spread(x, value)
-    _dots(axes, x[chosen], factor * value[chosen])
-    axes.plot(*_medians(x, factor * value), color=MEASURED, lw=1.8, marker="o", ms=3.4, label="nominal")
-    if after:
-        at, left = _joined(after, name)
-        axes.plot(*_medians(at, factor * left), color=EXTENDED, lw=2.6, label="extended")
-    axes.set_title(f"{100 * explained(value, x):.0f} % of its variance", fontsize=9.5, loc="right", pad=3)
-
-
 def _spread(x: np.ndarray, value: np.ndarray) -> np.ndarray:
     """Instants at about equal distances along the curve in a panel: rest is drawn once, motion in full."""
     steps = np.abs(np.diff(x)) / max(float(np.ptp(x)), 1e-300) + np.abs(np.diff(value)) / max(
@@ -212,32 +249,22 @@ def _spread(x: np.ndarray, value: np.ndarray) -> np.ndarray:
     return np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], min(DOTS, len(x)))))
 
 
-def _dots(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
-    """Dots as one path of round pen-downs: a tenth of the size of single markers."""
-    ends = np.stack([x, x + 1e-6 * max(float(np.ptp(x)), 1e-12)], axis=1)
-    vertices = np.stack([ends, np.stack([y, y], axis=1)], axis=2).reshape(-1, 2)
-    path = MplPath(vertices, np.tile([MplPath.MOVETO, MplPath.LINETO], len(x)))
-    path.should_simplify = False
-    pen = {"lw": 2.4, "edgecolor": NOMINAL, "alpha": 0.6, "capstyle": "round"}
-    axes.add_patch(PathPatch(path, fill=False, **pen))
-
-
 def _medians(x: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     groups = binned(value, x)
     return np.array([at for at, _ in groups]), np.array([float(np.median(v)) for _, v in groups])
 
 
-def stimulus_figure(trial: Trial, position_unit: str = "rad") -> Figure:
+def stimulus_drawing(trial: Trial, position_unit: str = "rad") -> Drawing:
     """The inputs of a trial that is still to be run."""
-    names = list(trial.columns)
-    with styled():
-        figure = Figure(figsize=(WIDTH, 0.6 + 1.0 * len(names)))
-        for k, name in enumerate(names):
-            axes = figure.add_subplot(len(names), 1, k + 1)
-            _strip(axes, trial, name)
-            axes.set(ylabel=label(name, position_unit), xlim=(trial.time[0], trial.time[-1]), xlabel="time (s)")
-        figure.subplots_adjust(left=0.16, right=0.985, bottom=0.48 / figure.get_figheight(), top=0.96)
-    return figure
+    panels = [_strip(trial, name, 8 + 38 * k, position_unit, POINTS) for k, name in enumerate(trial.columns)]
+    panels[-1].x_axis("time (s)")
+    ranges = ", ".join(
+        f"{label(n, position_unit)} from {_short(v.min())} to {_short(v.max())}" for n, v in trial.columns.items()
+    )
+    drawn = svg(panels, WIDE, 8 + 38 * len(panels) + 28, f"Inputs of the next trial, {trial.duration:.3g} s: {ranges}.")
+    step = every(len(trial))
+    columns = {"time_s": trial.time, **trial.columns}
+    return Drawing(drawn, csv_of(columns, step), f"one sample in {step}" if step > 1 else "")
 
 
 def by_kind(many: Sequence[Missing]) -> Mapping[str, list[int]]:

@@ -5,70 +5,68 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.models.catalogue import Catalogue
-from fes_pin.view.style import BAND, FAINT, INK, PANEL, STAGES, styled
+from fes_pin.view.chart import Panel, svg
+from fes_pin.view.drawing import Drawing, rows_csv
+from fes_pin.view.style import STAGES
 
 RIVALS = 7
 """Rivals shown of each cause."""
 LEAST = 0.3
 """Where the logarithmic axis of shortfalls begins."""
+NAMES, WIDE, ROW = 176.0, 420.0, 24.0
+"""Room for names, width of a figure, height of a row."""
 
 
-def gain_figure(causes: Sequence[Cause]) -> Figure:
+def gain_drawing(causes: Sequence[Cause]) -> Drawing:
     """Held-out gain of each cause: a bar, and its 95 % interval."""
-    figure, axes = _rows_figure(len(causes))
-    with styled():
-        for k, cause in enumerate(causes):
-            held, colour = cause.gain_held_out, STAGES.get(cause.stage, INK)
-            axes.barh(k, held.percent, 0.62, color=colour, alpha=0.35, lw=0)
-            axes.plot([held.low, held.high], [k, k], color=colour, lw=2.6)
-            axes.plot([held.percent], [k], "o", color=colour, ms=5)
-        _rows(axes, [c.name for c in causes], [STAGES.get(c.stage, INK) for c in causes])
-        low = min([0.0, *(c.gain_held_out.low for c in causes)])
-        high = max([100.0, *(c.gain_held_out.high for c in causes)])
-        axes.set(xlim=(1.03 * low, 1.03 * high), xlabel="held-out gain (%)")
-        axes.axvline(0.0, color=FAINT, lw=0.7)
-    return figure
+    low = min([0.0, *(c.gain_held_out.low for c in causes)])
+    high = max([100.0, *(c.gain_held_out.high for c in causes)])
+    panel = _rows([c.name for c in causes], [c.stage for c in causes], (1.03 * low, 1.03 * high))
+    rows: list[tuple[str | float, ...]] = []
+    for k, cause in enumerate(causes):
+        held, colour = cause.gain_held_out, _stage(cause.stage)
+        panel.box((0.0, held.percent), (-k - 0.3, -k + 0.3), colour, 0.35)
+        panel.line([held.low, held.high], [-k, -k], colour, 2.6)
+        panel.dot(held.percent, -k, colour)
+        rows.append((cause.name, held.percent, held.low, held.high))
+    panel.x_axis("gain on held-out trials (%)")
+    words = "; ".join(f"{n} {p:.0f} %, interval {a:.0f} to {b:.0f}" for n, p, a, b in rows)
+    return _drawing(panel, len(causes), f"Gain of each cause on held-out trials: {words}.",
+                    rows_csv(("cause", "gain_percent", "low", "high"), rows))  # fmt: skip
 
 
-def rivals_figure(diagnosis: Diagnosis, cause: Cause) -> Figure:
+def rivals_drawing(diagnosis: Diagnosis, cause: Cause) -> Drawing:
     """The rivals of one cause by their shortfall, on a logarithmic axis.
 
     The shortfall is by how much twice the log-likelihood of the whole fit falls with the rival in the cause's place.
     The grey band is what chance alone makes; a hollow dot is a rival that is not told apart.
     """
     rivals = shown_rivals(diagnosis, cause)
-    figure, axes = _rows_figure(len(rivals))
-    with styled():
-        values = np.maximum([v for _, v in rivals], LEAST)
-        names = [n for n, _ in rivals]
-        colours = [_colour(diagnosis.catalogue, n) for n in names]
-        axes.set_xscale("log")
-        axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}" if x < 2e3 else f"{x:.0e}".replace("e+0", "e"))
-        axes.minorticks_off()
-        axes.axvspan(LEAST, SEPARABLE, color=BAND, lw=0)
-        for k, (value, colour) in enumerate(zip(values, colours, strict=True)):
-            near = names[k] in cause.equivalents
-            axes.plot([LEAST, value], [k, k], color=colour, lw=1.2, alpha=0.6)
-            axes.plot([value], [k], "o", color=colour, ms=6, mfc="none" if near else colour, mew=1.6)
-        _rows(axes, names, colours)
-        axes.set(xlim=(LEAST, max(30.0, 2.5 * float(values.max()))), xlabel="shortfall, 2 log-lik. (1)")
-    return figure
-
-
-def _rows_figure(count: int) -> tuple[Figure, Axes]:
-    """A figure with room for rows of horizontal bars."""
-    with styled():
-        height = 0.3 * count + 0.12
-        figure = Figure(figsize=(PANEL, height + 0.65))
-        total = figure.get_figheight()
-        return figure, figure.add_axes((0.45, 0.58 / total, 0.52, height / total))
+    values = np.maximum([v for _, v in rivals], LEAST)
+    stages = [_stage_of(diagnosis.catalogue, n) for n, _ in rivals]
+    high = max(30.0, 2.5 * float(values.max()))
+    panel = _rows([n for n, _ in rivals], stages, (LEAST, high), True)
+    panel.box((LEAST, SEPARABLE), panel.y, "band")
+    for k, ((name, _), value, stage) in enumerate(zip(rivals, values, stages, strict=True)):
+        panel.line([LEAST, value], [-k, -k], _stage(stage), 1.2, 0.6)
+        panel.dot(float(value), -k, _stage(stage), hollow=name in cause.equivalents)
+    powers = [10.0**p for p in range(int(np.ceil(np.log10(LEAST))), int(np.log10(high)) + 1)]
+    shown = powers[:: max(1, -(-len(powers) // 5))]
+    panel.x_axis("loss of twice the log-likelihood", [(p, f"{p:g}" if p < 1e4 else f"{p:.0e}".replace("e+0", "e"))
+                                                       for p in shown])  # fmt: skip
+    words = "; ".join(f"{n} {v:.3g}{', not told apart' if n in cause.equivalents else ''}" for n, v in rivals)
+    return _drawing(
+        panel,
+        len(rivals),
+        f"Rivals of {cause.name}, by how much twice the log-likelihood falls with each in its place: {words}. "
+        f"Chance alone makes {SEPARABLE:.2g}.",
+        rows_csv(("rival", "loss_of_twice_the_log_likelihood"), rivals),
+    )
 
 
 def shown_rivals(diagnosis: Diagnosis, cause: Cause) -> list[tuple[str, float]]:
@@ -82,17 +80,25 @@ def shown_rivals(diagnosis: Diagnosis, cause: Cause) -> list[tuple[str, float]]:
     return sorted(found.items(), key=lambda pair: pair[1])[:RIVALS]
 
 
-def _colour(catalogue: Catalogue, names: str) -> str:
-    return STAGES.get(str(catalogue.effect(names.split(" + ", maxsplit=1)[0]).stage), INK)
+def _rows(names: Sequence[str], stages: Sequence[str], x: tuple[float, float], logarithmic: bool = False) -> Panel:
+    """A panel with a row for each name, in the colour of its stage."""
+    panel = Panel(NAMES, 8, WIDE - NAMES - 14, ROW * len(names), x, (0.5 - len(names), 0.5), logarithmic)
+    for k, (name, stage) in enumerate(zip(names, stages, strict=True)):
+        panel.text(NAMES - 8, 8 + ROW * (k + 0.5) + 4, _cut(name), "end", _stage(stage), "name")
+    return panel
 
 
-def _rows(axes: Axes, names: Sequence[str], colours: Sequence[str]) -> None:
-    axes.set_yticks(range(len(names)), [_cut(n) for n in names])
-    for text, colour in zip(axes.get_yticklabels(), colours, strict=True):
-        text.set_color(colour)
-    axes.set_ylim(len(names) - 0.45, -0.55)
-    axes.tick_params(axis="y", length=0)
+def _drawing(panel: Panel, rows: int, words: str, csv: str) -> Drawing:
+    return Drawing(svg([panel], WIDE, 8 + ROW * rows + 40, words), csv)
 
 
-def _cut(name: str, limit: int = 24) -> str:
+def _stage(stage: str) -> str:
+    return f"stage-{stage}" if stage in STAGES else "ink"
+
+
+def _stage_of(catalogue: Catalogue, names: str) -> str:
+    return str(catalogue.effect(names.split(" + ", maxsplit=1)[0]).stage)
+
+
+def _cut(name: str, limit: int = 27) -> str:
     return name if len(name) <= limit else name[: limit - 1] + "\N{HORIZONTAL ELLIPSIS}"

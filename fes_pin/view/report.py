@@ -6,10 +6,11 @@ from collections import Counter
 from pathlib import Path
 
 from fes_pin.data.files import write_text
+from fes_pin.diagnose.errors_ahead import Ahead
 from fes_pin.diagnose.record import NEXT_FILE
 from fes_pin.diagnose.replay import replay
 from fes_pin.diagnose.result import Diagnosis
-from fes_pin.diagnose.text import left_out_text
+from fes_pin.diagnose.text import left_out_text, percent, probability
 from fes_pin.models.describe import sentence
 from fes_pin.models.outside import origin
 from fes_pin.view.page import (
@@ -17,19 +18,18 @@ from fes_pin.view.page import (
     Markup,
     element,
     figure,
+    folded,
     joined,
     page,
-    percent,
-    probability,
     section,
     table,
     unit_text,
 )
-from fes_pin.view.plots import stimulus_figure
+from fes_pin.view.plots import stimulus_drawing
 from fes_pin.view.report_causes import causes_section, stage_mark, value_and_interval
 from fes_pin.view.report_trials import missing_section, position_unit, trials_section
-from fes_pin.view.style import styled, unit_of
-from fes_pin.view.svg import inline_svg
+from fes_pin.view.style import unit_of
+from fes_pin.view.words import answers, title
 
 
 def report(diagnosis: Diagnosis, path: str | Path) -> None:
@@ -44,15 +44,11 @@ def report(diagnosis: Diagnosis, path: str | Path) -> None:
 
 
 def report_html(diagnosis: Diagnosis) -> str:
-    """The report of a diagnosis as one HTML page that needs nothing else: no network, no script."""
-    with styled():
-        return _html(diagnosis)
-
-
-def _html(diagnosis: Diagnosis) -> str:
+    """The report of a diagnosis as one HTML page that needs nothing else: no network."""
     replays = replay(diagnosis)
     parts = [
         _head(diagnosis),
+        section("Errors", *_errors(diagnosis)),
         section("Causes", *causes_section(diagnosis)),
         section("What is left", *_left(diagnosis)),
         section("Next experiment", *(_next(diagnosis) if diagnosis.causes else [])),
@@ -60,6 +56,7 @@ def _html(diagnosis: Diagnosis) -> str:
         section("Trials", *trials_section(diagnosis, replays)),
         section("Parameters and noise", *_parameters(diagnosis)),
         section("The model, to be used", *_use(diagnosis)),
+        section("Where this comes from", *_provenance(diagnosis)),
         element("footer", "Made by fes-pin. Residual = measured - simulated. Intervals are 95 %. SI units."),
     ]
     return page(f"{diagnosis.study.name} - diagnosis", joined([p for p in parts if p.text]))
@@ -69,38 +66,78 @@ def _head(diagnosis: Diagnosis) -> Markup:
     study = diagnosis.study
     kinds = " and ".join(f"{n} {kind}" for kind, n in Counter(t.kind for t in study.trials).items())
     seconds = sum(t.duration for t in study.trials)
-    words = diagnosis.headline()
     partly = " partly" if diagnosis.causes and diagnosis.remainder.unexplained else ""
     return element(
         "header",
         element("p", f"{study.name} · rig {study.rig} · {kinds} trials, {seconds:.4g} s", class_="eyebrow"),
-        element("h1", words[0].upper() + words[1:], class_=f"verdict {diagnosis.verdict}{partly}"),
-        _facts(diagnosis),
+        element("h1", title(diagnosis), class_=f"verdict {diagnosis.verdict}{partly}"),
+        answers(diagnosis),
         *(element("p", element("strong", "Warning: "), f"{words}.") for words in diagnosis.warnings),
     )
 
 
-def _facts(diagnosis: Diagnosis) -> Markup:
-    before, after = diagnosis.nominal_error, diagnosis.extended_error
-    left = diagnosis.remainder
-    rows: list[tuple[str, str, str]] = []
-    for k, where in enumerate(("on the fitted trials", "held out")):
-        if before[k] is not None and after[k] is not None:
-            shown = f"{percent(before[k])} → {percent(after[k])}" if diagnosis.causes else percent(before[k])
-            by = diagnosis.held_out_by if k else "nominal → extended" if diagnosis.causes else "nominal"
-            rows.append((f"error E, {where}", shown, by))
-    rows.append(("noise floor of E", percent(diagnosis.ceiling_percent), "no model can be better"))
+E_WORDS = (
+    "E is the squared error of a model, in percent of the measurement's squares about its mean (equation 2 of the "
+    "paper): 0 % is a perfect model, 100 % no better than the mean."
+)
+
+
+def _errors(diagnosis: Diagnosis) -> list[Markup]:
+    """Errors of both models, in sample and held out; of a driven rig over three spans of time."""
+    both, rows = bool(diagnosis.causes), _error_rows(diagnosis)
+    head = ["trials", "prediction", "E nominal"] + ["E extended"] * both
+    out = [element("p", E_WORDS), table(head, [r[: len(head)] for r in rows], (2, 3))]
+    floor = f"The noise of the readings alone is {percent(diagnosis.ceiling_percent)} of E: no model can be better."
+    notes = [floor, f"Held out: {diagnosis.held_out_by}."]
+    ahead = diagnosis.ahead
+    if ahead is not None:
+        spans = (
+            "One sample ahead any model is right where sampling is fast; free, a rig whose effort answers what is read "
+            "drifts away with the best of models. What counts is the horizon between."
+        )
+        notes.append(spans)
+        if ahead.extended.free is None:
+            notes.append("This rig falls over by itself: its free error is meaningless, and is not given.")
+        unit = diagnosis.model.rig.units().get("effort", "")
+        notes += [
+            f"A random {r.name} of {r.std:.3g} {unit} acts all the time: {100.0 * r.share:.2g} % of what drives the "
+            f"rig, changing within {r.time_constant_s:.2g} s."
+            for r in diagnosis.random
+        ]
     if diagnosis.left_out:
         count = sum(len(k) for columns in diagnosis.left_out.values() for k in columns.values())
-        rows.append(
-            ("left out as spikes", f"{count} samples", left_out_text(diagnosis.left_out, diagnosis.study.trials))
+        notes.append(
+            f"{count} samples were left out as spikes: {left_out_text(diagnosis.left_out, diagnosis.study.trials)}."
         )
-    state = "something" if left.unexplained else "nothing"
-    rows.append(("left unexplained", state, probability(left.p_value)))
     for where, names in diagnosis.catalogue.origins().items():
-        rows.append(("looked for as well", ", ".join(names), f"code of {Path(where).name}"))
-    cells = [element("div", element("dt", t), element("dd", v, element("small", note))) for t, v, note in rows]
-    return element("dl", joined(cells), class_="facts")
+        notes.append(f"Looked for as well: {', '.join(names)}, code of {Path(where).name}.")
+    return [*out, *(element("p", words, class_="soft") for words in notes)]
+
+
+def _error_rows(diagnosis: Diagnosis) -> list[list[Content]]:
+    ahead = diagnosis.ahead
+    if ahead is None:
+        pairs = zip(("fitted", "held out"), diagnosis.nominal_error, diagnosis.extended_error, strict=True)
+        return [[where, "free, from the inputs", percent(b), percent(a)] for where, b, a in pairs if b is not None]
+    rows: list[list[Content]] = []
+    for where, before, after in (
+        ("fitted", ahead.nominal, ahead.extended),
+        ("held out", ahead.nominal_held_out, ahead.extended_held_out),
+    ):
+        if before is not None and after is not None:
+            rows += [[where, what, old, new] for what, old, new in _spans(ahead.horizon_s, before, after)]
+    return rows
+
+
+def _spans(horizon_s: float, before: Ahead, after: Ahead) -> list[tuple[str, str, str]]:
+    def free(value: float | None) -> str:
+        return "meaningless: it falls" if value is None else percent(value)
+
+    return [
+        ("one sample ahead", percent(before.one_step), percent(after.one_step)),
+        (f"{horizon_s:g} s ahead", percent(before.horizon), percent(after.horizon)),
+        ("free, from the inputs", free(before.free), free(after.free)),
+    ]
 
 
 def _left(diagnosis: Diagnosis) -> list[Markup]:
@@ -116,7 +153,7 @@ def _left(diagnosis: Diagnosis) -> list[Markup]:
     )
     out = [element("p", told)]
     if diagnosis.absorbed:
-        why = "what the nominal parameters take up, or no input of these trials drives"
+        why = "what the nominal parameters take up, or no input of these trials drives."
         out.append(element("p", f"Not testable here, which is not the same as absent: {why}"))
         unseen = [diagnosis.catalogue.effect(n) for n in diagnosis.absorbed]
         rows: list[list[Content]] = [[element("code", e.name), stage_mark(str(e.stage)), sentence(e)] for e in unseen]
@@ -138,8 +175,8 @@ def _next(diagnosis: Diagnosis) -> list[Markup]:
         element("p", f"Its kind: {plan.trial.kind}{conditions}; its inputs are in ", element("code", NEXT_FILE), ".")
     )
     if plan.trial.columns:
-        drawn = inline_svg(stimulus_figure(plan.trial, position_unit(diagnosis)), "Inputs of the next trial")
-        out.append(figure(drawn, class_="narrow"))
+        drawn = stimulus_drawing(plan.trial, position_unit(diagnosis))
+        out.append(figure(drawn, "Inputs of the next trial.", "narrow", "next_trial"))
     return out
 
 
@@ -156,7 +193,7 @@ def _parameters(diagnosis: Diagnosis) -> list[Markup]:
     head = ("parameter", "unit", "start", "nominal", "95 % interval", "extended", "95 % interval")
     unit = position_unit(diagnosis)
     noise: list[list[Content]] = [
-        [element("code", n), f"{m.std:.3g}", unit_of(n, unit), str(len(m.ar)) if m.ar else "white"]
+        [element("code", n), f"{m.std:.3g}", unit_of(n, unit) or "-", str(len(m.ar)) if m.ar else "white"]
         for n, m in diagnosis.extended.noise.items()
     ]
     return [
@@ -186,3 +223,19 @@ def _use(diagnosis: Diagnosis) -> list[Markup]:
         element("pre", "\n".join(lines)),
         element("pre", python),
     ]
+
+
+def _provenance(diagnosis: Diagnosis) -> list[Markup]:
+    made = diagnosis.provenance
+    if made is None:
+        return []
+    rows: list[list[Content]] = [["made", made.date], ["seed", str(made.seed)]]
+    if made.command:
+        rows.append(["command", element("code", made.command)])
+    rows.append(["versions", ", ".join(f"{n} {v}" for n, v in made.versions.items())])
+    files: list[list[Content]] = [[element("code", n), element("code", digest)] for n, digest in made.inputs.items()]
+    out = [element("div", table(("what", "value"), rows, prose=True), class_="provenance")]
+    if files:
+        hashes = element("div", table(("file of the study", "SHA-256"), files, prose=True), class_="provenance")
+        out.append(folded(f"Hashes of the {len(files)} files that were read", hashes))
+    return out

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.result import EACH_TRIAL, Diagnosis
+from fes_pin.diagnose.text import probability
 from fes_pin.identify.fit import CONFIDENCE_95, Fit
 from fes_pin.models.describe import equation, remark, sentence
-from fes_pin.view.page import Content, Markup, element, figure, probability, rounded, table, unit_text
-from fes_pin.view.ranking import gain_figure, rivals_figure, shown_rivals
-from fes_pin.view.svg import inline_svg
+from fes_pin.view.mathml import equations
+from fes_pin.view.page import Content, Markup, element, figure, rounded, table, unit_text
+from fes_pin.view.ranking import gain_drawing, rivals_drawing, shown_rivals
 
 
 def stage_mark(stage: str) -> Markup:
@@ -30,13 +31,12 @@ def causes_section(diagnosis: Diagnosis) -> list[Markup]:
         ]
         for c in diagnosis.causes
     ]
-    shown = inline_svg(gain_figure(diagnosis.causes), "Held-out gain of each cause")
     caption = (
         "Gain on held-out trials with its 95 % interval: percent of the nominal model's squared error above noise."
     )
     return [
         table(("cause", "stage", "held-out gain [95 %]", "p", "cannot be told from"), rows, (2, 3)),
-        figure(shown, caption, "narrow"),
+        figure(gain_drawing(diagnosis.causes), caption, "narrow", "gains"),
         *(_cause(diagnosis, c) for c in diagnosis.causes),
     ]
 
@@ -44,12 +44,11 @@ def causes_section(diagnosis: Diagnosis) -> list[Markup]:
 def _rivals(diagnosis: Diagnosis, cause: Cause) -> Markup:
     if not shown_rivals(diagnosis, cause):
         return Markup("")
-    shown = inline_svg(rivals_figure(diagnosis, cause), f"Rivals of {cause.name} by their shortfall")
     caption = (
         f"Rivals in place of {cause.name}: by how much twice the log-likelihood of the whole fit falls. Hollow: not "
         "told apart; the grey band is what chance alone makes. Colours are the stages of the signal path."
     )
-    return figure(shown, caption, "narrow")
+    return figure(rivals_drawing(diagnosis, cause), caption, "narrow", f"rivals_{cause.name}")
 
 
 def _gain_text(cause: Cause) -> str:
@@ -74,7 +73,7 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
             "div",
             element("h3", element("code", cause.name), " ", stage_mark(cause.stage)),
             element("p", sentence(kind)),
-            element("pre", equation(kind)),
+            equations(equation(kind)),
             _estimates(diagnosis.extended, cause),
             element("p", gain, " ", told, *_own_note(diagnosis, cause)),
             element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}", class_="soft"),

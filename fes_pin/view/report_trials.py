@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fes_pin.data.trial import Trial
 from fes_pin.diagnose.replay import Replay
 from fes_pin.diagnose.result import Diagnosis
-from fes_pin.view.missing import missing_input
-from fes_pin.view.page import Markup, element, figure, joined, key, percent, table
-from fes_pin.view.plots import by_kind, missing_figure, share, trial_figure
-from fes_pin.view.svg import inline_svg
+from fes_pin.diagnose.text import percent
+from fes_pin.models.model import Model
+from fes_pin.models.tracking import can_track
+from fes_pin.view.missing import Missing, missing_along, missing_input
+from fes_pin.view.page import Content, Markup, element, figure, folded, joined, key, table
+from fes_pin.view.plots import by_kind, missing_drawing, points_of, share, trial_drawing
 
-DRAWN = 8
-"""Trials that are drawn; the table has them all."""
+OPEN = 4
+"""Trials that are drawn at once, those that the nominal model misses most; the others are folded."""
+WORSE = 0.01
+"""Share by which a trial's error must grow to count as worse: less is the noise of one trial's fit."""
 
 
 def position_unit(diagnosis: Diagnosis) -> str:
@@ -22,23 +27,30 @@ def position_unit(diagnosis: Diagnosis) -> str:
 
 def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Markup]:
     """Missing torque and force against every variable."""
-    before = [missing_input(diagnosis.nominal.model, r.measured, r.nominal) for r in replays]
-    after = [missing_input(diagnosis.model, r.measured, r.extended) for r in replays] if diagnosis.causes else []
+    before = _missing(diagnosis, diagnosis.nominal.model, [r.nominal for r in replays], replays)
+    after = _missing(diagnosis, diagnosis.model, [r.extended for r in replays], replays) if diagnosis.causes else []
     unit = position_unit(diagnosis)
+    along = diagnosis.ahead is not None and can_track(diagnosis.model)
+    how = (
+        "the effort of a stiff servo that keeps the model on the measured motion. No free simulation takes part, for "
+        "this rig's would run away"
+        if along
+        else "the smoothed residual, taken through the inertia, damping and stiffness of the rig"
+    )
+    text = (
+        f"What would have to be added to the model's torque (or force) at each instant to make it right: {how}. A "
+        "cause shows as a function of what it depends on. Most telling variable first: the percentage is the share of "
+        "the variance that is a function of that variable alone."
+    )
+    extended = [("extended", "extended, median")] if after else []
     out = [
-        element(
-            "p",
-            "What would have to be added to the model's torque (or force) at each instant to make it right: the "
-            "smoothed residual, taken through the inertia, damping and stiffness of the rig. A cause shows as a "
-            "function of what it depends on. Most telling variable first: the percentage is the share of the variance "
-            "that is a function of that variable alone.",
-        ),
-        key(("nominal", "nominal, instants"), ("measured", "nominal, median"), *_if(bool(after), "extended, median")),
+        element("p", text),
+        key(("nominal", "nominal, instants"), ("measured", "nominal, median"), *extended),
     ]
     for kind, chosen in by_kind(before).items():
         first, second = [before[k] for k in chosen], [after[k] for k in chosen if after]
         drawn = [
-            figure(inline_svg(missing_figure(first, second, n, unit, False), f"Missing {kind} against {n}"))
+            figure(missing_drawing(first, second, n, unit), file=f"missing_{kind}_against_{n}")
             for n in sorted(first[0].against, key=lambda n: -share(first, n))
         ]
         count = f"{len(chosen)} trial{'s' if len(chosen) > 1 else ''}"
@@ -47,37 +59,64 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
     return out
 
 
-def _if(there: bool, words: str) -> list[tuple[str, str]]:
-    return [("extended", words)] if there else []
+def _missing(
+    diagnosis: Diagnosis, model: Model, simulated: Sequence[Trial], replays: Sequence[Replay]
+) -> list[Missing]:
+    if diagnosis.ahead is not None and can_track(model):
+        return [missing_along(model, r.measured) for r in replays]
+    return [missing_input(model, r.measured, one) for r, one in zip(replays, simulated, strict=True)]
 
 
 def trials_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Markup]:
-    """The trials: figures of those with the largest errors, and a table of all."""
+    """The trials: a table and a figure of each, those with small errors folded."""
     extended = bool(diagnosis.causes)
-    noise, unit = diagnosis.extended.noise, position_unit(diagnosis)
-    drawn = []
-    for k in _chosen(replays):
+    noise, unit, points = diagnosis.extended.noise, position_unit(diagnosis), points_of(len(replays))
+
+    def drawn(k: int) -> Markup:
         one = replays[k]
-        plot = trial_figure(one, noise, unit, extended, legend=False)
-        svg = inline_svg(plot, f"Trial {k + 1}: measured, simulated and residual")
-        drawn.append(figure(svg, _trial_caption(one, extended)))
-    left_out = f" Drawn are the {len(drawn)} of {len(replays)} trials that the nominal model misses most."
-    text = (
-        "Residual = measured - simulated, as it is (faint) and smoothed; its band is twice the standard deviation of "
-        f"the noise.{left_out if len(drawn) < len(replays) else ''}"
+        made = trial_drawing(one, noise, unit, extended, points)
+        return figure(made, _trial_caption(one, extended), file=f"trial_{k + 1}")
+
+    worst = set(sorted(range(len(replays)), key=lambda k: -replays[k].nominal_error)[:OPEN])
+    others = [k for k in range(len(replays)) if k not in worst]
+    ahead = (
+        f"Simulated: {diagnosis.ahead.horizon_s:g} s ahead of what was measured, for the effort answers the reading. "
+        if diagnosis.ahead
+        else ""
     )
-    return [
+    text = (
+        f"{ahead}Residual = measured - simulated, as it is (faint) and smoothed; its band is twice the standard "
+        "deviation of the noise."
+    )
+    names = [("measured", "measured"), ("nominal", "nominal model, fitted")]
+    out = [
         element("p", text, class_="soft"),
-        key(("measured", "measured"), ("nominal", "nominal model, fitted"), *_if(extended, "extended model")),
-        element("div", joined(drawn), class_="grid"),
-        _trial_table(replays, extended),
+        *_worse_note(replays, extended),
+        key(*names, *([("extended", "extended model")] if extended else [])),
+        element("div", joined([drawn(k) for k in sorted(worst)]), class_="grid"),
     ]
+    if others:
+        few = f"the other {len(others)} trials, which" if len(others) > 1 else "the other trial, which"
+        rest = element("div", joined([drawn(k) for k in others]), class_="grid")
+        out.append(folded(f"Show {few} the nominal model misses less", rest))
+    return [*out, _trial_table(replays, extended)]
 
 
-def _chosen(replays: Sequence[Replay]) -> list[int]:
-    """Which trials are drawn: those with the largest error, in the order of the study."""
-    worst = sorted(range(len(replays)), key=lambda k: -replays[k].nominal_error)[:DRAWN]
-    return sorted(worst)
+def got_worse(one: Replay) -> bool:
+    """True if the extended model misses a trial by more than the nominal one, and by more than noise makes it."""
+    return one.extended_error > (1.0 + WORSE) * one.nominal_error
+
+
+def _worse_note(replays: Sequence[Replay], extended: bool) -> list[Markup]:
+    worse = [r.measured.name for r in replays if extended and got_worse(r)]
+    if not worse:
+        return []
+    which = f"{len(worse)} of {len(replays)} trials" if len(worse) > 1 else "One trial"
+    return [element("p", _flag(), f" {which} got worse with the extended model: {', '.join(worse)}.")]
+
+
+def _flag() -> Markup:
+    return element("strong", "worse", class_="worse")
 
 
 def _conditions(one: Replay) -> str:
@@ -89,14 +128,17 @@ def _conditions(one: Replay) -> str:
 def _trial_caption(one: Replay, extended: bool) -> Markup:
     after = f" → {percent(one.extended_error)}" if extended else ""
     name = element("strong", one.measured.name)
-    return name + element("span", f" · {_conditions(one)} · E {percent(one.nominal_error)}{after}")
+    said = element("span", f" · {_conditions(one)} · E {percent(one.nominal_error)}{after} ")
+    return name + said + (_flag() if extended and got_worse(one) else Markup(""))
 
 
 def _trial_table(replays: Sequence[Replay], extended: bool) -> Markup:
     head = ["trial", "conditions", "duration (s)", "E nominal"] + ["E extended"] * extended
-    rows = [
-        [r.measured.name, _conditions(r), f"{r.measured.duration:.4g}", percent(r.nominal_error)]
-        + [percent(r.extended_error)] * extended
-        for r in replays
-    ]
+    rows: list[list[Content]] = []
+    for r in replays:
+        row: list[Content] = [r.measured.name, _conditions(r), f"{r.measured.duration:.4g}", percent(r.nominal_error)]
+        if extended:
+            shown = element("span", percent(r.extended_error), " ")
+            row.append(shown + (_flag() if got_worse(r) else Markup("")))
+        rows.append(row)
     return table(head, rows, (2, 3, 4))

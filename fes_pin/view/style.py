@@ -1,4 +1,4 @@
-"""How figures look: colours by stage and by role, units of columns, axes.
+"""How figures look: colours by stage and by role, units of columns.
 
 The colours are Okabe and Ito's, which colour-blind readers tell apart (Color Universal Design, 2008). Each has a name,
 under which a page may give it another shade on a dark ground.
@@ -6,15 +6,7 @@ under which a page may give it another shade on a dark ground.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from contextvars import ContextVar
-from typing import Any
-
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 STAGES = {"nerve": "#0072b2", "muscle": "#d55e00", "joint": "#009e73", "rig": "#b8860b", "sensor": "#b2558e"}
 """Colour of each stage of the signal path; two are darkened, to be read as text on white."""
@@ -37,59 +29,9 @@ LABELS = {
     "force_n": ("force", "N"),
     "pulse_width_us": ("pulse width", "us"),
     "stim": ("pulses", ""),
-    "activation": ("activation", "1"),
+    "activation": ("activation", ""),
     "time_s": ("time", "s"),
 }
-WIDTH = 5.4
-"""Width of a figure, inches; a report shows one or two beside each other."""
-
-PANEL = 4.3
-"""Width of a panel of the missing torque, inches."""
-
-_RC: Mapping[str, Any] = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"],
-    "font.size": 10.5,
-    "axes.labelsize": 10.5,
-    "xtick.labelsize": 9.5,
-    "ytick.labelsize": 9.5,
-    "legend.fontsize": 9.5,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 5),
-    "axes.formatter.use_mathtext": False,
-    "axes.unicode_minus": True,
-    "lines.solid_capstyle": "round",
-    "legend.frameon": False,
-    "path.simplify": True,
-    "path.simplify_threshold": 0.2,
-    "axes.titley": 1.0,
-    "svg.fonttype": "none",
-}
-_STYLED = ContextVar("_STYLED", default=False)
-
-
-@contextmanager
-def styled() -> Iterator[None]:
-    """The settings that every figure is drawn with, whatever the user's own are; many figures may share one call."""
-    if _STYLED.get():
-        yield
-        return
-    token = _STYLED.set(True)
-    try:
-        with mpl.rc_context():
-            mpl.rcdefaults()
-            mpl.rcParams.update(_RC)  # type: ignore[arg-type]
-            yield
-    finally:
-        _STYLED.reset(token)
 
 
 def label(column: str, position_unit: str = "rad") -> str:
@@ -139,17 +81,6 @@ def thin_curve(time: np.ndarray, values: np.ndarray, points: int = 350) -> tuple
     extremes = begins + stretches.argmin(axis=1), begins + stretches.argmax(axis=1)
     chosen = np.unique(np.concatenate([[0, n - 1], *extremes]))
     return time[chosen], values[chosen]
-
-
-def bare(axes: Axes) -> None:
-    """Take the horizontal axis off: another one beneath has it."""
-    axes.xaxis.set_visible(False)
-
-
-def legend_above(figure: Figure, handles: list[Any], names: list[str]) -> None:
-    """One row of legend along the top of a figure."""
-    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.14, 1.0), "borderaxespad": 0.2}
-    figure.legend(handles, names, ncols=len(names), handlelength=1.6, columnspacing=1.3, **place)
 
 
 def milli(values: np.ndarray, unit: str) -> tuple[float, str]:

@@ -1,15 +1,67 @@
-"""Figures as text that stands inside a page: no identifiers that clash, colours that follow the page."""
+"""Figures of matplotlib inside a page: no identifiers that clash, colours that follow the page."""
 
 from __future__ import annotations
 
 import html
 import io
 import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from fes_pin.view.style import COLOURS, styled
+from fes_pin.view.style import COLOURS, INK
+
+WIDTH = 5.4
+"""Width of a figure, inches; a report shows one or two beside each other."""
+_RC: Mapping[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"],
+    "font.size": 10.5,
+    "axes.labelsize": 10.5,
+    "xtick.labelsize": 9.5,
+    "ytick.labelsize": 9.5,
+    "legend.fontsize": 9.5,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 5),
+    "axes.formatter.use_mathtext": False,
+    "axes.unicode_minus": True,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "path.simplify": True,
+    "path.simplify_threshold": 0.2,
+    "axes.titley": 1.0,
+    "svg.fonttype": "none",
+}
+_STYLED = ContextVar("_STYLED", default=False)
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """The settings that every figure is drawn with, whatever the user's own are; many figures may share one call."""
+    if _STYLED.get():
+        yield
+        return
+    token = _STYLED.set(True)
+    try:
+        with mpl.rc_context():
+            mpl.rcdefaults()
+            mpl.rcParams.update(_RC)  # type: ignore[arg-type]
+            yield
+    finally:
+        _STYLED.reset(token)
+
 
 _PATH = re.compile(r' d="[^"]*"')
 _TENTH = re.compile(r"(\.\d)\d+(?: \n)?")

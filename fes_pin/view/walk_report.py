@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from fes_pin.diagnose.text import percent, probability
 from fes_pin.models.describe import sentence
-from fes_pin.view.page import Content, Markup, element, figure, joined, key, page, percent, probability, section, table
-from fes_pin.view.style import EXTENDED, FAINT, MEASURED, NOMINAL, WIDTH, styled
-from fes_pin.view.svg import inline_svg
+from fes_pin.view.page import Content, Markup, element, figure, joined, key, page, section, table
+from fes_pin.view.style import EXTENDED, FAINT, MEASURED, NOMINAL
+from fes_pin.view.svg import WIDTH, inline_svg, styled
 from fes_pin.walk.diagnosis import WalkDiagnosis
 from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.judge import CHANNELS

@@ -1,12 +1,11 @@
-"""Writes analysis/figures/verdict.png: a trial of the demo study, measured, as simulated, and as extended."""
+"""Writes analysis/figures/verdict.svg: a trial of the demo study, measured, as simulated, and as extended."""
 
 from pathlib import Path
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.diagnosis import diagnose
 from fes_pin.diagnose.replay import replay
-from fes_pin.view.plots import trial_figure
-from fes_pin.view.style import styled
+from fes_pin.view.plots import trial_drawing
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 TRIAL = "stairs"
@@ -17,11 +16,10 @@ def main() -> None:
     diagnosis = diagnose(read_study(ANALYSIS / "studies" / "ankle_demo"))
     print(diagnosis)
     (one,) = (r for r in replay(diagnosis) if r.measured.name == TRIAL)
-    figure = trial_figure(one, diagnosis.extended.noise)
-    path = ANALYSIS / "figures" / "verdict.png"
+    drawing = trial_drawing(one, diagnosis.extended.noise, alone=True)
+    path = ANALYSIS / "figures" / "verdict.svg"
     path.parent.mkdir(exist_ok=True)
-    with styled():
-        figure.savefig(path, dpi=160, metadata={"Software": None})
+    path.write_text(drawing.svg + "\n", encoding="utf-8")
     print(f"{path.relative_to(ANALYSIS.parent)}: {path.stat().st_size / 1000:.0f} kB")
 
 

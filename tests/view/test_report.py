@@ -1,19 +1,29 @@
+import base64
+import csv
+import hashlib
+import html
+import io
 import os
 import re
 import shutil
 import subprocess
 import tempfile
 import time
+from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
+from urllib.parse import unquote
 
 import pytest
 from view.reported import NASTY, ankle_diagnosis, ankle_study, diagnosed, joint_study, muscle_study
 
 import fes_pin as fp
+from fes_pin.diagnose.record import diagnosis_record
 from fes_pin.models.describe import equation
 from fes_pin.models.effects import effect
+from fes_pin.view.mathml import equations
 from fes_pin.view.report import report_html
+from fes_pin.view.report_trials import got_worse
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
 
@@ -27,6 +37,7 @@ class Page(HTMLParser):
         self.seen: list[str] = []
         self.tags: set[str] = set()
         self.words: list[str] = []
+        self.scripts: list[str] = []
         self.feed(text)
         self.close()
 
@@ -45,7 +56,9 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
-        if not self.open or self.open[-1] != "style":
+        if self.open and self.open[-1] == "script":
+            self.scripts.append(data)
+        elif not self.open or self.open[-1] != "style":
             self.words.append(data)
 
     @property
@@ -66,7 +79,9 @@ def checked(diagnosis) -> str:
 def checked_page(page: str) -> str:
     read = Page(page)
     assert not read.open
-    assert "script" not in read.tags
+    (script,) = read.scripts
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in page, "the page may run its own script and no other"
     assert all(s.startswith(("#", "data:")) for s in read.seen), "the page asks for something outside itself"
     assert not re.search(r"url\((?!#)|@import", page)
     assert "nan" not in read.text.lower().split()
@@ -75,16 +90,22 @@ def checked_page(page: str) -> str:
 
 def test_a_report_says_what_the_diagnosis_found():
     text = checked_page(ankle_page())
-    for words in ("coulomb_friction", "One cause explains", "80 % [74, 84]", "quadratic_damping", "sensor_offset"):
+    for words in (
+        "coulomb_friction",
+        "The model lacks coulomb friction",
+        "80 % [74, 84]",
+        "quadratic_damping",
+        "sensor_offset",
+    ):
         assert words in text
-    assert " ".join(equation(effect("coulomb_friction")).split()) in text
+    assert equations(equation(effect("coulomb_friction"))).text in ankle_page()
     assert "--set load_kg" in text
     assert "next_trial.csv" in text
 
 
 def test_text_of_the_study_cannot_become_markup():
     page = ankle_page()
-    assert "<script" not in page
+    assert page.count("<script") == 1
     assert page.count("&lt;script&gt;") >= 3  # title, heading, the trial's name
     assert NASTY in Page(page).text
     assert "default-src 'none'" in page
@@ -125,6 +146,68 @@ def test_a_long_study_keeps_its_page_small_and_quick():
     page = report_html(diagnosis)
     assert time.process_time() - began < 4.0  # 1 s where nothing else runs
     assert len(page) < 1_000_000
+
+
+def data_of(page: str) -> list[tuple[str, list[dict[str, str]]]]:
+    """Name and rows of every CSV behind a figure."""
+    found = re.findall(r'download="([^"]*)" href="data:text/csv,([^"]*)"', page)
+    return [(html.unescape(n), list(csv.DictReader(io.StringIO(unquote(html.unescape(d)))))) for n, d in found]
+
+
+def test_the_first_screen_answers_what_a_reader_asks():
+    text = checked_page(ankle_page())
+    for words in (
+        "How large it is torque",
+        "chance alone makes a cause look so strong in one study in 1 × 10⁹",
+        "these data cannot tell it from quadratic damping",
+        "on the trials that it was fitted to",
+        "Run the trial in next_trial.csv",
+        "E is the squared error of a model",
+    ):
+        assert words.lower() in text.lower(), words
+
+
+def test_every_figure_has_its_data_and_its_values_in_words():
+    page, study = ankle_page(), ankle_diagnosis().study
+    data = dict(data_of(page))
+    assert page.count("<figure") == len(data_of(page))
+    (trial,) = (t for t in study.trials if t.kind == "motion")
+    rows = data["trial_1.csv"]
+    assert float(rows[-1]["time_s"]) == pytest.approx(trial.time[-1], abs=0.02)
+    measured = [float(r["angle_rad_measured"]) for r in rows]
+    assert measured == pytest.approx(trial["angle_rad"][:: round(len(trial) / len(rows))], rel=1e-5)
+    labels = re.findall(r'aria-label="([^"]*)"', page)
+    assert len(labels) == page.count("<figure") and all(re.search(r"\d", label) for label in labels)
+    assert any(f"from {trial['angle_rad'].min():.3g} to {trial['angle_rad'].max():.3g} rad" in x for x in labels)
+
+
+def test_every_trial_is_drawn_and_those_that_got_worse_are_said():
+    study = ankle_study()
+    many = replace(study, trials=tuple(replace(study.trials[0], name=f"t{k}") for k in range(9)))
+    diagnosis = diagnosed(many, ("coulomb_friction",))
+    page = report_html(diagnosis)
+    assert [f"trial_{k + 1}.csv" for k in range(9)] == sorted(n for n, _ in data_of(page) if n.startswith("trial_"))
+    assert page.count("<details") == 1 and "worse" not in Page(page).text
+    swapped = replace(diagnosis, nominal=diagnosis.extended, extended=diagnosis.nominal)
+    found = report_html(replace(swapped, extended=replace(swapped.extended, model=diagnosis.nominal.model)))
+    assert "9 of 9 trials got worse" in Page(found).text
+
+
+def test_what_got_worse_is_more_than_rounding():
+    class One:
+        nominal_error, extended_error = 1.0, 1.005
+
+    assert not got_worse(One) and setattr(One, "extended_error", 1.02) is None and got_worse(One)
+
+
+def test_no_chance_is_zero_and_no_floor_is_a_tiny_number():
+    diagnosis = ankle_diagnosis()
+    causes = tuple(replace(c, p_value=0.0) for c in diagnosis.causes)
+    sure = replace(diagnosis, causes=causes, ceiling_percent=5.8e-8)
+    text = checked(sure)
+    assert "fewer than one study in 10¹²" in text and "below 0.001 %" in text and "e-08" not in text
+    assert diagnosis_record(sure)["causes"][0]["p_value"] > 0.0
+    assert "5.8e-08" not in str(sure)
 
 
 def test_the_same_diagnosis_gives_the_same_page():

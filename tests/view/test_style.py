@@ -4,7 +4,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from fes_pin.view.style import styled, thin_curve
+from fes_pin.view.style import thin_curve
+from fes_pin.view.svg import styled
 
 
 @pytest.mark.parametrize("n", [1, 5, 699, 700, 701, 1000, 12345])

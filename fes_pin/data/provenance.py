@@ -1,0 +1,108 @@
+"""What a result was made of: when, by which versions, from which files, with which seed and command."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import os
+import platform
+import shlex
+import sys
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import inside, read_bytes
+from fes_pin.data.study import Study
+
+PACKAGES = ("fes-pin", "pin", "casadi", "numpy", "scipy", "llvmlite")
+"""Whose versions a result depends on."""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a result comes from.
+
+    Attributes
+    ----------
+    date
+        When it was made, UTC, to the second (ISO 8601). `SOURCE_DATE_EPOCH` stands in for the clock where it is set.
+    versions
+        Of Python and the packages that it depends on.
+    inputs
+        SHA-256 of each file that was read, by its path in the study; empty for a study that was made in memory.
+    seed
+        Of what is simulated.
+    command
+        The command line that made it; empty for a call from Python.
+    """
+
+    date: str
+    versions: Mapping[str, str]
+    inputs: Mapping[str, str]
+    seed: int
+    command: str = ""
+
+    def record(self) -> dict[str, Any]:
+        """As a dictionary for JSON."""
+        told = {"date": self.date, "versions": dict(self.versions), "inputs": dict(self.inputs), "seed": self.seed}
+        return {**told, "command": self.command} if self.command else told
+
+
+def this_command() -> str:
+    """The command line of this process, as it would be typed."""
+    return shlex.join(["fes-pin", *sys.argv[1:]])
+
+
+def provenance(study: Study, seed: int) -> Provenance:
+    """Where what is made of a study now comes from."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    moment = datetime.datetime.fromtimestamp(int(epoch), datetime.UTC) if epoch.isdigit() else None
+    date = (moment or datetime.datetime.now(datetime.UTC)).isoformat(timespec="seconds").replace("+00:00", "Z")
+    return Provenance(date, _versions(), _hashes(study.folder), seed)
+
+
+def _versions() -> dict[str, str]:
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def _hashes(folder: Path) -> dict[str, str]:
+    """SHA-256 of `study.toml` and of every file that it names."""
+    try:
+        tables = tomllib.loads(read_bytes(folder / "study.toml").decode("utf-8-sig"))
+    except (InputError, ValueError):
+        return {}
+    out = {"study.toml": _sha256(folder / "study.toml")}
+    for text in _texts(tables):
+        try:
+            path = inside(folder, text)
+            if path.is_file():
+                out[text] = _sha256(path)
+        except (ValueError, OSError, InputError):
+            continue
+    return out
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        for one in value.values():
+            yield from _texts(one)
+    elif isinstance(value, list):
+        for one in value:
+            yield from _texts(one)
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(read_bytes(path)).hexdigest()

@@ -1,0 +1,50 @@
+"""A figure of a report: its drawing, its words for those who cannot see it, and its data as CSV behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+ROWS = 800
+"""Rows of the data behind a figure, at most; of a longer trial every second, third ... sample stands there."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What a page needs of a figure.
+
+    Attributes
+    ----------
+    svg
+        The element, with its description inside.
+    csv
+        The data that it shows.
+    note
+        What the data leave out; empty for nothing.
+    """
+
+    svg: str
+    csv: str
+    note: str = ""
+
+
+def every(count: int, rows: int = ROWS) -> int:
+    """One in how many samples stands in the data of a figure."""
+    return max(1, -(-count // rows))
+
+
+def csv_of(columns: Mapping[str, np.ndarray | Sequence[float]], step: int = 1) -> str:
+    """Columns of numbers as CSV, every `step`-th row."""
+    arrays = [np.asarray(v, dtype=float)[::step].tolist() for v in columns.values()]
+    lines = [",".join(columns)]
+    lines += [",".join(f"{v:.6g}" for v in row) for row in zip(*arrays, strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def rows_csv(head: Sequence[str], rows: Sequence[Sequence[str | float]]) -> str:
+    """Rows of words and numbers as CSV; the words hold no comma."""
+    lines = [",".join(head)]
+    lines += [",".join(v if isinstance(v, str) else f"{v:.6g}" for v in row) for row in rows]
+    return "\n".join(lines) + "\n"
