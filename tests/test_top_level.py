@@ -3,6 +3,7 @@
 import ast
 from pathlib import Path
 
+import pytest
 import typed
 from data import studies
 
@@ -33,5 +34,8 @@ def test_what_a_user_writes_in_types_runs(tmp_path):
     study = fp.read_study(studies.ankle(tmp_path / "study"))
     model = typed.with_friction(study)
     assert typed.residual(model, study.trials[0], "angle_rad").shape == study.trials[0].time.shape
-    assert "torque_nm" in repr(typed.refitted(study, tmp_path))
+    fitted = typed.refitted(study, tmp_path)
+    assert "torque_nm" in repr(fitted)
+    pytest.importorskip("pandas")
+    assert typed.tables(study, fitted)[0] > 0.0
     assert typed.one_line(tmp_path / "none").startswith(str(tmp_path / "none"))

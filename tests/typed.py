@@ -31,6 +31,13 @@ def refitted(study: fp.Study, folder: Path) -> fp.Fit:
     return fp.fit(fp.load_model(folder / "model.toml"), study.trials)
 
 
+def tables(study: fp.Study, fitted: fp.Fit) -> tuple[float, float, str]:
+    """A time, a value and what a notebook shows."""
+    seconds = float(study.to_frame()["duration_s"].sum())
+    values: NDArray[np.float64] = fitted.to_numpy()
+    return seconds, float(values[0]), repr(fitted)
+
+
 def one_line(folder: Path) -> str:
     """What is wrong with a study that cannot be read."""
     try:

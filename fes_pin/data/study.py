@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
@@ -26,9 +27,13 @@ from fes_pin.data.schema import (
     schema_of,
     unknown,
 )
+from fes_pin.data.show import frame, table_html
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.data.trial import Trial, checked_kind, read_body_trial, read_trial, trial_csv
 from fes_pin.data.urdf import moving_joints
+
+if TYPE_CHECKING:
+    import pandas
 
 NOTES = ("description", "subject", "source", "licence", "license", "date", "notes")
 
@@ -104,6 +109,27 @@ class Study:
         counts = " and ".join(f"{count} {kind}" for kind, count in kinds.items())
         seconds = sum(trial.duration for trial in self.trials)
         return f"Study {self.name} ({self.rig}): {counts} trials, {seconds:.4g} s"
+
+    def _repr_html_(self) -> str:
+        head = ("trial", "kind", "role", "samples", "duration", "columns")
+        rows = [
+            (t.name, t.kind, t.role or "-", str(len(t)), f"{t.duration:.4g} s", ", ".join(t.columns))
+            for t in self.trials
+        ]
+        return table_html(repr(self), head, rows)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """One row a trial, with its conditions, as a frame of pandas; see `data.show.frame`."""
+        conditions = dict.fromkeys(n for t in self.trials for n in t.conditions)
+        told: dict[str, list[Any]] = {
+            "trial": [t.name for t in self.trials],
+            "kind": [t.kind for t in self.trials],
+            "role": [t.role for t in self.trials],
+            "samples": [len(t) for t in self.trials],
+            "duration_s": [t.duration for t in self.trials],
+        }
+        given = {n: [t.conditions.get(n, math.nan) for t in self.trials] for n in conditions}
+        return frame({**told, **given}, index="trial")
 
 
 def read_study(path: str | Path, *, rigs: Rigs | None = None) -> Study:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,11 @@ from fes_pin.data.schema import (
     unknown,
     unread,
 )
+from fes_pin.data.show import frame
 from fes_pin.data.table import MIN_ROWS, Table, check_time, format_csv, read_csv
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -152,6 +156,10 @@ class Trial:
         columns = ", ".join(self.columns)
         role = f", {self.role}" if self.role else ""
         return f"Trial {self.name} ({self.kind}{role}): {len(self)} samples{rate}{conditions}; {columns}"
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Every column against `time_s` as a frame of pandas; see `data.show.frame`."""
+        return frame({"time_s": self.time, **self.columns}, index="time_s")
 
 
 def _frozen(values: Any) -> np.ndarray:

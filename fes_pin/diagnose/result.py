@@ -4,19 +4,32 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fes_pin.data.provenance import Provenance
+from fes_pin.data.show import frame, table_html
 from fes_pin.data.study import Study
 from fes_pin.diagnose.cause import Cause, Ranked
 from fes_pin.diagnose.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnose.experiment import NextExperiment
 from fes_pin.diagnose.remainder.open_set import Remainder
-from fes_pin.diagnose.text import ahead_notes, cause_table, left_out_text, percent, probability
+from fes_pin.diagnose.text import (
+    CAUSE_COLUMNS,
+    ahead_notes,
+    cause_row,
+    cause_table,
+    left_out_text,
+    percent,
+    probability,
+)
 from fes_pin.identify.fit import Fit
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
+
+if TYPE_CHECKING:
+    import pandas
 
 HEADLINES = {
     "adequate": "the model is adequate: these data justify no extension of it.",
@@ -30,7 +43,7 @@ EACH_TRIAL = (
 """What is said of effects whose amplitudes are each trial's own."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosis:
     """What a simulation gets wrong.
 
@@ -143,6 +156,32 @@ class Diagnosis:
         if self.next_experiment:
             lines.append(f"next experiment: {self.next_experiment.why}")
         return [*lines, *(f"warning: {words}" for words in self.warnings)]
+
+    def __repr__(self) -> str:
+        names = f" ({', '.join(c.name for c in self.causes)})" if self.causes else ""
+        return f"Diagnosis of {self.study.name}: {self.verdict}{names}"
+
+    def _repr_html_(self) -> str:
+        title = f"{self.study.name}: {self.headline()}"
+        return table_html(title, CAUSE_COLUMNS, [cause_row(c) for c in self.causes], self.footnotes())
+
+    def to_frame(self) -> pandas.DataFrame:
+        """One row a parameter of each cause as a frame of pandas; see `data.show.frame`. No row without a cause."""
+        rows = [(c, n, one) for c in self.causes for n, one in c.parameters.items()]
+        columns = {
+            "cause": [c.name for c, _, _ in rows],
+            "stage": [c.stage for c, _, _ in rows],
+            "parameter": [n for _, n, _ in rows],
+            "value": [one.value for _, _, one in rows],
+            "std": [one.std for _, _, one in rows],
+            "unit": [one.unit for _, _, one in rows],
+            "p_value": [c.p_value for c, _, _ in rows],
+            "gain_percent": [c.gain_held_out.percent for c, _, _ in rows],
+            "gain_low": [c.gain_held_out.low for c, _, _ in rows],
+            "gain_high": [c.gain_held_out.high for c, _, _ in rows],
+            "equivalents": [", ".join(c.equivalents) for c, _, _ in rows],
+        }
+        return frame(columns)
 
     def __str__(self) -> str:
         lines = [f"{self.study.name}: {self.headline()}", *cause_table(self.causes)]

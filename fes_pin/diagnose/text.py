@@ -41,6 +41,10 @@ def quantity(value: float, std: float, unit: str) -> str:
     return f"{value:.{digits}f} +- {std:.{digits}f} {unit}".strip()
 
 
+CAUSE_COLUMNS = ("cause", "stage", "parameters", "held-out gain", "cannot be told from")
+"""What `cause_row` gives."""
+
+
 def cause_row(cause: Cause) -> tuple[str, str, str, str, str]:
     """Cause, stage, parameters, held-out gain, what it cannot be told from."""
     values = "\n".join(f"{n} {quantity(p.value, p.std, p.unit)}" for n, p in cause.parameters.items())
@@ -53,7 +57,7 @@ def cause_table(causes: Sequence[Cause]) -> list[str]:
     """The causes as lines of a table; none without causes."""
     if not causes:
         return []
-    rows = [("cause", "stage", "parameters", "held-out gain", "cannot be told from")]
+    rows = [CAUSE_COLUMNS]
     for cause in causes:
         name, stage, values, gain, others = cause_row(cause)
         for k, value in enumerate(values.split("\n")):

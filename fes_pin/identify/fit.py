@@ -6,9 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fes_pin.data.show import frame, table_html
 from fes_pin.data.trial import Trial
 from fes_pin.identify.descent import UNIDENTIFIED, Descent
 from fes_pin.identify.distributions import normal_quantile
@@ -17,6 +20,9 @@ from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equat
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import one_thread_each
+
+if TYPE_CHECKING:
+    import pandas
 
 MAX_ITERATIONS = 60
 CONFIDENCE_95 = normal_quantile(0.975)
@@ -32,7 +38,7 @@ GROSS = 10.0
 """Reduced chi-square from which a fit may have ended far from the optimum."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Fit:
     """A model with fitted parameters; it can prove its own quality.
 
@@ -99,6 +105,43 @@ class Fit:
     def not_identified(self) -> tuple[str, ...]:
         """Parameters that these data say nothing about."""
         return tuple(n for n in self.free if not math.isfinite(self.std(n)))
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{n} = {self.values[n]:.4g} +- {self.std(n):.2g}" for n in self.free)
+        return f"Fit {' + '.join(self.model.structure())}: {self.samples} samples, chi2 {self.reduced:.3f}; {values}"
+
+    def _repr_html_(self) -> str:
+        info, rows = self.model.parameter_info(), []
+        for name in self.free:
+            low, high = self.interval(name)
+            note = (
+                "not identified" if name in self.not_identified() else "at its bound" if name in self.at_bound else ""
+            )
+            rows.append((name, f"{self.values[name]:.5g}", f"[{low:.5g}, {high:.5g}]", info[name].unit or "-", note))
+        notes = [] if self.is_optimal() else ["The fit did not end at an optimum."]
+        return table_html(
+            f"{' + '.join(self.model.structure())}: {self.samples} samples, reduced chi2 {self.reduced:.3f}",
+            ("parameter", "value", "95 % interval", "unit", ""),
+            rows,
+            notes,
+        )
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The fitted parameters with deviations and 95 % intervals as a frame of pandas; see `data.show.frame`."""
+        info = self.model.parameter_info()
+        columns = {
+            "parameter": list(self.free),
+            "value": self.to_numpy(),
+            "std": [self.std(n) for n in self.free],
+            "low": [self.interval(n)[0] for n in self.free],
+            "high": [self.interval(n)[1] for n in self.free],
+            "unit": [info[n].unit for n in self.free],
+        }
+        return frame(columns, index="parameter")
+
+    def to_numpy(self) -> NDArray[np.float64]:
+        """Values of the fitted parameters, shape (free,), in the order of `free` and of `covariance`."""
+        return np.array([self.values[n] for n in self.free], dtype=np.float64)
 
     def __str__(self) -> str:
         info = self.model.parameter_info()

@@ -5,15 +5,19 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from fes_pin.data.show import frame, table_html
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import Parameter
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, in_order
 
+if TYPE_CHECKING:
+    import pandas
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Model:
     """A rig and its effects, in the order of the signal path; immutable. `model + effect` is the extended model.
 
@@ -108,6 +112,28 @@ class Model:
     def structure(self) -> tuple[str, ...]:
         """The rig and the effects, not their values."""
         return (self.rig.name, *(f"{e.name} of each trial" if e.each_trial else e.name for e in self.effects))
+
+    def __repr__(self) -> str:
+        return (
+            f"Model {' + '.join(self.structure())}: {', '.join(f'{n} = {v:.4g}' for n, v in self.parameters().items())}"
+        )
+
+    def _repr_html_(self) -> str:
+        info = self.parameter_info()
+        rows = [(n, f"{v:.6g}", info[n].unit or "-") for n, v in self.parameters().items()]
+        return table_html(f"{' + '.join(self.structure())} model", ("parameter", "value", "unit"), rows)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Every parameter with its value, unit and bounds as a frame of pandas; see `data.show.frame`."""
+        info, values = self.parameter_info(), self.parameters()
+        columns = {
+            "parameter": list(values),
+            "value": list(values.values()),
+            "unit": [info[n].unit for n in values],
+            "lower": [info[n].lower for n in values],
+            "upper": [info[n].upper for n in values],
+        }
+        return frame(columns, index="parameter")
 
     def __str__(self) -> str:
         info = self.parameter_info()

@@ -1,0 +1,41 @@
+"""How results show themselves: tables for a notebook, frames for pandas."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from fes_pin.data.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas
+
+
+def table_html(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> str:
+    """A titled table as a notebook shows it; every text is escaped here."""
+
+    def cells(tag: str, row: Sequence[str]) -> str:
+        made = "".join(f'<{tag} style="text-align: left">{html.escape(c)}</{tag}>' for c in row)
+        return f"<tr>{made}</tr>"
+
+    body = "".join(cells("td", row) for row in rows)
+    table = f"<table><thead>{cells('th', head)}</thead><tbody>{body}</tbody></table>" if rows else ""
+    said = "".join(f"<p>{html.escape(n)}</p>" for n in notes)
+    return f"<div><p><strong>{html.escape(title)}</strong></p>{table}{said}</div>"
+
+
+def frame(columns: Mapping[str, Any], index: str | None = None) -> pandas.DataFrame:
+    """Columns as a frame of pandas, one of them as its index.
+
+    Raises
+    ------
+    InputError
+        pandas is not installed.
+    """
+    try:
+        import pandas  # noqa: PLC0415
+    except ImportError:
+        raise InputError("frames need pandas: pip install 'fes-pin[pandas]'") from None
+    made = pandas.DataFrame(dict(columns))
+    return made.set_index(index) if index is not None else made
