@@ -13,6 +13,7 @@ import typer
 from fes_pin.cli.allocate import allocate
 from fes_pin.cli.body import app as body
 from fes_pin.cli.group import Commands
+from fes_pin.cli.own import check, new_study
 from fes_pin.cli.walk import diagnose_walking, print_effects
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 app = typer.Typer(cls=Commands, pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
 app.command()(allocate)
+app.command()(new_study)
+app.command()(check)
 
 Libraries = Annotated[
     list[str] | None,

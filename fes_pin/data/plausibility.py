@@ -34,6 +34,12 @@ COMMON = 0.05
 """Share of equal neighbours from which a reading is coarse: equal samples in a row then say nothing."""
 CLIPPED = 0.01
 """Share of a column's samples at its very largest or smallest value from which it counts as clipped."""
+COUNTS = 20
+"""Different whole numbers from which on a column of nothing else is a counter's, not a quantity in SI units."""
+SHORTEST, JUMP = 5, 3.0
+"""Samples that a dropout stands still for, at least; and by how many of its largest usual steps it then jumps."""
+LONGEST_MUSCLE_M = 1.0
+"""Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
 RATE_RATIO = 5.0
 """Factor by which a velocity may differ from the slope of its position: filters make less, degrees make 57."""
 PIECES = 8
@@ -49,7 +55,7 @@ def implausible(study: Study) -> list[str]:
         For what no verdict could follow from; see the module.
     """
     _check_rows(study)
-    warnings = [*_inputs(study), *_units(study)]
+    warnings = [*_read(study), *_inputs(study), *_units(study)]
     outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
     measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in _driving(study, t)]
     constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
@@ -58,9 +64,19 @@ def implausible(study: Study) -> list[str]:
     warnings += _told("does not change at all", constant)
     moving = [one for one in measured if one not in constant]
     warnings += _told("is cut off at its largest or smallest value (clipping?)", [m for m in moving if _is_clipped(*m)])
+    warnings += _told("holds whole numbers only: are they an encoder's counts?", [m for m in moving if _is_counted(*m)])
     for trial, name in moving:
-        warnings += _held(trial, name)
+        warnings += _held(trial, name) or dropouts(trial, name)
     return [*warnings, *_rates(study.trials)]
+
+
+def _read(study: Study) -> list[str]:
+    """What was done to samples when they were read: the same of many trials in one line."""
+    by_remark: dict[str, list[str]] = {}
+    for trial in study.trials:
+        for remark in trial.remarks:
+            by_remark.setdefault(remark, []).append(trial.name)
+    return [f"{remark} in {_trials(names)}" for remark, names in by_remark.items()]
 
 
 def _driving(study: Study, trial: Trial) -> tuple[str, ...]:
@@ -111,9 +127,10 @@ def _inputs(study: Study) -> Iterable[str]:
         elif name not in PULSES:
             yield f"no trial is driven: {told}"
         else:
-            raise InputError(
-                f"{told} in all trials; a muscle that is never stimulated shows nothing", file=study.folder
-            )
+            most = max(float(np.abs(t[name]).max()) for t in study.trials if name in t)
+            hint = f" (it reaches {most:.4g}: is it in ms?)" if threshold < 1e3 * most and most > 0.0 else ""
+            message = f"{told} in all trials{hint}; a muscle that is never stimulated shows nothing"
+            raise InputError(message, file=study.folder)
 
 
 def _units(study: Study) -> Iterable[str]:
@@ -128,6 +145,12 @@ def _units(study: Study) -> Iterable[str]:
     strong = [t.name for t in study.trials if "force_n" in t and float(np.abs(t["force_n"]).max()) > STRONGEST_N]
     if strong:
         yield f"force_n is beyond {STRONGEST_N:g} N, which no limb exerts, in {_trials(strong)}: is it in mN?"
+    long = [t.name for t in study.trials if "length_m" in t and float(np.abs(t["length_m"]).max()) > LONGEST_MUSCLE_M]
+    if long:
+        yield f"length_m is beyond {LONGEST_MUSCLE_M:g} m, which no muscle is, in {_trials(long)}: is it in mm?"
+    whole = [t.name for t in study.trials if t.dt >= 1.0 and (t.time == np.rint(t.time)).all()]
+    if whole:
+        yield f"time_s counts whole numbers in {_trials(whole)}: is it in ms, or a number of the sample?"
     heavy = [t.name for t in study.trials if t.conditions.get("load_kg", 0.0) > HEAVIEST_KG]
     if heavy:
         yield f"load_kg is above {HEAVIEST_KG:g} kg in {_trials(heavy)}: is it in g?"
@@ -147,15 +170,47 @@ def _is_clipped(trial: Trial, name: str) -> bool:
     return False
 
 
-def _held(trial: Trial, name: str) -> Iterable[str]:
+def _is_counted(trial: Trial, name: str) -> bool:
+    """True if a column takes many values, all of them whole."""
+    values = trial[name]
+    return bool((values == np.rint(values)).all()) and len(np.unique(values)) > COUNTS
+
+
+def dropouts(trial: Trial, name: str) -> list[str]:
+    """Stretches in which a reading stands still and then jumps: what was not recorded, its last value held.
+
+    Whatever stands still by itself goes on from where it stood; an encoder that is coarse stands still as often
+    elsewhere, and steps by what it always steps by.
+    """
+    values = trial[name]
+    steps = np.abs(np.diff(values))
+    changes = np.flatnonzero(steps)
+    if len(changes) < 2 * RUN:
+        return []
+    lengths = np.diff(np.r_[-1, changes])  # samples that each value stands for, the last value's left out
+    usual = float(np.quantile(lengths, 0.95))
+    sizes = steps[changes]
+    jump = JUMP * float(np.quantile(sizes, 0.99))
+    found = np.flatnonzero((lengths >= max(SHORTEST, 3.0 * usual)) & (sizes > jump))
+    if not len(found):
+        return []
+    first = int(changes[found[0]])
+    begin = float(trial.time[first - lengths[found[0]] + 1])
+    more = f", and {len(found) - 1} times more" if len(found) > 1 else ""
+    told = f"{name} stays at {values[first]:.4g} for {lengths[found[0]]} samples from {begin:.4g} s on and then jumps"
+    return [f"{told}{more} in trial {trial.name}: a dropout, its last value held?"]
+
+
+def _held(trial: Trial, name: str) -> list[str]:
     """A reading that repeats its values: in step, as sampled at a lower rate, or once, as where a sensor drops out."""
     values = trial[name]
     changes = np.flatnonzero(np.diff(values) != 0.0)
     still = 1.0 - len(changes) / max(len(values) - 1, 1)
     every = np.diff(changes)
     if still > 0.4 and len(every) > 3 and (count := int(np.median(every))) > 1 and np.mean(every % count == 0) > 0.95:
-        yield f"{name} changes only every {count} samples in trial {trial.name}: it was sampled more slowly, and held"
-        return
+        return [
+            f"{name} changes only every {count} samples in trial {trial.name}: it was sampled more slowly, and held"
+        ]
     ends = np.r_[-1, changes, len(values) - 1]
     lengths = np.diff(ends)
     longest = int(np.argmax(lengths))
@@ -163,7 +218,9 @@ def _held(trial: Trial, name: str) -> Iterable[str]:
     apart = 1.0 - (len(changes) + lengths[longest] - 1) / max(len(values) - 1, 1)
     if lengths[longest] >= RUN and apart < COMMON and values.min() < inside < values.max():
         begin = float(trial.time[ends[longest] + 1])
-        yield f"{name} stays at {inside:.4g} for {lengths[longest]} samples from {begin:.4g} s on in trial {trial.name}"
+        told = f"{name} stays at {inside:.4g} for {lengths[longest]} samples"
+        return [f"{told} from {begin:.4g} s on in trial {trial.name}: a dropout, its last value held?"]
+    return []
 
 
 def _rates(trials: Sequence[Trial]) -> Iterable[str]:

@@ -16,6 +16,7 @@ import tomli_w
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes, read_text, write_files
 from fes_pin.data.motion import GROUND_REACTION
+from fes_pin.data.recorded.columns import Columns, columns_of
 from fes_pin.data.schema import (
     ROLES,
     Number,
@@ -30,7 +31,7 @@ from fes_pin.data.schema import (
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.data.trial import Trial, checked_kind, read_body_trial, read_trial, trial_csv
-from fes_pin.data.urdf import moving_joints
+from fes_pin.data.urdf import is_revolute, moving_joints
 
 if TYPE_CHECKING:
     import pandas
@@ -157,6 +158,18 @@ def read_study(path: str | Path, *, rigs: Rigs | None = None) -> Study:
     return _Reader(read_toml(path / "study.toml" if folder else path), known_rigs(rigs)).study()
 
 
+def read_columns(path: str | Path, *, rigs: Rigs | None = None) -> Columns | None:
+    """How a study's recordings are written, to read another one like them; None if they are as the format has it.
+
+    Raises
+    ------
+    InputError
+        As `read_study`, of everything but the trials.
+    """
+    path = Path(path)
+    return _Reader(read_toml(path / "study.toml" if path.is_dir() else path), known_rigs(rigs)).columns()
+
+
 class _Reader:
     """One reading of a study.toml; every error that it raises names the line and the key."""
 
@@ -165,14 +178,19 @@ class _Reader:
         self.folder = document.path.parent
         self.error = document.error
         for key in document.data:
-            if key not in (known := ("study", "rig", "start", "trial")):
+            if key not in (known := ("study", "rig", "start", "columns", "trial")):
                 raise self.error(key, unknown(key, known))
         self.name, self.rig = self._study_table()
         self.schema = rigs[self.rig]
+        self.own: Columns | None = None
+
+    def columns(self) -> Columns | None:
+        return self._columns_table(self._rig_table()[1])
 
     def study(self) -> Study:
         constants, files = self._rig_table()
         start = self._start_table(constants)
+        self.own = self._columns_table(files)
         names = self._trial_names()
         trials = []
         for index, table in enumerate(self._trial_tables()):
@@ -253,6 +271,15 @@ class _Reader:
             del known[key]
         return self.document.numbers("start", table, known)
 
+    def _columns_table(self, files: Mapping[str, Path]) -> Columns | None:
+        if "columns" not in self.document.data:
+            return None
+
+        def error(key: str, message: str) -> InputError:
+            return self.error(f"columns.{key}".rstrip("."), message)
+
+        return columns_of(self.document.table("columns"), self.schema, is_revolute(files.get("urdf")), error)
+
     def _trial_tables(self) -> list[dict[str, Any]]:
         tables = self.document.data.get("trial", [])
         if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
@@ -297,7 +324,9 @@ class _Reader:
         numbers = check_conditions(self.schema, kind, rest, error)
         if len(named) == 1:
             path = self.document.path_of(f"{where}.{named[0]}", table[named[0]])
-            return read_trial(path, rig=self.schema, kind=kind, conditions=numbers, role=role, name=name, group=group)
+            return read_trial(
+                path, rig=self.schema, kind=kind, conditions=numbers, role=role, name=name, group=group, own=self.own
+            )
         for key in named:
             if key not in table:
                 raise error(key, "missing; expected the path of a file inside the study")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
@@ -33,6 +33,9 @@ class Table:
         Line number of the header; the first numbers stand in the next line.
     lines, delimiter
         The rows as text and what separates their values; None stands for white space.
+    rows, half_digit, called
+        Where a file is read as its study's `[columns]` says: the place of each sample, shape (n,); half of the last
+        digit that times were printed with, s; the file's own names of its columns.
     """
 
     path: Path
@@ -41,10 +44,13 @@ class Table:
     header_row: int
     lines: tuple[str, ...]
     delimiter: str | None
+    rows: np.ndarray | None = None
+    half_digit: float | None = None
+    called: Mapping[str, str] = field(default_factory=dict)
 
     def row(self, sample: int) -> int:
         """Line number of a sample."""
-        return self.header_row + 1 + int(sample)
+        return self.header_row + 1 + int(sample) if self.rows is None else int(self.rows[sample])
 
     def column(self, name: str) -> np.ndarray:
         """One column, shape (n,)."""
@@ -52,8 +58,11 @@ class Table:
 
     def error(self, message: str, column: str, sample: int | None = None) -> InputError:
         """The error that names this file, a sample's row (or the header's) and a column."""
-        row = self.header_row if sample is None else self.row(sample)
-        return InputError(message, file=self.path, row=row, column=column)
+        row = (self.header_row or None) if sample is None else self.row(sample)
+        called = self.called.get(column, column)
+        return InputError(
+            message, file=self.path, row=row, column=column if called == column else f"{called} ({column})"
+        )
 
 
 def read_csv(path: str | Path) -> Table:
@@ -115,8 +124,8 @@ def _parse_slowly(
             at = names[min(len(fields), len(names) - 1)]
             message = f"expected {len(names)} values as in the header, found {len(fields)}"
             raise InputError(message, file=path, row=row, column=at)
-        for place, (name, field) in enumerate(zip(names, fields, strict=True)):
-            values[index, place] = _number(field, path, row, name)
+        for place, (name, cell) in enumerate(zip(names, fields, strict=True)):
+            values[index, place] = _number(cell, path, row, name)
     return values
 
 
@@ -155,9 +164,11 @@ def check_time(table: Table) -> None:
     step = float(np.median(steps))
     if (np.abs(steps - step) <= STEP_TOLERANCE * step * (1 + 1e-6)).all():
         return
-    late = _first_off_grid(time, steps, step, 0.5 * 10.0 ** -_time_decimals(table))
+    half_digit = 0.5 * 10.0 ** -_time_decimals(table) if table.half_digit is None else table.half_digit
+    late = _first_off_grid(time, steps, step, half_digit)
     if late is not None:
         found = f"expected a fixed step of {step:.6g} s within 1 %, found {steps[late - 1]:.6g} s"
+        found += "; resample_hz in [columns.file] has the samples interpolated"
         raise table.error(found, table.names[0], late)
 
 

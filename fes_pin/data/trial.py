@@ -14,6 +14,8 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
+from fes_pin.data.recorded.columns import Columns
+from fes_pin.data.recorded.hint import NEW_STUDY, read_csv_or_hint
 from fes_pin.data.schema import (
     ROLES,
     RigSchema,
@@ -25,7 +27,7 @@ from fes_pin.data.schema import (
     unread,
 )
 from fes_pin.data.show import frame
-from fes_pin.data.table import MIN_ROWS, Table, check_time, format_csv, read_csv
+from fes_pin.data.table import MIN_ROWS, Table, check_time, format_csv
 
 if TYPE_CHECKING:
     import pandas
@@ -51,6 +53,8 @@ class Trial:
         "fit", "held_out", or None: not decided by the study.
     group
         A label of the condition that it was measured under, or None.
+    remarks
+        What was done to its samples when it was read: filled in, interpolated.
 
     Raises
     ------
@@ -65,6 +69,7 @@ class Trial:
     conditions: Mapping[str, float] = field(default_factory=dict)
     role: str | None = None
     group: str | None = None
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)
@@ -85,6 +90,7 @@ class Trial:
             dict(self.conditions),
             self.role,
             self.group,
+            self.remarks,
         )
 
     def __len__(self) -> int:
@@ -178,8 +184,9 @@ def read_trial(
     inputs_only: bool = False,
     name: str | None = None,
     group: str | None = None,
+    own: Columns | None = None,
 ) -> Trial:
-    """Read one trial from its CSV file.
+    """Read one trial from its file.
 
     Parameters
     ----------
@@ -195,6 +202,9 @@ def read_trial(
         Do not require the measured outputs, to predict them; they are kept if they are there.
     name
         Of the trial; without it the stem of the file.
+    own
+        How the file is written and what its columns are, as the study's `[columns]` says; without it the file is a
+        CSV as the study format has it.
 
     Raises
     ------
@@ -214,9 +224,12 @@ def read_trial(
     if role is not None:
         _checked("role", role, ROLES, error)
     numbers = check_conditions(schema, kind, conditions or {}, error)
-    whole = len(schema.recordings) == 1
-    columns, time = _columns(path, schema, kind, inputs_only) if whole else _body_columns(path, inputs_only)
-    return Trial(name or path.stem, kind, columns, time, numbers, role, group)
+    if len(schema.recordings) > 1:
+        columns, time = _body_columns(path, inputs_only)
+        return Trial(name or path.stem, kind, columns, time, numbers, role, group)
+    table, said = (read_csv_or_hint(path), "") if own is None else own.read(path, schema, kind, inputs_only)
+    columns, time = _columns(table, schema, kind, inputs_only)
+    return Trial(name or path.stem, kind, columns, time, numbers, role, group, (said,) if said else ())
 
 
 def checked_kind(schema: RigSchema, kind: object, error: Callable[[str, str], InputError]) -> str:
@@ -243,8 +256,7 @@ def _checked(key: str, value: object, known: tuple[str, ...], error: Callable[[s
         raise error(key, str(problem)) from None
 
 
-def _columns(path: Path, schema: RigSchema, kind: str, inputs_only: bool) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    table = read_csv(path)
+def _columns(table: Table, schema: RigSchema, kind: str, inputs_only: bool) -> tuple[dict[str, np.ndarray], np.ndarray]:
     _check_columns(table, schema, kind, inputs_only)
     check_time(table)
     _check_stimulus(table)
@@ -254,7 +266,8 @@ def _columns(path: Path, schema: RigSchema, kind: str, inputs_only: bool) -> tup
 def _check_columns(table: Table, schema: RigSchema, kind: str, inputs_only: bool) -> None:
     """Require the columns of this rig and kind, and no others: another unit and a likely typo are told as such."""
     if table.names[0] != "time_s":
-        raise table.error(f"expected time_s as the first column, found {table.names[0][:40]!r}", "time_s")
+        told = f"expected time_s as the first column, found {table.names[0][:40]!r}"
+        raise table.error(f"{told}; {NEW_STUDY}", "time_s")
     absent = [name for name in schema.columns if name not in table.names]
     for name in table.names:
         if name not in schema.columns and is_like(name, absent):

@@ -51,6 +51,18 @@ def moving_joints(path: str | Path) -> list[tuple[str, str]]:
     ]
 
 
+def is_revolute(path: str | Path | None) -> bool | None:
+    """Whether the joints that move turn (True) or slide (False); None where some do either, or there is no file.
+
+    Raises
+    ------
+    InputError
+        As `moving_joints`.
+    """
+    kinds = {kind == "prismatic" for _, kind in moving_joints(path)} if path is not None else set()
+    return not kinds.pop() if len(kinds) == 1 else None
+
+
 def check_one_joint(path: str | Path) -> tuple[str, str]:
     """Name and type of the one moving joint of a `joint` rig.
 

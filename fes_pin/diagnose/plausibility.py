@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.plausibility import implausible
@@ -21,7 +22,13 @@ SLOWEST_S = 1.0
 TURNS = 4.0
 """Turns from zero beyond which an angle is likelier in degrees: 4 turns are 25 rad, and 25 degrees a small swing."""
 LONGEST_M = 10.0
-"""Position in m that no slide of a laboratory reaches; millimetres do."""
+"""Position in m that no slide of a laboratory reaches, and length of no pendulum in it; millimetres do."""
+SWING = 2.0 * math.pi
+"""Way in rad between two turning points of a pendulum that is not driven, at most: from upright round to upright."""
+STILL = 0.02
+"""Share of a trial's range below which its last tenth stands still."""
+ASKEW = 0.5
+"""Angle in rad from hanging at which dry friction hardly holds a pendulum: half of its weight pulls."""
 
 
 def check_study(study: Study, model: Model) -> list[str]:
@@ -33,7 +40,7 @@ def check_study(study: Study, model: Model) -> list[str]:
         For what no verdict could follow from: see `data.plausibility`; or a time step much longer than the time
         constants of the model's start values.
     """
-    return [*implausible(study), *_steps(study, model), *_range(study, model)]
+    return [*implausible(study), *_steps(study, model), *_range(study, model), *_swings(study, model)]
 
 
 def _steps(study: Study, model: Model) -> Iterable[str]:
@@ -62,3 +69,36 @@ def _range(study: Study, model: Model) -> Iterable[str]:
         yield f"position reaches {most:.4g} rad, {most / (2.0 * math.pi):.1f} turns: is it in degrees?"
     if not model.rig.constants["revolute"] and most > LONGEST_M:
         yield f"position reaches {most:.4g} m: is it in mm?"
+
+
+def _swings(study: Study, model: Model) -> Iterable[str]:
+    """What no pendulum does by itself: swing back from more than a turn away, or rest where it does not hang."""
+    c = model.rig.constants
+    weight = math.hypot(c.get("gravity_cos", 0.0), c.get("gravity_sin", 0.0))
+    if not c.get("revolute") or not weight > 0.0 or model.parameters().get("gravity_scale", 1.0) == 0.0:
+        return
+    free = [t for t in study.trials if "position" in t and ("effort" not in t or not t["effort"].any())]
+    wide = [t.name for t in free if _widest_swing(t["position"]) > SWING]
+    if wide:
+        yield f"position swings back by more than a turn, and nothing drives it, in trial {wide[0]}: is it in degrees?"
+        return
+    hangs = math.atan2(-c["gravity_cos"], c["gravity_sin"])
+    for trial in free:
+        end = trial["position"][-max(len(trial) // 10, 1) :]
+        if np.ptp(end) > STILL * np.ptp(trial["position"]):
+            continue
+        rest = float(np.mean(end))
+        if math.cos(rest - hangs) < math.cos(ASKEW):
+            told = f"trial {trial.name} comes to rest at {rest:.4g} rad, and by the URDF it hangs at {hangs:.4g}"
+            yield f"{told}: is the position's zero elsewhere (zero in [columns]), or its sign another?"
+            return
+    length = c["inertia"] * 9.81 / weight
+    if length > LONGEST_M:
+        yield f"by its URDF the rig swings like a pendulum of {length:.4g} m: is the URDF in mm?"
+
+
+def _widest_swing(position: np.ndarray) -> float:
+    """The longest way between two turning points, rad; small ripples are no turning points."""
+    ripple = 0.05 * float(np.ptp(position))
+    turns = np.sort(np.concatenate([find_peaks(side * position, prominence=ripple)[0] for side in (1.0, -1.0)]))
+    return float(np.max(np.abs(np.diff(position[turns.astype(int)])), initial=0.0))

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
+
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
+from fes_pin.models.rigs.rigid import joint_inertia, load_urdf
+
+RUN_OUT_S = 10.0
+"""Seconds in which a joint of a laboratory about runs out: inertia over damping, a start value."""
 
 
 def nominal_model(study: Study) -> Model:
@@ -31,3 +38,26 @@ def rig_of(study: Study) -> type[Rig]:
     if rig is None:
         raise InputError(f"the rig {study.rig} has no model of single trials", file=study.folder)
     return rig
+
+
+def guess_start(rig: type[Rig], known: Mapping[str, float], urdf: Path | None = None) -> dict[str, float]:
+    """Start values of what a rig's nominal model fits, where nobody gave any: only their size matters.
+
+    Parameters
+    ----------
+    known
+        Numbers of the rig that were given.
+    urdf
+        Of a joint.
+
+    Raises
+    ------
+    InputError
+        If the URDF cannot be read.
+    """
+    out = {name: float(getattr(rig, name)) for name in rig.parameters() if name in rig.schema.start}
+    if urdf is not None and out.get("damping") == 0.0:
+        out["damping"] = joint_inertia(load_urdf(urdf)) / RUN_OUT_S
+    if {"foot_mass_kg", "com_distance_m"} <= set(known) and "inertia_kgm2" in out:
+        out["inertia_kgm2"] = known["foot_mass_kg"] * known["com_distance_m"] ** 2
+    return out

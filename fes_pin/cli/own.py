@@ -1,0 +1,307 @@
+"""`fes-pin new-study` and `fes-pin check`: somebody's own recordings as a study, and what it can show."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+import tomllib
+from collections.abc import Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from fes_pin.cli.group import release_output
+from fes_pin.data.files import write_files
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from fes_pin.data.new_study import NewStudy, Wanted
+    from fes_pin.data.study import Study
+    from fes_pin.models.catalogue import Catalogue
+
+FAR = 0.3
+"""Share of the variance that a nominal model leaves from which on it is said that it is far off."""
+
+Libraries = Annotated[
+    list[str] | None,
+    typer.Option("--library", help="A Python file, or the name of a module, with causes or rigs. Its code is run."),
+]
+
+
+def new_study(
+    files: Annotated[list[Path] | None, typer.Argument(help="Recordings, one a trial.")] = None,
+    rig: Annotated[
+        str | None, typer.Option(help="ankle, joint, muscle, or a rig of your own. [default: joint]")
+    ] = None,
+    urdf: Annotated[Path | None, typer.Option(help="Of a joint: the rig as it is believed to be.")] = None,
+    pendulum: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="LENGTH MASS", help="Write a URDF: a mass on a light arm; m, kg."),
+    ] = None,
+    rod: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="LENGTH MASS", help="Write a URDF: a uniform rod; m, kg.")
+    ] = None,
+    slide: Annotated[
+        float | None, typer.Option(metavar="MASS", help="Write a URDF: a carriage on a level rail; kg.")
+    ] = None,
+    upright: Annotated[bool, typer.Option("--upright", help="Position 0 is upright; else it hangs there.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder of the study. [default: where the recordings are]")] = None,
+    name: Annotated[str | None, typer.Option(help="Of the study. [default: its folder's]")] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(help="position=Angle:deg, effort=Torque:Nm,scale=-1, time_s=rate=1000; velocity= takes none."),
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A number: load_kg=1, a.csv:load_kg=1.5, rig.damping=0.1; kind=isometric."),
+    ] = None,
+    resample: Annotated[
+        float | None, typer.Option(min=0.0, help="Hz: interpolate times that are not equally spaced.")
+    ] = None,
+    fill: Annotated[bool, typer.Option("--fill", help="Fill in short gaps of missing samples.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Write over a study.toml that is there.")] = False,
+    library: Libraries = None,
+) -> None:
+    """Make a study of your own recordings, which stay as they are: reads headers, writes study.toml, checks it.
+
+    With --pendulum, --rod or --slide and no recordings it writes the URDF alone.
+    """
+    from fes_pin.data.errors import InputError
+    from fes_pin.data.new_study import new_study as make
+    from fes_pin.models.catalogue import load_library
+    from fes_pin.models.nominal import guess_start
+
+    template = _template(pendulum, rod, slide, upright)
+    if template is not None and urdf is not None:
+        raise InputError("expected one of --urdf, --pendulum, --rod and --slide, found several")
+    if not files:
+        if template is None:
+            raise InputError("expected recordings, or --pendulum LENGTH MASS for a URDF alone")
+        _write_template(template, out or Path(), force)
+        return
+    catalogue = load_library(*(library or []))
+    given: Mapping[str, object] = {"columns": _pairs("--column", column), "settings": _pairs("--set", setting)}
+    with _urdf_file(template, urdf) as path:
+        wanted = _wanted(files, rig, out, name, catalogue, template or urdf, path, resample, fill, given)
+        if (wanted.folder / "study.toml").exists() and not force:
+            raise InputError("is there already; --force writes over it", file=wanted.folder / "study.toml")
+        made = make(wanted, lambda known: guess_start(wanted.schema.owner, known, path))
+    study, warnings = _tried(made, wanted.folder, catalogue)
+    write_files(wanted.folder, made.contents)
+    for own, theirs, unit in made.taken:
+        typer.echo(f"{own:16s} is {theirs}{f', in {unit}' if unit else ''}")
+    _say(study, warnings)
+    place = wanted.folder / "study.toml"
+    typer.echo(
+        f"wrote {place}: look at it, then run\n  fes-pin check {wanted.folder}\n"
+        f"  fes-pin diagnose {wanted.folder} --out answer"
+    )
+
+
+def check(
+    study: Annotated[Path, typer.Argument(help="Folder of a study, or its study.toml.")],
+    library: Libraries = None,
+) -> None:
+    """Say what is odd about a study before anything is looked for, and what its trials can and cannot show."""
+    from fes_pin.data.study import read_study
+    from fes_pin.diagnose.testable import testable
+    from fes_pin.models.catalogue import load_library
+
+    catalogue = load_library(*(library or []))
+    measured = read_study(study, rigs=catalogue.schemas())
+    _say(measured, _checked(measured, catalogue))
+    if measured.schema.owner is None:
+        return
+    found = testable(measured, catalogue)
+    if isinstance(found, str):
+        typer.echo(f"what these trials can show is not known before a diagnosis: {found}")
+        return
+    for warning in found.warnings:
+        typer.echo(f"odd: {warning}")
+    if found.unexplained > FAR:
+        share = f"{100.0 * found.unexplained:.3g} % of the variance"
+        typer.echo(f"the nominal model leaves {share}: what follows is linearized far from what was measured")
+    _list(f"these trials can show {len(found.shown)} causes", found.shown)
+    _list("they cannot show, as what is fitted takes it up", found.absorbed)
+    _list("they cannot show, as it acts in none of them", found.silent)
+    if found.alike:
+        typer.echo(f"they look alike on these trials: {'; '.join(' and '.join(group) for group in found.alike)}")
+    if len(measured.trials) == 1:
+        typer.echo("one trial: nothing can be held out, and no cause can be borne out by another trial")
+
+
+def _list(words: str, names: Sequence[str] | Mapping[str, float]) -> None:
+    if names:
+        typer.echo(f"{words}: {', '.join(names)}")
+
+
+def _say(study: Study, warnings: Sequence[str]) -> None:
+    typer.echo(study)
+    for warning in warnings:
+        typer.echo(f"odd: {warning}")
+    if not warnings:
+        typer.echo("nothing is odd about its numbers")
+
+
+def _checked(study: Study, catalogue: Catalogue) -> list[str]:
+    from fes_pin.diagnose.diagnosis import despiked_study
+    from fes_pin.diagnose.plausibility import check_study
+    from fes_pin.models.nominal import nominal_model
+
+    if study.schema.owner is None:
+        return []
+    clean, spikes = despiked_study(study)
+    count = sum(len(k) for columns in spikes.values() for k in columns.values())
+    said = [f"{count} samples look like spikes, and are taken for what their neighbours say"] if count else []
+    return [*said, *check_study(clean, nominal_model(clean))]
+
+
+def _template(
+    pendulum: tuple[float, float] | None, rod: tuple[float, float] | None, slide: float | None, upright: bool
+) -> tuple[str, str] | None:
+    """Name and text of the URDF that was asked for."""
+    from fes_pin.data import templates
+    from fes_pin.data.errors import InputError
+
+    asked = [one for one in (pendulum, rod, slide) if one is not None]
+    if len(asked) > 1:
+        raise InputError("expected one of --pendulum, --rod and --slide, found several")
+    if pendulum is not None:
+        return "pendulum.urdf", templates.pendulum(*pendulum, upright)
+    if rod is not None:
+        return "rod.urdf", templates.rod(*rod, upright)
+    if upright:
+        raise InputError("expected --upright with --pendulum or --rod", column="--upright")
+    return None if slide is None else ("slide.urdf", templates.slide(slide))
+
+
+def _write_template(template: tuple[str, str], folder: Path, force: bool) -> None:
+    from fes_pin.data.errors import InputError
+
+    place = folder / template[0]
+    if place.exists() and not force:
+        raise InputError("is there already; --force writes over it", file=place)
+    write_files(folder, {template[0]: template[1]})
+    typer.echo(f"wrote {place}")
+
+
+@contextmanager
+def _urdf_file(template: tuple[str, str] | None, urdf: Path | None) -> Iterator[Path | None]:
+    """The rig's URDF as a file, a template's in a folder of its own for as long."""
+    if template is None:
+        yield urdf
+        return
+    with tempfile.TemporaryDirectory(prefix="fes-pin-") as folder:
+        path = Path(folder) / template[0]
+        path.write_text(template[1])
+        yield path
+
+
+def _wanted(
+    files: list[Path],
+    rig: str | None,
+    out: Path | None,
+    name: str | None,
+    catalogue: Catalogue,
+    urdf: Path | tuple[str, str] | None,
+    urdf_file: Path | None,
+    resample: float | None,
+    fill: bool,
+    given: Mapping[str, object],
+) -> Wanted:
+    from fes_pin.data.errors import InputError
+    from fes_pin.data.new_study import Wanted, common_folder
+    from fes_pin.data.schema import known_rigs, one_of
+    from fes_pin.data.urdf import is_revolute
+
+    rigs = known_rigs(catalogue.schemas())
+    try:
+        schema = rigs[one_of(rig or "joint", tuple(rigs))]
+    except ValueError as problem:
+        raise InputError(str(problem), column="--rig") from None
+    if schema.owner is None:
+        raise InputError("a study of walking names two files a trial: docs/study_format.md shows one", column="--rig")
+    if ("urdf" in schema.files) != (urdf is not None):
+        told = "--urdf FILE, or --pendulum LENGTH MASS, --rod or --slide" if urdf is None else "no URDF"
+        raise InputError(f"expected {told} for rig {schema.name}", column="--urdf")
+    if urdf_file is not None and schema.check_files is not None:
+        schema.check_files({"urdf": urdf_file})
+    doubles = [f for k, f in enumerate(files) if f.absolute() in [g.absolute() for g in files[:k]]]
+    if doubles:
+        raise InputError("was named twice", file=doubles[0])
+    folder = out or common_folder(files)
+    settings = dict(given["settings"])  # type: ignore[call-overload]
+    return Wanted(
+        files=tuple(files),
+        schema=schema,
+        folder=folder,
+        name=name or folder.absolute().name or "study",
+        urdf=urdf,
+        revolute=is_revolute(urdf_file),
+        columns=dict(given["columns"]),  # type: ignore[call-overload]
+        settings=settings,
+        kind=settings.pop("kind", None),
+        resample_hz=resample or None,
+        fill=fill,
+        ask=_ask if sys.stdin.isatty() and sys.stdout.isatty() else None,
+    )
+
+
+def _ask(question: str) -> str:
+    release_output()
+    return str(typer.prompt(question, default="", show_default=False))
+
+
+def _pairs(option: str, words: list[str] | None) -> dict[str, str]:
+    from fes_pin.data.errors import InputError
+
+    out: dict[str, str] = {}
+    for word in words or []:
+        key, equals, value = word.partition("=")
+        if not equals or not key:
+            raise InputError(f"expected {option} NAME=VALUE, found {word!r}")
+        if key in out:
+            raise InputError(f"expected {option} {key} once, found it again as {word!r}")
+        out[key] = value
+    return out
+
+
+def _tried(made: NewStudy, folder: Path, catalogue: Catalogue) -> tuple[Study, list[str]]:
+    """The study as it will be read, and what is odd about it, before anything of it is written where it belongs.
+
+    Raises
+    ------
+    InputError
+        As `read_study`; of the files that were given, not of their copies.
+    """
+    from fes_pin.data.errors import InputError
+    from fes_pin.data.study import read_study
+
+    with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
+        try:
+            study = read_study(_staged(made, folder, Path(scratch)), rigs=catalogue.schemas())
+            return study, _checked(study, catalogue)
+        except InputError as error:
+            if error.file is None or not Path(error.file).is_relative_to(scratch):
+                raise
+            place = Path(error.file).relative_to(scratch).as_posix()
+            file = folder if place == "." else made.origins.get(place, folder / place)
+            raise InputError(error.message, file=file, row=error.row, column=error.column) from None
+
+
+def _staged(made: NewStudy, folder: Path, scratch: Path) -> Path:
+    """A folder like the study's to be: what is made lies in it, and a copy of what stays where it is."""
+    text = made.contents["study.toml"]
+    assert isinstance(text, str)
+    rig = tomllib.loads(text).get("rig", {})
+    for place in [*made.origins, *([rig["urdf"]] if "urdf" in rig else [])]:
+        if place not in made.contents:
+            target = scratch / place
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(folder / place, target)
+    write_files(scratch, made.contents)
+    return scratch

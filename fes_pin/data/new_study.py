@@ -1,0 +1,424 @@
+"""A study made of somebody's own recordings: `study.toml` and what belongs to it, with all that was assumed said.
+
+What the files do not say is taken from options, or asked of a person at a terminal; only start values are guessed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import inside, read_bytes
+from fes_pin.data.recorded.columns import INTERPOLATE, SOURCE_KEYS
+from fes_pin.data.recorded.propose import Proposal, propose
+from fes_pin.data.recorded.text import TextForm
+from fes_pin.data.schema import RigSchema, unknown
+from fes_pin.data.units import known_unit, own_unit, quantities_of
+
+Ask = Callable[[str], str]
+"""Puts a question to a person and gives the answer."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a new study is to be made of.
+
+    Parameters
+    ----------
+    files
+        Recordings.
+    schema
+        Of the rig.
+    folder
+        Of the study: files inside it stay where they are, others are copied as they are.
+    name
+        Of the study.
+    urdf
+        Of a rig that has one: a file, or the text of a template with its name.
+    revolute
+        Whether the rig's joint turns; None if it has none.
+    columns
+        By the rig's column what a person said of it: `NAME[:UNIT][,zero=...][,scale=...]`.
+    settings
+        By key, numbers of the rig, start values, conditions of all trials; by `FILE:key` of one trial alone.
+    kind
+        Of all trials; None to be told from their columns.
+    resample_hz, fill
+        See `[columns.file]`.
+    ask
+        None where nobody can be asked.
+    """
+
+    files: tuple[Path, ...]
+    schema: RigSchema
+    folder: Path
+    name: str
+    urdf: Path | tuple[str, str] | None = None
+    revolute: bool | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, str] = field(default_factory=dict)
+    kind: str | None = None
+    resample_hz: float | None = None
+    fill: bool = False
+    ask: Ask | None = None
+
+
+@dataclass(frozen=True)
+class NewStudy:
+    """The files of a new study, not written yet.
+
+    Parameters
+    ----------
+    contents
+        By path below the study's folder: `study.toml`, and what is copied there.
+    taken
+        The rig's column, the file's name of it and its unit, as a person wants to see them.
+    origins
+        Where each recording lies, by its path below the study's folder.
+    """
+
+    contents: Mapping[str, str | bytes]
+    taken: tuple[tuple[str, str, str], ...]
+    origins: Mapping[str, Path]
+
+
+def new_study(wanted: Wanted, guess: Callable[[Mapping[str, float]], Mapping[str, float]]) -> NewStudy:
+    """Propose a study of recordings.
+
+    Parameters
+    ----------
+    guess
+        Start values of what the nominal model fits, of the rig's known numbers: for those that nobody gave.
+
+    Raises
+    ------
+    InputError
+        A recording that cannot be read; what the files do not say and no option does, all of it in one line.
+    """
+    return _Making(wanted).made(guess)
+
+
+class _Making:
+    """One study in the making; `missing` collects what nobody has said."""
+
+    def __init__(self, wanted: Wanted) -> None:
+        self.wanted, self.schema = wanted, wanted.schema
+        self.missing: list[str] = []
+        self.proposals = [propose(path, self.schema, wanted.revolute) for path in wanted.files]
+        self.form = self._one_form()
+        self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
+        for key in wanted.columns:
+            if key not in self.schema.columns:
+                raise InputError(unknown(key, self.schema.columns), column="--column")
+
+    def made(self, guess: Callable[[Mapping[str, float]], Mapping[str, float]]) -> NewStudy:
+        kinds = [self._kind(p) for p in self.proposals]
+        sources = self._sources(set(kinds))
+        rig = self._numbers("rig", self.schema.constants)
+        passive = self._numbers("rig.passive", self.schema.passive)
+        trials = [self._trial(p, kind) for p, kind in zip(self.proposals, kinds, strict=True)]
+        known, start = self._start({**rig, **passive}, guess)
+        self._check_settings()
+        if self.missing:
+            raise InputError("the files do not say everything; please add " + ", ".join(dict.fromkeys(self.missing)))
+        contents: dict[str, str | bytes] = {}
+        files = self._urdf(contents)
+        places = [self._place(path, contents) for path in self.wanted.files]
+        text = [
+            *_table("study", {"name": self.wanted.name, "rig": self.schema.name}),
+            *_table("rig", {**files, **rig, **known}, "known before the trials, never fitted", self._units()),
+            *_table("rig.passive", passive, "known as well", self._units()),
+            *_table("start", start, "start values of what the nominal model fits", self._units()),
+            *self._columns(sources),
+        ]
+        for place, kind, conditions in zip(places, kinds, trials, strict=True):
+            text += ["", "[[trial]]", f"file = {_quoted(place)}", f"kind = {_quoted(kind)}"]
+            text += [f"{key} = {value!r}" for key, value in conditions.items()]
+        contents["study.toml"] = "\n".join([*_HEADER, *text]) + "\n"
+        taken = tuple(
+            (c, s.get("name", "from its rate"), _said(s, c, self.wanted.revolute)) for c, s in sources.items()
+        )
+        return NewStudy(contents, taken, dict(zip(places, self.wanted.files, strict=True)))
+
+    def _one_form(self) -> TextForm | None:
+        forms = {p.form: p for p in self.proposals}
+        if len(forms) > 1:
+            one, other = list(forms.items())[:2]
+            told = " and ".join(f"{p.recording.path.name} has {_form(form)}" for form, p in (one, other))
+            raise InputError(f"expected files that are written alike, but {told}; make a study of each kind")
+        return self.proposals[0].form
+
+    def _kind(self, proposal: Proposal) -> str:
+        """The kind of trial that a file's columns make."""
+        path, outputs = proposal.recording.path, self.schema.outputs
+        given = self._own(path, "kind") or self.wanted.kind
+        if given is not None:
+            if given not in outputs:
+                raise InputError(f"expected one of {', '.join(outputs)}, found {given!r}", column="--kind")
+            return given
+        fits = [k for k, c in outputs.items() if c in self.wanted.columns or proposal.candidates[c]]
+        fits = [k for k in fits if not (self.schema.default_kind in fits and outputs[k] in self.schema.inputs)]
+        return self.schema.default_kind if self.schema.default_kind in fits or not fits else fits[0]
+
+    def _own(self, path: Path, key: str) -> str | None:
+        """What was set for one file alone."""
+        return next(
+            (
+                self.wanted.settings[f"{n}:{key}"]
+                for n in (path.name, path.stem)
+                if f"{n}:{key}" in self.wanted.settings
+            ),
+            None,
+        )
+
+    def _sources(self, kinds: set[str]) -> dict[str, dict[str, Any]]:
+        """For each of the rig's columns what `[columns]` says of it."""
+        needed = ["time_s", *dict.fromkeys(self.schema.outputs[k] for k in kinds)]
+        inputs = [c for c in self.schema.inputs if c in self.wanted.columns or self._candidates(c)]
+        if not inputs and self.schema.inputs_required:
+            needed.append(self.schema.inputs[0])
+        sources = {}
+        for column in dict.fromkeys([*needed, *inputs[:1], *self.schema.optional]):
+            source = self._source(column, column in needed)
+            if source is not None:
+                sources[column] = source
+        return sources
+
+    def _candidates(self, column: str) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(n for p in self.proposals for n in p.candidates[column]))
+
+    def _source(self, column: str, is_needed: bool) -> dict[str, Any] | None:
+        option = self.wanted.columns.get(column)
+        if option is not None:
+            return _from_option(column, option, self.names) if option else None
+        candidates = self._candidates(column)
+        if len(candidates) != 1:
+            if not is_needed and len(candidates) < 2:
+                return None
+            could = f"{' or '.join(candidates)}" if candidates else f"one of {', '.join(self.names)}"
+            what = f"--column {column}=NAME:UNIT ({could}"
+            return self._asked(column, f"{what}; or nothing: --column {column}=)" if not is_needed else f"{what})")
+        return self._with_unit(column, candidates[0])
+
+    def _with_unit(self, column: str, name: str) -> dict[str, Any] | None:
+        """The column of that name, and the unit that it seems to be in."""
+        unit = next((u for p in self.proposals if (u := p.units.get(name))), "")
+        quantities = quantities_of(column, self.wanted.revolute)
+        if name == column or not quantities or quantities == ("pulses",):
+            return {"name": name}
+        if unit:
+            found = known_unit(unit, quantities)
+            if found is not None:
+                return {"name": name, "unit": found[1]}
+            return self._asked(column, f"--column {column}={name},scale=NUMBER ({own_unit(column)} for each {unit})")
+        units = own_unit(column, self.wanted.revolute)
+        return self._asked(column, f"--column {column}={name}:UNIT ({self._range(name)}: {units}, or which unit?)")
+
+    def _range(self, name: str) -> str:
+        values = [p.recording.columns[name] for p in self.proposals if name in p.recording.columns]
+        low, high = (f(np.concatenate(values)) for f in (np.nanmin, np.nanmax))
+        return f"{low:.4g} to {high:.4g}"
+
+    def _asked(self, column: str, what: str) -> dict[str, Any] | None:
+        if self.wanted.ask is None:
+            self.missing.append(what)
+            return None
+        answer = self.wanted.ask(what.removeprefix("--column ")).strip().removeprefix(f"{column}=")
+        return _from_option(column, answer, self.names) if answer else None
+
+    def _number(self, key: str, unit: str, number: Any, path: Path | None = None) -> float | None:
+        """A number that somebody gave; None, and it is missing, if nobody has."""
+        text = (self._own(path, key) if path else None) or self.wanted.settings.get(key)
+        place = f"{path.name}:" if path and len(self.proposals) > 1 else ""
+        if text is None and self.wanted.ask is not None:
+            text = self.wanted.ask(f"{place}{key}{f' in {unit}' if unit else ''}").strip()
+        if not text:
+            self.missing.append(f"--set {place}{key}=NUMBER{f' ({unit})' if unit else ''}")
+            return None
+        try:
+            return number.check(float(text))
+        except ValueError as problem:
+            words = str(problem) if str(problem).startswith("expected") else f"expected a number, found {text[:40]!r}"
+            raise InputError(words, column=f"--set {key}") from None
+
+    def _numbers(self, where: str, table: Mapping[str, Any]) -> dict[str, float]:
+        """Numbers of a table: those that it must have, and those that were given."""
+        threshold = "pulse_width_us" in (*self.wanted.columns, *(c for c in table)) or bool(
+            "pulse_width_us" in self.schema.inputs and self._candidates("pulse_width_us")
+        )
+        out: dict[str, float] = {}
+        for key, number in table.items():
+            needed = number.required or (threshold and key in ("threshold_us", "saturation_us"))
+            if needed or key in self.wanted.settings:
+                value = self._number(key, number.unit, number)
+                out |= {} if value is None else {key: value}
+        return out
+
+    def _trial(self, proposal: Proposal, kind: str) -> dict[str, float]:
+        """Conditions of one trial."""
+        path = proposal.recording.path
+        out: dict[str, float] = {}
+        needed = self.schema.needed.get(kind, {})
+        for key, number in self.schema.conditions.items():
+            if self.schema.only.get(key, kind) != kind:
+                continue
+            if key in needed or key in self.wanted.settings or self._own(path, key) is not None:
+                value = self._number(key, number.unit, number, path)
+                out |= {} if value is None else {key: value}
+        return out
+
+    def _start(
+        self, rig: Mapping[str, float], guess: Callable[[Mapping[str, float]], Mapping[str, float]]
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """What is known of `[start]`, as `rig.KEY` was set, and what is fitted."""
+        known: dict[str, float] = {}
+        start: dict[str, float] = {}
+        guessed = {} if self.missing else guess(rig)
+        for key, number in self.schema.start.items():
+            if f"rig.{key}" in self.wanted.settings and self.schema.start_may_be_known:
+                known[key] = self._number(f"rig.{key}", number.unit, number) or 0.0
+            elif key in self.wanted.settings:
+                start[key] = self._number(key, number.unit, number) or 0.0
+            elif key in guessed and number.required:
+                start[key] = float(f"{guessed[key]:.3g}")
+        return known, start
+
+    def _check_settings(self) -> None:
+        """Refuse a setting that nothing reads."""
+        schema = self.schema
+        known = [*schema.constants, *schema.passive, *schema.start, *schema.conditions]
+        also = [f"rig.{key}" for key in schema.start] if schema.start_may_be_known else []
+        files = {n for path in self.wanted.files for n in (path.name, path.stem)}
+        for key in self.wanted.settings:
+            file, _, last = key.rpartition(":")
+            if file and file not in files:
+                raise InputError(f"expected one of the files, found {file!r}", column=f"--set {key}")
+            if last not in ([*schema.conditions, "kind"] if file else [*known, *also]):
+                raise InputError(unknown(last, known), column=f"--set {key}")
+
+    def _urdf(self, contents: dict[str, str | bytes]) -> dict[str, str]:
+        urdf = self.wanted.urdf
+        if urdf is None:
+            return {}
+        if isinstance(urdf, tuple):
+            contents[urdf[0]] = urdf[1]
+            return {"urdf": urdf[0]}
+        return {"urdf": self._place(urdf, contents, "")}
+
+    def _place(self, path: Path, contents: dict[str, str | bytes], below: str = "trials/") -> str:
+        """The file's path below the study's folder, where it is copied to if it is elsewhere."""
+        try:
+            relative = path.absolute().relative_to(self.wanted.folder.absolute()).as_posix()
+            inside(self.wanted.folder, relative)
+            return relative
+        except ValueError:
+            place = f"{below}{path.name}"
+        if place in contents or (self.wanted.folder / place).exists():
+            raise InputError(f"would be copied to {place}, where there is a file already", file=path)
+        contents[place] = read_bytes(path)
+        return place
+
+    def _columns(self, sources: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        """The table `[columns]`; empty where the files are as the study format has them."""
+        used = {s["name"] for s in sources.values() if "name" in s}
+        ignored = [n for n in self.names if n not in used]
+        form = self.form if self.form != TextForm() else None
+        options = {"resample_hz": self.wanted.resample_hz, "missing": INTERPOLATE if self.wanted.fill else None}
+        plain = all(s == {"name": c} for c, s in sources.items()) and self.names[:1] == ("time_s",)
+        if plain and form is None and self.form is not None and not ignored and not any(options.values()):
+            return []
+        out = ["", "[columns]  # the rig's columns, as the recordings call them, and their units there"]
+        out += [f"{column} = {_inline(source)}" for column, source in sources.items()]
+        out += [f"ignored = [{', '.join(map(_quoted, ignored))}]"] if ignored else []
+        about: dict[str, Any] = {k: v for k, v in options.items() if v is not None}
+        if form is not None:
+            plain_form = TextForm()
+            for key in ("delimiter", "decimal", "header_row", "first_row", "comment", "encoding"):
+                if getattr(form, key) != getattr(plain_form, key):
+                    about[key] = getattr(form, key)
+        return out + _table("columns.file", about, "how the recordings are written")
+
+    def _units(self) -> dict[str, str]:
+        schema = self.schema
+        return {k: n.unit for table in (schema.constants, schema.passive, schema.start) for k, n in table.items()}
+
+
+_HEADER = ("# Written by `fes-pin new-study`; every line may be changed. docs/study_format.md says what each means.",)
+
+
+def _table(name: str, values: Mapping[str, Any], what: str = "", units: Mapping[str, str] | None = None) -> list[str]:
+    if not values:
+        return []
+    out = ["", f"[{name}]" + (f"  # {what}" if what else "")]
+    for key, value in values.items():
+        unit = (units or {}).get(key, "")
+        out.append(f"{key} = {_value(value)}" + (f"  # {unit}" if unit else ""))
+    return out
+
+
+def _value(value: Any) -> str:
+    return _quoted(value) if isinstance(value, str) else repr(value)
+
+
+def _quoted(text: str) -> str:
+    """A TOML string: JSON's escapes are a subset of its own, but for the character 127."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _inline(source: Mapping[str, Any]) -> str:
+    return "{ " + ", ".join(f"{k} = {_value(v)}" for k, v in source.items()) + " }"
+
+
+def _from_option(column: str, option: str, names: Sequence[str]) -> dict[str, Any]:
+    """`NAME[:UNIT][,key=number ...]`, or `rate=HZ` for a file without times."""
+    where = f"--column {column}"
+    if option in names:  # whatever signs it has
+        return {"name": option}
+    first, *more = option.split(",")
+    if first.startswith("rate=") and column == "time_s":
+        return {"rate_hz": _float(first.removeprefix("rate="), where)}
+    name, colon, unit = first.rpartition(":") if first not in names else (first, "", "")
+    out: dict[str, Any] = {"name": name if colon else first} | ({"unit": unit} if unit and colon else {})
+    if out["name"] not in names:
+        raise InputError(
+            f"expected a column of the files, one of {', '.join(names)}; found {out['name']!r}", column=where
+        )
+    for pair in more:
+        key, equals, value = pair.partition("=")
+        if not equals or key not in SOURCE_KEYS:
+            raise InputError(f"expected NAME:UNIT,zero=NUMBER,scale=NUMBER; found {option!r}", column=where)
+        out[key] = _float(value, where)
+    return out
+
+
+def _float(text: str, where: str) -> float:
+    try:
+        return float("" if "_" in text else text)
+    except ValueError:
+        raise InputError(f"expected a number, found {text[:40]!r}", column=where) from None
+
+
+def _said(source: Mapping[str, Any], column: str, revolute: bool | None) -> str:
+    if "rate_hz" in source:
+        return f"{source['rate_hz']:g} Hz"
+    more = ", ".join(f"{k} {source[k]:g}" for k in ("scale", "zero", "edge") if k in source)
+    return ", ".join(filter(None, [source.get("unit") or own_unit(column, revolute), more]))
+
+
+def _form(form: TextForm | None) -> str:
+    return "another format" if form is None else form.in_words() or "commas, and one header row"
+
+
+def common_folder(files: Iterable[Path]) -> Path:
+    """The folder that all files lie in or below."""
+    parents = [path.absolute().parent for path in files]
+    shared = parents[0]
+    while not all(p.is_relative_to(shared) for p in parents):
+        shared = shared.parent
+    return shared

@@ -1,0 +1,291 @@
+"""The table `[columns]` of a study: which column of the recordings is which of the rig's, in which unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.recorded.formats import read_recording
+from fes_pin.data.recorded.recording import Recording
+from fes_pin.data.recorded.regular import check_steps, filled, resampled
+from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
+from fes_pin.data.schema import RigSchema, one_of, unknown
+from fes_pin.data.table import Table
+from fes_pin.data.units import factor_of
+
+FILE_KEYS = ("delimiter", "decimal", "header_row", "first_row", "comment", "encoding", "resample_hz", "missing")
+SOURCE_KEYS = ("name", "unit", "scale", "zero", "edge", "rate_hz")
+INTERPOLATE = "interpolate"
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a rig's column comes from: `value = scale * factor * (recorded - zero)`.
+
+    Parameters
+    ----------
+    name
+        Of the column in the file; "" for times that are made from a rate.
+    factor
+        What the recorded unit is in the study format's own.
+    scale
+        1; -1 where the recording counts the other way; radians a count, newtons a volt.
+    zero
+        The reading, as recorded, that stands for zero.
+    edge
+        Of `stim`: a pulse begins where the recording rises above this.
+    rate_hz
+        Of `time_s`: the sample rate of a file without times.
+    """
+
+    name: str
+    factor: float = 1.0
+    scale: float = 1.0
+    zero: float = 0.0
+    edge: float | None = None
+    rate_hz: float | None = None
+
+    def __call__(self, recorded: np.ndarray) -> np.ndarray:
+        """The study's numbers of what was recorded, shape (n,)."""
+        if self.edge is not None:
+            above = recorded > self.edge
+            return np.r_[0.0, (above[1:] & ~above[:-1]).astype(float)]
+        return self.scale * self.factor * (recorded - self.zero)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """How the recordings of a study are read.
+
+    Parameters
+    ----------
+    sources
+        By the rig's column.
+    ignored
+        Columns of the files that are passed over.
+    form
+        Of text files.
+    resample_hz
+        None: times must be equally spaced.
+    fills
+        Whether missing samples are filled in.
+    """
+
+    sources: Mapping[str, Source]
+    ignored: tuple[str, ...] = ()
+    form: TextForm = field(default_factory=TextForm)
+    resample_hz: float | None = None
+    fills: bool = False
+
+    def read(self, path: str | Path, schema: RigSchema, kind: str, inputs_only: bool = False) -> tuple[Table, str]:
+        """The rig's columns of one recording, in the study format's units, time first.
+
+        Returns
+        -------
+        Table, and what was done to its samples, in words: "" for nothing
+
+        Raises
+        ------
+        InputError
+            As `read_recording`; a column that is missing, or neither taken nor ignored; samples that are missing or
+            times that are not equally spaced, where the table does not say what to do with them.
+        """
+        names = tuple(dict.fromkeys([s.name for s in self.sources.values() if s.name] + list(schema.columns)))
+        recording = read_recording(path, self.form, names)
+        taken = self._taken(recording, schema, kind, inputs_only)
+        called = {column: source.name or column for column, source in taken.items()}
+        columns = {c: s(recording.columns[s.name]) for c, s in taken.items() if c != "time_s"}
+        time = self._time(recording, taken.get("time_s"))
+        half = taken["time_s"] if "time_s" in taken else Source("")
+        half_digit = abs(half.scale * half.factor) * recording.half_digit(half.name) if half.name else 0.0
+        time, columns, rows, said = self._regular(recording, time, columns, schema, called)
+        table = Table(
+            path=Path(path),
+            names=("time_s", *columns),
+            values=np.column_stack([time, *columns.values()]),
+            header_row=recording.header_row or 0,
+            lines=(),
+            delimiter=",",
+            rows=rows,
+            half_digit=half_digit if self.resample_hz is None else 0.0,
+            called=called,
+        )
+        return table, said
+
+    def _taken(self, recording: Recording, schema: RigSchema, kind: str, inputs_only: bool) -> dict[str, Source]:
+        """Sources of this file's columns; refuses what nobody has spoken for."""
+        needed = {"time_s", *schema.inputs, *(() if inputs_only else (schema.outputs[kind],))}
+        taken = {}
+        for column, source in self.sources.items():
+            if source.name and source.name not in recording.names:
+                if column in needed:
+                    message = f"missing; [columns] takes {column} from it, and this file has {_list(recording.names)}"
+                    raise recording.error(message, source.name)
+                continue
+            taken[column] = source
+        spoken_for = {*self.ignored, *(s.name for s in self.sources.values())}
+        for name in recording.names:
+            if name in spoken_for:
+                continue
+            if name not in schema.columns or name in taken:
+                expected = f"this rig reads {', '.join(schema.columns)}"
+                raise recording.error(f"expected it in [columns], or there among `ignored`; {expected}", name)
+            taken[name] = Source(name)
+        return {c: taken[c] for c in ("time_s", *(n for n in taken if n != "time_s")) if c in taken}
+
+    def _time(self, recording: Recording, source: Source | None) -> np.ndarray:
+        if source is None:
+            raise recording.error("missing; expected [columns] to say which column it is, or its rate_hz", "time_s")
+        if not source.name:
+            assert source.rate_hz is not None
+            return np.arange(len(recording.rows)) / source.rate_hz
+        return source(recording.columns[source.name])
+
+    def _regular(
+        self,
+        recording: Recording,
+        time: np.ndarray,
+        columns: dict[str, np.ndarray],
+        schema: RigSchema,
+        called: Mapping[str, str],
+    ) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray, str]:
+        """Times and columns without holes, the row of each sample, and what was done, in words."""
+        said = []
+        if self.resample_hz is not None:
+            check_steps(recording, time, called["time_s"])
+        elif np.isnan(time).any():
+            raise recording.error("expected a time, found nothing", called["time_s"], int(np.argmax(np.isnan(time))))
+        for name, values in columns.items():
+            if np.isnan(values).any() and not self.fills:
+                hint = f'missing = "{INTERPOLATE}" in [columns.file] fills in short gaps'
+                sample = int(np.argmax(np.isnan(values)))
+                raise recording.error(f"expected a number, found nothing; {hint}", called[name], sample)
+        if self.fills:
+            columns, count = filled(recording, time, columns, schema.inputs, called)
+            said += [f"{count} missing samples are filled in"] if count else []
+        rows = recording.rows
+        if self.resample_hz is not None:
+            steps = np.diff(time)
+            grid, columns = resampled(recording, time, columns, schema.inputs, called, self.resample_hz)
+            rows = rows[np.searchsorted(time, grid + 1e-9, side="right") - 1]
+            time = grid
+            was = f"{1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms"
+            said.append(f"time steps of {was} are interpolated to {self.resample_hz:g} Hz, without a filter")
+        return time, columns, rows, "; ".join(said)
+
+
+def columns_of(
+    table: Mapping[str, Any], schema: RigSchema, revolute: bool | None, error: Callable[[str, str], Exception]
+) -> Columns:
+    """The table `[columns]` of a study, checked.
+
+    Parameters
+    ----------
+    table
+        As TOML gives it.
+    revolute
+        Whether the rig's joint turns or slides; None if it has none, or that is not known.
+    error
+        Makes the exception for a key below `columns` and a message.
+
+    Raises
+    ------
+    Exception
+        What `error` makes.
+    """
+    if len(schema.recordings) > 1:
+        raise error("", f"expected no [columns] for rig {schema.name}: its files name their columns themselves")
+    sources, ignored, about = {}, (), {}
+    for key, value in table.items():
+        if key == "ignored":
+            if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
+                raise error(key, "expected a list of column names")
+            ignored = tuple(value)
+        elif key == "file":
+            if not isinstance(value, dict):
+                raise error(key, "expected a table [columns.file]")
+            about = value
+        elif key not in schema.columns:
+            raise error(key, unknown(key, (*schema.columns, "ignored", "file")))
+        else:
+            sources[key] = _source(key, value, revolute, error)
+    names = [s.name for s in sources.values() if s.name]
+    for column, source in sources.items():
+        if source.name in ignored or (source.name and names.count(source.name) > 1):
+            raise error(column, f"{source.name!r} is named twice in [columns]")
+    return _with_file(Columns(sources, ignored), about, error)
+
+
+def _source(column: str, value: Any, revolute: bool | None, error: Callable[[str, str], Exception]) -> Source:
+    given = {"name": value} if isinstance(value, str) else value
+    if not isinstance(given, dict):
+        raise error(column, 'expected the name of a column, or a table like { name = "Angle", unit = "deg" }')
+    for key in given:
+        if key not in SOURCE_KEYS:
+            raise error(f"{column}.{key}", unknown(key, SOURCE_KEYS))
+    numbers = {k: _number(f"{column}.{k}", given[k], error) for k in ("scale", "zero", "edge", "rate_hz") if k in given}
+    rate = numbers.get("rate_hz")
+    if rate is not None and (column != "time_s" or not rate > 0.0 or len(given) > 1):
+        raise error(f"{column}.rate_hz", "expected a rate above 0, alone, and of time_s only")
+    if "edge" in numbers and column != "stim":
+        raise error(f"{column}.edge", "expected for stim only: where a recorded trigger rises above it, a pulse begins")
+    if numbers.get("scale") == 0.0:
+        raise error(f"{column}.scale", "expected a number other than 0")
+    name, unit = given.get("name", ""), given.get("unit", "")
+    if not isinstance(unit, str):
+        raise error(f"{column}.unit", "expected a unit as text")
+    if rate is None and (not isinstance(name, str) or not name):
+        raise error(f"{column}.name", "expected the name of a column of the files")
+    try:
+        factor = factor_of(unit, column, revolute) if unit else 1.0
+    except ValueError as problem:
+        raise error(f"{column}.unit", str(problem)) from None
+    return Source(name, factor, **numbers)
+
+
+def _number(key: str, value: Any, error: Callable[[str, str], Exception]) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise error(key, "expected a finite number")
+    return float(value)
+
+
+def _with_file(columns: Columns, about: Mapping[str, Any], error: Callable[[str, str], Exception]) -> Columns:
+    """With what `[columns.file]` says of how the files are written."""
+    form: dict[str, Any] = {}
+    for key, value in about.items():
+        where = f"file.{key}"
+        if key not in FILE_KEYS:
+            raise error(where, unknown(key, FILE_KEYS))
+        known = {"delimiter": DELIMITERS, "decimal": DECIMALS, "encoding": ENCODINGS, "missing": (INTERPOLATE,)}
+        if key in known:
+            try:
+                form[key] = one_of(value, known[key])
+            except ValueError as problem:
+                raise error(where, str(problem)) from None
+        elif key == "comment":
+            if not isinstance(value, str) or not value.strip():
+                raise error(where, "expected what a comment begins with")
+            form[key] = value.strip()
+        elif key == "resample_hz":
+            form[key] = _number(where, value, error)
+            if not form[key] > 0.0:
+                raise error(where, "expected a rate above 0 Hz")
+        elif isinstance(value, bool) or not isinstance(value, int) or value < (key == "first_row"):
+            raise error(where, "expected the number of a line, from 1" + (" (0: no header)" * (key == "header_row")))
+        else:
+            form[key] = value
+    rate, missing = form.pop("resample_hz", None), form.pop("missing", None)
+    form.setdefault("first_row", form.get("header_row", 1) + 1)
+    text = TextForm(**form)
+    if text.first_row <= text.header_row:
+        raise error("file.first_row", f"expected a line below the header in line {text.header_row}")
+    return replace(columns, form=text, resample_hz=rate, fills=missing is not None)
+
+
+def _list(names: tuple[str, ...]) -> str:
+    return ", ".join(names)[:200]

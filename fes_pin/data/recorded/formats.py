@@ -1,0 +1,245 @@
+"""Recordings in files that are no plain text: each by the library that its community keeps, as an extra.
+
+| suffix | library | extra |
+|---|---|---|
+| `.parquet` | pyarrow | `parquet` |
+| `.mat` | pymatreader (scipy and h5py) | `matlab` |
+| `.c3d` | ezc3d | `c3d` |
+| `.xdf`, `.xdfz` | pyxdf | `xdf` |
+| `.mot`, `.sto`, `.trc` | none | |
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import what_is_at
+from fes_pin.data.markers import read_markers
+from fes_pin.data.motion import read_motion
+from fes_pin.data.recorded.recording import Recording, without_twins
+from fes_pin.data.recorded.text import TextForm, read_text_recording
+from fes_pin.data.table import MIN_ROWS
+
+REFUSED = {
+    **dict.fromkeys(
+        (".xlsx", ".xls", ".xlsm", ".ods", ".numbers"),
+        "a spreadsheet: what a cell shows need not be what was measured; save the sheet as CSV",
+    ),
+    **dict.fromkeys((".pkl", ".pickle"), "a pickle, which runs code when it is read; save it as CSV or Parquet"),
+    **dict.fromkeys((".zip", ".gz", ".7z"), "an archive; unpack it first"),
+}
+"""Suffixes of files that are not read, and what to do instead."""
+TIME = "time"
+"""What the times of a format are called that has no column of them."""
+
+
+def is_text(path: Path) -> bool:
+    """Whether a file is read as text, by its suffix."""
+    return path.suffix.lower() not in {*_READERS, *REFUSED}
+
+
+def read_recording(path: str | Path, form: TextForm | None = None, wanted: Sequence[str] | None = None) -> Recording:
+    """Read some columns of a recording by its suffix; what is none of those above is text.
+
+    Parameters
+    ----------
+    form
+        Of a text file; without it that of the study format.
+    wanted
+        Names of columns; None for all that are numbers.
+
+    Raises
+    ------
+    InputError
+        Not what its suffix says, a library that is not installed, a file of a kind that is refused, with what to do.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix in REFUSED:
+        raise InputError(f"this is {REFUSED[suffix]}", file=path)
+    if suffix not in _READERS:
+        return read_text_recording(path, form or TextForm(), wanted)
+    found = what_is_at(path)
+    if found != "a file":
+        raise InputError(f"expected a file, found {found}", file=path)
+    recording = _READERS[suffix](path, wanted)
+    sizes = {len(values) for values in recording.columns.values()}
+    if len(sizes) > 1:
+        told = ", ".join(f"{name} {len(values)}" for name, values in recording.columns.items())
+        raise InputError(f"expected columns of one length, found {told[:200]}", file=path)
+    if not sizes or min(sizes) < MIN_ROWS:
+        raise InputError(f"expected at least {MIN_ROWS} samples of numbers, found {min(sizes, default=0)}", file=path)
+    for name, values in recording.columns.items():
+        if np.isinf(values).any():
+            raise recording.error("expected a finite number", name, int(np.argmax(np.isinf(values))))
+    return recording
+
+
+def _library(module: str, extra: str, path: Path) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        message = f"{path.suffix} files need {module.split('.', maxsplit=1)[0]}: pip install 'fes-pin[{extra}]'"
+        raise InputError(message, file=path) from None
+
+
+def _unreadable(path: Path, kind: str, error: BaseException) -> InputError:
+    return InputError(f"cannot be read as {kind}: {' '.join(str(error).split())[:120]}", file=path)
+
+
+def _made(path: Path, columns: Mapping[str, np.ndarray], wanted: Sequence[str] | None, **more: Any) -> Recording:
+    """A recording of columns, of which only those that are wanted must be of one length."""
+    names = tuple(columns)
+    if wanted is not None:
+        columns = {n: v for n, v in columns.items() if n in wanted}
+    count = max((len(v) for v in columns.values()), default=0)
+    return Recording(path, names, columns, np.arange(1, count + 1), **more)
+
+
+def _parquet(path: Path, wanted: Sequence[str] | None) -> Recording:
+    parquet = _library("pyarrow.parquet", "parquet", path)
+    types = _library("pyarrow.types", "parquet", path)
+    try:
+        table = parquet.read_table(path)
+    except Exception as error:
+        raise _unreadable(path, "Parquet", error) from None
+    columns: dict[str, np.ndarray] = {}
+    for name, column in zip(without_twins(list(table.column_names)), table.columns, strict=True):
+        kind = column.type
+        if types.is_timestamp(kind):  # seconds from the first one
+            ticks = column.to_numpy().astype("datetime64[ns]").astype(np.int64)
+            columns[name] = 1e-9 * (ticks - ticks[:1])
+        elif types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind):
+            columns[name] = np.array(column.cast("float64").to_numpy(), dtype=float)
+    return _made(path, columns, wanted)
+
+
+def _matlab(path: Path, wanted: Sequence[str] | None) -> Recording:
+    reader = _library("pymatreader", "matlab", path)
+    try:
+        content = reader.read_mat(str(path))
+    except Exception as error:
+        raise _unreadable(path, "a MATLAB file", error) from None
+    columns = dict(_vectors(content))
+    if wanted is None and columns:  # scalars and tables of other lengths are no columns of the recording
+        count = Counter(len(v) for v in columns.values()).most_common(1)[0][0]
+        columns = {n: v for n, v in columns.items() if len(v) == count}
+    return _made(path, columns, wanted)
+
+
+def _vectors(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    """Vectors of numbers in nested structures, by dotted names; columns of a matrix are counted from 1."""
+    if isinstance(content, Mapping):
+        for key, value in content.items():
+            if not str(key).startswith("__"):
+                yield from _vectors(value, f"{name}.{key}" if name else str(key))
+        return
+    if isinstance(content, list) and not all(isinstance(x, int | float) for x in content):
+        for place, value in enumerate(content, 1):
+            yield from _vectors(value, f"{name}.{place}")
+        return
+    try:
+        values = np.asarray(content)
+    except ValueError:
+        return
+    if values.dtype.kind not in "biuf" or values.size < MIN_ROWS or values.ndim > 2:
+        return
+    if values.ndim == 1 or 1 in values.shape:
+        yield name, values.astype(float).ravel()
+        return
+    table = values if values.shape[0] >= values.shape[1] else values.T
+    for place, column in enumerate(table.T, 1):
+        yield f"{name}.{place}", column.astype(float)
+
+
+def _c3d(path: Path, wanted: Sequence[str] | None) -> Recording:
+    """Analog channels at their rate; where only points are wanted, `<marker>_x`, `_y`, `_z` in m at theirs."""
+    ezc3d = _library("ezc3d", "c3d", path)
+    try:
+        content = ezc3d.c3d(str(path))
+        about = content["parameters"]["ANALOG"]
+        labels = without_twins([str(n).strip() for n in about.get("LABELS", {}).get("value", [])])
+        units = [str(u).strip() for u in about.get("UNITS", {}).get("value", [])]
+        values = np.asarray(content["data"]["analogs"], dtype=float)[0]
+        rate = float(content["header"]["analogs"]["frame_rate"])
+    except Exception as error:
+        raise _unreadable(path, "C3D", error) from None
+    analog = dict(zip(labels, values, strict=False)) if values.size else {}
+    points = _points(path) if content["data"]["points"].size else {}
+    names = (TIME, *analog, *(n for n in points if n != TIME))
+    if analog and (wanted is None or set(wanted) & set(analog)):
+        columns = {TIME: np.arange(values.shape[1]) / rate, **analog}
+        stated = {**dict(zip(labels, units, strict=False)), TIME: "s"}
+    else:
+        columns, stated = points, dict.fromkeys(points, "m") | {TIME: "s"}
+    found = _made(path, columns, wanted, units=stated, rate_hz=rate)
+    return Recording(path, names, found.columns, found.rows, None, found.units, found.rate_hz)
+
+
+def _points(path: Path) -> dict[str, np.ndarray]:
+    markers = read_markers(path)
+    axes = {f"{n}_{c}": xyz[:, k] for n, xyz in markers.places.items() for k, c in enumerate("xyz")}
+    return {TIME: markers.time, **axes}
+
+
+def _trc(path: Path, wanted: Sequence[str] | None) -> Recording:
+    columns = _points(path)
+    return _made(path, columns, wanted, units=dict.fromkeys(columns, "m") | {TIME: "s"})
+
+
+def _storage(path: Path, wanted: Sequence[str] | None) -> Recording:
+    table, _ = read_motion(path)
+    columns = {n: table.column(n) for n in table.names}
+    return _made(path, columns, wanted, units={table.names[0]: "s"})
+
+
+def _xdf(path: Path, wanted: Sequence[str] | None) -> Recording:
+    """Streams of numbers, `<stream>.<channel>` where there are several; each has its own times."""
+    pyxdf = _library("pyxdf", "xdf", path)
+    try:
+        streams, _ = pyxdf.load_xdf(str(path))
+        numbers = [s for s in streams if np.asarray(s["time_series"]).dtype.kind in "iuf" and len(s["time_stamps"])]
+        named = [(str(s["info"]["name"][0]), s, _channels(s)) for s in numbers]
+    except Exception as error:
+        raise _unreadable(path, "XDF", error) from None
+    columns: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    for name, stream, channels in named:
+        before = f"{name}." if len(named) > 1 else ""
+        values = np.asarray(stream["time_series"], dtype=float)
+        columns[f"{before}{TIME}"] = np.asarray(stream["time_stamps"], dtype=float)
+        units[f"{before}{TIME}"] = "s"
+        for k, (label, unit) in enumerate(channels):
+            columns[f"{before}{label}"] = values[:, k]
+            units |= {f"{before}{label}": unit} if unit else {}
+    return _made(path, columns, wanted, units=units)
+
+
+def _channels(stream: Any) -> list[tuple[str, str]]:
+    """Label and unit of each channel; numbers from 1 where the stream does not say."""
+    count = np.asarray(stream["time_series"]).shape[1]
+    described: list[Any] = []
+    for place in ((stream["info"].get("desc") or [None])[0] or {}).get("channels", []):
+        described = (place or {}).get("channel", [])
+    labels = without_twins([str((c.get("label") or [""])[0] or "") for c in described] or [""] * count)
+    units = [str((c.get("unit") or [""])[0] or "") for c in described] or [""] * count
+    return list(zip(labels, units, strict=True))[:count]
+
+
+_READERS: Mapping[str, Callable[[Path, Sequence[str] | None], Recording]] = {
+    ".parquet": _parquet,
+    ".mat": _matlab,
+    ".c3d": _c3d,
+    ".trc": _trc,
+    ".mot": _storage,
+    ".sto": _storage,
+    ".xdf": _xdf,
+    ".xdfz": _xdf,
+}

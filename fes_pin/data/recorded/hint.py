@@ -1,0 +1,44 @@
+"""A file that is not as the study format has it is refused, with a word on what would read it as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.recorded.formats import REFUSED, is_text
+from fes_pin.data.recorded.sniff import sniff
+from fes_pin.data.table import Table, read_csv
+
+NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is"
+
+
+def read_csv_or_hint(path: str | Path) -> Table:
+    """As `read_csv`; where that fails and the file seems to be written otherwise, the error says how.
+
+    Raises
+    ------
+    InputError
+        As `read_csv`.
+    """
+    path = Path(path)
+    if path.suffix.lower() in REFUSED:
+        raise InputError(f"this is {REFUSED[path.suffix.lower()]}", file=path)
+    if not is_text(path):
+        raise InputError(f"expected CSV, found {path.suffix}; {NEW_STUDY}", file=path)
+    try:
+        return read_csv(path)
+    except InputError as error:
+        hint = _hint(path)
+        if not hint:
+            raise
+        message = f"{error.message}; {hint}"
+        raise InputError(message, file=error.file, row=error.row, column=error.column) from None
+
+
+def _hint(path: Path) -> str:
+    try:
+        form, _ = sniff(path)
+    except InputError:
+        return ""
+    words = form.in_words()
+    return f"it seems to have {words}: {NEW_STUDY}" if words else ""

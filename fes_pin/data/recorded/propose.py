@@ -1,0 +1,122 @@
+"""Which column of a recording is probably which of the rig's, and in which unit: from names, never from numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fes_pin.data.recorded.formats import is_text, read_recording
+from fes_pin.data.recorded.recording import Recording
+from fes_pin.data.recorded.sniff import sniff
+from fes_pin.data.recorded.text import TextForm, read_text_recording
+from fes_pin.data.schema import MEANT, RigSchema, without_unit
+from fes_pin.data.units import UNITS, known_unit, quantities_of, split_header
+
+TIMES = frozenset({"t", "time", "times", "timestamp", "clock", "seconds", "zeit", "temps", "tempo", "tiempo"})
+"""What the time of a sample is called."""
+MORE: Mapping[str, frozenset[str]] = {
+    "position": frozenset({"position", "winkel", "weg", "angolo", "angulo", "deplacement"}),
+    "velocity": frozenset({"velocity", "geschwindigkeit", "vitesse", "angvel", "gyro"}),
+    "effort": frozenset({"effort", "drehmoment", "moment", "couple", "kraft", "motortorque"}),
+    "angle_rad": frozenset({"angle", "winkel"}),
+    "force_n": frozenset({"kraft"}),
+    "torque_nm": frozenset({"torque", "moment", "drehmoment", "couple"}),
+    "length_m": frozenset({"length", "laenge", "longueur"}),
+    "pulse_width_us": frozenset({"pulsbreite", "width", "pw", "stim"}),
+}
+"""Words beside those of `MEANT`, some of them German, French, Italian or Spanish, without accents."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What a file seems to hold.
+
+    Parameters
+    ----------
+    recording
+        The file with all of its columns that are numbers.
+    form
+        Of a text file; None of another.
+    candidates
+        Names of columns that could be each of the rig's.
+    units
+        Unit of each of the file's columns as its name or the file itself states it; "" where neither does.
+    """
+
+    recording: Recording
+    form: TextForm | None
+    candidates: Mapping[str, tuple[str, ...]]
+    units: Mapping[str, str]
+
+
+def propose(path: Path, schema: RigSchema, revolute: bool | None) -> Proposal:
+    """What a file seems to hold for a rig.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or holds no numbers.
+    """
+    form, stated = sniff(path) if is_text(path) else (None, {})
+    if form is None:
+        recording = read_recording(path)
+        units = dict(recording.units)
+    else:
+        recording = _numbers(path, form)
+        units = {name: stated[k] for k, name in enumerate(recording.names) if stated.get(k)}
+    for name in recording.columns:
+        units.setdefault(name, split_header(name)[1])
+    candidates = {c: tuple(_candidates(c, recording.columns, units, revolute)) for c in schema.columns}
+    return Proposal(recording, form, _without_doubles(candidates), units)
+
+
+def _numbers(path: Path, form: TextForm) -> Recording:
+    """A text file's columns of numbers; columns of words or of dates are among its names only."""
+    from fes_pin.data.errors import InputError  # noqa: PLC0415
+
+    names = read_text_recording(path, form, ()).names
+    for _ in names:
+        try:
+            return read_text_recording(path, form, names)
+        except InputError as error:
+            if error.column not in names:
+                raise
+            names = tuple(n for n in names if n != error.column)
+    return read_text_recording(path, form, names)
+
+
+def _candidates(
+    column: str, names: Sequence[str] | Mapping[str, object], units: Mapping[str, str], revolute: bool | None
+) -> Iterator[str]:
+    quantities = quantities_of(column, revolute)
+    for name in names:
+        bare, _ = split_header(name)
+        unit = units.get(name, "")
+        if unit and known_unit(unit, quantities) is None and known_unit(unit, tuple(UNITS)) is not None:
+            continue  # another quantity
+        words = _words(bare)
+        if name == column or without_unit(column) == "_".join(words) or words & _meant(column):
+            yield name
+
+
+def _meant(column: str) -> frozenset[str]:
+    if column == "time_s":
+        return TIMES
+    return frozenset(MEANT.get(column, ())) | MORE.get(column, frozenset())
+
+
+def _words(name: str) -> frozenset[str]:
+    """Lower-case words of a name: `Motor Torque`, `motorTorque`, `knee.angle`."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    return frozenset(w for w in re.split(r"[^a-z0-9]+", apart.lower()) if w)
+
+
+def _without_doubles(candidates: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+    """A name that is the only candidate of one column is none of another's."""
+    out = dict(candidates)
+    for _ in out:
+        sole = {names[0]: c for c, names in out.items() if len(names) == 1}
+        out = {c: tuple(n for n in names if sole.get(n, c) == c) for c, names in out.items()}
+    return out

@@ -1,0 +1,112 @@
+"""What form a text file seems to have: proposed to a person, never used unseen."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import read_bytes
+from fes_pin.data.recorded.text import DELIMITERS, MISSING, TextForm, cells_of, lines_of
+from fes_pin.data.units import UNITS, known_unit
+
+LOOKED_AT = 400
+"""Lines that are looked at; no preamble of an instrument is nearly as long."""
+COMMENTS = ("#", "%", "//")
+_NUMBER = {
+    ".": re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"),
+    ",": re.compile(r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$"),
+}
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """One way to read the lines: how much of them is numbers then."""
+
+    share: float
+    columns: int
+    rows: int
+    first: int
+    delimiter: str
+    decimal: str
+
+
+def sniff(path: Path) -> tuple[TextForm, dict[int, str]]:
+    """The form that a text file seems to have, and the units that a row of it names, by place of the column.
+
+    Raises
+    ------
+    InputError
+        Not a text file, or no rows of numbers in it.
+    """
+    encoding = _encoding(path)
+    lines = lines_of(path, encoding)[:LOOKED_AT]
+    guesses = [g for d in DELIMITERS for c in (".", ",") if (g := _guess(lines, d, c)) is not None]
+    if not guesses:
+        raise InputError("expected rows of numbers, found none", file=path)
+    best = max(guesses, key=lambda g: (round(g.share, 3), g.rows > 1, g.columns, g.decimal == "."))
+    comment = next((c for line in lines for c in COMMENTS if line.lstrip().startswith(c)), "")
+    header, units = _header(lines, best, comment)
+    form = TextForm(best.delimiter, best.decimal, header, best.first + 1, comment, encoding)
+    return form, units
+
+
+def _encoding(path: Path) -> str:
+    content = read_bytes(path)
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    if b"\0" in content[:4096]:
+        raise InputError("expected a text file, found a binary one", file=path)
+    try:
+        content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
+
+
+def _guess(lines: list[str], delimiter: str, decimal: str) -> _Guess | None:
+    """The rows at the end of the lines that are numbers read this way; None if there are none."""
+    number = _NUMBER[decimal]
+    rows: list[tuple[int, list[bool]]] = []
+    for place in range(len(lines) - 1, -1, -1):
+        line = lines[place]
+        if not line.strip() or line.lstrip().startswith(COMMENTS):
+            continue
+        cells = cells_of(line, delimiter)
+        kinds = [bool(number.match(cell)) or cell.lower() in MISSING for cell in cells]
+        numbers = sum(bool(number.match(cell)) for cell in cells)
+        if rows and len(kinds) != len(rows[0][1]):
+            break
+        if not numbers:
+            break
+        rows.append((place, kinds))
+    if not rows:
+        return None
+    cells_in_all = sum(len(kinds) for _, kinds in rows)
+    share = sum(sum(kinds) for _, kinds in rows) / cells_in_all
+    return _Guess(share, len(rows[0][1]), len(rows), rows[-1][0], delimiter, decimal)
+
+
+def _header(lines: list[str], best: _Guess, comment: str) -> tuple[int, dict[int, str]]:
+    """Row of the names above the numbers, 0 if there is none; and the units of a row between, by place."""
+    units: dict[int, str] = {}
+    nearest = 0
+    for place in range(best.first - 1, -1, -1):
+        line = lines[place].lstrip()
+        cells = cells_of(line.removeprefix(comment) if comment else line, best.delimiter)
+        cells += [""] * (len(cells) == best.columns - 1)  # a last one that is empty, as of a unit of words
+        if not line or len(cells) != best.columns or not any(re.search(r"[^\W\d_]", c) for c in cells):
+            continue
+        if not units and place and _are_units(cells):
+            units, nearest = {k: cell.strip("[](){} ") for k, cell in enumerate(cells)}, place + 1
+            continue
+        return place + 1, units
+    return nearest, {}  # a row like one of units, with no names above it, holds the names
+
+
+def _are_units(cells: list[str]) -> bool:
+    bare = [cell.strip("[](){} ") for cell in cells]
+    told = [cell for cell in bare if cell not in ("", "-", "1")]
+    bracketed = all(cell[:1] in "[({" for cell in cells if cell)
+    return bool(told) and (bracketed or all(known_unit(cell, tuple(UNITS)) for cell in told))

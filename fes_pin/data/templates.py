@@ -1,0 +1,92 @@
+"""URDF templates of the commonest one-joint rigs, to be written and then improved upon by hand."""
+
+from __future__ import annotations
+
+from fes_pin.data.errors import InputError
+
+_URDF = """<?xml version="1.0"?>
+<!-- {what} Position 0: {zero}. {axis}
+     Written by `fes-pin new-study`: better values of mass, centre (origin) and inertia about it go in below. -->
+<robot name="{name}">
+  <link name="base"/>
+  <link name="{link}">
+    <inertial>
+      <origin xyz="0 0 {height!r}"/>
+      <mass value="{mass!r}"/>
+      <inertia ixx="{across!r}" ixy="0" ixz="0" iyy="{across!r}" iyz="0" izz="{along!r}"/>
+    </inertial>
+  </link>
+  <joint name="{joint}" type="{kind}">
+    <parent link="base"/>
+    <child link="{link}"/>
+    <axis xyz="{direction}"/>
+{limit}  </joint>
+</robot>
+"""
+LIMIT = '    <limit lower="-100" upper="100" effort="1e6" velocity="1e6"/>\n'
+_SWING = "Positive turns about +y (a hanging arm swings to -x)."
+
+
+def pendulum(length_m: float, mass_kg: float, upright: bool = False) -> str:
+    """URDF of a mass at the end of a light arm.
+
+    Parameters
+    ----------
+    length_m, mass_kg
+        From the pivot to the mass's centre; the mass.
+    upright
+        Whether position 0 is the mass standing above the pivot; else it hangs there.
+
+    Raises
+    ------
+    InputError
+        A length or mass that is not above 0.
+    """
+    _check(length=length_m, mass=mass_kg)
+    what = f"A pendulum: {mass_kg:g} kg at {length_m:g} m on an arm without mass."
+    return _turning("pendulum", what, mass_kg, length_m, 0.0, upright)
+
+
+def rod(length_m: float, mass_kg: float, upright: bool = False) -> str:
+    """URDF of a uniform thin rod that turns about its end; its inertia about its middle is m L^2 / 12.
+
+    Raises
+    ------
+    InputError
+        A length or mass that is not above 0.
+    """
+    _check(length=length_m, mass=mass_kg)
+    what = f"A uniform rod of {length_m:g} m and {mass_kg:g} kg that turns about its end."
+    return _turning("rod", what, mass_kg, length_m / 2.0, mass_kg * length_m**2 / 12.0, upright)
+
+
+def slide(mass_kg: float) -> str:
+    """URDF of a carriage on a level rail.
+
+    Raises
+    ------
+    InputError
+        A mass that is not above 0.
+    """
+    _check(mass=mass_kg)
+    return _URDF.format(
+        **{"name": "slide", "what": f"A carriage of {mass_kg:g} kg on a level rail.", "zero": "where you say"},
+        **{"axis": "Positive moves along +x.", "link": "carriage", "joint": "rail", "kind": "prismatic"},
+        **{"direction": "1 0 0", "height": 0.0, "mass": float(mass_kg), "across": 0.0, "along": 0.0, "limit": LIMIT},
+    )
+
+
+def _turning(name: str, what: str, mass: float, centre: float, about_centre: float, upright: bool) -> str:
+    return _URDF.format(
+        **{"name": name, "what": what, "zero": "upright" if upright else "hanging straight down", "axis": _SWING},
+        **{"link": "arm", "joint": "pivot", "kind": "continuous", "direction": "0 1 0", "limit": ""},
+        **{"height": float(centre if upright else -centre), "mass": float(mass)},
+        **{"across": float(about_centre), "along": 0.0},
+    )
+
+
+def _check(**numbers: float) -> None:
+    for name, value in numbers.items():
+        if not 1e-6 < value < 1e6:
+            unit = "m" if name == "length" else "kg"
+            raise InputError(f"expected a {name} above 0 {unit}, found {value:g}", column=name)

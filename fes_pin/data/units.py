@@ -1,0 +1,157 @@
+"""Units that recordings come in, and what they are in the study format's own.
+
+A table and no units library: a study holds eight quantities, every factor below is exact by definition (BIPM, The
+International System of Units, 9th edition; inch, pound-force and kilogram-force: NIST SP 811, appendix B), and headers
+write units as no library reads them: `Torque_Nm` is a newton metre, which a units library takes for a nanometre.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+from fes_pin.data.schema import without_unit
+
+DEG = math.pi / 180.0
+TURN = 2.0 * math.pi
+INCH, POUND, KILOGRAM = 0.0254, 4.4482216152605, 9.80665
+"""Inch in m, pound-force in N, kilogram-force in N."""
+
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "pulse width": {"us": 1.0, "ms": 1e3, "s": 1e6},
+    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": DEG, "rev": TURN},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": INCH, "ft": 12.0 * INCH},
+    "angular rate": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": DEG, "rev/s": TURN, "rpm": TURN / 60.0},
+    "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "in/s": INCH, "km/h": 1.0 / 3.6},
+    "force": {
+        "N": 1.0,
+        "mN": 1e-3,
+        "kN": 1e3,
+        "kgf": KILOGRAM,
+        "gf": 1e-3 * KILOGRAM,
+        "lbf": POUND,
+        "kip": 1e3 * POUND,
+    },
+    "torque": {
+        **{"N m": 1.0, "mN m": 1e-3, "kN m": 1e3, "N cm": 1e-2, "N mm": 1e-3},
+        **{"lbf in": POUND * INCH, "lbf ft": 12.0 * POUND * INCH, "kgf cm": 1e-2 * KILOGRAM, "kgf m": KILOGRAM},
+    },
+    "pulses": {"1": 1.0},
+}
+"""Factor to the study format's own unit (SI; microseconds for pulse widths), by quantity and unit."""
+
+_SPELLINGS = {
+    **{"sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "millisecond": "ms", "milliseconds": "ms"},
+    **{"usec": "us", "microseconds": "us", "minutes": "min", "hours": "h", "radian": "rad", "radians": "rad"},
+    **{"degree": "deg", "degrees": "deg", "turn": "rev", "turns": "rev", "dps": "deg/s", "degps": "deg/s"},
+    **{"radps": "rad/s", "rads": "rad/s", "degs": "deg/s", "revps": "rev/s", "mps": "m/s", "mmps": "mm/s"},
+    **{"mms": "mm/s", "ips": "in/s", "kmh": "km/h", "inch": "in", "inches": "in", "meter": "m", "metre": "m"},
+    **{"newton": "n", "newtons": "n", "lb": "lbf", "lbs": "lbf", "kg": "kgf", "kips": "kip", "inlb": "lbfin"},
+    **{"lbin": "lbfin", "inlbf": "lbfin", "ftlb": "lbfft", "lbft": "lbfft", "ftlbf": "lbfft", "kgcm": "kgfcm"},
+}
+"""Other spellings, as measuring systems write them, in the form that `_plain` leaves."""
+
+_BY_SUFFIX = {"s": "time", "us": "pulse width", "rad": "angle", "m": "length", "n": "force", "nm": "torque"}
+_OF_A_JOINT = {
+    "position": ("angle", "length"),
+    "velocity": ("angular rate", "speed"),
+    "effort": ("torque", "force"),
+}
+
+
+def _plain(unit: str) -> str:
+    """A unit without what writers vary: case, spaces, dots, signs of multiplication."""
+    text = unit.strip().replace("µ", "u").replace("μ", "u").replace("°", "deg").replace("º", "deg").lower()
+    text = re.sub(r"[\s.*·⋅^_-]", "", text)
+    return _SPELLINGS.get(text, text)
+
+
+_KNOWN = {quantity: {_plain(unit): unit for unit in units} for quantity, units in UNITS.items()}
+
+
+def quantities_of(column: str, revolute: bool | None = None) -> tuple[str, ...]:
+    """Quantities that a rig's column can hold.
+
+    Parameters
+    ----------
+    column
+        As the study format names it.
+    revolute
+        Whether a joint turns (True) or slides (False); None if that is not known yet.
+
+    Returns
+    -------
+    tuple of str
+        Of `UNITS`; empty for a column of somebody's own whose name says no unit.
+    """
+    stem = column.split("_", maxsplit=1)[0]
+    if column == "stim":
+        return ("pulses",)
+    if column in _OF_A_JOINT or (stem in _OF_A_JOINT and without_unit(column) == column):
+        both = _OF_A_JOINT[stem]
+        return both if revolute is None else both[:1] if revolute else both[1:]
+    suffix = column.rpartition("_")[2]
+    return (_BY_SUFFIX[suffix],) if suffix in _BY_SUFFIX and suffix != column else ()
+
+
+def known_unit(unit: str, quantities: tuple[str, ...]) -> tuple[str, str] | None:
+    """Quantity and standard spelling of a unit among some quantities, None if it is none of theirs."""
+    if unit.strip() in ("MN", "Ms", "MNm"):  # mega, which nothing else here distinguishes from milli
+        return None
+    plain = _plain(unit)
+    return next(((q, _KNOWN[q][plain]) for q in quantities if plain in _KNOWN[q]), None)
+
+
+def factor_of(unit: str, column: str, revolute: bool | None = None) -> float:
+    """What a number in a unit is multiplied by to stand in a rig's column.
+
+    Raises
+    ------
+    ValueError
+        The unit is none of what this column holds.
+    """
+    quantities = quantities_of(column, revolute)
+    found = known_unit(unit, quantities)
+    if found is not None:
+        return UNITS[found[0]][found[1]]
+    expected = [u for q in quantities for u in UNITS[q]]
+    if not expected:
+        raise ValueError(
+            f"this column holds a quantity without a table of units; expected a scale, found {unit[:40]!r}"
+        )
+    raise ValueError(f"expected a unit of {' or '.join(quantities)}: {', '.join(expected)}; found {unit[:40]!r}")
+
+
+def own_unit(column: str, revolute: bool | None = None) -> str:
+    """The unit that the study format has in a column; "" where it has none."""
+    quantities = quantities_of(column, revolute)
+    units = [next(iter(UNITS[q])) for q in quantities]
+    return " or ".join(u for u in units if u != "1")
+
+
+_BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[(<{]\s*(?P<unit>[^\])>}]*?)\s*[\])>}]\s*$")
+
+
+def split_header(header: str) -> tuple[str, str]:
+    """Name and unit that a header seems to hold: `Angle_deg`, `Torque [Nm]`, `t/ms`, `Winkel (°)`.
+
+    Returns
+    -------
+    (name, unit)
+        The unit is empty where the header names none that is known.
+    """
+    text = header.strip().strip("\"'")
+    found = _BRACKETED.match(text)
+    if found and found["unit"]:
+        return found["name"].strip(), found["unit"]
+    for separator in ("/", "_", " ", "-", "."):
+        name, at, unit = text.rpartition(separator)
+        if separator == "_" and at and "_" in name and unit.lower() in ("s",):  # rad_s, m_s: per second
+            before, _, per = name.rpartition("_")
+            if before and known_unit(f"{per}/{unit}", tuple(UNITS)):
+                return before, f"{per}/{unit}"
+        if at and name and known_unit(unit, tuple(UNITS)):
+            return name.strip(), unit
+    return text, ""
