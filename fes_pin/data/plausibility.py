@@ -66,7 +66,7 @@ def implausible(study: Study) -> list[str]:
     warnings += _told("is cut off at its largest or smallest value (clipping?)", [m for m in moving if _is_clipped(*m)])
     warnings += _told("holds whole numbers only: are they an encoder's counts?", [m for m in moving if _is_counted(*m)])
     for trial, name in moving:
-        warnings += _held(trial, name) or dropouts(trial, name)
+        warnings += dropouts(trial, name) or _held(trial, name)
     return [*warnings, *_rates(study.trials)]
 
 
@@ -219,7 +219,7 @@ def _held(trial: Trial, name: str) -> list[str]:
     if lengths[longest] >= RUN and apart < COMMON and values.min() < inside < values.max():
         begin = float(trial.time[ends[longest] + 1])
         told = f"{name} stays at {inside:.4g} for {lengths[longest]} samples"
-        return [f"{told} from {begin:.4g} s on in trial {trial.name}: a dropout, its last value held?"]
+        return [f"{told} from {begin:.4g} s on in trial {trial.name}"]
     return []
 
 

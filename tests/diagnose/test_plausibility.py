@@ -48,11 +48,27 @@ def dropout(values):
     return out
 
 
+def coarse(values):
+    """As an encoder of 0.01 rad reads it: equal neighbours are common then."""
+    return 0.01 * np.rint(values / 0.01)
+
+
+def free(position):
+    """Joint studies that nobody drives, with these positions over time."""
+    study = made("joint", driven=False)
+    trials = [
+        replace(t.without("velocity") if "velocity" in t else t, columns={"position": position(t.time)})
+        for t in study.trials
+    ]
+    return replace(study, trials=tuple(trials))
+
+
 REFUSED = {  # rig, what was done, words
     "never_stimulated": ("ankle", lambda s: changed(s, INPUTS, np.zeros_like), "never above the threshold of 180 us in all"),
     "faint": ("muscle", lambda s: changed(s, INPUTS, lambda u: 0.1 * u), "never above the threshold"),
     "constant": ("joint", lambda s: changed(s, OUTPUTS, lambda y: 0.0 * y + 1.0), "no output changes in any trial"),
     "degrees": ("ankle", lambda s: changed(s, ("angle_rad",), np.degrees), "is it in degrees"),
+    "pulse_widths_in_ms": ("ankle", lambda s: changed(s, INPUTS, lambda u: 1e-3 * u), "is it in ms"),
     "milliseconds": ("ankle", lambda s: timed(s, 1e3), "is time_s in ms"),
     "milliseconds_of_a_swing": ("joint", lambda s: timed(s, 1e3), "is time_s in ms"),
     "few_rows": ("muscle", lambda s: replace(s, trials=tuple(t.first(3) for t in s.trials)), "at least 20 samples"),
@@ -72,6 +88,9 @@ WARNED = {
     "one_constant": ("ankle", lambda s: changed(s, OUTPUTS, lambda y: 0.0 * y + 1.0, 1), "does not change at all in trial 01"),
     "clipped": ("joint", lambda s: changed(s, OUTPUTS, lambda y: np.minimum(y, np.quantile(y, 0.8))), "(clipping?)"),
     "dropout": ("ankle", lambda s: changed(s, OUTPUTS, dropout, 0), "for 100 samples from 1.5 s on in trial 00"),
+    "dropout_of_a_coarse_encoder": ("joint", lambda s: changed(s, OUTPUTS, lambda y: coarse(dropout(y)), 0), "and then jumps in trial 00: a dropout, its last value held?"),
+    "counts": ("muscle", lambda s: changed(s, OUTPUTS, lambda y: np.rint(20.0 * y)), "are they an encoder's counts?"),
+    "pulse_widths_in_ms": ("ankle", lambda s: changed(s, INPUTS, lambda u: 1e-3 * u, 1), "threshold of 180 us in trial 01"),
     "held": ("muscle", lambda s: changed(s, OUTPUTS, lambda y: np.repeat(y[::4], 4), 0), "changes only every 4 samples"),
     "force_in_mN": ("muscle", lambda s: changed(s, OUTPUTS, lambda y: 1e3 * y), "is it in mN"),
     "swing_in_degrees": ("joint", lambda s: changed(s, OUTPUTS, np.degrees), "is it in degrees"),
@@ -86,6 +105,19 @@ def test_a_warning_says_what_is_odd(case):
     rig, change, words = WARNED[case]
     (found,) = said(change(study_of(rig)))
     assert words in found
+
+
+def test_what_no_pendulum_does_by_itself():
+    rng = np.random.default_rng(0)
+    noise = lambda t: 1e-3 * rng.standard_normal(len(t))  # noqa: E731
+    swing = free(lambda t: 20.0 * np.exp(-0.1 * t) * np.cos(6.0 * t) + noise(t))
+    assert "position swings back by more than a turn, and nothing drives it, in trial 00: is it in degrees?" in said(
+        swing
+    )
+    settled = free(lambda t: 1.2 + 0.5 * np.exp(-3.0 * t) * np.cos(6.0 * t) + noise(t))
+    assert any("comes to rest at 1.2 rad, and by the URDF it hangs at" in words for words in said(settled))
+    fine = free(lambda t: 0.5 * np.exp(-3.0 * t) * np.cos(6.0 * t) + noise(t))
+    assert len(said(fine)) == 1  # that it is not driven
 
 
 def test_slides():
