@@ -73,18 +73,23 @@ def rig_text(name: str, schema: RigSchema) -> str:
 
 
 def _columns(schema: RigSchema) -> str:
-    inputs = " or ".join(f"`{n}`" for n in schema.inputs)
-    also = ", ".join(f"`{n}`" for n in schema.optional)
     rows = [
         (
             f"`{kind}`" + (" (default)" if kind == schema.default_kind else ""),
-            inputs + ("" if schema.inputs_required else ", or none"),
+            _inputs(schema, kind),
             f"`{output}`",
-            also or "none",
+            ", ".join(f"`{n}`" for n in (schema.motion(kind)[1:] or schema.optional)) or "none",
         )
         for kind, output in schema.outputs.items()
     ]
     return table(("kind of trial", "input column", "output column", "further columns"), rows)
+
+
+def _inputs(schema: RigSchema, kind: str) -> str:
+    stimuli = " or ".join(f"`{n}`" for n in schema.stimuli(kind))
+    motion = [f"`{n}`" for n in schema.motion(kind)[:1]]
+    free = stimuli + ("" if schema.inputs_required else ", or none")
+    return ", and ".join([*([free] if stimuli else []), *motion])
 
 
 def keys(schema: RigSchema) -> list[tuple[str, ...]]:

@@ -1,7 +1,8 @@
 """What a study's numbers alone say against it, before anything is fitted: refused, or warned of, in one line each.
 
 Refused, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change, too
-few samples, an angle that only degrees explain. Everything else is a warning: the diagnosis goes on, and tells it.
+few samples, an angle that only degrees explain, a length that only millimetres explain, an imposed motion that never
+moves. Everything else is a warning: the diagnosis goes on, and tells it.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.imposed import imposed_motion
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 
@@ -40,6 +43,8 @@ SHORTEST, JUMP = 5, 3.0
 """Samples that a dropout stands still for, at least; and by how many of its largest usual steps it then jumps."""
 LONGEST_MUSCLE_M = 1.0
 """Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
+STILL = 6.0
+"""Deviations of its noise that an imposed motion must exceed to count as one."""
 RATE_RATIO = 5.0
 """Factor by which a velocity may differ from the slope of its position: filters make less, degrees make 57."""
 PIECES = 8
@@ -55,7 +60,7 @@ def implausible(study: Study) -> list[str]:
         For what no verdict could follow from; see the module.
     """
     _check_rows(study)
-    warnings = [*_read(study), *_inputs(study), *_units(study)]
+    warnings = [*_read(study), *_inputs(study), *_units(study), *_imposed(study)]
     outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
     measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in _driving(study, t)]
     constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
@@ -81,7 +86,13 @@ def _read(study: Study) -> list[str]:
 
 def _driving(study: Study, trial: Trial) -> tuple[str, ...]:
     """Columns that a trial has as inputs."""
-    return tuple(n for n in study.schema.inputs if n in trial)
+    schema = study.schema
+    return tuple(n for n in (*schema.stimuli(trial.kind), *schema.motion(trial.kind)) if n in trial)
+
+
+def _stimuli(study: Study, trial: Trial) -> tuple[str, ...]:
+    """Those of them that are not a motion."""
+    return tuple(n for n in study.schema.stimuli(trial.kind) if n in trial)
 
 
 def _told(what: str, found: Sequence[tuple[Trial, str]]) -> list[str]:
@@ -113,15 +124,16 @@ def _inputs(study: Study) -> Iterable[str]:
     short = [t.name for t in study.trials if len(t) < FEW]
     if short:
         yield f"fewer than {FEW} samples in {_trials(short)}"
-    names = dict.fromkeys(n for t in study.trials for n in _driving(study, t))
-    if not names:
+    names = dict.fromkeys(n for t in study.trials for n in _stimuli(study, t))
+    if not names and not any(t.kind == IMPOSED for t in study.trials):
         column = " or ".join(study.schema.inputs)
         yield f"no trial is driven: there is no column {column}, and the motion is taken for free"
     for name in names:
         threshold = study.constants.get("threshold_us", 0.0) if name == "pulse_width_us" else 0.0
-        silent = [t.name for t in study.trials if name in t and not (np.abs(t[name]) > threshold).any()]
+        driven = [t for t in study.trials if name in _stimuli(study, t)]
+        silent = [t.name for t in driven if not (np.abs(t[name]) > threshold).any()]
         told = f"{name} is never above the threshold of {threshold:g} us" if threshold else f"{name} is zero throughout"
-        if len(silent) < len(study.trials):
+        if len(silent) < len(driven):
             if silent and name in PULSES:  # a joint may swing free between driven trials
                 yield f"{told} in {_trials(silent)}"
         elif name not in PULSES:
@@ -145,15 +157,36 @@ def _units(study: Study) -> Iterable[str]:
     strong = [t.name for t in study.trials if "force_n" in t and float(np.abs(t["force_n"]).max()) > STRONGEST_N]
     if strong:
         yield f"force_n is beyond {STRONGEST_N:g} N, which no limb exerts, in {_trials(strong)}: is it in mN?"
-    long = [t.name for t in study.trials if "length_m" in t and float(np.abs(t["length_m"]).max()) > LONGEST_MUSCLE_M]
-    if long:
-        yield f"length_m is beyond {LONGEST_MUSCLE_M:g} m, which no muscle is, in {_trials(long)}: is it in mm?"
     whole = [t.name for t in study.trials if t.dt >= 1.0 and (t.time == np.rint(t.time)).all()]
     if whole:
         yield f"time_s counts whole numbers in {_trials(whole)}: is it in ms, or a number of the sample?"
     heavy = [t.name for t in study.trials if t.conditions.get("load_kg", 0.0) > HEAVIEST_KG]
     if heavy:
         yield f"load_kg is above {HEAVIEST_KG:g} kg in {_trials(heavy)}: is it in g?"
+
+
+def _imposed(study: Study) -> Iterable[str]:
+    """What is odd about imposed motions; refuses a length in millimetres, and a motion that never moves."""
+    trials = [t for t in study.trials if t.kind == IMPOSED]
+    if not trials:
+        return
+    name = study.schema.imposed[0]
+    longest = max(float(np.abs(t[name]).max()) for t in trials)
+    if name == "length_m" and longest > LONGEST_MUSCLE_M:
+        message = f"length_m reaches {longest:.4g} m; no muscle is so long: is it in mm?"
+        raise InputError(message, file=study.folder, column=name)
+    if name == "length_m" and (short := [t for t in trials if not t[name].min() > 0.0]):
+        message = f"trial {short[0].name}: length_m is {short[0][name].min():.4g} m; expected the whole length, above 0"
+        raise InputError(message, file=study.folder, column=name)
+    motions = [imposed_motion(t, study.schema.imposed) for t in trials]
+    ends = [(float(m.values[0].min()), float(m.values[0].max())) for m in motions]
+    moved = max(high for _, high in ends) - min(low for low, _ in ends)
+    if not moved > STILL * max(m.doubt[0] for m in motions):
+        message = f"{name} never moves in any imposed trial: nothing but noise of {motions[0].doubt[0]:.2g} is in it"
+        raise InputError(message, file=study.folder, column=name)
+    bands = [m.bandwidth_hz for m in motions]
+    told = f"{min(bands):.2g} Hz" if max(bands) < 1.1 * min(bands) else f"{min(bands):.2g} to {max(bands):.2g} Hz"
+    yield f"velocity and acceleration of {name} are those of smoothing splines with a bandwidth of {told}"
 
 
 def _is_clipped(trial: Trial, name: str) -> bool:

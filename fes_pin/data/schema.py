@@ -9,6 +9,8 @@ from difflib import get_close_matches
 from typing import Any
 
 ROLES = ("fit", "held_out")
+IMPOSED = "imposed"
+"""The kind of a trial in which the motion is an input."""
 UNITS = (
     *("per_rad", "per_deg", "kgm2", "gm2", "nms", "nmm", "nm", "mps", "kmh", "rad", "deg", "degrees", "degree"),
     *("kg", "mg", "lb", "mm", "cm", "km", "m", "kn", "mn", "n", "ms", "us", "ns", "min", "s", "khz", "hz"),
@@ -46,6 +48,8 @@ MEANT: Mapping[str, set[str]] = {
     "stim": {"pulse", "pulses", "trigger", "stimulus", "stimulation", "sync"},
     "angle_rad": {"theta", "q", "position", "goniometer", "ankle"},
     "force_n": {"force", "load", "tension", "cell", "f"},
+    "length_m": {"length", "l", "lmtu", "lmtc", "mtu", "stretch", "displacement"},
+    "torque_nm": {"torque", "moment", "tau"},
 }
 """Other words for what a column holds, as measuring systems name it."""
 
@@ -119,6 +123,9 @@ class RigSchema:
         Columns of which a trial holds one; for a joint none is needed.
     optional
         Other columns that have a meaning. A column that has none is refused.
+    imposed
+        Columns that hold the motion in a trial of the kind "imposed": the position, which must be there, and what else
+        of it may have been measured. Such a trial has them as inputs; without them the rig has no such trials.
     either
         Constants that must all be there if no file is.
     start_may_be_known
@@ -145,6 +152,7 @@ class RigSchema:
     inputs: tuple[str, ...] = ()
     inputs_required: bool = True
     optional: tuple[str, ...] = ()
+    imposed: tuple[str, ...] = ()
     passive: Mapping[str, Number] = field(default_factory=dict)
     files: Mapping[str, bool] = field(default_factory=dict)
     either: tuple[str, ...] = ()
@@ -156,10 +164,29 @@ class RigSchema:
     name: str = ""
     owner: Any = None
 
+    def stimuli(self, kind: str) -> tuple[str, ...]:
+        """The input columns of a kind of trial, of which it holds one, beside a motion that it may impose."""
+        return tuple(n for n in self.inputs if n != self.outputs[kind])
+
+    def motion(self, kind: str) -> tuple[str, ...]:
+        """The columns that a kind of trial holds its imposed motion in; none of a kind that imposes none."""
+        return self.imposed if kind == IMPOSED else ()
+
     @property
     def columns(self) -> tuple[str, ...]:
         """Every column that has a meaning for this rig, time first."""
-        return ("time_s", *self.inputs, *dict.fromkeys(self.outputs.values()), *self.optional)
+        outputs = (n for one, n in self.outputs.items() if one != IMPOSED)
+        named = ("time_s", *self.inputs, *outputs, *self.optional, *self.imposed, *self.outputs.values())
+        return tuple(dict.fromkeys(named))
+
+    def columns_of(self, kind: str) -> tuple[str, ...]:
+        """Every column that has a meaning in a kind of trial, time first."""
+        if kind == IMPOSED:
+            named = (*self.stimuli(kind), *self.imposed, self.outputs[kind])
+        else:
+            free = (n for one, n in self.outputs.items() if one != IMPOSED)
+            named = (*self.inputs, *free, *self.optional)
+        return ("time_s", *dict.fromkeys(named))
 
 
 START_S = {"start_s": any_number("s", required=False)}

@@ -336,13 +336,14 @@ class _Reader:
 
     def _check_together(self, trials: list[Trial], constants: Mapping[str, float]) -> None:
         """What only all trials together show: the same inputs in each, and a recruitment curve for pulse widths."""
+        first = {trial.kind: trial for trial in reversed(trials)}
         for index, trial in enumerate(trials):
-            for column in self.schema.inputs if len(self.schema.recordings) == 1 else ():
-                if (column in trial) != (column in trials[0]):
-                    there, first = ("has", "has not") if column in trial else ("lacks", "has it")
-                    message = f"this trial {there} the column {column} and the first {first}; expected all or none"
+            for column in self.schema.stimuli(trial.kind) if len(self.schema.recordings) == 1 else ():
+                if (column in trial) != (column in first[trial.kind]):
+                    there, others = ("has", "has not") if column in trial else ("lacks", "has it")
+                    message = f"this trial {there} the column {column} and the first {others}; expected all or none"
                     raise self.error(f"trial[{index}].file", message)
-        if "pulse_width_us" in trials[0] and "threshold_us" not in constants:
+        if any("pulse_width_us" in t for t in trials) and "threshold_us" not in constants:
             raise self.error("rig.threshold_us", "missing; trials with pulse_width_us need threshold and saturation")
 
 

@@ -42,7 +42,7 @@ class Trial:
     name
         Of the trial within its study, e.g. the stem of its file.
     kind
-        "motion" or "isometric".
+        "motion", "isometric" or "imposed".
     columns : mapping of str to ndarray, shape (n,)
         Every column but the time, by its name with its unit. The arrays are copied and made read-only.
     time : ndarray, shape (n,)
@@ -195,7 +195,7 @@ def read_trial(
     rig
         Its name ("ankle", "muscle", "joint", "body" ...), or what its studies must and may hold.
     kind
-        Of those that the rig has, "motion" or "isometric"; without it the rig's default.
+        Of those that the rig has, "motion", "isometric" or "imposed"; without it the rig's default.
     conditions, role, group
         As a `[[trial]]` table gives them.
     inputs_only
@@ -268,21 +268,33 @@ def _check_columns(table: Table, schema: RigSchema, kind: str, inputs_only: bool
     if table.names[0] != "time_s":
         told = f"expected time_s as the first column, found {table.names[0][:40]!r}"
         raise table.error(f"{told}; {NEW_STUDY}", "time_s")
-    absent = [name for name in schema.columns if name not in table.names]
+    known, stimuli = schema.columns_of(kind), schema.stimuli(kind)
+    absent = [name for name in known if name not in table.names]
     for name in table.names:
-        if name not in schema.columns and is_like(name, absent):
+        if name not in known and is_like(name, absent):
             raise table.error(unknown(name, absent), name)
-    output = schema.outputs[kind]
-    found = [name for name in schema.inputs if name in table.names]
+    output, motion = schema.outputs[kind], schema.motion(kind)[:1]
+    found = [name for name in stimuli if name in table.names]
     if schema.inputs_required and not found:
-        raise table.error(f"missing; this rig needs {' or '.join(schema.inputs)}", schema.inputs[0])
+        raise table.error(f"missing; this rig needs {' or '.join(stimuli)}", stimuli[0])
     if len(found) > 1:
         raise table.error(f"expected one of {' and '.join(found)}, found both", found[1])
+    for name in motion:
+        if name not in table.names:
+            raise table.error(f"missing; a trial of kind {kind} has its motion there", name)
     if output not in table.names and not inputs_only:
         raise table.error(f"missing; a trial of kind {kind} measures it", output)
     for name in table.names:
-        if name not in schema.columns:
-            raise table.error(unread(name, schema.columns), name)
+        if name not in known:
+            raise table.error(_not_read(name, schema, kind), name)
+
+
+def _not_read(name: str, schema: RigSchema, kind: str) -> str:
+    """What to say of a column that a kind of trial does not read."""
+    others = [one for one in schema.outputs if name in schema.columns_of(one)]
+    if others:
+        return f"is read in trials of kind {' and '.join(others)}, and this one is of kind {kind}"
+    return unread(name, schema.columns_of(kind))
 
 
 def _check_stimulus(table: Table) -> None:

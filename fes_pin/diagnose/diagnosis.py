@@ -11,6 +11,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.provenance import provenance
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -78,7 +79,7 @@ def diagnose(
     with one_thread_each():
         recorded = train if said else [t for t in study.trials if t.role != "held_out"]
         search: SimulationSearch | LikelihoodSearch
-        if is_fed_back(nominal.rig, train):
+        if any(t.kind == IMPOSED for t in train) or is_fed_back(nominal.rig, train):
             search = LikelihoodSearch(LikelihoodFits(nominal, train, effects), seed, tell)
         else:
             search = SimulationSearch(nominal, train, recorded, seed, tell, effects)

@@ -49,7 +49,7 @@ def _steps(study: Study, model: Model) -> Iterable[str]:
     if slowest.dt > SLOWEST_S:
         message = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s; expected at most {SLOWEST_S:g} s"
         raise InputError(f"{message}: is time_s in ms?", file=study.folder, column="time_s")
-    for name, constant in model.rig.time_constants().items():
+    for name, constant in model.rig.time_constants({t.kind for t in study.trials}).items():
         told = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s, and {name} {constant:.4g} s"
         if slowest.dt > COARSE * constant:
             raise InputError(

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.model import Model
@@ -27,7 +28,9 @@ GROWTH = 100.0
 
 
 def default_horizon(trials: Sequence[Trial]) -> float:
-    """`HORIZON_S`, or a tenth of the shortest trial."""
+    """`HORIZON_S`, or a tenth of the shortest trial; all of the longest where every motion is imposed."""
+    if all(t.kind == IMPOSED for t in trials):
+        return max(t.duration for t in trials)
     return min(HORIZON_S, 0.1 * min(t.duration for t in trials))
 
 

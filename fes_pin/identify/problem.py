@@ -166,12 +166,18 @@ class Problem:
 
 
 def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
-    """Every measured output and effort, all trials end to end, by column name; `time` since each trial began, s."""
+    """Every measured output, imposed motion and effort, all trials end to end, by column name.
+
+    `time` since each trial began, s; `reading` the first output of each that passes a sensor.
+    """
     out: dict[str, list[np.ndarray]] = {"time": [t.time - t.time[0] for t in trials]}
+    rig = model.rig
     for trial in trials:
-        for name in (*model.rig.outputs(trial.kind), "effort"):
+        for name in dict.fromkeys((*rig.outputs(trial.kind), *rig.schema.motion(trial.kind), "effort")):
             if name in trial.columns:
                 out.setdefault(name, []).append(trial[name])
+        if rig.output(trial.kind) in trial.columns and "reading" in rig.signals(trial.kind):
+            out.setdefault("reading", []).append(trial[rig.output(trial.kind)])
     return {n: np.concatenate(v) for n, v in out.items()}
 
 

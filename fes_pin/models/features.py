@@ -92,8 +92,8 @@ class _Features(Effect):
         """Angle, rate, drive, activation and time, each from about -1 to 1."""
         drive = next((getattr(s.u, n) for n in ("effort", "pulse_width_us", "stim") if hasattr(s.u, n)), 0.0)
         return SimpleNamespace(
-            q=(getattr(s.x, "q", 0.0) - self.centre) / self.reach,  # type: ignore[attr-defined]
-            v=getattr(s.x, "v", 0.0) / self.speed,  # type: ignore[attr-defined]
+            q=(getattr(s.x, "q", getattr(s, "q", 0.0)) - self.centre) / self.reach,  # type: ignore[attr-defined]
+            v=getattr(s.x, "v", getattr(s, "v", 0.0)) / self.speed,  # type: ignore[attr-defined]
             u=drive / self.drive,  # type: ignore[attr-defined]
             act=getattr(s.x, "act", 0.0),
             t=s.time / self.duration,  # type: ignore[attr-defined]

@@ -102,12 +102,10 @@ class Model:
         signals = self.rig.signals(kind) if inputs is None else self.rig.changeable(kind, inputs)
         return Model(self.rig, tuple(e for e in self.effects if e.signal in signals))
 
-    def input_columns(self, trial: Trial) -> tuple[str, ...]:
-        """Columns of a trial that drive the rig, and those that effects which it can feel read besides."""
-        driving = self.rig.input_columns(trial)
-        return tuple(
-            dict.fromkeys([*driving, *(n for e in self.acting(trial.kind, driving).effects for n in e.inputs)])
-        )
+    def driven_by(self, trial: Trial) -> tuple[str, ...]:
+        """Names of what drives the rig in a trial, and of columns that effects which it can feel read besides."""
+        felt = self.acting(trial.kind, self.rig.input_columns(trial)).effects
+        return tuple(dict.fromkeys([*self.rig.driven_by(trial), *(n for e in felt for n in e.inputs)]))
 
     def structure(self) -> tuple[str, ...]:
         """The rig and the effects, not their values."""

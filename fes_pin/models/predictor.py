@@ -124,7 +124,7 @@ class Predictor:
         for i, trial in enumerate(self.trials):
             steps = substeps(self.model, trial.dt, self.max_step_s)
             groups.setdefault(
-                (trial.kind, self.model.input_columns(trial), _measured(self.model, trial), steps), []
+                (trial.kind, self.model.driven_by(trial), _measured(self.model, trial), steps), []
             ).append(i)
         for members in groups.values():
             members.sort(key=lambda i: len(self.trials[i]))
@@ -183,7 +183,8 @@ class _Block:
         max_step_s: float,
     ) -> None:
         first, self.lanes = trials[lanes[0]], lanes
-        rig, self.inputs = model.rig, model.input_columns(first)
+        self.rig = rig = model.rig
+        self.inputs = model.driven_by(first)
         self.outputs = _measured(model, first)
         model = disturbed(model.acting(first.kind, rig.input_columns(first)), first.kind, processes)
         available = set(model.parameters()) | set(model.unknowns(first.kind))
@@ -195,7 +196,7 @@ class _Block:
         self.trials = [trials[i] for i in lanes]
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
-        known = [{**rig.trial_constants(t), **timing(t, self.substeps)} for t in padded]
+        known = [{**rig.trial_constants(t), **rig.motion_constants(t), **timing(t, self.substeps)} for t in padded]
         own = [priors[i] for i in lanes] + [priors[lanes[-1]]] * (WIDTH - len(lanes))
         for constants, prior in zip(known, own, strict=True):
             constants.update({f"prior.{n}": prior[n] for n in rig.unknowns(first.kind)})
@@ -217,7 +218,7 @@ class _Block:
     def _driven(self, shift: tuple[int, ...]) -> np.ndarray:
         """Inputs of all lanes, later by whole samples, beside what was measured and whether it was."""
         if self._given is None or self._given[0] != shift:
-            driven = lane_inputs(self.trials, self.inputs, self.count, shift)
+            driven = lane_inputs(self.rig, self.trials, self.inputs, self.count, shift)
             self._given = (shift, np.concatenate([driven, self.measured, self.seen.astype(float)], axis=1))
         return self._given[1]
 

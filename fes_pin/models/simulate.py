@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fes_pin.data.imposed import MOTION, driving_values
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile.layout import WIDTH, Layout
 from fes_pin.models.compile.program import Program, program
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
+from fes_pin.models.rigs.base import Rig
 
 MAX_STEP_S = 2.5e-3
 """Longest integration step, s: 1/20 of a muscle's time constant; at 1/17 s of damping RK4 errs by 1e-6 rad a swing."""
@@ -97,7 +99,7 @@ class Simulator:
         """Trials that can share a block: same kind, inputs and integration steps per sample, of similar length."""
         groups: dict[tuple, list[int]] = {}
         for i, trial in enumerate(self.trials):
-            key = (trial.kind, self.model.input_columns(trial), substeps(self.model, trial.dt, self.max_step_s))
+            key = (trial.kind, self.model.driven_by(trial), substeps(self.model, trial.dt, self.max_step_s))
             groups.setdefault(key, []).append(i)
         for members in groups.values():
             members.sort(key=lambda i: len(self.trials[i]))
@@ -160,7 +162,7 @@ class Simulator:
             found = _first_motion(self.model, [self.trials[i] for i in todo], values, [out[i] for i in todo])
             for i, unknowns in zip(todo, found, strict=True):
                 out[i].update({n: unknowns[n] for n in rig.unmeasured(self.trials[i])})
-        if any(e.signal == "reading" for e in self.model.effects):
+        if any(e.signal in ("play", "reading") for e in self.model.effects):
             _read_through(self.model, self.trials, values, out)
         return out
 
@@ -216,8 +218,9 @@ class _Block:
         self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...], max_step_s: float
     ) -> None:
         first = trials[lanes[0]]
-        self.inputs = model.input_columns(first)
-        rig, model = model.rig, model.acting(first.kind, model.rig.input_columns(first))
+        self.inputs = model.driven_by(first)
+        self.rig = rig = model.rig
+        model = model.acting(first.kind, rig.input_columns(first))
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         self.program: Program = program(model, first.kind, self.inputs, tuple(c for c in columns if c in available))
@@ -226,7 +229,7 @@ class _Block:
         self.substeps = substeps(model, first.dt, max_step_s)
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
-        constants = [{**rig.trial_constants(t), **timing(t, self.substeps)} for t in padded]
+        constants = [{**rig.trial_constants(t), **rig.motion_constants(t), **timing(t, self.substeps)} for t in padded]
         self.constants = np.array([[c[n] for c in constants] for n in self.layout.constants]).reshape(-1, WIDTH)
         self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
         self._shifted: tuple[tuple[int, ...] | None, np.ndarray] = None, np.empty(0)
@@ -239,7 +242,7 @@ class _Block:
         known, u = self._shifted
         if known == shift:
             return u
-        u = lane_inputs(self.trials, self.inputs, self.count, shift)
+        u = lane_inputs(self.rig, self.trials, self.inputs, self.count, shift)
         self._shifted = shift, u
         return u
 
@@ -267,13 +270,18 @@ def substeps(model: Model, dt: float, max_step_s: float) -> int:
     return max(1, math.ceil(dt / max_step_s - 1e-6)) + is_delayed(model)
 
 
-def lane_inputs(trials: Sequence[Trial], inputs: Sequence[str], count: int, shift: Sequence[int]) -> np.ndarray:
-    """Inputs of trials side by side, shape (count, inputs, WIDTH), each later by whole samples; zero before."""
+def lane_inputs(
+    rig: Rig, trials: Sequence[Trial], inputs: Sequence[str], count: int, shift: Sequence[int]
+) -> np.ndarray:
+    """Inputs of trials side by side, shape (count, inputs, WIDTH), each later by whole samples; zero before.
+
+    An imposed motion is never late: what is delayed is the answer to a stimulus.
+    """
     u = np.zeros((count, len(inputs), WIDTH))
     for lane, trial in enumerate(trials):
         for j, name in enumerate(inputs):
-            late = min(shift[lane], len(trial))
-            u[late : len(trial), j, lane] = trial[name][: len(trial) - late]
+            late = 0 if name in MOTION else min(shift[lane], len(trial))
+            u[late : len(trial), j, lane] = driving_values(trial, name, rig.schema.imposed)[: len(trial) - late]
     return u
 
 

@@ -44,6 +44,8 @@ class Effect:
         What it changes: see the rig's equations for the names.
     rigs
         The rigs it can be part of.
+    states_of_form
+        Which of its states it has only beside a refinement, with the parameter that switches that on.
     random
         Names of processes that drive its states at random, one for each state; see `models.disturbance`.
     inputs
@@ -65,6 +67,7 @@ class Effect:
     rigs: ClassVar[tuple[str, ...]]
     states: ClassVar[tuple[str, ...]] = ()
     memories: ClassVar[tuple[str, ...]] = ()
+    states_of_form: ClassVar[Mapping[str, str]] = {}
     random: ClassVar[tuple[str, ...]] = ()
     inputs: ClassVar[tuple[str, ...]] = ()
     dissipative: ClassVar[bool] = False
@@ -125,6 +128,11 @@ class Effect:
         refined = self.refined()
         return {n: float(getattr(self, n)) for n, i in self.parameters().items() if i.optional and n not in refined}
 
+    def kept_states(self) -> tuple[str, ...]:
+        """Its states, without those of refinements that are switched off: such a state it does not have at all."""
+        refined = self.refined() if self.states_of_form else ()
+        return tuple(n for n in self.states if self.states_of_form.get(n, n) in (n, *refined))
+
     def unknowns(self) -> tuple[str, ...]:
         """The parameters that each trial has a value of its own of."""
         return self.amplitudes() if self.each_trial else ()
@@ -153,6 +161,14 @@ class Effect:
             Every measured column, all trials end to end, by name; `time` since each trial began, s.
         """
         return {n: info.grid or (getattr(cls, n),) for n, info in cls.parameters().items()}
+
+    @classmethod
+    def forms(cls, measured: Mapping[str, np.ndarray]) -> tuple[Mapping[str, float], ...]:
+        """Forms that a screen tries, each by the values of the refinements that it has: the plain one, by default.
+
+        A refinement belongs here if without it the effect may look like none at all; `measured` as in `grids`.
+        """
+        return ({},)
 
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
         """Bounds that the measured range sets to parameters, inside the physical ones; `measured` as in `grids`."""
@@ -203,15 +219,15 @@ def counted_from(s: Any, place: Any) -> Any:
 
 def places(measured: Mapping[str, np.ndarray]) -> tuple[float, ...]:
     """The choices of `counted_from` that a search has: a joint's trial may begin anywhere."""
-    return (1.0, 0.0, 2.0) if "position" in measured else (0.0,)
+    reads_position = np.array_equal(measured.get("position", ()), measured.get("reading", ()))
+    return (1.0, 0.0, 2.0) if "position" in measured and reads_position else (0.0,)
 
 
 def reading_range(measured: Mapping[str, np.ndarray]) -> float:
-    """Largest difference between readings of the first output that is there; 0 where none is."""
-    for name in ("position", "angle_rad", "force_n"):
-        if name in measured:
-            return float(np.nanmax(measured[name]) - np.nanmin(measured[name]))
-    return 0.0
+    """Largest difference between first readings; 0 where there are none."""
+    if "reading" not in measured:
+        return 0.0
+    return float(np.nanmax(measured["reading"]) - np.nanmin(measured["reading"]))
 
 
 def symmetric(size: float) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.walk.effect import STAGE
 from fes_pin.walk.experiment import NextExperiment, next_experiment
@@ -16,7 +17,6 @@ from fes_pin.walk.judge import Gain, error_percent, floor_percent, gain, other_l
 from fes_pin.walk.likelihood import white_level
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.search import LEVEL, SEPARABLE, Search, Set
-from fes_pin.walk.smooth import CUTOFF_HZ
 from fes_pin.workers import one_thread_each
 
 LEFT_LEVEL = 0.01

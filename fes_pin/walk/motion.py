@@ -13,7 +13,7 @@ from fes_pin.body.gait import pelvis_turns, postures_of_walk
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import OPTIONAL, REQUIRED
-from fes_pin.walk.smooth import CUTOFF_HZ, low_pass, rates, smoothing_spline
+from fes_pin.data.smooth import CUTOFF_HZ, low_pass, rates, smoothing_spline
 
 TO_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """OpenSim's axes (x forward, y up, z right) to ours (x forward, y left, z up)."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from fes_pin.body.joints import SIDES
 from fes_pin.data.errors import InputError
+from fes_pin.data.smooth import CUTOFF_HZ, low_pass
 from fes_pin.walk.motion import TO_WORLD
-from fes_pin.walk.smooth import CUTOFF_HZ, low_pass
 
 LOADED_N = 20.0
 """A foot stands where its vertical force is above this: the usual threshold on instrumented treadmills."""

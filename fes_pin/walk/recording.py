@@ -10,11 +10,11 @@ import numpy as np
 from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
+from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.walk.motion import Motion, motion_of, pelvis_to_hip
 from fes_pin.walk.plates import Plates, plates_of
-from fes_pin.walk.smooth import CUTOFF_HZ
 
 
 @dataclass(frozen=True)

@@ -181,7 +181,7 @@ JOINT = {  # file, old text, new text, blamed file, row, key, words
     "known_and_fitted": ("study.toml", "[start]", "damping = 1.0\n[start]", "study.toml", 9, "start.damping", "also in [rig]"),
     "no_damping": ("study.toml", "damping = 1e-3\n", "", "study.toml", 6, "start.damping", "missing"),
     "negative_scale": ("study.toml", "inertia_scale = 1.0", "inertia_scale = -1.0", "study.toml", 7, "start.inertia_scale", "above 0"),
-    "isometric": ("study.toml", '"a.csv"', '"a.csv"\nkind = "isometric"', "study.toml", 11, "trial[0].kind", "motion for rig joint"),
+    "isometric": ("study.toml", '"a.csv"', '"a.csv"\nkind = "isometric"', "study.toml", 11, "trial[0].kind", "motion, imposed for rig joint"),
     "load": ("study.toml", '"a.csv"', '"a.csv"\nload_kg = 1', "study.toml", 11, "trial[0].load_kg", "unknown"),
     "no_position": ("a.csv", "position", "height", "a.csv", 1, "position", "missing"),
     "position_unit": ("a.csv", "position", "position_deg", "a.csv", 1, "position_deg", "expected position"),

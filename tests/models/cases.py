@@ -36,7 +36,14 @@ CASES = [
     for kind in KINDS[rig]
     if effect.signal in RIGS[rig].signals(kind)
 ]
-"""The same with every kind of trial that can feel the effect."""
+"""The same with every kind of trial that can feel the effect, but for imposed motion."""
+
+IMPOSED_CASES = [
+    (effect, rig, "imposed")
+    for effect, rig in EFFECTS_OF_RIGS
+    if "imposed" in RIGS[rig].schema.outputs and effect.signal in RIGS[rig].signals("imposed")
+]
+"""The same where the motion is imposed."""
 
 
 def name_of(value):
@@ -62,6 +69,9 @@ def trial(rig, kind, rng, n=300, dt=5e-3, **conditions):
         columns = {"pulse_width_us": pulses(rng, n, 150.0, 950.0, dt)}
     elif rig == "muscle":
         columns = {"pulse_width_us": pulses(rng, n, 80.0, 520.0, dt)}
+    elif kind == "imposed":
+        waves = [rng.uniform(0.1, 0.4) * np.sin(rng.uniform(2.0, 9.0) * time + rng.uniform(0.0, 6.0)) for _ in range(2)]
+        columns = {"position": rng.uniform(-0.3, 0.3) + sum(waves)}
     else:
         columns = {"effort": rng.uniform(-0.4, 0.4) + 0.3 * np.sin(rng.uniform(2.0, 9.0) * time)}
         conditions = {"position0": rng.uniform(-0.8, 0.8), "velocity0": rng.uniform(-2.0, 2.0)} | conditions

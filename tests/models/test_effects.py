@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from models.cases import CASES, EFFECTS_OF_RIGS, JOINT, RIGS, everything, name_of, trial, with_effect
+from models.cases import CASES, EFFECTS_OF_RIGS, IMPOSED_CASES, JOINT, RIGS, everything, name_of, trial, with_effect
 
 from fes_pin.data.trial import Trial
 from fes_pin.models import effects
@@ -32,7 +32,7 @@ NOT_YET = {
     "condition_misread": {"ankle", "joint", "muscle"},
 }
 """Rigs of the contract on which a cause is not built yet."""
-CASE = pytest.mark.parametrize(("one", "rig", "kind"), CASES, ids=name_of)
+CASE = pytest.mark.parametrize(("one", "rig", "kind"), [*CASES, *IMPOSED_CASES], ids=name_of)
 
 
 def golden():

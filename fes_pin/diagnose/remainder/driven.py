@@ -75,14 +75,10 @@ def _whitened(fitted: Fit) -> tuple[list[str], np.ndarray]:
 def _scaled(effect: Effect, fitted: Fit) -> Effect:
     """Features whose variables run from about -1 to 1 in these trials."""
     rig, trials = fitted.model.rig, fitted.trials
-    readings = np.concatenate([t[rig.output(t.kind)] for t in trials if rig.output(t.kind) in t.columns])
-    low, high = float(np.nanmin(readings)), float(np.nanmax(readings))
+    moved = [t[(*rig.schema.motion(t.kind), rig.output(t.kind))[0]] for t in trials]
+    low, high = float(np.nanmin(np.concatenate(moved))), float(np.nanmax(np.concatenate(moved)))
     lag = [max(1, round(0.05 / t.dt)) for t in trials]
-    rates = [
-        np.abs(t[rig.output(t.kind)][k:] - t[rig.output(t.kind)][:-k]) / (k * t.dt)
-        for t, k in zip(trials, lag, strict=True)
-        if len(t) > k
-    ]
+    rates = [np.abs(q[k:] - q[:-k]) / (k * t.dt) for q, t, k in zip(moved, trials, lag, strict=True) if len(t) > k]
     drives = [np.abs(t[n]) for t in trials for n in rig.input_columns(t)]
     scales: dict[str, Any] = {
         "centre": 0.5 * (low + high),

@@ -50,15 +50,16 @@ class Library:
         self.effects = tuple(installed().effects_for(model.rig) if effects is None else effects)
         self.model, self.trials = Model(model.rig), tuple(trials)
         self.measured = measured_columns(model, trials)
-        self._problems: dict[str, Problem] = {}
+        self._problems: dict[tuple, Problem] = {}
 
     def grid(self, effect: type[Effect]) -> list[Effect]:
-        """The effect at its null with every combination of its shapes."""
+        """The effect at its null with every combination of its shapes, in every form that a screen tries."""
         grids = effect.grids(self.measured)
         shapes = effect.shapes()
         start: dict[str, Any] = {n: near_null(effect, n) for n in effect.amplitudes()}
         return [
-            effect(**{**start, **dict(zip(shapes, values, strict=True))})
+            effect(**{**start, **dict(zip(shapes, values, strict=True)), **form})
+            for form in effect.forms(self.measured)
             for values in itertools.product(*(grids[n] for n in shapes))
         ]
 
@@ -83,23 +84,27 @@ class Library:
 
     def _probe(self, effect: type[Effect], nominal: Model, fitted: Fit, noise: NoiseModel) -> list[Probe]:
         """The effect with every choice of its shapes; only the trials in which it acts are simulated."""
-        felt = self.felt(effect)
-        if effect.name not in self._problems:
-            free = tuple(f"{effect.name}.{n}" for n in effect.amplitudes())
-            self._problems[effect.name] = Problem(
-                nominal + effect.absent(), [self.trials[i] for i in felt], noise, free
-            )
-        problem = self._problems[effect.name]
-        problem.noise = noise
-        ends = np.cumsum([0, *(problem.rows(t) for t in self.trials)])
-        out = []
+        felt, out = self.felt(effect), []
         for one in self.grid(effect):
+            problem = self._problem(nominal + one, noise)
+            ends = np.cumsum([0, *(problem.rows(t) for t in self.trials)])
             columns = np.zeros((ends[-1], len(problem.free)))
             parts = problem.linearize((nominal + one).parameters(), [fitted.unknowns[i] for i in felt])
             for i, part in zip(felt, parts, strict=True):
                 columns[ends[i] : ends[i + 1]] = part.jacobian
             out.append(Probe(one, columns))
         return out
+
+    def _problem(self, model: Model, noise: NoiseModel) -> Problem:
+        """The problem of one effect beside the nominal model, in its form, on the trials that feel it."""
+        (one,) = model.effects
+        key = (one.name, tuple(one.unused().items()))
+        if key not in self._problems:
+            free = tuple(f"{one.name}.{n}" for n in one.amplitudes())
+            trials = [self.trials[i] for i in self.felt(type(one))]
+            self._problems[key] = Problem(model, trials, noise, free)
+        self._problems[key].noise = noise
+        return self._problems[key]
 
 
 def near_null(effect: type[Effect], name: str) -> float:

@@ -52,7 +52,7 @@ class LikelihoodFits:
         self.fits: dict[Names, Fit] = {}
         self._scores: dict[int, tuple[Fit, Scores]] = {}
         self._converged: set[Names] = set()
-        self._probing: dict[str, LikelihoodProblem] = {}
+        self._probing: dict[tuple, LikelihoodProblem] = {}
 
     def nominal(self) -> Fit:
         """Fit the nominal model, from several sizes of what is random."""
@@ -85,12 +85,13 @@ class LikelihoodFits:
         """
         nominal = Model(base.model.rig)
         assert base.doubt is not None
-        if effect.name not in self._probing:  # its columns are those of a fit, which shares the program
-            self._probing[effect.name] = LikelihoodProblem(nominal + effect.absent(), self.trials, base.doubt)
-        problem = self._probing[effect.name]
-        places = [problem.free.index(f"{effect.name}.{n}") for n in effect.amplitudes()]
         out = []
         for one in self.library.grid(effect):
+            key = (effect.name, tuple(one.unused().items()))
+            if key not in self._probing:  # its columns are those of a fit, which shares the program
+                self._probing[key] = LikelihoodProblem(nominal + one, self.trials, base.doubt)
+            problem = self._probing[key]
+            places = [problem.free.index(f"{effect.name}.{n}") for n in effect.amplitudes()]
             run = problem.innovations((nominal + one).parameters(), problem.start_unknowns(), base.doubt)
             columns = [-i.sensitivities[i.seen][:, places] / np.sqrt(i.variances[i.seen])[:, None] for i in run]
             out.append(Probe(one, np.nan_to_num(np.concatenate(columns))))

@@ -246,7 +246,7 @@ class SimulationFits:
         return self._refinements[id(base)][1]
 
     def _refinement(self, base: Fit) -> Fit | None:
-        refinements = [starts for effect in base.model.effects for starts in _refined(base.model, effect)]
+        refinements = [starts for effect in base.model.effects for starts in _refined(base.model, effect) if starts]
         starts = [s for r in refinements for s in r]
         tried = in_parallel(lambda s: self.fit_from([s], base.unknowns, SCREEN_ITERATIONS), starts)
         at = np.cumsum([0, *map(len, refinements)])

@@ -60,7 +60,7 @@ class _Symbols:
     def __init__(self, model: Model, layout: Layout) -> None:
         self.model, self.layout = model, layout
         rig, kind = model.rig, layout.kind
-        self.states = list(rig.states(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.states]
+        self.states = list(rig.states(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.kept_states()]
         self.memories = list(rig.memories(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.memories]
         self.x, self.m = _symbols("x", self.states), _symbols("m", self.memories)
         self.p, self.c = _symbols("p", layout.values), _symbols("c", layout.constants)
@@ -88,11 +88,13 @@ class _Symbols:
             initial=SimpleNamespace(**{n: p[n] for n in layout.unknowns if "." not in n}),
             time=self.t - self.c["t0"],
             step=self.c["step"],
+            elapsed=0.0,
             pace=1.0,
             delayed=lambda now, before: now,
         )
         s.owned = {
-            e.name: {n: states[f"{e.name}.{n}"] for n in e.states} | {n: memories[f"{e.name}.{n}"] for n in e.memories}
+            e.name: {n: states[f"{e.name}.{n}"] for n in e.kept_states()}
+            | {n: memories[f"{e.name}.{n}"] for n in e.memories}
             for e in self.model.effects
         }
         if self.is_late:
@@ -102,7 +104,8 @@ class _Symbols:
     def within_a_sample(self, s: Signals) -> Signals:
         """The signals at `into` after the start of the step that begins `since` after the sample."""
         if not self.is_late:
-            s.time = s.time + self.since + self.into
+            s.elapsed = self.since + self.into
+            s.time = s.time + s.elapsed
             return s
         steps = s.c.dt / s.c.step
         rest = s.through("delay", 0.0) - s.c.shift * s.c.dt
@@ -112,7 +115,8 @@ class _Symbols:
         first, second = rest / jump, (s.c.dt - rest) / (s.c.dt - jump)
         s.pace = where(early, first, second)
         begun = where(early, self.since * first, rest + (self.since - jump) * second)
-        s.time = s.time + begun + self.into * s.pace
+        s.elapsed = begun + self.into * s.pace
+        s.time = s.time + s.elapsed
         s.delayed = lambda now, past: where(early, past, now)
         return s
 

@@ -96,7 +96,7 @@ def make_layout(
         inputs=(*inputs, *reading_inputs(measured)),
         parameters=tuple(n for n in model.parameters() if n not in fixed),
         unknowns=model.unknowns(kind),
-        constants=(*rig.constant_names(kind), *TIMING, *doubt),
+        constants=(*rig.constant_names(kind), *rig.motion_names(kind), *TIMING, *doubt),
         outputs=rig.outputs(kind),
         columns=columns,
         fixed=tuple(fixed.items()),

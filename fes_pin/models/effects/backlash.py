@@ -30,7 +30,7 @@ class Backlash(Effect):
 
     half_width: float = parameter(0.01, unit="{q}", null=0.0, lower=0.0, upper=10.0, scale=0.005)
 
-    name, stage, signal, rigs = "backlash", Stage.JOINT, "reading", ("joint",)
+    name, stage, signal, rigs = "backlash", Stage.JOINT, "play", ("joint",)
     memories = ("followed",)
 
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from fes_pin.models.maths import exp, log, sqrt
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Effect, Stage, lag
 
 STIFFEST = 2.5
 """Largest rate of decay times step that it may show; RK4 is stable to 2.78: Hairer, Wanner, Solving ODEs II, IV.2."""
@@ -20,6 +20,10 @@ CREEP = 0.004
 """Speed at which a joint creeps under half its friction until data show another, rad/s: 0.2 degrees a second."""
 SPAN_S = 0.05
 """Time over which a speed is read off measured positions, s: an encoder's counts are small beside what is moved."""
+WAYS = (0.05, 0.2)
+"""Presliding that is tried, as shares of an imposed way."""
+STANDING = 1e-6
+"""Speed below which friction does not build up, rad/s or m/s: it keeps derivatives finite."""
 UNLOADED = 1e-3
 """Load below which its sign no longer shows, in units of the weight at rest: it keeps derivatives finite."""
 
@@ -32,12 +36,14 @@ class CoulombFriction(Effect):
         T = torque_nm |load|^load_exponent (1 + stiction exp(-(v / stribeck_speed)^2)) (1 + one_way)
         x = y / max(1, |y|)^2 + k v / S,   y = torque / S,   S = T + k creep_speed,   k = STIFFEST J / h
 
-    with clip(x) from -1 to 1 and h the integration step. It is T sign(v) in motion, and what holds the joint at rest:
-    there x is torque / S, and k v brings the joint there within a step. A torque beyond T only turns the motion: y
-    falls out of x then, and friction changes its sign where the velocity does. Under a torque below T the joint still
-    creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of small steps
-    x = v / creep_speed. The corners of clip are rounded over `softness` of the friction. `load` is the bearing's: see
-    the rig. one_way = asymmetry sign(x), x without it.
+    with clip(x) from -1 to 1 and h the integration step, 0 where the motion is imposed. It is T sign(v) in motion, and
+    what holds the joint at rest: there x is torque / S, and k v brings the joint there within a step. A torque beyond T
+    only turns the motion: y falls out of x then, and friction changes its sign where the velocity does. Under a torque
+    below T the joint still creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the
+    limit of small steps x = v / creep_speed. The corners of clip are rounded over `softness` of the friction. `load` is
+    the bearing's: see the rig. one_way = asymmetry sign(x), x without it.
+    Where the motion is imposed, friction may build up over a way `presliding`, as of a contact or band that stretches
+    before it slips: a share z of it acts, presliding z' = |v| (clip(x) - z).
     Sliding contacts lose in proportion to the load; rolling ones by elastic hysteresis, the load times the width of the
     contact: to the power 4/3 for balls, 3/2 for rollers. Friction that differs by the direction is, moving and at rest,
     symmetric friction beside a constant torque: a joint has `effort_offset` for that, and no asymmetry.
@@ -46,6 +52,7 @@ class CoulombFriction(Effect):
     Source: Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation,
     European Journal of Control 4 (1998). Load: Tabor, The mechanism of rolling friction II: the elastic range, Proc. R.
     Soc. A 229 (1955); Greenwood, Minshall and Tabor, Hysteresis losses in rolling and sliding friction, 259 (1961).
+    Presliding: Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1, 1968.
     Asymmetry: Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, whose offset holds it.
     """
 
@@ -64,39 +71,66 @@ class CoulombFriction(Effect):
     asymmetry: float = parameter(
         0.0, null=0.0, lower=-1.0, upper=1.0, scale=0.1, optional=True, grid=(0.3, -0.3), rigs=("ankle",)
     )
+    presliding: float = parameter(0.0, unit="{q}", null=0.0, lower=0.0, upper=10.0, scale=0.01, optional=True)
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
+    states, states_of_form = ("share",), {"share": "presliding"}
     dissipative = True
 
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
         """Of a joint, speeds in the measure of its own: those that it is at in a slow quarter of the time, and less."""
         grids, speed = super().grids(measured), _usual_speed(measured)
+        grids["presliding"] = tuple(k * _imposed_way(measured) for k in WAYS) if _imposed_way(measured) else ()
         if not speed > 0.0:
             return grids
         return {**grids, "stribeck_speed": (0.3 * speed, 0.1 * speed, speed), "creep_speed": (0.1 * speed, 0.5 * speed)}
 
+    @classmethod
+    def forms(cls, measured: Mapping[str, np.ndarray]) -> tuple[Mapping[str, float], ...]:
+        """With presliding as well where the motion is imposed: at rates of many samples a band's stretch is no jump."""
+        return ({}, *({"presliding": way} for way in cls.grids(measured)["presliding"]))
+
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
         """A fall of friction with speed ends among the speeds that a joint is mostly at; else it is less damping."""
-        speed = _usual_speed(measured)
-        return {"stribeck_speed": (0.0, 2.0 * speed)} if speed > 0.0 else {}
+        speed, way = _usual_speed(measured), _imposed_way(measured)
+        limits = {"stribeck_speed": (0.0, 2.0 * speed)} if speed > 0.0 else {}
+        return {**limits, "presliding": (0.0, 0.5 * way)} if way > 0.0 else limits
 
     def apply(self, value: Any, s: Any) -> Any:
         ratio = s.v / self.stribeck_speed
         loaded = exp(0.5 * self.load_exponent * log(s.bearing_load * s.bearing_load + UNLOADED * UNLOADED))
         most = self.torque_nm * loaded * (1.0 + self.stiction * exp(-ratio * ratio))
-        both_ways = self._share(most, value, s)
+        both_ways = self._acting(most, value, s)[0]
         most = most * (1.0 + self.asymmetry * both_ways / _length(both_ways))
-        return value - most * self._share(most, value, s)
+        return value - most * self._acting(most, value, s)[0]
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        return {"share": self._acting(self.torque_nm, 0.0, s)[1]} if hasattr(s.own, "share") else {}
+
+    def _acting(self, most: Any, value: Any, s: Any) -> tuple[Any, Any]:
+        """Share that acts, and the rate of its state."""
+        steady = self._share(most, value, s)
+        if not hasattr(s.own, "share"):
+            return steady, 0.0
+        return lag(steady, s.own.share, self.presliding / sqrt(s.v * s.v + STANDING * STANDING), s.step)
 
     def _share(self, most: Any, value: Any, s: Any) -> Any:
         """Share of the largest friction that acts, with its sign: clip(x)."""
-        stopping = STIFFEST * s.inertia / s.step
+        stopping = STIFFEST * getattr(s, "stopping", s.inertia / s.step)
         scale = most + stopping * self.creep_speed
         y = value / scale
         beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
         x = y / (beyond * beyond) + stopping * s.v / scale
         return 0.5 * (_length(x + 1.0, self.softness) - _length(x - 1.0, self.softness))
+
+
+def _imposed_way(measured: Mapping[str, np.ndarray]) -> float:
+    """How far an imposed motion goes, rad or m; 0 where the motion is what is read."""
+    position = measured.get("position", np.empty(0))
+    if not len(position) or np.array_equal(position, measured.get("reading", ())):
+        return 0.0
+    return float(np.max(position) - np.min(position))
 
 
 def _usual_speed(measured: Mapping[str, np.ndarray]) -> float:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
-from fes_pin.data.schema import START_S, RigSchema
+from fes_pin.data.imposed import MOTION, imposed_motion
+from fes_pin.data.schema import IMPOSED, START_S, RigSchema
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import ROTARY, Parameter, parameters_of
@@ -27,8 +28,9 @@ class Rig:
     """A rig and its nominal model: fields are what the nominal model fits, `constants` what is known before.
 
     A subclass writes its equations on `Signals`: `s.x` states, `s.m` memories, `s.u` inputs, `s.c` constants of rig
-    and trial, `s.initial` per-trial unknowns, `s.time`, `s.step` (no integration step is longer), and
-    `s.delayed(now, before)` for what is held between samples and may come late.
+    and trial, `s.initial` per-trial unknowns, `s.time`, `s.elapsed` since the last sample, `s.step` (no integration
+    step is longer), and `s.delayed(now, before)` for what is held between samples and may come late. What an imposed
+    motion is at an instant `imposed_now` says.
     Each method serves every `kind` of trial.
     """
 
@@ -71,8 +73,14 @@ class Rig:
         """True if the effect can be part of it."""
         return not {cls.name, *cls.like}.isdisjoint(effect.rigs)
 
-    def time_constants(self) -> dict[str, float]:
-        """Times in s that its answer takes at its own parameters, by what they are; only those that there are."""
+    def time_constants(self, kinds: Collection[str]) -> dict[str, float]:
+        """Times in s that its answer takes at its own parameters, by what they are; only those that there are.
+
+        Parameters
+        ----------
+        kinds
+            Of the trials: a joint that is made to move has no time of its own.
+        """
         muscle = getattr(self, "time_constant_s", None)
         return {} if muscle is None else {"the muscle's time constant": muscle}
 
@@ -150,8 +158,22 @@ class Rig:
         raise NotImplementedError
 
     def input_columns(self, trial: Trial) -> tuple[str, ...]:
-        """Columns of a trial that drive the model."""
+        """Columns of a trial that drive the model, an imposed motion among them."""
         raise NotImplementedError
+
+    def driven_by(self, trial: Trial) -> tuple[str, ...]:
+        """Names of what drives the model in a trial: an imposed motion with its rates stands for its columns."""
+        moved = self.schema.motion(trial.kind)
+        columns = tuple(n for n in self.input_columns(trial) if n not in moved)
+        return (*columns, *MOTION) if moved else columns
+
+    def motion_constants(self, trial: Trial) -> dict[str, float]:
+        """Constants of a trial with an imposed motion: where that begins."""
+        return {"imposed_start": imposed_motion(trial, self.schema.imposed).start} if trial.kind == IMPOSED else {}
+
+    def motion_names(self, kind: str) -> tuple[str, ...]:
+        """Names of those constants."""
+        return ("imposed_start",) if kind == IMPOSED else ()
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
         """Names of the constants of rig and trial that the equations read."""
@@ -205,6 +227,19 @@ class Rig:
     def readings(self, s: Signals) -> tuple[Any, ...]:
         """The predicted columns, in the order of `outputs`."""
         raise NotImplementedError
+
+
+def imposed_now(s: Signals) -> tuple[Any, Any, Any]:
+    """Position, velocity and acceleration of an imposed motion now, between samples by the latter two."""
+    e, bend = s.elapsed, s.u.imposed_acceleration
+    rate = s.u.imposed_rate + e * bend
+    return s.u.imposed + e * (s.u.imposed_rate + 0.5 * e * bend), rate, bend
+
+
+def undone(s: Signals, signal: str, value: Any) -> Any:
+    """What a signal was that comes out as `value`: all that acts on it is linear in it, or adds to it."""
+    at_zero, at_one = s.through(signal, 0.0), s.through(signal, 1.0)
+    return (value - at_zero) / (at_one - at_zero)
 
 
 def first_rate(time: np.ndarray, position: np.ndarray, span_s: float = 0.05) -> tuple[float, float]:

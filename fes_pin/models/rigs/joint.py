@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,16 +11,18 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.schema import START_S, RigSchema, any_number, not_negative, positive
+from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_negative, positive
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.data.urdf import check_one_joint
 from fes_pin.models.maths import cos, sin, sqrt, where
 from fes_pin.models.parameters import ROTARY, SLIDING, parameter
-from fes_pin.models.rigs.base import RUN_OUT, Rig, first_rate
+from fes_pin.models.rigs.base import RUN_OUT, Rig, first_rate, imposed_now, undone
 from fes_pin.models.rigs.rigid import gravity_coefficients, is_revolute, joint_inertia, load_urdf
 from fes_pin.models.stage import Signals
 
+IMPOSED_STOPPING = 1e9
+"""Rate at which friction could stop an imposed motion, 1/s: it does not, and its direction is that of the velocity."""
 WEIGHTLESS = 1e-6
 """Gravity's torque over inertia below which a joint counts as balanced, 1/s2: a period above an hour and a half."""
 
@@ -47,11 +49,11 @@ class Joint(Rig):
     """
 
     inertia_scale: float = parameter(1.0, lower=1e-3, upper=1e3, scale=0.1)
-    damping: float = parameter(0.0, unit="{effort} s/{q}", lower=0.0, upper=1e4, scale=1e-3)
+    damping: float = parameter(0.0, unit="{effort} s/{q}", lower=0.0, upper=1e8, scale=1e-3)
     gravity_scale: float = parameter(1.0, lower=-10.0, upper=10.0, scale=0.1)
 
     name, needed = "joint", ("inertia", "gravity_cos", "gravity_sin", "revolute")
-    settings = ("--set position0=0.5 --set velocity0=0",)
+    settings = ("--set position0=0.5 --set velocity0=0", "--set kind=imposed")
     begins = "A column position gives the initial state by its first sample."
     schema = RigSchema(
         constants={},
@@ -68,10 +70,11 @@ class Joint(Rig):
             **START_S,
         },
         default_kind="motion",
-        outputs={"motion": "position"},
+        outputs={"motion": "position", IMPOSED: "effort"},
         inputs=("effort",),
         inputs_required=False,
         optional=("velocity",),
+        imposed=("position", "velocity"),
         check_files=_check_urdf,
     )
 
@@ -81,7 +84,9 @@ class Joint(Rig):
         driven = any("effort" in t.columns for t in study.trials)
         return joint_model(study.urdf, study.constants, study.start, driven)
 
-    def time_constants(self) -> dict[str, float]:
+    def time_constants(self, kinds: Collection[str]) -> dict[str, float]:
+        if set(kinds) == {IMPOSED}:
+            return {}
         inertia = self.inertia_scale * self.constants["inertia"]
         weight = math.hypot(self.constants["gravity_cos"], self.constants["gravity_sin"])
         stiffness = abs(self.gravity_scale) * weight
@@ -90,13 +95,17 @@ class Joint(Rig):
         return {RUN_OUT: inertia / self.damping} if self.damping > 0.0 else {}
 
     def check_prediction(self, trial: Trial) -> None:
+        if trial.kind == IMPOSED:
+            return
         if "position" not in trial.columns and "position0" not in trial.conditions:
             raise InputError("expected a column position (its first sample) or --set position0=...")
 
     @classmethod
     def conditions_to_try(cls, study: Study) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
-        """Released at rest, from positions that trials began at."""
-        starts = [float(t["position"][0]) for t in study.trials]
+        """Released at rest, from positions that trials began at; none where every motion was imposed."""
+        starts = [float(t["position"][0]) for t in study.trials if t.kind != IMPOSED]
+        if not starts:
+            return set()
         released = np.quantile(starts, (0.0, 0.25, 0.5, 0.75, 1.0))
         return {("motion", (("position0", round(float(p), 4)), ("velocity0", 0.0))) for p in released}
 
@@ -104,22 +113,25 @@ class Joint(Rig):
         return ROTARY if self.constants.get("revolute", 1.0) else SLIDING
 
     def signals(self, kind: str) -> tuple[str, ...]:
-        return ("gravity_angle", "effort", "torque", "friction", "driving", "acceleration", "reading")
+        if kind == IMPOSED:
+            return ("gravity_angle", "play", "torque", "friction", "effort", "reading")
+        return ("gravity_angle", "effort", "torque", "friction", "driving", "acceleration", "play", "reading")
 
     def states(self, kind: str) -> tuple[str, ...]:
-        return ("q", "v")
+        return () if kind == IMPOSED else ("q", "v")
 
     def memories(self, kind: str) -> tuple[str, ...]:
-        return ("rest",)
+        return () if kind == IMPOSED else ("rest",)
 
     def unknowns(self, kind: str) -> tuple[str, ...]:
-        return ("initial_position", "initial_velocity")
+        return () if kind == IMPOSED else ("initial_position", "initial_velocity")
 
     def outputs(self, kind: str) -> tuple[str, ...]:
-        return ("position", "velocity")
+        return ("effort",) if kind == IMPOSED else ("position", "velocity")
 
     def input_columns(self, trial: Trial) -> tuple[str, ...]:
-        return ("effort",) if "effort" in trial.columns else ()
+        wanted = self.schema.imposed if trial.kind == IMPOSED else ("effort",)
+        return tuple(n for n in wanted if n in trial.columns)
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
         return (*self.needed, "idle")
@@ -130,6 +142,8 @@ class Joint(Rig):
         return {**known, "idle": math.atan2(-a, b) if known["revolute"] and (a or b) else 0.0}
 
     def initial_unknowns(self, trial: Trial) -> dict[str, float]:
+        if trial.kind == IMPOSED:
+            return {}
         position, rate = first_rate(trial.time, trial["position"]) if "position" in trial.columns else (0.0, 0.0)
         if "position" in trial.columns:
             position = float(trial["position"][0])
@@ -142,7 +156,7 @@ class Joint(Rig):
         }
 
     def is_driven(self, trials: Sequence[Trial]) -> bool:
-        return any("effort" in t.columns for t in trials)
+        return any("effort" in t.columns and t.kind != IMPOSED for t in trials)
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         driven = [t["effort"] for t in trials if "effort" in t.columns]
@@ -154,14 +168,18 @@ class Joint(Rig):
         return {"effort": max(size, 1e-9 * self.constants["inertia"])}
 
     def unmeasured(self, trial: Trial) -> tuple[str, ...]:
-        told = "velocity" in trial.columns or "velocity0" in trial.conditions
+        told = trial.kind == IMPOSED or "velocity" in trial.columns or "velocity0" in trial.conditions
         return () if told or "position" not in trial.columns else ("initial_velocity",)
 
     def read_first(self, trial: Trial) -> Mapping[str, str]:
-        told = "position0" in trial.conditions or "position" not in trial.columns
+        told = trial.kind == IMPOSED or "position0" in trial.conditions or "position" not in trial.columns
         return {} if told else {"initial_position": "position"}
 
     def set_rest(self, s: Signals, z: Any) -> None:
+        if s.kind == IMPOSED:
+            s.q, s.inertia = s.c.imposed_start, self.inertia_scale * s.c.inertia
+            s.sensed = self._gravity(s, 0.0)[0]
+            return
         s.x.q, s.x.v, s.m.rest = s.initial.initial_position, s.initial.initial_velocity, s.initial.initial_position
         s.q = s.sensed = s.x.q
 
@@ -169,28 +187,51 @@ class Joint(Rig):
         return z
 
     def sample(self, s: Signals) -> dict[str, Any]:
-        s.q = s.sensed = s.x.q
+        if s.kind == IMPOSED:
+            s.q = s.sensed = imposed_now(s)[0]
+        else:
+            s.q = s.sensed = s.x.q
         return {}
 
     def rates(self, s: Signals) -> dict[str, Any]:
-        c = s.c
-        s.q, s.v, s.act, s.sensed = s.x.q, s.x.v, 0.0, s.x.q
-        s.inertia = self.inertia_scale * c.inertia
-        tilted = s.through("gravity_angle", c.revolute * s.q)
-        gravity = self.gravity_scale * (c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted))
-        pull = self.gravity_scale * (c.gravity_sin * cos(tilted) - c.gravity_cos * sin(tilted)) + s.inertia * s.v * s.v
-        weight = sqrt(c.gravity_cos * c.gravity_cos + c.gravity_sin * c.gravity_sin)
-        swings = where(weight > WEIGHTLESS * c.inertia, c.revolute, 0.0)
-        s.bearing_load = 1.0 + swings * (pull / where(swings > 0.0, weight, 1.0) - 1.0)
+        s.act, s.inertia = 0.0, self.inertia_scale * s.c.inertia
+        if s.kind == IMPOSED:
+            return self._imposed(s)
+        s.q, s.v, s.sensed = s.x.q, s.x.v, s.x.q
+        gravity, s.bearing_load = self._gravity(s, s.v)
         effort = s.through("effort", getattr(s.u, "effort", 0.0))
         s.torque = s.through("friction", s.through("torque", effort - gravity - self.damping * s.v))
         s.driving = s.through("driving", s.torque / s.inertia)
         s.acceleration = s.through("acceleration", s.driving)
         return {"q": s.v, "v": s.acceleration}
 
+    def _imposed(self, s: Signals) -> dict[str, Any]:
+        """The effort that an imposed motion takes: what the inertia needs beyond what acts on it anyway."""
+        s.q, s.v, bend = imposed_now(s)
+        s.q = s.through("play", s.q)
+        s.stopping = IMPOSED_STOPPING * s.inertia
+        gravity, s.bearing_load = self._gravity(s, s.v)
+        s.torque = s.through("friction", s.through("torque", -gravity - self.damping * s.v))
+        s.sensed = undone(s, "effort", s.inertia * bend - s.torque)
+        return {}
+
+    def _gravity(self, s: Signals, v: Any) -> tuple[Any, Any]:
+        """Torque of gravity, and the load of the bearing, at the position and a velocity."""
+        c = s.c
+        tilted = s.through("gravity_angle", c.revolute * s.q)
+        gravity = self.gravity_scale * (c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted))
+        pull = self.gravity_scale * (c.gravity_sin * cos(tilted) - c.gravity_cos * sin(tilted)) + s.inertia * v * v
+        weight = sqrt(c.gravity_cos * c.gravity_cos + c.gravity_sin * c.gravity_sin)
+        swings = where(weight > WEIGHTLESS * c.inertia, c.revolute, 0.0)
+        return gravity, 1.0 + swings * (pull / where(swings > 0.0, weight, 1.0) - 1.0)
+
     def readings(self, s: Signals) -> tuple[Any, ...]:
+        if s.kind == IMPOSED:
+            s.rest_reading = s.idle_reading = 0.0
+            self.rates(s)
+            return (s.through("reading", s.sensed),)
         s.rest_reading, s.idle_reading, s.sensed = s.m.rest, s.c.idle, s.x.q
-        return s.through("reading", s.x.q), s.x.v
+        return s.through("reading", s.through("play", s.x.q)), s.x.v
 
 
 def joint_model(urdf: Path, constants: Mapping[str, Any], start: Mapping[str, Any], driven: bool = True) -> Joint:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fes_pin.data.errors import InputError
-from fes_pin.walk.smooth import low_pass, rates, smoothing_spline
+from fes_pin.data.smooth import low_pass, rates, smoothed_rates, smoothing_spline
 
 TIME = np.arange(400) / 100.0
 
@@ -52,3 +52,16 @@ def test_a_smoothing_splines_bandwidth_falls_with_the_noise_and_its_rate_is_near
         error = rate[20:-20, 0] - 2 * np.pi * np.cos(2 * np.pi * TIME[20:-20])
         assert np.sqrt(np.mean(error**2)) < 2 * np.pi * band[0] * noise
     assert 1.0 < bands[1] < bands[0] < 20.0
+
+
+@pytest.mark.parametrize("noise", [1e-4, 1e-2])
+def test_rates_of_a_reading_are_as_sure_as_they_say(noise):
+    """At the ends as well, where a spline with a penalty has a bend of zero."""
+    rng, time = np.random.default_rng(5), np.arange(2000) * 2e-3
+    w = 2.0 * np.pi * 1.3
+    truth = [np.sin(w * time + 0.4), w * np.cos(w * time + 0.4), -(w**2) * np.sin(w * time + 0.4)]
+    found, doubt, bandwidth = smoothed_rates(truth[0] + noise * rng.standard_normal(len(time)), time)
+    assert 1.3 < bandwidth < 8.0
+    for value, true, std in zip(found, truth, doubt, strict=True):
+        assert 0.4 < (value - true)[100:-100].std() / std < 2.5
+        assert np.abs(value - true).max() < max(60.0 * std, 0.03 * np.ptp(true))

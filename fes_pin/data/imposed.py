@@ -1,0 +1,75 @@
+"""Motion that the rig is made to follow: smoothed, with its rates, and with what its reading leaves in doubt.
+
+A dynamometer, a muscle lever or a test stand imposes the motion; what is measured is the force that it takes. A model
+needs velocity and acceleration of the motion: they come from a smoothing spline of the reading, whose bandwidth
+cross-validation sets (`data.smooth`). A velocity that was measured as well is smoothed by itself, and stands for that
+of the position. What noise stays in them acts on a model's force, and is estimated with all else that is random about
+that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from fes_pin.data.smooth import smoothed_rates
+from fes_pin.data.trial import Trial
+
+MOTION = ("imposed", "imposed_rate", "imposed_acceleration")
+"""What a model is driven by in such a trial, whatever the column's name: position, velocity, acceleration."""
+
+
+@dataclass(frozen=True)
+class ImposedMotion:
+    """An imposed motion.
+
+    Attributes
+    ----------
+    values
+        Shape (3, n): position, velocity and acceleration, as `MOTION` names them.
+    doubt
+        Standard deviations of the noise that stays in each.
+    bandwidth_hz
+        Of velocity and acceleration.
+    """
+
+    values: np.ndarray
+    doubt: tuple[float, float, float]
+    bandwidth_hz: float
+
+    @property
+    def start(self) -> float:
+        """Position at the first sample."""
+        return float(self.values[0, 0])
+
+
+_KNOWN: WeakKeyDictionary[Trial, ImposedMotion] = WeakKeyDictionary()
+
+
+def imposed_motion(trial: Trial, columns: tuple[str, ...]) -> ImposedMotion:
+    """The motion that a trial imposes.
+
+    Parameters
+    ----------
+    columns
+        Names of the columns that may hold it: the position, and perhaps its velocity.
+    """
+    if trial not in _KNOWN:
+        _KNOWN[trial] = _smoothed(trial, columns)
+    return _KNOWN[trial]
+
+
+def driving_values(trial: Trial, name: str, columns: tuple[str, ...]) -> np.ndarray:
+    """What drives a model under one name, shape (n,): a column, or a part of the imposed motion."""
+    return imposed_motion(trial, columns).values[MOTION.index(name)] if name in MOTION else trial[name]
+
+
+def _smoothed(trial: Trial, columns: tuple[str, ...]) -> ImposedMotion:
+    measured = [n for n in columns if n in trial]
+    values, doubt, bandwidth = smoothed_rates(trial[measured[0]], trial.time)
+    if len(measured) > 1:
+        rate, rate_doubt, bandwidth = smoothed_rates(trial[measured[1]], trial.time)
+        values[1:], doubt[1:] = rate[:2], rate_doubt[:2]
+    return ImposedMotion(values, (float(doubt[0]), float(doubt[1]), float(doubt[2])), bandwidth)

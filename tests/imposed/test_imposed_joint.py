@@ -1,0 +1,101 @@
+"""A joint whose motion is imposed: the effort that it takes, its noise, and what hides in it."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from imposed_rigs import joint
+from imposed_rigs.motion import drawn
+
+from fes_pin.data.imposed import imposed_motion
+from fes_pin.data.study import read_study, write_study
+from fes_pin.data.trial import Trial, read_trial, write_trial
+from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.models.effects import CoulombFriction, EffortGain, EffortOffset, PassiveRelaxation
+from fes_pin.models.model import Model
+from fes_pin.models.nominal import nominal_model
+from fes_pin.models.predict import predict
+from fes_pin.models.rigs.rigid import load_urdf
+from fes_pin.models.simulate import simulate
+from fes_pin.models.store import load_model, save_model
+
+COLUMNS = ("position", "velocity")
+
+
+def moved(seed=0, n=2000, dt=2e-3):
+    motion = drawn(0.1, 0.6, 0.3, 1.5, np.random.default_rng(seed))
+    time = np.arange(n) * dt
+    return motion, Trial("moved", "imposed", {"position": motion.at(time)}, time)
+
+
+def arm(tmp_path, **hidden):
+    made = joint.study(tuple(hidden), hidden.get(next(iter(hidden), ""), 0.0), np.random.default_rng(3), tmp_path)
+    return made, nominal_model(made)
+
+
+def test_the_effort_is_that_of_inverse_dynamics(tmp_path):
+    """Of Pinocchio's RNEA, on the motion itself."""
+    made, model = arm(tmp_path)
+    body, (motion, trial) = load_urdf(made.urdf), moved()
+    data = body.createData()
+    q, v, a = (motion.at(trial.time, k) for k in range(3))
+    model = model.with_parameters({"inertia_scale": 1.0, "damping": 0.2})
+    wanted = [pin.rnea(body, data, *(np.array([x[k]]) for x in (q, v, a)))[0] + 0.2 * v[k] for k in range(len(q))]
+    missed = simulate(model, trial)["effort"] - wanted
+    assert np.abs(missed).max() < 1e-3 * np.ptp(wanted)
+
+
+def test_a_measured_velocity_stands_for_that_of_the_position():
+    motion, trial = moved()
+    measured = trial.with_columns(velocity=motion.at(trial.time, 1) + 0.5)
+    assert np.abs(imposed_motion(measured, COLUMNS).values[1] - measured["velocity"]).max() < 1e-4
+    assert np.abs(imposed_motion(trial, COLUMNS).values[1] - motion.at(trial.time, 1)).max() < 1e-4
+
+
+def test_what_acts_on_the_effort_is_undone(tmp_path):
+    """The reading is the effort that was commanded: what acts is -1 times what was, and 0.3 more."""
+    (_, model), (_, trial) = arm(tmp_path), moved()
+    plain = simulate(model, trial)["effort"]
+    turned = simulate(model + EffortGain(error=-2.0) + EffortOffset(offset=0.3), trial)["effort"]
+    acts = min((-turned + 0.3, -(turned + 0.3)), key=lambda x: np.abs(plain - x).max())  # as the path orders them
+    assert np.abs(plain - acts).max() < 1e-9 * np.abs(plain).max()
+
+
+def test_friction_follows_the_velocity_and_builds_up_over_a_way(tmp_path):
+    (_, model), (motion, trial) = arm(tmp_path), moved()
+    v, plain = motion.at(trial.time, 1), simulate(model, trial)["effort"]
+    sharp = simulate(model + CoulombFriction(torque_nm=0.5), trial)["effort"] - plain
+    fast = np.abs(v) > 0.05
+    assert np.abs(sharp[fast] - 0.5 * np.sign(v[fast])).max() < 2e-3
+    soft = simulate(model + CoulombFriction(torque_nm=0.5, presliding=0.05), trial)["effort"] - plain
+    turn = int(np.flatnonzero(np.diff(np.sign(v)))[1]) + 1
+    way = np.abs(motion.at(trial.time[turn:]) - motion.at(trial.time[turn]))
+    after = int(np.argmax(way > 0.05))  # 1 - 2 / e of the way from one sign to the other
+    assert soft[turn + after] / (0.5 * np.sign(v[turn + after])) == pytest.approx(1.0 - 2.0 / np.e, abs=0.05)
+
+
+@pytest.mark.parametrize("cause", ["coulomb_friction", "passive_relaxation"])
+def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
+    """Through files: study, diagnosis, model, and a held-out trial from its inputs alone."""
+    write_study(joint.study((cause,), 0.3, np.random.default_rng(7), tmp_path / "made"), tmp_path / "study")
+    study = read_study(tmp_path / "study")
+    found = diagnose(study)
+    assert [c.name for c in found.causes][:1] == [cause] or cause in found.causes[0].equivalents
+    assert found.extended_error[1] < 0.2 * found.nominal_error[1]
+    save_model(found.model, tmp_path / "model.toml")
+    inputs = study.trials[0].without("effort")
+    write_trial(inputs, tmp_path / "one.csv")
+    again = read_trial(tmp_path / "one.csv", rig="joint", kind="imposed", inputs_only=True)
+    foretold = predict(load_model(tmp_path / "model.toml"), again)["effort"]
+    assert np.abs(foretold - simulate(found.model, study.trials[0])["effort"]).max() < 1e-9
+
+
+def test_nothing_hidden_is_adequate(tmp_path):
+    made = joint.study((), 0.0, np.random.default_rng(11), tmp_path)
+    assert diagnose(made).verdict == "adequate"
+
+
+def test_a_spring_and_damper_in_series_begin_relaxed(tmp_path):
+    (_, model), (_, trial) = arm(tmp_path), moved()
+    with_it = simulate(model + PassiveRelaxation(stiffness_nm_per_rad=2.0, relaxation_s=0.3), trial)["effort"]
+    assert abs(with_it[0] - simulate(model, trial)["effort"][0]) < 1e-6
+    assert isinstance(model, Model)
