@@ -1,6 +1,7 @@
 """The imports run one way: view -> diagnose -> identify -> models -> data; control -> allocate -> muscles -> body.
 
-Measured walking (walk) reads the body, and the parameters and stages of models for its causes.
+The controller takes eq. (1) from paper. Measured walking (walk) reads the body, and the parameters and stages of models
+for its causes.
 """
 
 import ast
@@ -20,7 +21,7 @@ ALLOWED = {
     "walk": {"body", "models", "data"},
     "muscles": {"body", "models", "data"},
     "allocate": {"muscles", "body", "data"},
-    "control": {"allocate", "muscles", "identify", "models", "data"},
+    "control": {"paper", "allocate", "muscles", "identify", "models", "data"},
     "view": {"paper", "diagnose", "identify", "models", "data", "control", "allocate", "muscles", "body", "walk"},
 }
 

@@ -14,7 +14,7 @@ from fes_pin.allocate.inputs import wanted_torque, wanted_torques
 from fes_pin.allocate.off_or_enough import best_choice, rounded
 from fes_pin.allocate.problem import Options, Problem, problem_of
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.checked_numbers import by_name
+from fes_pin.data.numbers import by_name
 
 __all__ = ["Allocator"]
 

@@ -14,7 +14,7 @@ from fes_pin.allocate.inputs import torque_matrix
 from fes_pin.allocate.walk import allocate_walk
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.checked_numbers import by_name
+from fes_pin.data.numbers import by_name
 
 INSIDE_NM = 1e-6
 """A torque nearer to the set than this counts as inside, N m."""

@@ -10,9 +10,10 @@ import numpy as np
 from fes_pin.allocate.allocator import Allocator
 from fes_pin.allocate.bounded import known_solver
 from fes_pin.allocate.horizon_program import NO_ROOM, HorizonProgram
-from fes_pin.allocate.inputs import number, wanted_torques
+from fes_pin.allocate.inputs import wanted_torques
 from fes_pin.allocate.problem import within_rate
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import between, positive, whole
 
 ROUNDED = 1e-13
 """A plan may exceed the rate by so much: its steps are sums, and solvers round; a pulse width by 1e-10 us."""
@@ -34,10 +35,9 @@ class StrengthFatigue:
     least: float = 0.2
 
     def __post_init__(self) -> None:
-        for name in ("fatigue_s", "recovery_s", "least"):
-            number(getattr(self, name), name)
-        if not (self.fatigue_s > 0.0 and self.recovery_s > 0.0 and 0.0 <= self.least <= 1.0):
-            raise InputError("fatigue needs positive time constants and a least strength between 0 and 1")
+        for name in ("fatigue_s", "recovery_s"):
+            positive(getattr(self, name), name, infinite=True)
+        between(self.least, 0.0, 1.0, "least")
 
     def after(self, left: np.ndarray, act: np.ndarray, step_s: float) -> np.ndarray:
         """Strength left (n,) after a step with activation act (n,), exact for constant activation."""
@@ -134,12 +134,10 @@ class Horizon:
     left: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        times = number(self.step_s, "step_s"), number(self.time_constant_s, "time_constant_s")
-        counts = number(self.delay_steps, "delay_steps"), number(self.steps, "steps")
-        good = all(0.0 < t < np.inf for t in times) and all(c == int(c) for c in counts if np.isfinite(c))
-        if not (good and 0 <= counts[0] < LONGEST and 1 <= counts[1] < LONGEST):
-            raise InputError("a horizon needs positive times and whole numbers delay_steps >= 0 and steps >= 1")
-        self.delay_steps, self.steps = int(counts[0]), int(counts[1])
+        for name in ("step_s", "time_constant_s"):
+            positive(getattr(self, name), name)
+        self.delay_steps = whole(self.delay_steps, "delay_steps", 0, LONGEST - 1)
+        self.steps = whole(self.steps, "steps", 1, LONGEST - 1)
         _check(self.program)
         n = self.program.n
         self.keep = float(np.exp(-self.step_s / self.time_constant_s))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.checked_numbers import by_name
+from fes_pin.data.numbers import by_name, numbers
 
 LARGEST_NM, SMALLEST_NM = 1e4, 1e-6
 """No joint of any body makes more: the strongest people's hips extend with some hundred N m (Anderson, Madigan and
@@ -83,34 +83,3 @@ def wanted_torques(torques: Any, joints: tuple[str, ...], what: str = "samples")
         must = f"not a finite number within {LARGEST_NM:g} N m"
         raise InputError(f"wanted torque of {joints[j]} at sample {k} is {wanted[k, j]:g}, {must}")
     return wanted
-
-
-def numbers(values: Any, what: str) -> np.ndarray:
-    """Values as an array of numbers.
-
-    Raises
-    ------
-    InputError
-        Text, or lists of different lengths.
-    """
-    try:
-        return np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{what} must be numbers in rows of one length") from None
-
-
-def number(value: Any, what: str) -> float:
-    """One number.
-
-    Raises
-    ------
-    InputError
-        Text, nothing, several numbers, or not a number.
-    """
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        array = np.array(np.nan)
-    if array.ndim or np.isnan(array):
-        raise InputError(f"{what} must be a number, got {value!r:.40}")
-    return float(array)

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.allocate.inputs import number, torque_matrix
+from fes_pin.allocate.inputs import torque_matrix
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.checked_numbers import by_name
+from fes_pin.data.numbers import between, by_name, positive
 from fes_pin.muscles.recruitment import ChannelRecruitment, LinearRecruitment
 
 EFFORT = 1e-4
@@ -205,13 +205,8 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> Problem:
     prices = checked_prices(options.effort, names)
     if options.effort_kind == "fatigue":
         prices = prices / np.maximum(getattr(nerves, "left_over", np.ones(n)), LEAST_LEFT) ** 2
-    change = number(options.change, "change")
-    if not 0.0 <= change <= LARGEST_PRICE:
-        raise InputError(f"change must cost 0 to {LARGEST_PRICE:g}, got {change}")
-    rate, seconds = number(options.rate, "rate"), number(options.seconds, "seconds")
-    for value, what in ((rate, "rate"), (seconds, "seconds")):
-        if not value > 0.0:
-            raise InputError(f"{what} must be more than 0, got {value}")
+    change = between(options.change, 0.0, LARGEST_PRICE, "change")
+    rate, seconds = (positive(getattr(options, n), n, infinite=True) for n in ("rate", "seconds"))
     matrix = np.where(upper == 0.0, 0.0, nominal)
     scale = float(np.einsum("ji,j,ji->i", matrix, weights, matrix).max()) or 1.0
     for array in (nominal, matrix, weights, prices, lower, upper, *(() if least is None else (least,))):

@@ -10,9 +10,10 @@ import numpy as np
 from fes_pin.allocate.allocation import Allocation
 from fes_pin.allocate.bounded import solve_sequence
 from fes_pin.allocate.certificate import Certifier, residuals
-from fes_pin.allocate.inputs import in_range, numbers, wanted_torques
+from fes_pin.allocate.inputs import in_range, wanted_torques
 from fes_pin.allocate.problem import Options, Problem, problem_of
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import numbers
 
 
 @dataclass(frozen=True, slots=True, eq=False)

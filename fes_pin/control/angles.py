@@ -3,28 +3,12 @@
 from __future__ import annotations
 
 import math
-from numbers import Real
-
-import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import as_number, shortened
 
 LARGEST_RAD = 2.0 * math.pi
 """An angle in rad is within a turn to either side; beyond that it is probably in degrees."""
-
-
-def number(value: object) -> float | None:
-    """A number as a float, infinite where it is too large; None for what is no number."""
-    if type(value) is float:
-        return value
-    if isinstance(value, np.ndarray) and value.ndim == 0:
-        value = value.item()
-    if not isinstance(value, Real) or isinstance(value, (bool, np.bool_)):
-        return None
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
 
 
 def reading(value: object) -> float:
@@ -35,9 +19,9 @@ def reading(value: object) -> float:
     InputError
         For what is neither a number nor None.
     """
-    found = math.nan if value is None else number(value)
+    found = math.nan if value is None else as_number(value)
     if found is None:
-        raise InputError(f"angle_rad: expected one number in rad, or None for no reading, found {_shown(value)}")
+        raise InputError(f"angle_rad: expected one number in rad, or None for no reading, found {shortened(value)}")
     return found
 
 
@@ -49,10 +33,10 @@ def reference(value: object, ends: tuple[float, float], place: str = "") -> floa
     InputError
         For what is no number, not finite, or outside of two angles in rad.
     """
-    found = value if type(value) is float else number(value)
+    found = value if type(value) is float else as_number(value)
     if found is None or not ends[0] <= found <= ends[1]:
         raise InputError(
-            f"reference_rad{place}: expected {ends[0]:g} to {ends[1]:g} rad, found {_shown(value)}{hint(found)}"
+            f"reference_rad{place}: expected {ends[0]:g} to {ends[1]:g} rad, found {shortened(value)}{hint(found)}"
         )
     return found
 
@@ -60,8 +44,3 @@ def reference(value: object, ends: tuple[float, float], place: str = "") -> floa
 def hint(angle: float | None) -> str:
     """A few words where a number can hardly be rad."""
     return " (degrees?)" if angle is not None and LARGEST_RAD < abs(angle) <= 360.0 else ""
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else f"{text[:37]}..."

@@ -1,23 +1,19 @@
-"""Eq. (1) of one ankle as plain numbers, for use pulse by pulse.
-
-    J theta'' = (a F_M - l (F_ANT - M g)) sin(theta) + m g l cos(theta) - xi theta' + torque
-
-Source: Dombre, Fournier and Coiffet, section II-1.
-"""
+"""Eq. (1) of one ankle (`fes_pin.paper.equation_1`) from pulse to pulse, with an unknown torque beside it."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number
 from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.ankle import Ankle
-from fes_pin.models.rigs.base import GRAVITY
-from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
+from fes_pin.paper.equation_1 import static_stiffness_nm, static_torque_nm
 
 PULSE_S = 1.0 / 45.0
 """Time between pulses, s; Dombre, Fournier and Coiffet, section II-3-1."""
@@ -27,7 +23,7 @@ ANGLES_RAD = (0.3, 2.8)
 """Angles that eq. (1) is used between, rad: at 0 and at pi its cables pull along the leg and turn nothing; an ankle's
 own lie well within."""
 LONGEST_STRETCH = 3.0
-"""Angle in rad beyond theta_r from which F_ANT grows no more, so that no state overflows."""
+"""Angle in rad beyond theta_r from which eq. (1) is as there, so that no state overflows: far beyond any ankle."""
 
 
 def _frame_of(model: Model) -> dict[str, float]:
@@ -49,6 +45,10 @@ class AnkleDynamics:
     ----------
     pull_nm
         a K F_ref: torque of full activation at sin(theta) = 1, N m.
+    known
+        Constants of eq. (1) by the rig's names.
+    load_kg
+        M.
     frame_coupling, frame_hz, frame_damping
         Of the effect `frame_vibration`; a coupling of 0 is a rigid frame. Gains are chosen with it; nothing else here
         moves with it.
@@ -58,13 +58,8 @@ class AnkleDynamics:
     damping: float
     time_constant: float
     pull_nm: float
-    lever: float
-    f0: float
-    f1: float
-    theta_r: float
-    load_n: float
-    gravity_cos: float
-    gravity_sin: float
+    known: Mapping[str, float]
+    load_kg: float
     frame_coupling: float = 0.0
     frame_hz: float = 0.0
     frame_damping: float = 0.0
@@ -80,22 +75,16 @@ class AnkleDynamics:
         """
         if not isinstance(model.rig, Ankle):
             raise InputError(f"position control needs the rig ankle, found {model.rig.name}")
-        if not (math.isfinite(load_kg) and load_kg >= 0.0):
+        if number(load_kg, "load_kg") < 0.0:
             raise InputError(f"expected a load of at least 0 kg, found {load_kg:g}")
         rig, c = model.rig, {n: float(v) for n, v in model.rig.constants.items()}
-        a, b = gravity_coefficients(point_foot(c["foot_mass_kg"], c["com_distance_m"]))
         return cls(
             rig.inertia_kgm2,
             rig.damping_nms,
             rig.time_constant_s,
             c["moment_arm_m"] * rig.gain * c["force_scale_n"],
-            c["com_distance_m"],
-            c["f0_n"],
-            c["f1_per_rad"],
-            c["theta_r_rad"],
-            load_kg * GRAVITY,
-            a,
-            b,
+            c,
+            float(load_kg),
             **_frame_of(model),
         )
 
@@ -110,17 +99,16 @@ class AnkleDynamics:
 
     def passive(self, q: float) -> tuple[float, float]:
         """Torque of antagonist, load and weight at an angle, N m, and its slope, N m/rad."""
-        stretch = min(q - self.theta_r, LONGEST_STRETCH)
-        grown = self.f0 * math.exp(self.f1 * stretch) if stretch > 0.0 else self.f0
-        pull, slope = grown - self.f0 - self.load_n, self.f1 * grown if stretch > 0.0 else 0.0
-        s, c = math.sin(q), math.cos(q)
-        torque = -self.lever * pull * s - self.gravity_cos * c - self.gravity_sin * s
-        return torque, -self.lever * (slope * s + pull * c) + self.gravity_cos * s - self.gravity_sin * c
+        q = self._within(q)
+        return static_torque_nm(self.known, q, 0.0, self.load_kg), static_stiffness_nm(self.known, q, 0.0, self.load_kg)
 
     def acceleration(self, q: float, v: float, pull_nm: float, torque: float) -> float:
         """Eq. (1): rad/s2 under a muscle that would pull `pull_nm` at sin(theta) = 1, and an unknown torque, N m."""
-        held = self.passive(q)[0] + pull_nm * math.sin(q)
+        held = static_torque_nm(self.known, self._within(q), pull_nm / self.known["moment_arm_m"], self.load_kg)
         return (held + torque - self.damping * v) / self.inertia
+
+    def _within(self, q: float) -> float:
+        return min(q, self.known["theta_r_rad"] + LONGEST_STRETCH)
 
     def rest_angle(self, activation: float = 0.0) -> float:
         """Angle in rad that a steady activation of the believed muscle holds; by bisection."""

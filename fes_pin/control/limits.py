@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from fes_pin.control.dynamics import ANGLES_RAD, PULSE_S
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import as_number, between, positive
 
 BURST = 0.2
 """Share of a second's charge that may be given at once; the rest is what may be given steadily. Together they are what
@@ -48,30 +49,18 @@ class StimulationLimits:
     ramp_s: float = 0.2
 
     def __post_init__(self) -> None:
-        for name, unit in (("pulse_width_us", "us"), ("rate_us_per_s", "us/s"), ("charge_uc_per_s", "uC/s")):
-            _above_zero(name, getattr(self, name), unit)
+        for name in ("pulse_width_us", "rate_us_per_s", "charge_uc_per_s"):
+            positive(getattr(self, name), name, infinite=True)
         if self.current_ma is not None:
-            _above_zero("current_ma", self.current_ma, "mA")
-            if self.current_ma == math.inf:
-                raise InputError("current_ma: expected a finite current, found inf")
+            positive(self.current_ma, "current_ma")
         elif self.charge_uc_per_s < math.inf:
             raise InputError("charge_uc_per_s: a limit of charge needs current_ma")
-        if not (_is_number(self.ramp_s) and 0.0 <= self.ramp_s <= 1.0):
-            raise InputError(f"ramp_s: expected 0 to 1 s, found {self.ramp_s!r}")
+        between(self.ramp_s, 0.0, 1.0, "ramp_s")
         ends = self.range_of_motion_rad
-        two = isinstance(ends, tuple) and len(ends) == 2 and all(map(_is_number, ends))
+        two = isinstance(ends, tuple) and len(ends) == 2 and None not in map(as_number, ends)
         if not (two and ANGLES_RAD[0] <= ends[0] < ends[1] <= ANGLES_RAD[1]):
             low, high = ANGLES_RAD
             raise InputError(f"range_of_motion_rad: expected two angles within {low:g} to {high:g} rad, found {ends!r}")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value)
-
-
-def _above_zero(name: str, value: object, unit: str) -> None:
-    if not (_is_number(value) and value > 0.0):  # type: ignore[operator]
-        raise InputError(f"{name}: expected a number above 0 {unit}, found {value!r}")
 
 
 class Limiter:

@@ -129,7 +129,8 @@ def corners(dynamics: AnkleDynamics) -> list[AnkleDynamics]:
     found = []
     for gain, tau, stiff in itertools.product((low, high), repeat=3):
         other = replace(dynamics, pull_nm=dynamics.pull_nm * gain, time_constant=dynamics.time_constant * tau)
-        found.append(replace(other, f1=dynamics.f1 * stiff))
+        stiffer = {**dynamics.known, "f1_per_rad": dynamics.known["f1_per_rad"] * stiff}
+        found.append(replace(other, known=stiffer))
     return found
 
 

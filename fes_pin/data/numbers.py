@@ -3,8 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
 
 from fes_pin.data.errors import InputError
+
+
+def as_number(value: object) -> float | None:
+    """A number as a float, infinite where it is too large for one; None for what is no number: text, True, several."""
+    if type(value) is float:
+        return value
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    if not isinstance(value, Real) or isinstance(value, bool | np.bool_):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def number(value: object, name: str, infinite: bool = False) -> float:
@@ -22,14 +41,25 @@ def number(value: object, name: str, infinite: bool = False) -> float:
     InputError
         No number, or not finite.
     """
-    try:
-        if isinstance(value, str | bytes | bool):
-            raise TypeError
-        found = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"must be a number, got {value!r}", column=name) from None
+    found = as_number(value)
+    if found is None:
+        raise InputError(f"must be a number, got {shortened(value)}", column=name)
     if math.isnan(found) or (math.isinf(found) and not infinite):
-        raise InputError(f"must be a finite number, got {value!r}", column=name)
+        raise InputError(f"must be a finite number, got {shortened(value)}", column=name)
+    return found
+
+
+def between(value: object, low: float, high: float, name: str) -> float:
+    """A number no less than one and no more than another, which may be infinite.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    found = number(value, name, infinite=math.isinf(high))
+    if not low <= found <= high:
+        raise InputError(f"must lie between {low:g} and {high:g}, got {found:g}", column=name)
     return found
 
 
@@ -43,12 +73,12 @@ def positive(value: object, name: str, infinite: bool = False) -> float:
     """
     found = number(value, name, infinite)
     if not found > 0.0:
-        raise InputError(f"must be positive, got {value!r}", column=name)
+        raise InputError(f"must be positive, got {shortened(value)}", column=name)
     return found
 
 
-def whole(value: object, name: str, least: int = 0) -> int:
-    """A whole number, at least so great.
+def whole(value: object, name: str, least: int = 0, most: float = math.inf) -> int:
+    """A whole number, at least so great and at most so great.
 
     Raises
     ------
@@ -56,6 +86,50 @@ def whole(value: object, name: str, least: int = 0) -> int:
         Anything else.
     """
     found = number(value, name)
-    if found != int(found) or found < least:
-        raise InputError(f"must be a whole number of {least} or more, got {value!r}", column=name)
+    if found != int(found) or not least <= found <= most:
+        ends = f"of {least} or more" if math.isinf(most) else f"of {least} to {most:g}"
+        raise InputError(f"must be a whole number {ends}, got {shortened(value)}", column=name)
     return int(found)
+
+
+def numbers(values: Any, name: str) -> np.ndarray:
+    """Values as an array of numbers.
+
+    Raises
+    ------
+    InputError
+        Text, or lists of different lengths.
+    """
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError("must be numbers in rows of one length", column=name) from None
+
+
+def by_name(values: Any, names: Sequence[str], what: str, default: float) -> np.ndarray:
+    """Numbers per name, from a mapping (absent names get the default), one number for all, or an array.
+
+    Raises
+    ------
+    InputError
+        Unknown name, wrong length, or not a finite number.
+    """
+    if isinstance(values, Mapping):
+        unknown = [key for key in values if key not in names]
+        if unknown:
+            raise InputError(f"{what} names {unknown[0]!r}, which is not one of {', '.join(names)}")
+        values = [values.get(name, default) for name in names]
+    array = numbers(values, what)
+    if array.ndim == 0:
+        array = np.full(len(names), float(array))
+    if array.shape != (len(names),):
+        raise InputError(f"{what} must have {len(names)} numbers, got an array of shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{what} of {names[int(np.argmax(~np.isfinite(array)))]} is not a finite number")
+    return array
+
+
+def shortened(value: object) -> str:
+    """A value as it is shown in an error: 40 characters at most."""
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."

@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.checked_numbers import number
+from fes_pin.data.numbers import between
 from fes_pin.muscles.muscles import MuscleTable, angles_of, standard_muscles
 
 STRENGTH_FACTOR = 1.8
@@ -75,12 +75,12 @@ class Nerves:
                 raise InputError(f"unknown nerve {name!r}; the nerves are {', '.join(known)}")
         if len(set(names)) < len(names):
             raise InputError("a nerve is named twice")
-        number(self.assumed_strength, 0.0, STRONGEST, "strength (1: a healthy adult)")
-        number(self.length, SHORTEST, LONGEST, "length (1: the table's adult)")
+        between(self.assumed_strength, 0.0, STRONGEST, "strength (1: a healthy adult)")
+        between(self.length, SHORTEST, LONGEST, "length (1: the table's adult)")
         for name, left in self.fatigue.items():
             if name not in names:
                 raise InputError(f"fatigue names {name!r}, which is not among the nerves")
-            number(left, 0.0, 1.0, f"fatigue of {name} (0: nothing left, 1: fresh)")
+            between(left, 0.0, 1.0, f"fatigue of {name} (0: nothing left, 1: fresh)")
         members = np.array(
             [[n in (nerve, m) for n in names] for nerve, m in zip(table.nerves, table.names, strict=True)]
         )
@@ -110,9 +110,11 @@ class Nerves:
         InputError
             Mass, height or strength of no body.
         """
-        size = number(mass_kg, 0.0, STRONGEST * SUBJECT_MASS, "mass_kg") / SUBJECT_MASS
-        length = number(height_m, SHORTEST * SUBJECT_HEIGHT, LONGEST * SUBJECT_HEIGHT, "height_m") / SUBJECT_HEIGHT
-        return cls(tuple(names), strength=number(strength, 0.0, STRONGEST, "strength") * size, length=length, **options)
+        size = between(mass_kg, 0.0, STRONGEST * SUBJECT_MASS, "mass_kg") / SUBJECT_MASS
+        length = between(height_m, SHORTEST * SUBJECT_HEIGHT, LONGEST * SUBJECT_HEIGHT, "height_m") / SUBJECT_HEIGHT
+        return cls(
+            tuple(names), strength=between(strength, 0.0, STRONGEST, "strength") * size, length=length, **options
+        )
 
     @classmethod
     def muscles(cls, *nerves: str, **options) -> Nerves:

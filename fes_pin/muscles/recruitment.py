@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.checked_numbers import number
+from fes_pin.data.numbers import between
 
 STRAIGHT_BELOW = 1e-6
 """Fraction of the way below which a Hill curve is straight, as in the model of the same name."""
@@ -208,8 +208,8 @@ class Hysteresis:
     """
 
     def __init__(self, curve: LinearRecruitment, half_width_us: float, acting_us: float = 0.0) -> None:
-        self.curve, self.half_width_us = curve, number(half_width_us, 0.0, np.inf, "half_width_us")
-        self.acting_us = number(acting_us, 0.0, np.inf, "acting_us")
+        self.curve, self.half_width_us = curve, between(half_width_us, 0.0, np.inf, "half_width_us")
+        self.acting_us = between(acting_us, 0.0, np.inf, "acting_us")
 
     def recruitment(self, pulse_width_us: float) -> float:
         """Recruitment by the next pulse, which moves the play."""

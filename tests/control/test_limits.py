@@ -89,13 +89,13 @@ def test_a_reading_outside_the_range_of_motion_is_a_fault_and_a_reference_an_err
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"pulse_width_us": 0.0}, "pulse_width_us: expected a number above 0 us"),
-        ({"pulse_width_us": "300"}, "found '300'"),
+        ({"pulse_width_us": 0.0}, "pulse_width_us: must be positive, got 0.0"),
+        ({"pulse_width_us": "300"}, "pulse_width_us: must be a number, got '300'"),
         ({"rate_us_per_s": math.nan}, "rate_us_per_s"),
         ({"charge_uc_per_s": 100.0}, "needs current_ma"),
         ({"charge_uc_per_s": 100.0, "current_ma": -1.0}, "current_ma"),
         ({"current_ma": True}, "current_ma"),
-        ({"ramp_s": 2.0}, "ramp_s: expected 0 to 1 s"),
+        ({"ramp_s": 2.0}, "ramp_s: must lie between 0 and 1, got 2"),
         ({"range_of_motion_rad": (60.0, 120.0)}, "range_of_motion_rad"),
         ({"range_of_motion_rad": (2.0, 1.0)}, "range_of_motion_rad"),
     ],

@@ -45,7 +45,7 @@ def test_a_pulses_transition_is_the_matrix_exponential(twin):
 
 @pytest.mark.parametrize("twin", [TWIN, paper_twin("4-24"), replace(TWIN, damping_nms=0.5)])
 def test_prediction_comes_to_the_twins_motion(twin):
-    """One pulse from the same state, against an integrator that shares no line with it."""
+    """One pulse from the same state, against another integrator of eq. (1)."""
     pulse, joint = PulseToPulse(dynamics_of(twin)), RunningTwin(twin)
     for recruitment in (1.0, 0.3, 0.8, 0.0, 0.5):
         act, q, v = joint.state[:3]
