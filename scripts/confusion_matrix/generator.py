@@ -158,14 +158,15 @@ def _made(one: Draft, forms: Sequence[type[Form]], readings: list[np.ndarray], q
         for k, (p, y) in enumerate(zip(one.fresh, readings[count:], strict=True))
     ]
     orthogonal = _orthogonal(one, quiet) if one.item.kind == "outside" and quiet else None
-    truth = _truth(one, forms)
+    truth = true_values(one, forms)
     felt = felt_noncentrality(one, quiet) if quiet and one.item.kind == "single" else None
     return Made(
         one.item, study_of(one, noisy), tuple(fresh), tuple(one.sizes), tuple(one.distances), felt, truth, orthogonal
     )
 
 
-def _truth(one: Draft, forms: Sequence[type[Form]]) -> dict[str, float]:
+def true_values(one: Draft, forms: Sequence[type[Form]]) -> dict[str, float]:
+    """Parameters by name as the engine would have them; none where its form is another."""
     out: dict[str, float] = {}
     for form, size, shape in zip(forms, one.sizes, one.shapes, strict=True):
         own = form.truth(size, shape)

@@ -302,7 +302,7 @@ def test_fatigue_is_carried_from_pulse_to_pulse_and_the_plan_knows_it():
         wanted = rng.normal(size=(6, 3)) * 40
         fresh = Horizon(Allocator(matrix, rate=0.2, change=1e-3), steps=6)
         fresh.act, fresh.before, fresh.left = tiring.act, tiring.before, left
-        fresh._assemble()
+        fresh.carry_on(fresh.program)
         alone = fresh.plan(wanted).recruitment
         np.testing.assert_allclose(tiring.advance(wanted).recruitment, alone, atol=1e-9)
         left = fatigue.after(left, tiring.act, tiring.step_s)

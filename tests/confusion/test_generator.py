@@ -43,7 +43,7 @@ def test_causes_in_the_engines_form_agree_with_it(cause, short, tmp_path):
     study = drafts.study_of(one, readings)
     shape = {n: v for n, v in {"side": one.shapes[0].get("side")}.items() if v is not None}
     model = nominal_model(study) + dataclasses.replace(effect(cause)(), **shape)
-    truth = generator._truth(one, (form,)) | one.plant.true
+    truth = generator.true_values(one, (form,)) | one.plant.true
     if cause in ("recruitment_hysteresis", "passive_relaxation"):
         assert set(truth) > set(one.plant.true)
     left = whitened_sse(
@@ -66,7 +66,7 @@ def test_causes_of_joints_alone_agree_with_the_engine(cause, short, tmp_path):
     (readings,) = drafts.run_trials([one], [one.sizes], (form,), 10)
     study = drafts.study_of(one, readings)
     extended = nominal_model(study) + effect(cause)()
-    left = generator.nominal_fit(study, generator._truth(one, (form,)), extended)
+    left = generator.nominal_fit(study, generator.true_values(one, (form,)), extended)
     assert np.sqrt(left.sse) < 0.5 < 0.05 * generator.noncentrality(one, readings)
 
 

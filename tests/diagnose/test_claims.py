@@ -8,7 +8,7 @@ import pytest
 
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.decide.claims import Claims
-from fes_pin.diagnose.decide.held_out import Evidence, Gain, _evidence
+from fes_pin.diagnose.decide.held_out import Evidence, Gain, added_likelihood
 from fes_pin.diagnose.free import REFUSED_LEVEL, with_refused
 from fes_pin.diagnose.remainder.open_set import Remainder
 
@@ -21,7 +21,7 @@ def test_evidence_covers_what_the_difference_is_worth():
     below = 0
     for _ in range(runs):
         noise = rng.standard_normal(500)
-        found = _evidence(noise + difference, noise)
+        found = added_likelihood(noise + difference, noise)
         assert found.squares == pytest.approx(size**2)
         below += found.low < size**2
     assert below / runs == pytest.approx(0.975, abs=0.012)
@@ -31,7 +31,7 @@ def test_evidence_against_a_cause_that_only_fits_noise():
     """A difference that noise has nothing to do with costs its own square."""
     rng = np.random.default_rng(1)
     noise, difference = rng.standard_normal(4000), 0.1 * rng.standard_normal(4000)
-    assert _evidence(noise, noise - difference).low < 0.0
+    assert added_likelihood(noise, noise - difference).low < 0.0
 
 
 def test_evidence_adds_up_over_folds():

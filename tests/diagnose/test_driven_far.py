@@ -7,7 +7,7 @@ import pytest
 import scipy.signal
 from diagnose.hidden import named
 from oracle import TYPICAL, simulate
-from oracle.studies import _joint, _pendulum_urdf
+from oracle.studies import joint_rig, pendulum_urdf
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -19,7 +19,7 @@ DT = 5e-3
 def far_driven(seed, causes, folder, trials=4, seconds=6.0):
     """A pendulum that a square wave near its own rate drives over the top, believed 40 % heavier and less damped."""
     rng, time = np.random.default_rng(seed), np.arange(round(seconds / DT)) * DT
-    constants, true, _ = _joint(rng)
+    constants, true, _ = joint_rig(rng)
     weight, made = math.hypot(constants["gravity_cos"], constants["gravity_sin"]), []
     rate = math.sqrt(weight / (true["inertia_scale"] * constants["inertia"]))
     for number, phase in enumerate(rng.uniform(0.0, 2.0 * math.pi, trials)):
@@ -27,7 +27,7 @@ def far_driven(seed, causes, folder, trials=4, seconds=6.0):
         bare = Trial(str(number), "motion", {"effort": effort}, time, {"position0": 0.3, "velocity0": 0.0})
         position = simulate(constants, true, causes, bare)["position"] + 2e-3 * rng.standard_normal(len(time))
         made.append(Trial(bare.name, "motion", {"effort": effort, "position": position}, time))
-    (folder / "rig.urdf").write_text(_pendulum_urdf(constants))
+    (folder / "rig.urdf").write_text(pendulum_urdf(constants))
     start = {"inertia_scale": 1.4 * true["inertia_scale"], "damping": 0.6 * true["damping"]}
     return Study("far", "joint", {}, start, tuple(made), files={"urdf": folder / "rig.urdf"})
 

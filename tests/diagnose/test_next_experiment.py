@@ -9,7 +9,7 @@ import pytest
 from diagnose.hidden import shortened, study_of
 from identify.rigs import WHITE, off
 from oracle import make_study, simulate
-from oracle.studies import _ankle
+from oracle.studies import ankle_rig
 
 from fes_pin.cli import main
 from fes_pin.data.study import write_study
@@ -54,7 +54,7 @@ def test_a_set_of_two_is_resolved_by_the_trial_that_the_command_writes(monkeypat
     predicted = np.genfromtxt(out, delimiter=",", names=True)
     assert len(predicted) == len(given)
 
-    constants, true, _ = _ankle(np.random.default_rng(drawn))  # the first that make_study draws
+    constants, true, _ = ankle_rig(np.random.default_rng(drawn))  # the first that make_study draws
     ((column, y),) = simulate(constants, true, hidden, given).items()
     assert np.abs(predicted[column] - y).max() < 0.1 * np.ptp(y)
     noise = {"angle_rad": 2e-3, "force_n": 0.2}[column] * np.random.default_rng(1).standard_normal(len(y))

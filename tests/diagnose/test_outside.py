@@ -3,19 +3,30 @@
 import math
 
 import oracle.rigs
+import pytest
 from diagnose.hidden import study_of
 
 from fes_pin.diagnose.diagnosis import diagnose
 
 
-def test_a_detent_is_not_explained(monkeypatch):
-    """A joint that prefers every quarter radian."""
+@pytest.fixture(scope="module")
+def diagnosis():
+    """Of an ankle whose joint prefers every quarter radian, which no cause of that rig does."""
     usual = oracle.rigs.joint_torque
 
     def torque(x, q, v, t, causes):
         return usual(x, q, v, t, causes) - 0.02 * math.sin(2.0 * math.pi * q / 0.25)
 
-    monkeypatch.setattr(oracle.rigs, "joint_torque", torque)
-    diagnosis = diagnose(study_of("ankle", seed=30))
-    assert diagnosis.verdict != "adequate"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(oracle.rigs, "joint_torque", torque)
+        return diagnose(study_of("ankle", seed=30))
+
+
+def test_a_detent_leaves_a_remainder(diagnosis):
     assert diagnosis.remainder.unexplained and diagnosis.remainder.where, str(diagnosis)
+    assert diagnosis.remainder.p_value < 1e-3
+
+
+@pytest.mark.xfail(strict=True, reason="a stop and a spring, which are not there, are named beside the remainder")
+def test_nothing_is_named_for_a_detent(diagnosis):
+    assert diagnosis.causes == (), str(diagnosis)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from models.cases import CASES, EFFECTS_OF_RIGS, IMPOSED_CASES, JOINT, RIGS, everything, name_of, trial, with_effect
+from scipy.optimize import newton
 
 from fes_pin.data.trial import Trial
 from fes_pin.models import effects
@@ -182,7 +183,7 @@ def test_a_trial_starts_at_rest(one, rig, kind):
     timing = {"t0": 0.0, "dt": first.dt, "step": first.dt / 4, "shift": 0.0}
     p = np.array([model.parameters()[n] for n in layout.values])
     c = np.array([{**RIGS[rig].trial_constants(first), **timing}[n] for n in layout.constants])
-    z = program._rest(RIGS[rig].guess(first), p, c)
+    z = newton(lambda z: float(program.equations.rest(z, p, c)[0]), RIGS[rig].guess(first))
     state, memory = program.equations.start(z, p, c)
     held = program.equations.sample(state, memory, [0.0], 0.0, p, c)
     rates = np.array(program.equations.rates(state, held, [0.0], 0.0, 0.0, 0.0, p, c)).ravel()

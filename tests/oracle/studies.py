@@ -94,7 +94,7 @@ def make_study(
     causes = causes or {}
     if noise not in ("white", "ar1", "process"):
         raise ValueError(noise)
-    constants, nominal, start = {"ankle": _ankle, "joint": _joint, "muscle": _muscle}[rig](rng)
+    constants, nominal, start = {"ankle": ankle_rig, "joint": joint_rig, "muscle": muscle_rig}[rig](rng)
     kinds = ["motion"] * (n_motion if rig != "muscle" else 0) + ["isometric"] * (n_isometric if rig != "joint" else 0)
     trials = []
     for number, kind in enumerate(kinds):
@@ -112,7 +112,7 @@ def make_study(
     if rig == "joint":
         folder = Path(folder or tempfile.mkdtemp(prefix="oracle"))
         files["urdf"] = folder / "rig.urdf"
-        files["urdf"].write_text(_pendulum_urdf(constants))
+        files["urdf"].write_text(pendulum_urdf(constants))
         constants = {}
     return Study("oracle", rig, constants, start, tuple(trials), files=files)
 
@@ -121,7 +121,7 @@ def _near(rng, value, share=0.15):
     return value * math.exp(rng.uniform(-share, share))
 
 
-def _ankle(rng):
+def ankle_rig(rng):
     constants = {
         "foot_mass_kg": _near(rng, 0.12),
         "com_distance_m": _near(rng, 0.08, 0.08),
@@ -142,13 +142,13 @@ def _ankle(rng):
     return constants, true, {"gain": 0.5, "time_constant_s": 0.07, "inertia_kgm2": 1.3e-3, "damping_nms": 0.05}
 
 
-def _muscle(rng):
+def muscle_rig(rng):
     constants = {"threshold_us": THRESHOLD_US, "saturation_us": SATURATION_US}
     true = {"gain": _near(rng, 35.0), "time_constant_s": _near(rng, 0.05, 0.2)}
     return constants, true, {"gain": 25.0, "time_constant_s": 0.08}
 
 
-def _joint(rng):
+def joint_rig(rng):
     mass, length = _near(rng, 0.6), _near(rng, 0.18)
     own = 0.1 * mass * length**2
     turned = rng.uniform(-0.4, 0.4)
@@ -167,7 +167,7 @@ def _joint(rng):
     return constants, true, {"inertia_scale": 1.0, "damping": 0.03}
 
 
-def _pendulum_urdf(k):
+def pendulum_urdf(k):
     """A pendulum about x whose rest is turned by `turned`: g(q) = m g l sin(q + turned)."""
     return f"""<?xml version="1.0"?>
 <robot name="pendulum">

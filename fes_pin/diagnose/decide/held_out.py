@@ -204,7 +204,7 @@ def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Tr
         errors_of(nominal.model, test, floor),
         extended,
         {n: errors_of(f.model, test, floor) for n, f in without.items()},
-        {n: _evidence(_whitened(f, test), left) for n, f in without.items()},
+        {n: added_likelihood(_whitened(f, test), left) for n, f in without.items()},
         extended,
     )
 
@@ -235,7 +235,8 @@ def within(errors: np.ndarray, most: float) -> np.ndarray:
     return np.clip(np.nan_to_num(errors, nan=most, posinf=most, neginf=-most), -most, most)
 
 
-def _evidence(without: np.ndarray, extended: np.ndarray) -> Evidence:
+def added_likelihood(without: np.ndarray, extended: np.ndarray) -> Evidence:
+    """What a cause adds, from whitened residuals without it and with it."""
     without, extended = within(without, FAR), within(extended, FAR)
     difference = without - extended
     return Evidence(float(without @ without - extended @ extended), float(difference @ difference))

@@ -23,7 +23,7 @@ def _new_target(name: str, features: str) -> llvm.TargetMachine:
 
 
 @cache
-def _target(name: str, features: str) -> llvm.TargetMachine:
+def compiling_target(name: str, features: str) -> llvm.TargetMachine:
     """The one that compiles. An execution engine takes its target machine with it when it goes: it needs its own."""
     return _new_target(name, features)
 
@@ -55,4 +55,4 @@ def compile_object(assembly: str) -> bytes:
     gain a tenth of the running time. NaN and infinity are honoured.
     """
     with _LOCK:
-        return _target(*settings.target()).emit_object(llvm.parse_assembly(assembly))
+        return compiling_target(*settings.target()).emit_object(llvm.parse_assembly(assembly))
