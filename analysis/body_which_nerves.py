@@ -4,7 +4,7 @@ The paper ends on the question whether a nerve acts on one joint or on several, 
 Here every nerve of the legs may be used; braces are added one by one; for each the fewest nerves are found, exactly:
 that hold a degree of lean stimulated constantly, and that catch it, stimulated over time. The centre of pressure must
 lie on the soles, so the postures are ones to stand in. The command line asks the same:
-`fes-pin body nerves --posture one_leg --brace corset ... --fewest [--constant]`.
+`fes-pin body nerves --posture one_leg --brace corset ... --strength 1 --fewest [--constant]`.
 Run the cells, or `python analysis/body_which_nerves.py` (minutes); the picture goes to out/body_which_nerves.png.
 """
 
@@ -26,11 +26,11 @@ from fes_pin.body.linearize import linearize
 from fes_pin.body.minimal_sets import ORTHOSES, STIMULATIONS, minimal_sets
 from fes_pin.body.passive import PassiveLegs
 from fes_pin.muscles.nerve_inputs import subject_nerves
-from fes_pin.muscles.nerves import PARALYSED, Nerves
+from fes_pin.muscles.nerves import HEALTHY, PARALYSED, Nerves
 
 body = Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
 LEGS = tuple(n for n in Nerves().names if not n.endswith(("erector_spinae", "abdominals")))
-legs = subject_nerves(body, LEGS)
+legs = subject_nerves(body, LEGS, strength=HEALTHY)
 POSTURES = ("one_leg", "standing")
 both = lambda name: (*ORTHOSES[f"left_{name}"], *ORTHOSES[f"right_{name}"])  # noqa: E731
 STEPS = {
@@ -106,7 +106,7 @@ for question, options, strength, passive in [("as above", {}, 1.0, None), *QUEST
 linear = linearize(body, "one_leg").brace(LOCKED)
 for stimulation in STIMULATIONS:
     for best in minimal_sets(linear, legs, stimulation=stimulation, alternatives=3):
-        names = subject_nerves(body, best.inputs)
+        names = subject_nerves(body, best.inputs, strength=HEALTHY)
         starts = [sign * mode.one_degree for mode in linear.modes().falling for sign in (1.0, -1.0)]
         for moving in (False, True):
             runs = [close_the_loop(linear, names, start, moving_arms=moving) for start in starts]

@@ -123,8 +123,8 @@ def nerves(
     ] = False,
     settle: Annotated[float, typer.Option(help="how far modes may be from the posture, degrees")] = 10.0,
     strength: Annotated[
-        float, typer.Option(help="strength of all nerves: 1 a healthy adult's; paralysed muscle has less")
-    ] = 1.0,
+        float | None, typer.Option(help="1: a healthy adult's; without it that of paralysed, stimulated muscle, 0.5")
+    ] = None,
 ) -> None:
     """Which nerves control which modes, what they can catch and hold, and the fewest that do."""
     from fes_pin.body.attainable import attainable
@@ -133,10 +133,10 @@ def nerves(
     from fes_pin.body.controllability import controllability
     from fes_pin.body.inputs import Inputs
     from fes_pin.muscles.nerve_inputs import subject_nerves
-    from fes_pin.muscles.nerves import PARALYSED
     from fes_pin.view.influence import influence_table, plot_influence
 
-    _within(strength, "--strength", 0.01, 10.0)
+    if strength is not None:
+        _within(strength, "--strength", 0.01, 10.0)
     _within(settle, "--settle", 0.1, 90.0)
     _within(lean, "--lean", 1e-3, 45.0)
     _within(max_braces, "--max-braces", 0, 10)
@@ -146,11 +146,12 @@ def nerves(
     lines = [f"{linear}\n{place_of_weight(linear)[1]}\n\n{result}\n"]
     weak, strong = (attainable(linear, inputs.scaled(f), settle_deg=settle) for f in chosen.strength_band)
     held = attainable(linear, inputs, settle_deg=settle)
-    whose = "a healthy adult's" if strength == 1.0 else f"{strength:g} of a healthy adult's"
-    lines.append(f"At {whose} strength (paralysed, stimulated muscle has about {PARALYSED:g} of it) {held}")
+    low, high = (chosen.assumed_strength * f for f in chosen.strength_band)
+    whose = "of a healthy adult's strength" + (" (paralysed, stimulated muscle)" if strength is None else "")
+    lines.append(f"At {chosen.assumed_strength:g} {whose} {held}")
     if held.falling:
         lines.append(
-            f"A given strength is known to a factor of {max(chosen.strength_band):.1f}: the least of these leans is "
+            f"It may be {low:.2g} to {high:.2g}: the least of these leans is "
             f"{weak.least_lean_deg:.1f} to {strong.least_lean_deg:.1f} degrees."
         )
         lines.append(f"With these nerves: {catchable(linear, inputs, settle)}")

@@ -16,54 +16,42 @@ from fes_pin.models.stage import Effect, Stage
 
 
 @dataclass(frozen=True)
-class RandomEffort(Effect):
-    """A random effort at the joint.
+class RandomProcess(Effect):
+    """A first-order process that is added to a signal.
 
-    torque + e,   e' = -e / time + noise
+    value + e,   e' = -e / time + noise
     """
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value + getattr(s.own, self.states[0])
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        (name,) = self.states
+        return {name: -getattr(s.own, name) / getattr(s.c, f"time.{name}")}
+
+
+@dataclass(frozen=True)
+class RandomEffort(RandomProcess):
+    """A random effort at the joint."""
 
     name, stage, signal, rigs = "random_effort", Stage.JOINT, "torque", ("ankle", "joint")
     states, random = ("effort",), ("effort",)
 
-    def apply(self, value: Any, s: Any) -> Any:
-        return value + s.own.effort
-
-    def rate(self, s: Any) -> Mapping[str, Any]:
-        return {"effort": -s.own.effort / getattr(s.c, "time.effort")}
-
 
 @dataclass(frozen=True)
-class RandomForce(Effect):
-    """A random force of a muscle that is held.
-
-    force + e,   e' = -e / time + noise
-    """
+class RandomForce(RandomProcess):
+    """A random force of a muscle that is held."""
 
     name, stage, signal, rigs = "random_force", Stage.MUSCLE, "force", ("ankle", "muscle")
     states, random = ("force",), ("force",)
 
-    def apply(self, value: Any, s: Any) -> Any:
-        return value + s.own.force
-
-    def rate(self, s: Any) -> Mapping[str, Any]:
-        return {"force": -s.own.force / getattr(s.c, "time.force")}
-
 
 @dataclass(frozen=True)
-class WanderingReading(Effect):
-    """A slow random part of the first reading.
-
-    y + e,   e' = -e / time + noise
-    """
+class WanderingReading(RandomProcess):
+    """A slow random part of the first reading."""
 
     name, stage, signal, rigs = "wandering_reading", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
     states, random = ("reading",), ("reading",)
-
-    def apply(self, value: Any, s: Any) -> Any:
-        return value + s.own.reading
-
-    def rate(self, s: Any) -> Mapping[str, Any]:
-        return {"reading": -s.own.reading / getattr(s.c, "time.reading")}
 
 
 DISTURBANCES = (RandomEffort, RandomForce, WanderingReading)

@@ -9,10 +9,10 @@ from fes_pin.body.controllability import Controllability
 from fes_pin.body.controllability import controllability as _controllability
 from fes_pin.body.joints import JOINT_NAMES, SIDES
 from fes_pin.body.linearize import LinearBody
-from fes_pin.muscles.nerves import HEALTHY, SUBJECT_HEIGHT, Nerves
+from fes_pin.muscles.nerves import SUBJECT_HEIGHT, Nerves
 
 
-def subject_nerves(body: Body, names: Iterable[str] = (), strength: float = HEALTHY, **options) -> Nerves:
+def subject_nerves(body: Body, names: Iterable[str] = (), strength: float | None = None, **options) -> Nerves:
     """The nerves of a body of this size: strength as mass, moment arms as height (1.80 m where it is not known).
 
     Parameters
@@ -22,7 +22,7 @@ def subject_nerves(body: Body, names: Iterable[str] = (), strength: float = HEAL
     names
         `left_femoral`; `femoral` stands for both sides. All nerves of the table by default.
     strength
-        Of a healthy adult's of that size.
+        Of a healthy adult's of that size; not given: that of paralysed, stimulated muscle, as everywhere.
     options
         Further ones of `Nerves` (`fatigue`, `force_length`).
 

@@ -45,11 +45,13 @@ class Nerves:
         Whether strength falls off away from the optimal fibre length; else it is that at the optimum everywhere.
     fatigue
         Factor per name on the strength that is left, 0 (nothing: a dead channel) to 1; absent names are fresh.
+    size
+        Factor on all strengths beside `strength` (body mass over 72.6 kg), which is that of an adult of this size.
 
     Raises
     ------
     InputError
-        Unknown or repeated name, strength or length of no body, fatigue outside [0, 1].
+        Unknown or repeated name, strength, length or size of no body, fatigue outside [0, 1].
 
     Examples
     --------
@@ -62,6 +64,7 @@ class Nerves:
     length: float = 1.0
     force_length: bool = True
     fatigue: dict[str, float] = field(default_factory=dict)
+    size: float = 1.0
     members: np.ndarray = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -76,6 +79,7 @@ class Nerves:
         if len(set(names)) < len(names):
             raise InputError("a nerve is named twice")
         between(self.assumed_strength, 0.0, STRONGEST, "strength (1: a healthy adult)")
+        between(self.size, 0.0, STRONGEST, "size (1: the table's adult)")
         between(self.length, SHORTEST, LONGEST, "length (1: the table's adult)")
         for name, left in self.fatigue.items():
             if name not in names:
@@ -88,11 +92,12 @@ class Nerves:
         object.__setattr__(self, "members", members.astype(float))
 
     def __hash__(self) -> int:
-        return hash((self.names, self.strength, self.length, self.force_length, tuple(sorted(self.fatigue.items()))))
+        left = tuple(sorted(self.fatigue.items()))
+        return hash((self.names, self.strength, self.length, self.force_length, self.size, left))
 
     @classmethod
     def of_subject(
-        cls, mass_kg: float, height_m: float, names: Iterable[str] = (), strength: float = PARALYSED, **options
+        cls, mass_kg: float, height_m: float, names: Iterable[str] = (), strength: float | None = None, **options
     ) -> Nerves:
         """Nerves of an adult of other size: strength as mass, arms as height.
 
@@ -103,7 +108,7 @@ class Nerves:
         names, options
             See `Nerves`.
         strength
-            Of a healthy adult's of that size.
+            Of a healthy adult's of that size; not given: that of paralysed muscle, see `Nerves`.
 
         Raises
         ------
@@ -112,9 +117,7 @@ class Nerves:
         """
         size = between(mass_kg, 0.0, STRONGEST * SUBJECT_MASS, "mass_kg") / SUBJECT_MASS
         length = between(height_m, SHORTEST * SUBJECT_HEIGHT, LONGEST * SUBJECT_HEIGHT, "height_m") / SUBJECT_HEIGHT
-        return cls(
-            tuple(names), strength=between(strength, 0.0, STRONGEST, "strength") * size, length=length, **options
-        )
+        return cls(tuple(names), strength=strength, length=length, size=size, **options)
 
     @classmethod
     def muscles(cls, *nerves: str, **options) -> Nerves:
@@ -168,7 +171,7 @@ class Nerves:
             Joint angles, rad, and rates, rad/s: mapping by joint name or array (..., 19). Without rates: isometric.
         """
         table = self.table
-        force = self.assumed_strength * table.strength
+        force = self.assumed_strength * self.size * table.strength
         force = force * (table.isometric_fraction(q) if self.force_length else np.cos(table.pennation))
         if v is not None:
             force = force * table.velocity_fraction(q, v)

@@ -34,7 +34,7 @@ def test_nerves_with_braces_and_the_fewest(tmp_path):
     braces = [x for b in BRACES for x in ("--brace", b)]
     some = ["left_superior_gluteal", *(f"right_{n}" for n in ("superior_gluteal", "femoral", "iliopsoas", "tibial"))]
     some += ["right_biceps_short_head", "right_inferior_gluteal"]
-    common = ("nerves", *some, *braces, "--posture", "one_leg", "--fewest")
+    common = ("nerves", *some, *braces, "--posture", "one_leg", "--fewest", "--strength", "1")
     result = run(*common, "--map", str(tmp_path / "map.png"))
     assert result.exit_code == 0, result.output
     assert "8 joints" in result.output and "11 joints locked" in result.output
@@ -43,7 +43,7 @@ def test_nerves_with_braces_and_the_fewest(tmp_path):
     assert (tmp_path / "map.png").stat().st_size > 10_000
     constant = run(*common, "--constant").output
     assert " 6 nerves (" in constant and "holds a lean" in constant
-    assert "brace more joints" in run(*common, "--strength", "0.3").output
+    assert "brace more joints" in run(*common[:-2]).output  # paralysed
     assert "brace more joints" in run("nerves", "right_tibial", "--fewest").output
 
 
@@ -61,10 +61,19 @@ def test_strength_settling_and_passive_legs_are_options():
     braces = [x for b in BRACES for x in ("--brace", b)]
     some = ("right_superior_gluteal", "right_femoral", "right_iliopsoas", "right_tibial", "left_superior_gluteal")
     common = ("nerves", *some, "right_biceps_short_head", *braces, "--posture", "one_leg")
-    options = ((), ("--strength", "0.7"), ("--settle", "5"), ("--passive", "1"))
-    outputs = {run(*common, *more).output for more in options}
+    options = ((), ("--settle", "5"), ("--passive", "1"))
+    outputs = {run(*common, "--strength", "1", *more).output for more in options}
+    outputs.add(run(*common, "--strength", "0.7").output)
     assert len(outputs) == 4
-    assert "paralysed, stimulated muscle" in outputs.pop()
+
+
+def test_without_a_strength_muscle_is_paralysed_and_that_is_said():
+    """The default of allocation: 0.5 of a healthy adult's, 0.3 to 0.7."""
+    common = ("nerves", "femoral", "tibial", "--posture", "standing")
+    output = run(*common).output
+    assert "At 0.5 of a healthy adult's strength (paralysed, stimulated muscle)" in output
+    assert "It may be 0.3 to 0.7" in output
+    assert "At 1 of a healthy adult's strength " in run(*common, "--strength", "1").output
 
 
 def test_standing_on_both_feet():

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from fes_pin.models.compile import disk_cache
 from fes_pin.models.compile.disk_cache import read_cached, write_cached
 
 
@@ -15,6 +16,7 @@ from fes_pin.models.compile.disk_cache import read_cached, write_cached
 def folder(monkeypatch, tmp_path):
     """A cache that does not exist yet."""
     monkeypatch.setenv("FES_PIN_CACHE", str(tmp_path / "deep" / "cache"))
+    disk_cache.say_unsafe.cache_clear()
     return tmp_path / "deep" / "cache"
 
 

@@ -7,12 +7,15 @@ from fes_pin.body.build import Body
 from fes_pin.body.linearize import linearize
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.nerve_inputs import controllability, subject_nerves
+from fes_pin.muscles.nerves import Nerves
 
 
 def test_names_stand_for_both_sides_and_scale_with_the_body():
     small, large = (Body.from_subject(mass_kg=m, height_m=h) for m, h in ((50.0, 1.6), (100.0, 1.9)))
     nerves = subject_nerves(small, ["femoral", "right_tibial", "left_femoral"])
     assert nerves.names == ("left_femoral", "right_femoral", "right_tibial")
+    ours, everyones = subject_nerves(small), Nerves()
+    assert ours.assumed_strength == everyones.assumed_strength and ours.strength_band == everyones.strength_band
     weak, strong = (subject_nerves(b, ["femoral"]).torque_matrix() for b in (small, large))
     assert np.allclose(strong, weak * 2.0 * 1.9 / 1.6)
 

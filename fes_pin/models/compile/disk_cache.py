@@ -79,7 +79,7 @@ def _own(path: str | Path, flags: int, folder: int | None = None) -> Iterator[in
     try:
         status = os.fstat(handle)
         if status.st_uid != os.geteuid() or status.st_mode & _OTHERS_WRITE:
-            _say_unsafe(f"{path} in the cache" if folder is not None else str(path))
+            say_unsafe(f"{path} in the cache" if folder is not None else str(path))
             raise PermissionError(f"others can write {path}")
         yield handle
     finally:
@@ -87,5 +87,6 @@ def _own(path: str | Path, flags: int, folder: int | None = None) -> Iterator[in
 
 
 @cache
-def _say_unsafe(place: str) -> None:
+def say_unsafe(place: str) -> None:
+    """A warning, once for each place."""
     _LOG.warning("compiled models are not read from %s: it is not this user's alone to write", place)
