@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import what_is_at
+from fes_pin.data.files import read_bytes, what_is_at
 from fes_pin.data.markers import read_markers
 from fes_pin.data.motion import read_motion
 from fes_pin.data.recorded.recording import Recording, without_twins
@@ -95,12 +95,11 @@ def _unreadable(path: Path, kind: str, error: BaseException) -> InputError:
 
 
 def _made(path: Path, columns: Mapping[str, np.ndarray], wanted: Sequence[str] | None, **more: Any) -> Recording:
-    """A recording of columns, of which only those that are wanted must be of one length."""
-    names = tuple(columns)
-    if wanted is not None:
-        columns = {n: v for n, v in columns.items() if n in wanted}
-    count = max((len(v) for v in columns.values()), default=0)
-    return Recording(path, names, columns, np.arange(1, count + 1), **more)
+    """A recording of columns, of which only those that are wanted must be of one length; others are no part of it."""
+    chosen = columns if wanted is None else {n: v for n, v in columns.items() if n in wanted}
+    count = max((len(v) for v in chosen.values()), default=0)
+    names = tuple(n for n, v in columns.items() if n in chosen or len(v) == count)
+    return Recording(path, names, chosen, np.arange(1, count + 1), **more)
 
 
 def _parquet(path: Path, wanted: Sequence[str] | None) -> Recording:
@@ -203,6 +202,8 @@ def _storage(path: Path, wanted: Sequence[str] | None) -> Recording:
 def _xdf(path: Path, wanted: Sequence[str] | None) -> Recording:
     """Streams of numbers, `<stream>.<channel>` where there are several; each has its own times."""
     pyxdf = _library("pyxdf", "xdf", path)
+    if read_bytes(path)[:4] not in (b"XDF:", b"\x1f\x8b\x08\x00", b"\x1f\x8b\x08\x08"):
+        raise InputError("cannot be read as XDF: it does not begin as one", file=path)  # pyxdf would leave it open
     try:
         streams, _ = pyxdf.load_xdf(str(path))
         numbers = [s for s in streams if np.asarray(s["time_series"]).dtype.kind in "iuf" and len(s["time_stamps"])]
