@@ -13,6 +13,7 @@ import typer
 from fes_pin.cli.allocate import allocate
 from fes_pin.cli.body import app as body
 from fes_pin.cli.group import Commands
+from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
 from fes_pin.cli.walk import diagnose_walking, print_effects
 
@@ -25,6 +26,8 @@ app.add_typer(body, name="body")
 app.command()(allocate)
 app.command()(new_study)
 app.command()(check)
+app.command()(urdf)
+app.command()(pulses)
 
 Libraries = Annotated[
     list[str] | None,
@@ -63,14 +66,24 @@ def diagnose(
     limit: Annotated[
         float | None, typer.Option(min=0.0, help="Seconds of search; then the best set of causes so far is told.")
     ] = None,
+    tables: Annotated[
+        str | None, typer.Option(help="csv or parquet: also trajectories.csv, every sample beside both models.")
+    ] = None,
     library: Libraries = None,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
+    from fes_pin.data.errors import InputError
     from fes_pin.data.files import check_folder, write_files
     from fes_pin.data.study import read_study
+    from fes_pin.data.tabular import SUFFIXES, check_table, table_bytes
 
     catalogue = _catalogue(library)
     measured = read_study(study, rigs=catalogue.schemas())
+    table = None if tables is None else f"trajectories.{tables}"
+    if table is not None:
+        if f".{tables}" not in SUFFIXES:
+            raise InputError(f"expected csv or parquet, found {tables!r}", column="--tables")
+        check_table(table)
     check_folder(out)  # what cannot be read or written is said before any work
     if measured.rig == "body":
         with _progress() as tell:
@@ -79,6 +92,7 @@ def diagnose(
         return
     from fes_pin.diagnose.diagnosis import diagnose as find
     from fes_pin.diagnose.record import NEXT_FILE, by_this_command, diagnosis_files
+    from fes_pin.diagnose.trajectories import trajectories
     from fes_pin.view.report import report_html
 
     with _progress() as tell:
@@ -91,9 +105,13 @@ def diagnose(
 
         diagnosis = by_this_command(find(measured, library=catalogue, seed=seed, limit=limit, progress=told))
         tell(DIAGNOSING, "report")
-        files = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
+        files: dict[str, str | bytes] = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
+        if table is not None:
+            trials, columns = trajectories(diagnosis)
+            files[table] = table_bytes(columns, table, {"trial": trials})
         tell(1.0, "done")
-    write_files(out, files, without={NEXT_FILE} - set(files))  # what an earlier diagnosis proposed is not this one's
+    old = {NEXT_FILE, *(f"trajectories{suffix}" for suffix in SUFFIXES)}
+    write_files(out, files, without=old - set(files))  # what an earlier diagnosis proposed is not this one's
     _print_verdict(diagnosis)
     typer.echo(f"report: {out / 'report.html'}")
 
@@ -101,23 +119,44 @@ def diagnose(
 @app.command()
 def predict(
     model: Annotated[Path, typer.Argument(help="model.toml of a diagnosis.")],
-    trial: Annotated[Path, typer.Argument(help="CSV with time_s and the inputs.")],
-    out: Annotated[Path, typer.Option(help="CSV to write: time_s and the predicted outputs.")],
+    trial: Annotated[Path, typer.Argument(help="CSV with time_s and the inputs, or as --columns-of says.")],
+    out: Annotated[Path, typer.Option(help="CSV or Parquet to write: time_s and the predicted outputs.")],
     setting: Annotated[
         list[str] | None, typer.Option("--set", help="A condition of the trial: load_kg=1.5, kind=isometric ...")
     ] = None,
+    columns_of: Annotated[
+        Path | None, typer.Option(help="A study whose [columns] says how the trial's file is written.")
+    ] = None,
+    residuals: Annotated[
+        bool, typer.Option("--residuals", help="Also what was measured, and measured minus predicted.")
+    ] = False,
     library: Libraries = None,
 ) -> None:
     """Predict a trial from its inputs with a saved model."""
-    from fes_pin.data.trial import read_trial, write_trial
+    from fes_pin.data.errors import InputError
+    from fes_pin.data.files import write_bytes
+    from fes_pin.data.study import read_columns
+    from fes_pin.data.tabular import check_table, table_bytes
+    from fes_pin.data.trial import read_trial
     from fes_pin.models.predict import predict as run
     from fes_pin.models.store import load_model
 
     catalogue = _catalogue(library)
+    check_table(out)
     loaded = load_model(model, library=catalogue)
     kind, conditions = _settings(setting or [])
-    given = read_trial(trial, rig=loaded.rig.described(), kind=kind, conditions=conditions, inputs_only=True)
-    write_trial(run(loaded, given), out)
+    own = None if columns_of is None else read_columns(columns_of, rigs=catalogue.schemas())
+    rig = loaded.rig.described()
+    given = read_trial(trial, rig=rig, kind=kind, conditions=conditions, inputs_only=True, own=own)
+    found = run(loaded, given)
+    columns = {"time_s": found.time, **found.columns}
+    if residuals:
+        measured = [n for n in found.columns if n in given]
+        if not measured:
+            raise InputError(f"expected a column {' or '.join(found.columns)} to compare with", file=trial)
+        columns |= {f"{n}_measured": given[n] for n in measured}
+        columns |= {f"{n}_residual": given.residual(found, n) for n in measured}
+    write_bytes(out, table_bytes(columns, out))
     _say_whose_code(catalogue)
 
 

@@ -1,0 +1,94 @@
+"""A proposed trial as a list of pulses that a stimulator can be given, within the limits that somebody states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.trial import Trial
+
+
+@dataclass(frozen=True)
+class PulseLimits:
+    """What no pulse of a list may exceed; all of it must be said.
+
+    Parameters
+    ----------
+    width_us
+        The widest pulse, us.
+    rate_hz
+        The highest rate: no two pulses come closer than one over it.
+    charge_uc
+        Charge of one pulse, uC: width times current.
+    current_ma
+        Amplitude of the pulses, mA.
+    """
+
+    width_us: float
+    rate_hz: float
+    charge_uc: float
+    current_ma: float
+
+    def __post_init__(self) -> None:
+        for name in ("width_us", "rate_hz", "charge_uc", "current_ma"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise InputError(f"expected a number above 0, found {getattr(self, name):g}", column=name)
+
+
+def pulse_list(
+    trial: Trial, limits: PulseLimits, rate_hz: float | None = None, width_us: float | None = None
+) -> dict[str, np.ndarray]:
+    """The pulses of a trial.
+
+    A trial beyond a limit is refused, not clipped: cut short it would be another experiment, and would separate less.
+
+    Parameters
+    ----------
+    trial
+        With `pulse_width_us`, of which pulses of `rate_hz` take the width at their time; or with `stim`, whose pulses
+        all have `width_us`.
+
+    Returns
+    -------
+    dict of ndarray, shape (pulses,)
+        `time_s` from the trial's first sample, `pulse_width_us`, `current_ma`, `charge_uc`.
+
+    Raises
+    ------
+    InputError
+        No such column, a rate or width that is not said, a pulse beyond a limit, with its time.
+    """
+    if "pulse_width_us" in trial:
+        if rate_hz is None or not 0.0 < rate_hz < np.inf:
+            raise InputError("expected the rate of the pulses, whose widths the trial says", column="rate")
+        count = int(np.floor((trial.duration + trial.dt) * rate_hz * (1 - 1e-9))) + 1
+        time = np.arange(count) / rate_hz
+        samples = np.minimum((time / trial.dt + 1e-6).astype(int), len(trial) - 1)
+        width = trial["pulse_width_us"][samples]
+        time, width = time[width > 0.0], width[width > 0.0]
+    elif "stim" in trial:
+        if width_us is None or not 0.0 < width_us < np.inf:
+            raise InputError("expected the width of the pulses, whose times the trial says", column="width")
+        time = trial.time[trial["stim"] > 0.5] - trial.time[0]
+        width = np.full(len(time), width_us)
+    else:
+        raise InputError("expected a column pulse_width_us or stim", column=trial.name)
+    charge = 1e-3 * width * limits.current_ma
+    _refuse(time, width > limits.width_us, f"a pulse is wider than {limits.width_us:g} us")
+    _refuse(time, charge > limits.charge_uc * (1 + 1e-12), f"a pulse has more than {limits.charge_uc:g} uC")
+    close = np.r_[False, np.diff(time) < (1 - 1e-6) / limits.rate_hz]
+    _refuse(time, close, f"two pulses come closer than at {limits.rate_hz:g} Hz")
+    return {
+        "time_s": time,
+        "pulse_width_us": width,
+        "current_ma": np.full(len(time), limits.current_ma),
+        "charge_uc": charge,
+    }
+
+
+def _refuse(time: np.ndarray, where: np.ndarray, what: str) -> None:
+    if where.any():
+        first = float(time[np.argmax(where)])
+        raise InputError(f"{what} at {first:.4g} s, and {np.count_nonzero(where) - 1} more; nothing is written")
