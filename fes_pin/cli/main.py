@@ -1,4 +1,4 @@
-"""The command line: `fes-pin diagnose | predict | effects | body | allocate`."""
+"""The command line: `fes-pin new-study | check | diagnose | predict | effects | ...`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import typer
 
 from fes_pin.cli.allocate import allocate
 from fes_pin.cli.body import app as body
+from fes_pin.cli.datasets import datasets
 from fes_pin.cli.group import Commands
 from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
@@ -27,6 +28,7 @@ app.command()(allocate)
 app.command()(new_study)
 app.command()(check)
 app.command()(urdf)
+app.command()(datasets)
 app.command()(pulses)
 
 Libraries = Annotated[

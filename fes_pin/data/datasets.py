@@ -1,24 +1,38 @@
-"""Public measured data that the documentation and the tests refer to: where they come from, where they lie."""
+"""Public measured data that the documentation and the tests refer to: where they come from, fetched and made studies.
+
+`datasets.json` beside this file is written by `scripts/generate/dataset_registry.py`: repositories at a pinned commit,
+licences, checksums.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import logging
 import os
+import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from urllib.parse import quote
 
+from fes_pin.data.conversions import CONVERTERS
 from fes_pin.data.errors import InputError
+from fes_pin.data.files import write_files
 from fes_pin.data.schema import unknown
 
 VARIABLE = "FES_PIN_DATA"
+REGISTRY = Path(__file__).with_name("datasets.json")
+SOURCE_URL = "https://raw.githubusercontent.com"
+"""Where repositories are fetched from, `/<repository>/<commit>/<path>` below it."""
+WALKING_NAME = "walking_subject01"
+TIMEOUT_S = 30.0
+"""Seconds without an answer after which a server is given up."""
 
 
 @dataclass(frozen=True)
 class Dataset:
     """One public recording.
-
-    There is no download: no checksum of the upstream files is known to this project, and a file that cannot be checked
-    is not fetched. Convert the upstream file to a study and name its folder in FES_PIN_DATA.
 
     Parameters
     ----------
@@ -27,11 +41,17 @@ class Dataset:
     what
         One line on what was measured.
     repository, commit, file
-        Origin on GitHub.
+        Origin on GitHub; `file` is where a person begins to look.
     licence
         SPDX identifier.
+    upstream
+        SHA-256 of the files that a conversion needs, by path; None where it is not known.
+    converted
+        SHA-256 of the trials that the documentation was written with, by path in the study.
     reference
         Publication, if there is one.
+    by_hand
+        Why it cannot be fetched, and what to do instead; "" where it can.
     """
 
     name: str
@@ -40,51 +60,47 @@ class Dataset:
     commit: str
     file: str
     licence: str
+    upstream: Mapping[str, str | None] = field(default_factory=dict)
+    converted: Mapping[str, str] = field(default_factory=dict)
     reference: str = ""
+    by_hand: str = ""
 
     @property
     def origin(self) -> str:
         """Where a person finds the upstream file."""
-        return f"https://github.com/{self.repository}/blob/{self.commit}/{self.file}"
+        return f"https://github.com/{self.repository}/blob/{self.commit}/{quote(self.file)}"
+
+    @property
+    def url(self) -> str:
+        """Below which its files are fetched."""
+        return f"{SOURCE_URL}/{self.repository}/{self.commit}/"
 
 
 DATASETS: Mapping[str, Dataset] = {
-    dataset.name: dataset
-    for dataset in (
-        Dataset(
-            name="free_pendulum",
-            what="free swings of a real pendulum, angle and rate at 1 kHz",
-            repository="dynamicslab/MultiArm-Pendulum",
-            commit="e99a7e13fe2adc8fc647321a156b6cb59a48a698",
-            file="SinglePendulumDataForParameterEstimation.mat",
-            licence="MIT",
-            reference="arXiv:2205.06231",
-        ),
-        Dataset(
-            name="biceps_fes",
-            what="isometric force of a human biceps under stimulation trains at about 31 Hz",
-            repository="Kev1CO/cocofest_archive",
-            commit="f50d932e07117a5a8da42cad808052b331c8f578",
-            file="cocofest/examples/data/biceps_force.pkl",
-            licence="MIT",
-        ),
-    )
+    name: Dataset(name=name, **known) for name, known in json.loads(REGISTRY.read_text(encoding="utf-8")).items()
 }
-
-
-WALKING = Dataset(
-    name="walking_subject01",
-    what="two strides of one adult on a treadmill: joint angles, ground reaction, inverse dynamics",
-    repository="opensim-org/opensim-models",
-    commit="20a888b9655e73fb84963d6e03eee3752cf6074b",
-    file="Pipelines/Gait2354_Simbody",
-    licence="CC-BY-3.0",
-)
+WALKING = DATASETS[WALKING_NAME]
 """Not a study: tables of its own (`fes_pin.body.measured_walk.read_walk`)."""
 
 
+def folders() -> tuple[Path, ...]:
+    """Where data sets are looked for: in FES_PIN_DATA and its `data`, else in the user's cache."""
+    named = os.environ.get(VARIABLE, "")
+    return (Path(named), Path(named) / "data") if named else (_cache(),)
+
+
+def _cache() -> Path:
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fes_pin" / "datasets"
+
+
+def _known(name: str) -> Dataset:
+    if name not in DATASETS:
+        raise InputError(unknown(name, DATASETS), column=name)
+    return DATASETS[name]
+
+
 def fetch(name: str) -> Path:
-    """Folder of a public data set, as a study that `read_study` reads.
+    """Folder of a public data set that is on this machine, as a study that `read_study` reads.
 
     Parameters
     ----------
@@ -94,21 +110,98 @@ def fetch(name: str) -> Path:
     Returns
     -------
     Path
-        `<name>` or `data/<name>` in the folder that the environment variable FES_PIN_DATA names.
+        Its folder below one of `folders`.
 
     Raises
     ------
     InputError
-        Unknown name, FES_PIN_DATA not set, or nothing of that name in it; the message says where the data come from.
+        Unknown name, or nothing of that name there; the message says how to get it.
     """
-    if name not in DATASETS:
-        raise InputError(unknown(name, DATASETS), column=name)
-    dataset = DATASETS[name]
-    hint = f"convert {dataset.origin} ({dataset.licence}) to a study in its folder {name}"
-    named = os.environ.get(VARIABLE, "")
-    if not named:
-        raise InputError(f"expected {VARIABLE} to name a folder of data; {hint}", column=name)
-    for folder in (Path(named) / name, Path(named) / "data" / name):
-        if (folder / "study.toml").is_file():
-            return folder
-    raise InputError(f"no {name}/study.toml in the folder that {VARIABLE} names; {hint}", file=named)
+    dataset = _known(name)
+    for folder in folders():
+        if (folder / name / "study.toml").is_file():
+            return folder / name
+    how = dataset.by_hand or f"`fes-pin datasets {name}` fetches it"
+    raise InputError(
+        f"no {name}/study.toml there, nor in another folder that {VARIABLE} names; {how} ({dataset.origin}, "
+        f"{dataset.licence})",
+        file=folders()[0],
+    )
+
+
+def download(name: str, folder: str | Path | None = None, unverified: bool = False) -> Path:
+    """Fetch a data set from its repository, and make a study of it.
+
+    Each upstream file must have its checksum, where one is known; where none is, the converted trials must have
+    theirs. Nothing is kept of what does not.
+
+    Parameters
+    ----------
+    folder
+        To make `<name>` in; without it the first of `folders`.
+    unverified
+        Keep what no checksum is known of, or whose conversion differs. A wrong checksum of an upstream file is refused
+        anyway.
+
+    Returns
+    -------
+    Path
+        Of the study.
+
+    Raises
+    ------
+    InputError
+        Unknown name, a set that cannot be fetched, no pooch, no answer, a wrong checksum.
+    """
+    dataset = _known(name)
+    if dataset.by_hand or name not in CONVERTERS:
+        raise InputError(f"{dataset.by_hand}; it is at {dataset.origin} ({dataset.licence})", column=name)
+    target = Path(folder or folders()[0]) / name
+    with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
+        _retrieve(dataset, Path(scratch))
+        made = CONVERTERS[name][0](Path(scratch))
+    trusted = all(dataset.upstream.values())
+    other = [p for p, known in dataset.converted.items() if _sha256(made.get(p, "")) != known]
+    if not trusted and other and not unverified:
+        found = f"{len(other)} of {len(dataset.converted)} trials differ from those that the documentation was written"
+        hint = "--unverified keeps them all the same"
+        raise InputError(
+            f"{found} with ({other[0]} is one), and no checksum of its origin is known; {hint}", column=name
+        )
+    about = f"# From {dataset.origin}\n# {dataset.licence}; converted by fes-pin datasets. {dataset.reference}".rstrip()
+    made["study.toml"] = f"{about}\n{made['study.toml']}"
+    write_files(target, {**made})
+    return target
+
+
+def _retrieve(dataset: Dataset, scratch: Path) -> None:
+    """Fetch every upstream file into a folder."""
+    try:
+        import pooch  # noqa: PLC0415
+    except ImportError:
+        raise InputError("fetching needs pooch: pip install 'fes-pin[datasets]'", column=dataset.name) from None
+    pooch.get_logger().setLevel(logging.ERROR)
+    fetcher = pooch.HTTPDownloader(timeout=TIMEOUT_S)
+    for place, known in dataset.upstream.items():
+        target = scratch / place
+        target.parent.mkdir(parents=True, exist_ok=True)
+        address = dataset.url + quote(place)
+        try:
+            pooch.retrieve(
+                address,
+                known_hash=None if known is None else f"sha256:{known}",
+                fname=target.name,
+                path=target.parent,
+                downloader=fetcher,
+            )
+        except Exception as error:
+            reason = "its checksum is another" if "does not match the known hash" in str(error) else _short(error)
+            raise InputError(f"cannot be fetched: {reason}", file=address) from None
+
+
+def _short(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:160]
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

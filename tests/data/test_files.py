@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from fes_pin.data import files
-from fes_pin.data.datasets import DATASETS, fetch
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import check_folder, write_files, write_text
 
@@ -165,21 +164,6 @@ def test_a_folder_that_cannot_be_is_said_before_the_work(tmp_path, monkeypatch, 
     with pytest.raises(InputError, match="cannot be written"):
         check_folder(f"{tmp_path}{below}")
     assert file.read_text() == "kept"
-
-
-def test_fetch(tmp_path, monkeypatch):
-    monkeypatch.delenv("FES_PIN_DATA", raising=False)
-    with pytest.raises(InputError, match=r"FES_PIN_DATA.*MultiArm-Pendulum"):
-        fetch("free_pendulum")
-    with pytest.raises(InputError, match="did you mean free_pendulum"):
-        fetch("free_pendulums")
-    monkeypatch.setenv("FES_PIN_DATA", str(tmp_path))
-    with pytest.raises(InputError, match="no biceps_fes"):
-        fetch("biceps_fes")
-    for name, folder in zip(DATASETS, (tmp_path / "data", tmp_path), strict=True):
-        (folder / name).mkdir(parents=True)
-        (folder / name / "study.toml").write_text("")
-        assert fetch(name) == folder / name
 
 
 def fail(*_):

@@ -120,13 +120,24 @@ def _parquet(path: Path, wanted: Sequence[str] | None) -> Recording:
     return _made(path, columns, wanted)
 
 
-def _matlab(path: Path, wanted: Sequence[str] | None) -> Recording:
+def matlab_vectors(path: Path) -> dict[str, np.ndarray]:
+    """Every vector of numbers in a MATLAB file, by dotted names: `log.angle`, `cells.2`, `table.1` (a column).
+
+    Raises
+    ------
+    InputError
+        Not a MATLAB file, or pymatreader is not installed.
+    """
     reader = _library("pymatreader", "matlab", path)
     try:
         content = reader.read_mat(str(path))
     except Exception as error:
         raise _unreadable(path, "a MATLAB file", error) from None
-    columns = dict(_vectors(content))
+    return dict(_vectors(content))
+
+
+def _matlab(path: Path, wanted: Sequence[str] | None) -> Recording:
+    columns = matlab_vectors(path)
     if wanted is None and columns:  # scalars and tables of other lengths are no columns of the recording
         count = Counter(len(v) for v in columns.values()).most_common(1)[0][0]
         columns = {n: v for n, v in columns.items() if len(v) == count}

@@ -1,0 +1,41 @@
+"""`fes-pin datasets`: the public recordings that the documentation uses, listed and fetched."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def datasets(
+    names: Annotated[list[str] | None, typer.Argument(help="To fetch. [default: list them]")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to fetch into. [default: FES_PIN_DATA, or the user's cache]")
+    ] = None,
+    unverified: Annotated[
+        bool, typer.Option("--unverified", help="Keep what no checksum is known of and converts to other numbers.")
+    ] = False,
+) -> None:
+    """List the public data sets that the documentation uses; with names, fetch them and make them studies."""
+    from fes_pin.data.datasets import DATASETS, download
+
+    for name in names or []:
+        typer.echo(f"{name}: {download(name, out, unverified)}")
+    if names:
+        return
+    for one in DATASETS.values():
+        typer.echo(f"{one.name}: {one.what}\n  {one.origin} ({one.licence})")
+        typer.echo(f"  {_where(one.name) or one.by_hand or f'fes-pin datasets {one.name}'}")
+
+
+def _where(name: str) -> str:
+    """Where a data set lies on this machine; "" where it does not."""
+    from fes_pin.body.measured_walk import data_folder
+    from fes_pin.data.datasets import WALKING_NAME, fetch
+    from fes_pin.data.errors import InputError
+
+    try:
+        return f"here: {data_folder() if name == WALKING_NAME else fetch(name)}"
+    except InputError:
+        return ""

@@ -1,0 +1,208 @@
+"""Public recordings as they are published, made studies: what `fes-pin datasets` does with what it fetches.
+
+Each function takes the folder that holds the upstream files, by their paths in the repository, and gives the files of a
+study. The steps are those that the data set's description names; nothing is filtered.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import read_text
+from fes_pin.data.recorded.formats import matlab_vectors
+from fes_pin.data.units import INCH, POUND
+
+Files = dict[str, str]
+
+_ARM = """<?xml version="1.0"?>
+<!-- {what} -->
+<robot name="{name}">
+  <link name="base"/>
+  <link name="arm">
+    <inertial>
+      <origin xyz="0 0 {height}"/>
+      <mass value="{mass}"/>
+      <inertia ixx="{across}" ixy="0" ixz="0" iyy="{across}" iyz="0" izz="1e-6"/>
+    </inertial>
+  </link>
+  <joint name="pivot" type="continuous">
+    <parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+  </joint>
+</robot>
+"""
+_ROD = """<?xml version="1.0"?>
+<!-- The damper's rod, driven horizontally. The moving mass is not published: 20 kg is a guess. -->
+<robot name="friction_damper">
+  <link name="base"/>
+  <link name="rod">
+    <inertial><mass value="20"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>
+  </link>
+  <joint name="rod" type="prismatic">
+    <parent link="base"/><child link="rod"/><axis xyz="1 0 0"/>
+    <limit lower="-0.05" upper="0.05" effort="1e5" velocity="1"/>
+  </joint>
+</robot>
+"""
+
+SERVO_LOGS = tuple(
+    f"bam/data.bak/raw/2026-01-15_10h{time}.json"
+    for time in (
+        *("28m10", "28m17", "28m24", "28m32", "28m42", "28m49", "28m57", "29m04"),
+        *("29m14", "29m21", "29m29", "29m37", "29m47", "29m54", "30m02", "30m10"),
+    )
+)
+SERVO_PULSES, SERVO_TORQUE, SERVO_RESISTANCE = 885.0, 0.3232, 4.7637
+"""Full pulse width of the servo's PWM; torque constant in N m/A and resistance in Ohm as the data's authors identified
+them (Rhoban/bam, params/xl330/m1.json)."""
+SERVO_RATE_HZ, DAMPER_RATE_HZ = 200.0, 500.0
+
+
+def servo_pendulum(folder: Path) -> Files:
+    """A servo that carries a known mass: logs of 3.4 to 7 ms a row, interpolated to 200 Hz, the effort held.
+
+    effort = kt/R (PWM / 885 x supply - kt w), 0 while the motor is off.
+
+    Raises
+    ------
+    InputError
+        A log that is not as they were when this was written.
+    """
+    files, trials = {}, []
+    for place in SERVO_LOGS:
+        log = _json(folder / place)
+        rows = [_numbers(row, folder / place) for row in log["entries"]]
+        t, q, w, pwm, volts, on = np.array(rows).T
+        current = (pwm / SERVO_PULSES * volts - SERVO_TORQUE * w) / SERVO_RESISTANCE
+        effort = np.where(on > 0.5, SERVO_TORQUE * current, 0.0)
+        time = np.arange(int((t[-1] - t[0]) * SERVO_RATE_HZ) + 1) / SERVO_RATE_HZ
+        row = np.searchsorted(t - t[0], time + 1e-12, side="right") - 1
+        name = f"{log['trajectory']}_kp{log['kp']}"
+        columns = {"time_s": time, "effort": effort[row], "position": np.interp(time, t - t[0], q)}
+        files[f"trials/{name}.csv"] = _csv(columns)
+        role = "fit" if log["trajectory"] in ("lift_and_drop", "sin_sin") else "held_out"
+        trials.append({"file": f"trials/{name}.csv", "role": role})
+    what = "0.49 kg at 0.1 m on the horn of the servo; the arm and the servo's reflected inertia are not in here."
+    files["pendulum.urdf"] = _ARM.format(name="servo_pendulum", what=what, height=-0.1, mass=0.49, across="1e-6")
+    head = 'name = "servo-pendulum"\nrig = "joint"\n\n[rig]\nurdf = "pendulum.urdf"\ngravity_scale = 1.0\n'
+    start = "[start]\ninertia_scale = 1.2\ndamping = 0.01\n"
+    return {**files, "study.toml": _study(head, start, sorted(trials, key=lambda t: t["file"]))}
+
+
+def _numbers(row: Mapping[str, Any], path: Path) -> list[float]:
+    try:
+        return [float(row[k]) for k in ("timestamp", "position", "speed", "load", "input_volts", "torque_enable")]
+    except (KeyError, TypeError, ValueError) as problem:
+        raise InputError(f"not a log as it was when this was written: {problem}", file=path) from None
+
+
+DAMPER_FILES = {
+    **{
+        f"d1_{pull}lb_{rate.lower()}": (
+            f"data/dataset-1/characterization datasets/{rate}{pull}lbtension.json",
+            f"{pull} lb",
+        )
+        for pull in (20, 35, 70)
+        for rate in ("0.5Hz", "1Hz")
+    },
+    **{
+        f"d3_30lb_{rate.lower()}_{wide}in": (
+            f"data/dataset-3/characterization tests/{rate}30lbtension{wide}amplitude.json",
+            "30 lb, 2023",
+        )
+        for wide in ("0.5", "1", "1.5")
+        for rate in ("0.5Hz", "1Hz")
+    },
+}
+"""By the trial's name its file, and the tension that the experimenter set."""
+
+
+def friction_damper(folder: Path) -> Files:
+    """A banded friction damper: inch to m, kip to N, 1024 Hz interpolated to 500 Hz; actuators' forces left out.
+
+    Raises
+    ------
+    InputError
+        A file that is not as they were when this was written.
+    """
+    files, trials = {}, []
+    for name, (place, group) in DAMPER_FILES.items():
+        try:
+            table = np.array(_json(folder / place)["data"], dtype=float)
+            t, inches, kips, rate = table[:, 0], table[:, 1], table[:, 2], table[:, 3]
+        except (KeyError, IndexError, TypeError, ValueError) as problem:
+            raise InputError(f"not a test as it was when this was written: {problem}", file=folder / place) from None
+        time = np.arange(int((t[-1] - t[0]) * DAMPER_RATE_HZ + 1e-9) + 1) / DAMPER_RATE_HZ
+        columns = {"position": INCH * inches, "velocity": INCH * rate, "effort": 1e3 * POUND * kips}
+        at = {n: np.interp(time, t - t[0], v) for n, v in columns.items()}
+        files[f"trials/{name}.csv"] = _csv({"time_s": time, **at})
+        role = "fit" if "_0.5hz" in name else "held_out"
+        trials.append({"file": f"trials/{name}.csv", "kind": "imposed", "group": group, "role": role})
+    files["damper.urdf"] = _ROD
+    head = 'name = "friction-damper"\nrig = "joint"\n\n[rig]\nurdf = "damper.urdf"\ngravity_scale = 0.0\n'
+    return {**files, "study.toml": _study(head, "[start]\ninertia_scale = 1.0\ndamping = 1e5\n", trials)}
+
+
+PENDULUM_FILE = "SinglePendulumDataForParameterEstimation.mat"
+
+
+def free_pendulum(folder: Path) -> Files:
+    """Free swings in MATLAB cells: `Y_id`, `Y_vad` with angle and rate, `Time_id`, `Time_vad` with their times.
+
+    Raises
+    ------
+    InputError
+        A file that does not hold them, or pymatreader is not installed.
+    """
+    path = folder / PENDULUM_FILE
+    found = matlab_vectors(path)
+    files, trials = {}, []
+    for ours, theirs, role in (("fit", "id", "fit"), ("held", "vad", "held_out")):
+        for number in range(1, 100):
+            time, angle, rate = (
+                found.get(n) for n in (f"Time_{theirs}.{number}", *(f"Y_{theirs}.{number}.{k}" for k in (1, 2)))
+            )
+            if time is None or angle is None or rate is None:
+                break
+            rows = zip((time - time[0]).tolist(), angle.tolist(), rate.tolist(), strict=True)
+            lines = [f"{t:.3f},{q:.6f},{v:.6f}" for t, q, v in rows]
+            place = f"trials/{ours}_{number - 1}.csv"
+            files[place] = "\n".join(["time_s,position,velocity", *lines]) + "\n"
+            trials.append({"file": place, "role": role})
+    if len({t["role"] for t in trials}) < 2:
+        raise InputError("expected cells Y_id, Time_id, Y_vad and Time_vad", file=path)
+    what = "A rigid pendulum on a fixed pivot; position 0 is upright. As its authors identified it (arXiv:2205.06231)."
+    urdf = _ARM.format(name="free_pendulum", what=what, height=0.14775, mass=0.14758, across="1.0912e-4")
+    head = 'name = "free-pendulum"\nrig = "joint"\n\n[rig]\nurdf = "pendulum.urdf"\n'
+    start = "[start]\ninertia_scale = 1.0\ngravity_scale = 1.0\ndamping = 2.2394e-4\n"
+    return {**files, "pendulum.urdf": urdf, "study.toml": _study(head, start, trials)}
+
+
+CONVERTERS: Mapping[str, tuple[Callable[[Path], Files], tuple[str, ...]]] = {
+    "free_pendulum": (free_pendulum, (PENDULUM_FILE,)),
+    "friction_damper": (friction_damper, tuple(place for place, _ in DAMPER_FILES.values())),
+    "servo_pendulum": (servo_pendulum, SERVO_LOGS),
+}
+"""By data set what makes a study of it, and the upstream files that this needs."""
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(read_text(path))
+    except (ValueError, RecursionError) as error:
+        raise error if isinstance(error, InputError) else InputError("expected JSON", file=path) from None
+
+
+def _csv(columns: Mapping[str, np.ndarray]) -> str:
+    rows = zip(*(v.tolist() for v in columns.values()), strict=True)
+    return "\n".join([",".join(columns), *(",".join(f"{x:.6g}" for x in row) for row in rows)]) + "\n"
+
+
+def _study(head: str, start: str, trials: list[dict[str, str]]) -> str:
+    tables = ["\n".join(["[[trial]]", *(f'{k} = "{v}"' for k, v in trial.items())]) for trial in trials]
+    return "\n\n".join([f"[study]\n{head}".rstrip(), start.rstrip(), *tables]) + "\n"
