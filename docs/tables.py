@@ -31,6 +31,7 @@ ROOMS = {
     "allocate": "Allocation",
     "control": "Position control",
     "view": "Reports and pictures",
+    "cohort": "Cohorts",
 }
 """The packages of the API reference, with their headings; `cli` is the command line, which says itself what it does."""
 

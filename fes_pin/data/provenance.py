@@ -11,7 +11,6 @@ import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -60,13 +59,20 @@ def this_command() -> str:
 
 def provenance(study: Study, seed: int) -> Provenance:
     """Where what is made of a study now comes from."""
+    return Provenance(today(), versions(), hashes(study.folder), seed)
+
+
+def today() -> str:
+    """The moment, UTC, to the second; that of `SOURCE_DATE_EPOCH` where it is set."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     moment = datetime.datetime.fromtimestamp(int(epoch), datetime.UTC) if epoch.isdigit() else None
-    date = (moment or datetime.datetime.now(datetime.UTC)).isoformat(timespec="seconds").replace("+00:00", "Z")
-    return Provenance(date, _versions(), _hashes(study.folder), seed)
+    return (moment or datetime.datetime.now(datetime.UTC)).isoformat(timespec="seconds").replace("+00:00", "Z")
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of Python and of the packages that a result depends on."""
+    from importlib import metadata  # noqa: PLC0415 - reads the packages' own records, when they are asked for
+
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
@@ -76,7 +82,7 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _hashes(folder: Path) -> dict[str, str]:
+def hashes(folder: Path) -> dict[str, str]:
     """SHA-256 of `study.toml` and of every file that it names."""
     try:
         tables = tomllib.loads(read_bytes(folder / "study.toml").decode("utf-8-sig"))

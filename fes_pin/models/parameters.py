@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 _KEY = "fes_pin"
@@ -83,4 +84,9 @@ def parameter(
 
 def parameters_of(thing: Any) -> dict[str, Parameter]:
     """Name and description of every parameter of a dataclass or an instance of one, in order."""
-    return {f.name: f.metadata[_KEY] for f in dataclasses.fields(thing) if _KEY in f.metadata}
+    return dict(_parameters_of(thing if isinstance(thing, type) else type(thing)))
+
+
+@cache
+def _parameters_of(kind: type) -> dict[str, Parameter]:
+    return {f.name: f.metadata[_KEY] for f in dataclasses.fields(kind) if _KEY in f.metadata}

@@ -18,8 +18,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
-from scipy.signal import savgol_filter
 
 from fes_pin.data.trial import Trial
 from fes_pin.models.model import Model
@@ -67,6 +65,8 @@ def measured_motion(trial: Trial, output: str) -> tuple[np.ndarray, np.ndarray]:
     Source: Savitzky and Golay, Smoothing and differentiation of data by simplified least squares procedures, Analytical
     Chemistry 36 (1964).
     """
+    from scipy.signal import savgol_filter  # noqa: PLC0415 - a third of a second, for driven rigs alone
+
     width = min(max(5, 2 * round(0.125 / (BANDWIDTH_HZ * trial.dt)) + 1), len(trial) - 1 + len(trial) % 2)
     if width < 5:
         return trial[output], np.gradient(trial[output], trial.dt)
@@ -86,6 +86,8 @@ def tracking_effort(model: Model, trial: Trial, position: np.ndarray, rate: np.n
     position, rate
         Of the measured motion, shape (n,).
     """
+    from scipy.interpolate import CubicHermiteSpline  # noqa: PLC0415 - as above
+
     count = max(1, math.ceil(trial.dt * 2.0 * math.pi * BANDWIDTH_HZ / FINE))
     finer = _finer(trial, count)
     curve = CubicHermiteSpline(trial.time, position, rate)

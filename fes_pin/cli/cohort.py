@@ -1,0 +1,91 @@
+"""`fes-pin cohort`: many studies, resumable, on this machine or on a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from fes_pin.cohort.run import Progress
+
+SAID_EVERY_S = 30.0
+"""Seconds between lines of progress where nobody watches."""
+
+
+def cohort(
+    studies: Annotated[list[Path], typer.Argument(help="Studies, or folders that hold studies.")],
+    out: Annotated[Path, typer.Option(help="Folder for the answers, the tables and cohort.html; a run goes on in it.")],
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes on this machine; one a core without it.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler, as tcp://host:8786: its workers diagnose.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values and bootstrap intervals.")] = 0,
+    limit: Annotated[float | None, typer.Option(min=0.0, help="Seconds of search for each study.")] = None,
+    library: Annotated[
+        list[str] | None, typer.Option("--library", help="A Python file or module with causes or rigs; it is run.")
+    ] = None,
+) -> None:
+    """Diagnose many studies, and say what they have in common. What is there already is not done again."""
+    from fes_pin.cohort.run import run_cohort
+
+    with _progress() as tell:
+        made = run_cohort(
+            studies,
+            out,
+            workers=workers or os.cpu_count() or 1,
+            scheduler=scheduler,
+            seed=seed,
+            limit=limit,
+            library=tuple(library or ()),
+            progress=tell,
+        )
+    good = len(made.studies) - len(made.failed)
+    typer.echo(f"{good} of {len(made.studies)} studies diagnosed")
+    for row in made.prevalence:
+        typer.echo(f"  {row['cause']:28s} in {row['studies']} ({row['share_percent']:.0f} %)")
+    for row in made.failed:
+        typer.echo(f"failed: {row['study']}: {row['error']}", err=True)
+    typer.echo(f"page: {out / 'cohort.html'}")
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[Progress], None]]:
+    """A bar with the time left on standard error if a person is watching, a line now and then if not."""
+    if not sys.stderr.isatty():
+        said = [0.0]
+
+        def line(p: Progress) -> None:
+            if time.monotonic() - said[0] > SAID_EVERY_S or p.done == p.total:
+                said[0] = time.monotonic()
+                typer.echo(f"fes-pin: {p.done} of {p.total}, {p.failed} failed, {_left(p.left_s)}", err=True)
+
+        yield line
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+    from rich.progress import Progress as Bar
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda p: bar.update(
+            task, total=p.total, completed=p.done, description=f"{p.failed} failed, {_left(p.left_s)}, {p.name}"
+        )
+
+
+def _left(seconds: float | None) -> str:
+    """Time left in words."""
+    if seconds is None:
+        return "time left not known yet"
+    if seconds < 90.0:
+        return f"{seconds:.0f} s left"
+    return f"{seconds / 60.0:.0f} min left" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h left"

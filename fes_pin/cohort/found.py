@@ -1,0 +1,52 @@
+"""Which studies a cohort has, and what each is called in it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from fes_pin.data.errors import InputError
+
+STUDY = "study.toml"
+
+
+def find_studies(places: Sequence[Path]) -> dict[str, Path]:
+    """Every study that is named or lies beneath a folder that is named, by its name in the cohort, in order of names.
+
+    A study is called by its folder, and where two folders have one name by as many of the folders above as tell them
+    apart: `anna-knee`, `ben-knee`.
+
+    Raises
+    ------
+    InputError
+        A place that is not there, or holds no study.
+    """
+    found: dict[Path, None] = {}
+    for place in places:
+        folder = place.parent if place.name == STUDY else place
+        if not folder.is_dir():
+            raise InputError("no such folder; expected a study, or a folder that holds studies", file=place)
+        own = [folder] if (folder / STUDY).exists() else sorted(p.parent for p in folder.rglob(STUDY))
+        if not own:
+            raise InputError(f"expected a study, or a folder that holds studies; no {STUDY} in it", file=place)
+        found.update(dict.fromkeys(p.resolve() for p in own))
+    return dict(sorted(_named(list(found)).items()))
+
+
+def _named(folders: Sequence[Path]) -> dict[str, Path]:
+    parts = [[p for p in f.parts if p not in ("/", "\\")] for f in folders]
+    depth = [1] * len(folders)
+    while True:
+        names = ["-".join(p[-d:]) or "study" for p, d in zip(parts, depth, strict=True)]
+        count = Counter(names)
+        again = [k for k, n in enumerate(names) if count[n] > 1 and depth[k] < len(parts[k])]
+        if not again:
+            return {_unique(n, k, count): f for k, (n, f) in enumerate(zip(names, folders, strict=True))}
+        for k in again:
+            depth[k] += 1
+
+
+def _unique(name: str, number: int, count: Counter[str]) -> str:
+    safe = "".join(c if c.isalnum() or c in "-_.+" else "_" for c in name).lstrip(".")
+    return safe if safe and count[name] == 1 else f"{safe}-{number + 1}"

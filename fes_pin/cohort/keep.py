@@ -1,0 +1,63 @@
+"""What of a cohort is on disk: each study's answer whole or absent, so that a run that was killed goes on."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fes_pin.cohort.one import Answer, Work
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import read_text, write_files
+
+STATE = "state.json"
+"""Beside each answer: what it depends on, and what went wrong."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """An answer that is on disk: its `diagnosis.json`, empty for a study that failed."""
+
+    name: str
+    record: dict[str, Any]
+    error: str = ""
+
+
+class Store:
+    """Answers in a folder, one folder each beneath `studies`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def place(self, name: str) -> Path:
+        """Folder of one study's answer."""
+        return self.folder / "studies" / name
+
+    def has(self, work: Work, key: str) -> bool:
+        """True if the answer is there and still holds: the same files, versions, seed, limit and library."""
+        state = self._read(self.place(work.name) / STATE)
+        return state.get("key") == key and not state.get("again", False)
+
+    def put(self, answer: Answer) -> None:
+        """Keep an answer: all of its files, or none."""
+        state = {"key": answer.key, "error": answer.error, "again": answer.again}
+        files = {**answer.files, STATE: json.dumps(state) + "\n"}
+        place = self.place(answer.name)
+        old = {p.name for p in place.iterdir() if p.is_file()} if place.is_dir() else set()
+        write_files(place, files, without=old - set(files))
+
+    def get(self, name: str) -> Kept | None:
+        """One answer; None if there is none."""
+        state = self._read(self.place(name) / STATE)
+        if not state:
+            return None
+        return Kept(name, self._read(self.place(name) / "diagnosis.json"), str(state.get("error", "")))
+
+    @staticmethod
+    def _read(path: Path) -> dict[str, Any]:
+        try:
+            found = json.loads(read_text(path))
+        except (InputError, ValueError):
+            return {}
+        return found if isinstance(found, dict) else {}

@@ -1,0 +1,112 @@
+"""One study of a cohort, as a process of its own or a worker of a cluster diagnoses it.
+
+What a worker is given and gives back are plain values: it writes nothing, so that a worker that is killed leaves
+nothing behind, and one study that is diagnosed twice is still kept once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.provenance import hashes, versions
+from fes_pin.data.study import read_study
+
+
+@dataclass(frozen=True)
+class Work:
+    """A study that is to be diagnosed.
+
+    Attributes
+    ----------
+    name
+        In the cohort.
+    folder
+        Of the study.
+    seed, limit
+        As `diagnose` takes them.
+    library
+        Files and modules of causes and rigs.
+    """
+
+    name: str
+    folder: str
+    seed: int = 0
+    limit: float | None = None
+    library: tuple[str, ...] = ()
+
+    def key(self) -> str:
+        """What the answer depends on: the study's files, the versions, seed, limit and library."""
+        files = [hashlib.sha256(Path(n).read_bytes()).hexdigest() for n in self.library if Path(n).is_file()]
+        told = [asdict(self) | {"folder": ""}, hashes(Path(self.folder)), versions(), files]
+        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What became of it.
+
+    Attributes
+    ----------
+    name, key
+        Of the work.
+    files
+        Content by name: `diagnosis.json`, `model.toml`, `report.html` ...; empty for a study that failed.
+    error
+        Why it failed, one line; empty if it did not.
+    again
+        True if another attempt may succeed: its process died.
+    """
+
+    name: str
+    key: str
+    files: Mapping[str, str | bytes]
+    error: str = ""
+    again: bool = False
+
+
+def diagnose_one(work: Work, key: str) -> Answer:
+    """Diagnose a study; whatever goes wrong becomes an answer.
+
+    Linear algebra and fits run on one thread: studies are what runs in parallel.
+    """
+    os.environ["FES_PIN_THREADS"] = "1"
+    try:
+        return Answer(work.name, key, _files(work))
+    except InputError as problem:
+        return Answer(work.name, key, {}, str(problem))
+    except MemoryError:
+        return Answer(work.name, key, {}, "there was not enough memory", again=True)
+    except Exception as problem:
+        line = " ".join(f"{type(problem).__name__}: {problem}".split())
+        return Answer(work.name, key, {}, line[:500])
+
+
+def _files(work: Work) -> dict[str, str | bytes]:
+    from fes_pin.models.catalogue import load_library  # noqa: PLC0415 - a worker imports what it needs
+
+    catalogue = load_library(*work.library)
+    study = read_study(work.folder, rigs=catalogue.schemas())
+    if study.rig == "body":
+        return _walking(study, work.seed)
+    from fes_pin.diagnose.diagnosis import diagnose  # noqa: PLC0415
+    from fes_pin.diagnose.record import diagnosis_files  # noqa: PLC0415
+    from fes_pin.view.report import report_html  # noqa: PLC0415
+
+    found = diagnose(study, library=catalogue, seed=work.seed, limit=work.limit)
+    return {**diagnosis_files(found), "report.html": report_html(found)}
+
+
+def _walking(study: Any, seed: int) -> dict[str, str | bytes]:
+    from fes_pin.view.walk_report import walk_report_html  # noqa: PLC0415
+    from fes_pin.walk.diagnosis import diagnose_walk  # noqa: PLC0415
+    from fes_pin.walk.text import walk_files  # noqa: PLC0415
+
+    found = diagnose_walk(study, seed=seed)
+    return {**walk_files(found), "report.html": walk_report_html(found)}

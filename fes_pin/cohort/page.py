@@ -1,0 +1,184 @@
+"""The page of a cohort: which causes in which studies, what is common to them, and each study's own report."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from typing import Any
+
+from fes_pin.cohort.pool import pooled
+from fes_pin.data.provenance import this_command, today, versions
+from fes_pin.diagnose.text import percent, probability
+from fes_pin.view.chart import Panel, svg
+from fes_pin.view.drawing import Drawing, rows_csv
+from fes_pin.view.page import Content, Markup, element, figure, folded, joined, page, rounded, section, table
+from fes_pin.view.report_causes import stage_mark
+
+Row = dict[str, Any]
+FOREST = 40
+"""Studies of one forest plot; of more only the pooled value is drawn."""
+ROW, NAMES, WIDE = 20.0, 150.0, 420.0
+
+
+def cohort_html(
+    studies: Sequence[Row], causes: Sequence[Row], pooled_: Sequence[Row], prevalence: Sequence[Row], seed: int
+) -> str:
+    """The page, which links the reports beside it and needs nothing else."""
+    good = [r for r in studies if r["verdict"] != "failed"]
+    parts = [
+        _head(studies, good, prevalence),
+        section("Which causes, and in how many studies", *_prevalence(prevalence, len(good))),
+        section("How large they are in the population", *_pooled(causes, pooled_)),
+        section("Studies", *_studies(studies)),
+        section("Where this comes from", *_provenance(seed)),
+        element("footer", "Made by fes-pin. Intervals are 95 %. SI units."),
+    ]
+    return page("Cohort", joined([p for p in parts if p.text]))
+
+
+def _head(studies: Sequence[Row], good: Sequence[Row], prevalence: Sequence[Row]) -> Markup:
+    counts = Counter(r["verdict"] for r in good)
+    failed = len(studies) - len(good)
+    if prevalence:
+        first = prevalence[0]
+        name = first["cause"].replace("_", " ")
+        title = f"{name[0].upper()}{name[1:]} in {first['studies']} of {len(good)} studies"
+    else:
+        title = f"No cause is named in {len(good)} studies"
+    rows = [
+        ("A cause was named", f"in {counts['causes_found']} of {len(good)} studies"),
+        ("The model is adequate", f"in {counts['adequate']}"),
+        ("Something stays unexplained", f"in {sum(r['unexplained'] for r in good)}"),
+    ]
+    if failed:
+        rows.append(("Could not be diagnosed", f"{failed}: see the table of studies"))
+    made = [element("div", element("dt", q), element("dd", a)) for q, a in rows]
+    return element(
+        "header",
+        element("p", f"cohort of {len(studies)} studies", class_="eyebrow"),
+        element("h1", title, class_="verdict causes_found"),
+        element("dl", joined(made), class_="answers"),
+    )
+
+
+def _prevalence(rows: Sequence[Row], studies: int) -> list[Markup]:
+    if not rows:
+        return [element("p", "None.")]
+    head = (
+        "cause",
+        "stage",
+        "studies",
+        "share [95 %]",
+        "median gain",
+        "told apart in",
+        "false discovery rate below 5 % in",
+    )
+    cells: list[list[Content]] = [
+        [
+            element("code", r["cause"]),
+            stage_mark(r["stage"]),
+            f"{r['studies']} of {studies}",
+            f"{r['share_percent']:.0f} % [{r['share_low']:.0f}, {r['share_high']:.0f}]",
+            _percent(r["median_gain_percent"]),
+            str(r["alone"]),
+            str(r["certain"]),
+        ]
+        for r in rows
+    ]
+    words = (
+        "A study in which a cause was not named may still have it: small, or such as its trials cannot show. The false "
+        "discovery rate is over all causes that were looked for in all studies."
+    )
+    return [table(head, cells, (2, 3, 4, 5, 6)), element("p", words, class_="soft")]
+
+
+def _percent(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.0f} %"
+
+
+def _pooled(causes: Sequence[Row], rows: Sequence[Row]) -> list[Markup]:
+    if not rows:
+        return [element("p", "No value is known from two studies or more.")]
+    words = (
+        "Random-effects means over the studies, with the interval of the mean, how much the value differs from study "
+        "to study beyond their own uncertainty (tau), and where the next would lie. A cause's size is of the studies "
+        "in which it was named: where it is small it was not, so that the mean is that of those who have it, and "
+        "somewhat too large."
+    )
+    head = ("of", "parameter", "studies", "mean [95 %]", "tau", "next study [95 %]", "I²", "all alike")
+    out = [element("p", words, class_="soft"), table(head, [_pooled_cells(r) for r in rows], (2, 3, 4, 5, 6, 7))]
+    values: dict[tuple[str, str], list[Row]] = defaultdict(list)
+    for row in causes:
+        values[row["cause"], row["parameter"]].append(row)
+    drawn, shown = [], set()
+    for (cause, parameter), many in values.items():
+        if len(many) > 1 and cause not in shown:
+            shown.add(cause)  # the first parameter is what gives a cause its size
+            drawn.append(figure(_forest(cause, parameter, many), f"{cause}, {parameter}", file=f"{cause}_{parameter}"))
+    return [*out, element("div", joined(drawn), class_="grid")] if drawn else out
+
+
+def _pooled_cells(r: Row) -> list[Content]:
+    error = (r["high"] - r["low"]) / 4.0
+    bounds = [rounded(r[n], error) for n in ("next_low", "next_high") if math.isfinite(r[n])]
+    return [
+        element("code", r["cause"]) if r["cause"] else "the rig",
+        element("code", r["parameter"]),
+        f"{r['studies']} of {r['of']}",
+        f"{rounded(r['mean'], error)} [{rounded(r['low'], error)}, {rounded(r['high'], error)}]",
+        rounded(r["between"], error),
+        f"[{', '.join(bounds)}]" if bounds else "-",
+        f"{r['heterogeneity']:.0f} %",
+        probability(r["p_alike"]),
+    ]
+
+
+def _forest(cause: str, parameter: str, rows: Sequence[Row]) -> Drawing:
+    """Values of a parameter study by study with their 95 % intervals, and the pooled mean beneath."""
+    known = [r for r in rows if math.isfinite(r["value"])]
+    drawn = [r for r in known if math.isfinite(r["std"])] if len(known) <= FOREST else []
+    mean = pooled([r["value"] for r in known], [r["std"] for r in known])
+    lines = [(r["study"], r["value"], r["value"] - 1.96 * r["std"], r["value"] + 1.96 * r["std"]) for r in drawn]
+    if mean is not None:
+        lines.append(("pooled", mean.mean, mean.low, mean.high))
+    low, high = min(x[2] for x in lines), max(x[3] for x in lines)
+    room = 0.05 * (high - low) or 1.0
+    count = len(lines)
+    panel = Panel(NAMES, 6, WIDE - NAMES - 12, ROW * count, (low - room, high + room), (0.5 - count, 0.5))
+    for k, (name, value, least, most) in enumerate(lines):
+        is_mean = name == "pooled" and k == count - 1 and mean is not None
+        colour = "extended" if is_mean else "measured"
+        panel.text(NAMES - 8, 6 + ROW * (k + 0.5) + 4, name[-22:], "end")
+        panel.line([least, most], [-k, -k], colour, 3.0 if is_mean else 1.2)
+        panel.dot(value, -k, colour, hollow=not is_mean)
+    panel.x_axis(parameter)
+    last = lines[-1]
+    words = (
+        f"{parameter} of {cause} in {len(known)} studies; {last[0]} {last[1]:.4g} from {last[2]:.4g} to {last[3]:.4g}."
+    )
+    return Drawing(
+        svg([panel], WIDE, 6 + ROW * count + 38, words),
+        rows_csv(("study", "value", "std"), [(r["study"], r["value"], r["std"]) for r in known]),
+    )
+
+
+def _studies(rows: Sequence[Row]) -> list[Markup]:
+    head = ("study", "verdict", "causes", "E nominal", "E extended", "left")
+    cells: list[list[Content]] = []
+    for r in rows:
+        if r["verdict"] == "failed":
+            cells.append([r["study"], "failed", r["error"], "-", "-", "-"])
+            continue
+        link = element("a", r["study"], href=f"studies/{r['study']}/report.html")
+        errors = [percent(r[f"{n}_error_percent"]) for n in ("nominal", "extended")]
+        left = "something" if r["unexplained"] else "nothing"
+        cells.append([link, r["verdict"].replace("_", " "), r["causes"] or "-", *errors, left])
+    made = table(head, cells, (3, 4))
+    return [made] if len(rows) <= FOREST else [folded(f"All {len(rows)} studies", made)]
+
+
+def _provenance(seed: int) -> list[Markup]:
+    told = ", ".join(f"{n} {v}" for n, v in versions().items())
+    rows: list[list[Content]] = [["made", today()], ["seed", str(seed)], ["command", element("code", this_command())]]
+    return [element("div", table(("what", "value"), [*rows, ["versions", told]], prose=True), class_="provenance")]

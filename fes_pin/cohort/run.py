@@ -1,0 +1,170 @@
+"""A cohort from its studies to its tables and its page; a run that was killed goes on where it was."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fes_pin.cohort.cluster import on_cluster
+from fes_pin.cohort.found import find_studies
+from fes_pin.cohort.keep import Kept, Store
+from fes_pin.cohort.local import Task, in_processes
+from fes_pin.cohort.one import Answer, Work, diagnose_one
+from fes_pin.cohort.page import cohort_html
+from fes_pin.cohort.tables import (
+    Row,
+    cause_rows,
+    csv_text,
+    nominal_rows,
+    parquet_bytes,
+    pooled_rows,
+    prevalence_rows,
+    study_rows,
+)
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import check_folder, write_files
+from fes_pin.models.catalogue import load_library
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a cohort is.
+
+    Attributes
+    ----------
+    done, total, failed
+        Studies; those of an earlier run are done.
+    left_s
+        Seconds that the others will take, about; None before the first is there.
+    name
+        Of the study that came last.
+    """
+
+    done: int
+    total: int
+    failed: int
+    left_s: float | None
+    name: str
+
+
+@dataclass(frozen=True)
+class Cohort:
+    """What came of the studies; each table is a list of rows."""
+
+    studies: list[Row]
+    causes: list[Row]
+    pooled: list[Row]
+    prevalence: list[Row]
+
+    @property
+    def failed(self) -> list[Row]:
+        """Studies that could not be diagnosed."""
+        return [r for r in self.studies if r["verdict"] == "failed"]
+
+
+def run_cohort(
+    places: Sequence[Path],
+    out: Path,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    seed: int = 0,
+    limit: float | None = None,
+    library: Sequence[str] = (),
+    progress: Callable[[Progress], None] | None = None,
+    run: Callable[[Work, str], Answer] = diagnose_one,
+) -> Cohort:
+    """Diagnose every study that is not diagnosed yet, and write what all of them say together.
+
+    Parameters
+    ----------
+    places
+        Studies, or folders that hold studies.
+    out
+        Folder for the answers and tables.
+    workers
+        Processes on this machine.
+    scheduler
+        Address of a Dask scheduler, whose workers are used instead.
+    seed, limit, library
+        As `diagnose` takes them.
+    progress
+        Called after each study.
+    run
+        What diagnoses one study.
+
+    Raises
+    ------
+    InputError
+        A place without a study, a folder that cannot be written, a scheduler that does not answer, or not one study
+        that could be read.
+    """
+    found = find_studies(places)
+    library = tuple(library)
+    catalogue = load_library(*library)  # what cannot be read is said before any work
+    check_folder(out)
+    store = Store(out)
+    every = [Work(n, str(f), seed, limit, library) for n, f in found.items()]
+    todo: list[Task] = [(work, key) for work in every if not store.has(work, key := work.key())]
+    tell, began = progress or (lambda _progress: None), time.monotonic()
+    done, failed = len(every) - len(todo), 0
+    for answer in _answers(todo, workers, scheduler, run):
+        store.put(answer)
+        done, failed = done + 1, failed + bool(answer.error)
+        fresh = done - (len(every) - len(todo))
+        left = (time.monotonic() - began) / fresh * (len(every) - done)
+        tell(Progress(done, len(every), failed, left, answer.name))
+
+    def kept() -> Iterator[Kept]:  # read again for each table: no more than one record is held
+        return (one for name in found if (one := store.get(name)) is not None)
+
+    studies, causes = study_rows(kept()), cause_rows(kept(), catalogue)
+    good = sum(r["verdict"] != "failed" for r in studies)
+    made = Cohort(studies, causes, pooled_rows(causes, nominal_rows(kept()), good), prevalence_rows(causes, good))
+    write_files(out, _files(made, seed))
+    if not good:
+        raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {studies[0]['error']}")
+    return made
+
+
+def _answers(
+    todo: Sequence[Task], workers: int, scheduler: str | None, run: Callable[[Work, str], Answer]
+) -> Iterator[Answer]:
+    if not todo:
+        return iter(())
+    return on_cluster(todo, scheduler, run) if scheduler else in_processes(todo, workers, run)
+
+
+def _files(made: Cohort, seed: int) -> dict[str, str | bytes]:
+    out: dict[str, str | bytes] = {}
+    for name in ("studies", "causes", "pooled", "prevalence"):
+        rows: list[Row] = getattr(made, name)
+        out[f"{name}.csv"] = csv_text(rows, HEADS[name])
+        parquet = parquet_bytes(rows, HEADS[name])
+        if parquet is not None:
+            out[f"{name}.parquet"] = parquet
+    out["cohort.html"] = cohort_html(made.studies, made.causes, made.pooled, made.prevalence, seed)
+    return out
+
+
+HEADS = {
+    "studies": (
+        *("study", "verdict", "causes", "unexplained", "nominal_error_percent", "extended_error_percent"),
+        *("ceiling_percent", "wall_s", "error"),
+    ),
+    "causes": (
+        *("study", "cause", "stage", "parameter", "value", "std", "p_value", "false_discovery_rate"),
+        *("gain_percent", "gain_low", "gain_high", "equivalents"),
+    ),
+    "pooled": (
+        *("cause", "parameter", "studies", "of", "mean", "low", "high", "between", "next_low", "next_high"),
+        *("heterogeneity", "p_alike"),
+    ),
+    "prevalence": (
+        *("cause", "stage", "studies", "certain", "share_percent", "share_low", "share_high"),
+        *("median_gain_percent", "alone"),
+    ),
+}
+"""Columns of each table."""

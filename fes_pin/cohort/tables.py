@@ -1,0 +1,172 @@
+"""A cohort as tables: a row a study, a row a parameter of a cause, a row a pooled value."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from fes_pin.cohort.keep import Kept
+from fes_pin.cohort.pool import discovery_rates, pooled, share_interval
+from fes_pin.models.catalogue import Catalogue
+
+Row = dict[str, Any]
+RATE = 0.05
+"""False discovery rate below which a cause counts as found in the cohort."""
+
+
+def study_rows(kept: Iterable[Kept]) -> list[Row]:
+    """What was found of each study; of a study that failed its error."""
+    return [_study(one) for one in kept]
+
+
+def _study(one: Kept) -> Row:
+    found = one.record
+    nominal, extended = (found.get(n, {}).get("error_percent", {}) for n in ("nominal", "extended"))
+    left = found.get("remainder", {})
+    return {
+        "study": one.name,
+        "verdict": found.get("verdict", "failed"),
+        "causes": " + ".join(c["name"] for c in found.get("causes", ())),
+        "unexplained": bool(left.get("unexplained", False)),
+        "nominal_error_percent": _told(nominal),
+        "extended_error_percent": _told(extended),
+        "ceiling_percent": _number(found.get("ceiling_percent")),
+        "wall_s": _number(found.get("wall_s")),
+        "error": one.error,
+    }
+
+
+def _told(errors: Mapping[str, Any]) -> float:
+    """Held out if there is such an error; over the horizon of a driven rig."""
+    for name in ("horizon", "held_out", "fit"):
+        if errors.get(name) is not None:
+            return float(errors[name])
+    return math.nan
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None else float(value)
+
+
+def cause_rows(kept: Iterable[Kept], catalogue: Catalogue) -> list[Row]:
+    """Every parameter of every cause of every study, with the false discovery rate over the cohort."""
+    rows: list[Row] = []
+    tests = 0
+    for one in kept:
+        if not one.record:
+            continue
+        tests += len(catalogue.effects)
+        for cause in one.record.get("causes", ()):
+            rows += _cause(one.name, cause)
+    named = {(r["study"], r["cause"]): r["p_value"] for r in rows}
+    rates = dict(zip(named, discovery_rates(list(named.values()), tests).tolist(), strict=True))
+    return [{**r, "false_discovery_rate": rates[r["study"], r["cause"]]} for r in rows]
+
+
+def _cause(study: str, cause: Mapping[str, Any]) -> list[Row]:
+    gain = cause.get("gain_percent") or {}
+    low, high = gain.get("ci95") or (None, None)
+    return [
+        {
+            "study": study,
+            "cause": cause["name"],
+            "stage": cause.get("stage", ""),
+            "parameter": name,
+            "value": _number(one["value"]),
+            "std": _number(one["std"]),
+            "p_value": _number(cause.get("p_value")),
+            "gain_percent": _number(gain.get("held_out")),
+            "gain_low": _number(low),
+            "gain_high": _number(high),
+            "equivalents": " ".join(cause.get("equivalents", ())),
+        }
+        for name, one in cause["parameters"].items()
+    ]
+
+
+def nominal_rows(kept: Iterable[Kept]) -> list[Row]:
+    """Every parameter of every extended model but those of its causes: what all studies have."""
+    out: list[Row] = []
+    for one in kept:
+        known = one.record.get("extended", {}).get("parameters", {})
+        out += [
+            {"study": one.name, "parameter": n, "value": _number(v["value"]), "std": _number(v["std"])}
+            for n, v in known.items()
+            if "." not in n
+        ]
+    return out
+
+
+def pooled_rows(causes: Sequence[Row], nominal: Sequence[Row], studies: int) -> list[Row]:
+    """Pooled values of every parameter that at least two studies have; causes first."""
+    groups: dict[tuple[str, str], list[Row]] = defaultdict(list)
+    for row in causes:
+        groups[row["cause"], row["parameter"]].append(row)
+    for row in nominal:
+        groups["", row["parameter"]].append(row)
+    out: list[Row] = []
+    for (cause, parameter), rows in groups.items():
+        found = pooled([r["value"] for r in rows], [r["std"] for r in rows])
+        if found is None:
+            continue
+        out.append({"cause": cause, "parameter": parameter, "studies": found.count, "of": studies, **vars(found)})
+        del out[-1]["count"]
+    return sorted(out, key=lambda r: (r["cause"] == "", r["cause"]))
+
+
+def prevalence_rows(causes: Sequence[Row], studies: int) -> list[Row]:
+    """In how many studies each cause was named, with the 95 % interval of its share; most frequent first."""
+    named: dict[str, dict[str, Row]] = defaultdict(dict)
+    for row in causes:
+        named[row["cause"]][row["study"]] = row
+    out: list[Row] = []
+    for cause, rows in named.items():
+        low, high = share_interval(len(rows), studies)
+        gains = sorted(r["gain_percent"] for r in rows.values())
+        out.append(
+            {
+                "cause": cause,
+                "stage": next(iter(rows.values()))["stage"],
+                "studies": len(rows),
+                "certain": sum(r["false_discovery_rate"] <= RATE for r in rows.values()),
+                "share_percent": 100.0 * len(rows) / max(studies, 1),
+                "share_low": low,
+                "share_high": high,
+                "median_gain_percent": gains[len(gains) // 2],
+                "alone": sum(not r["equivalents"] for r in rows.values()),
+            }
+        )
+    return sorted(out, key=lambda r: (-r["studies"], r["cause"]))
+
+
+def csv_text(rows: Sequence[Row], head: Sequence[str]) -> str:
+    """Rows as CSV; an empty cell for a number that is not known."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(head)
+    for row in rows:
+        writer.writerow(["" if _unknown(row[n]) else row[n] for n in head])
+    return stream.getvalue()
+
+
+def _unknown(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
+def parquet_bytes(rows: Sequence[Row], head: Sequence[str]) -> bytes | None:
+    """Rows as Parquet; None where pyarrow is not installed."""
+    try:
+        import pyarrow  # noqa: PLC0415
+        import pyarrow.parquet  # noqa: PLC0415
+    except ImportError:
+        return None
+    kinds = {bool: pyarrow.bool_(), int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
+    types = {n: kinds[type(rows[0][n])] if rows else pyarrow.string() for n in head}
+    table = pyarrow.table({n: pyarrow.array([None if _unknown(r[n]) else r[n] for r in rows], types[n]) for n in head})
+    sink = io.BytesIO()
+    pyarrow.parquet.write_table(table, sink)
+    return sink.getvalue()

@@ -1,0 +1,124 @@
+"""A cohort: every study once, whatever fails or is killed; nothing done twice when it goes on."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from cohort.fakes import calls, quick, studies
+
+from fes_pin.cohort.found import find_studies
+from fes_pin.cohort.run import HEADS, run_cohort
+from fes_pin.data.errors import InputError
+
+DEMO = Path(__file__).parents[2] / "analysis/studies/ankle_demo"
+
+
+def rows(path):
+    with path.open() as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_one_bad_study_and_one_that_kills_its_process_stop_no_other(tmp_path):
+    names = ["a0", "bad", "f1", "f2", "killer", "z9"]
+    places, told = studies(tmp_path / "in", names), []
+    made = run_cohort([places], tmp_path / "out", workers=2, progress=told.append, run=quick)
+    assert [r["study"] for r in made.studies] == names
+    assert {r["study"]: r["error"] for r in made.failed} == {
+        "bad": "study.toml, rig: expected a rig",
+        "killer": "the process that diagnosed it died: out of memory, or killed",
+    }
+    assert [p.done for p in told] == [1, 2, 3, 4, 5, 6] and told[-1].failed == 2 and told[-1].left_s == 0.0
+    assert [(r["cause"], r["studies"], r["alone"]) for r in made.prevalence] == [("coulomb_friction", 2, 2)]
+    by_parameter = {r["parameter"]: r for r in made.pooled}
+    assert by_parameter["torque_nm"]["studies"] == 2 and by_parameter["gain"]["studies"] == 4
+    assert all(n in rows(tmp_path / "out/studies.csv")[0] for n in HEADS["studies"])
+    page = (tmp_path / "out/cohort.html").read_text()
+    assert "Coulomb friction in 2 of 4 studies" in page and 'href="studies/f1/report.html"' in page
+
+
+def test_a_cohort_goes_on_where_it_was(tmp_path):
+    places = studies(tmp_path / "in", ["a0", "bad", "killer"])
+    first = run_cohort([places], tmp_path / "out", run=quick)
+    before = calls(places)
+    studies(tmp_path / "in", ["f5"])
+    (places / "a0/study.toml").write_text('[study]\nname = "changed"\n')
+    again = run_cohort([places], tmp_path / "out", run=quick)
+    new = {n: k - before.get(n, 0) for n, k in calls(places).items()}
+    assert new["bad"] == 0 and new["a0"] == new["f5"] == 1 and new["killer"] >= 1  # what died may live another time
+    assert len(again.studies) == len(first.studies) + 1
+    run_cohort([places], tmp_path / "out", seed=1, run=quick)
+    assert calls(places)["bad"] == before["bad"] + 1  # another seed is another question
+
+
+def test_parquet_says_what_the_csv_says(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    run_cohort([studies(tmp_path / "in", ["bad", "f1", "f2"])], tmp_path / "out", run=quick)
+    for name, head in HEADS.items():
+        table = parquet.read_table(tmp_path / f"out/{name}.parquet")
+        assert tuple(table.column_names) == head
+        assert table.num_rows == len(rows(tmp_path / f"out/{name}.csv")) > 0
+    assert parquet.read_table(tmp_path / "out/studies.parquet")["ceiling_percent"].to_pylist() == [None, 1.5, 1.5]
+
+
+def test_studies_of_one_name_are_told_apart(tmp_path):
+    for person in ("anna", "ben"):
+        studies(tmp_path / person, ["knee"])
+    studies(tmp_path / "carl", ["hip"])
+    assert list(find_studies([tmp_path])) == ["anna-knee", "ben-knee", "hip"]
+    assert list(find_studies([tmp_path / "carl/hip/study.toml"])) == ["hip"]
+    with pytest.raises(InputError, match="no such folder"):
+        find_studies([tmp_path / "none"])
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match=r"no study\.toml"):
+        find_studies([tmp_path / "empty"])
+
+
+def test_a_cohort_of_nothing_but_bad_studies_is_refused(tmp_path):
+    with pytest.raises(InputError, match="none of 1 studies"):
+        run_cohort([studies(tmp_path / "in", ["bad"])], tmp_path / "out", run=quick)
+    assert rows(tmp_path / "out/studies.csv")[0]["error"]
+
+
+def test_a_run_that_is_killed_leaves_whole_answers_and_goes_on(tmp_path):
+    places = studies(tmp_path / "in", [f"f{k}" for k in range(8)])
+    here = Path(__file__).parents[1]
+    code = (
+        "from pathlib import Path; from cohort.fakes import quick; from fes_pin.cohort.run import run_cohort\n"
+        f"if __name__ == '__main__': run_cohort([Path({str(places)!r})], Path({str(tmp_path / 'out')!r}), run=quick)"
+    )
+    (tmp_path / "go.py").write_text(code)
+    known = {**os.environ, "PYTHONPATH": str(here)}
+    with subprocess.Popen([sys.executable, str(tmp_path / "go.py")], env=known) as process:
+        until = time.monotonic() + 60.0
+        while len(list((tmp_path / "out").glob("studies/*/state.json"))) < 2 and time.monotonic() < until:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGKILL)
+    there = {p.parent.name for p in (tmp_path / "out").glob("studies/*/state.json")}
+    assert 2 <= len(there) < 8
+    before = calls(places)
+    made = run_cohort([places], tmp_path / "out", run=quick)
+    assert len(made.studies) == 8 and not made.failed
+    after = calls(places)
+    assert all(after[n] == before[n] for n in there)
+    assert not list((tmp_path / "out").rglob(".fes_pin-*"))
+
+
+def test_the_command_diagnoses_a_study_and_says_what_failed(tmp_path):
+    broken = studies(tmp_path / "in", ["broken"])
+    words = [sys.executable, "-m", "fes_pin.cli.main", "cohort", str(DEMO), str(broken)]
+    done = subprocess.run(
+        [*words, "--out", str(tmp_path / "out"), "--workers", "2", "--limit", "0"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "1 of 2 studies diagnosed" in done.stdout
+    assert "failed: broken: " in done.stderr and "study.toml" in done.stderr
+    assert {p.name for p in (tmp_path / "out/studies/ankle_demo").iterdir()} == {
+        *("diagnosis.json", "model.toml", "report.html", "state.json")
+    }
