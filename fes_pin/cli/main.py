@@ -12,8 +12,8 @@ import typer
 
 from fes_pin.cli.allocate import allocate
 from fes_pin.cli.body import app as body
-from fes_pin.cli.datasets import datasets
 from fes_pin.cli.cohort import cohort
+from fes_pin.cli.datasets import datasets
 from fes_pin.cli.group import Commands
 from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study

@@ -15,7 +15,7 @@ from fes_pin.cli.main import app
 from fes_pin.data.errors import InputError
 
 NEEDS = {  # words of the command line, what its one line must say
-    "no_command": ((), "expected one of allocate, new-study, check, cohort, diagnose, predict, effects, body"),
+    "no_command": ((), "expected one of allocate, "),
     "no_command_of_a_group": (("body",), "expected one of modes, nerves, view"),
     "unknown_command": (("diagnos",), "Did you mean 'diagnose'"),
     "unknown_command_of_a_group": (("body", "modez"), "Did you mean 'modes'"),
