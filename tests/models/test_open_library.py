@@ -233,7 +233,7 @@ def test_a_rig_is_one_file_of_its_folder(monkeypatch, own):
     """Nothing else has to be edited for it to be known."""
     monkeypatch.setattr(rigs, "__path__", [*rigs.__path__, str(own)])
     (own / "door_closer.py").unlink()
-    names = {rig.name for rig in rigs._written_here()}
+    names = {rig.name for rig in rigs.written_here()}
     sys.modules.pop("fes_pin.models.rigs.tail")
     assert names == {*(rig.name for rig in rigs.RIGS), "tail"}
 

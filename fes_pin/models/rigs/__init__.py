@@ -17,12 +17,12 @@ from fes_pin.models.rigs.muscle import Muscle, pulse_period
 __all__ = ["RIGS", "Ankle", "Joint", "Muscle", "Rig", "pulse_period"]
 
 
-def _written_here() -> Iterator[type[Rig]]:
+def written_here() -> Iterator[type[Rig]]:
     for file in iter_modules(__path__, f"{__name__}."):
         for one in vars(import_module(file.name)).values():
             if isinstance(one, type) and issubclass(one, Rig) and one.__module__ == file.name and hasattr(one, "name"):
                 yield one
 
 
-RIGS: tuple[type[Rig], ...] = tuple(sorted(_written_here(), key=lambda rig: rig.name))
+RIGS: tuple[type[Rig], ...] = tuple(sorted(written_here(), key=lambda rig: rig.name))
 """Every rig, by name."""
