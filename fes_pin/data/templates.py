@@ -70,18 +70,37 @@ def slide(mass_kg: float) -> str:
     """
     _check(mass=mass_kg)
     return _URDF.format(
-        **{"name": "slide", "what": f"A carriage of {mass_kg:g} kg on a level rail.", "zero": "where you say"},
-        **{"axis": "Positive moves along +x.", "link": "carriage", "joint": "rail", "kind": "prismatic"},
-        **{"direction": "1 0 0", "height": 0.0, "mass": float(mass_kg), "across": 0.0, "along": 0.0, "limit": LIMIT},
+        name="slide",
+        what=f"A carriage of {mass_kg:g} kg on a level rail.",
+        zero="where you say",
+        axis="Positive moves along +x.",
+        link="carriage",
+        joint="rail",
+        kind="prismatic",
+        direction="1 0 0",
+        height=0.0,
+        mass=float(mass_kg),
+        across=0.0,
+        along=0.0,
+        limit=LIMIT,
     )
 
 
 def _turning(name: str, what: str, mass: float, centre: float, about_centre: float, upright: bool) -> str:
     return _URDF.format(
-        **{"name": name, "what": what, "zero": "upright" if upright else "hanging straight down", "axis": _SWING},
-        **{"link": "arm", "joint": "pivot", "kind": "continuous", "direction": "0 1 0", "limit": ""},
-        **{"height": float(centre if upright else -centre), "mass": float(mass)},
-        **{"across": float(about_centre), "along": 0.0},
+        name=name,
+        what=what,
+        zero="upright" if upright else "hanging straight down",
+        axis=_SWING,
+        link="arm",
+        joint="pivot",
+        kind="continuous",
+        direction="0 1 0",
+        limit="",
+        height=float(centre if upright else -centre),
+        mass=float(mass),
+        across=float(about_centre),
+        along=0.0,
     )
 
 
