@@ -72,6 +72,7 @@ def new_study(
     """
     from fes_pin.data.errors import InputError
     from fes_pin.data.new_study import new_study as make
+    from fes_pin.data.schema import IMPOSED
     from fes_pin.models.catalogue import load_library
     from fes_pin.models.nominal import guess_start
 
@@ -94,6 +95,11 @@ def new_study(
     write_files(wanted.folder, made.contents)
     for own, theirs, unit in made.taken:
         typer.echo(f"{own:16s} is {theirs}{f', in {unit}' if unit else ''}")
+    schema = wanted.schema
+    if "motion" in made.kinds and schema.outputs.get(IMPOSED) in {own for own, _, _ in made.taken}:
+        typer.echo(
+            f"{schema.outputs[IMPOSED]} is taken as what drives it; where the motion drives: --set kind={IMPOSED}"
+        )
     _say(study, warnings)
     place = wanted.folder / "study.toml"
     typer.echo(

@@ -81,11 +81,14 @@ class NewStudy:
         The rig's column, the file's name of it and its unit, as a person wants to see them.
     origins
         Where each recording lies, by its path below the study's folder.
+    kinds
+        Of its trials.
     """
 
     contents: Mapping[str, str | bytes]
     taken: tuple[tuple[str, str, str], ...]
     origins: Mapping[str, Path]
+    kinds: tuple[str, ...] = ()
 
 
 def new_study(wanted: Wanted, guess: Callable[[Mapping[str, float]], Mapping[str, float]]) -> NewStudy:
@@ -144,7 +147,7 @@ class _Making:
         taken = tuple(
             (c, s.get("name", "from its rate"), _said(s, c, self.wanted.revolute)) for c, s in sources.items()
         )
-        return NewStudy(contents, taken, dict(zip(places, self.wanted.files, strict=True)))
+        return NewStudy(contents, taken, dict(zip(places, self.wanted.files, strict=True)), tuple(kinds))
 
     def _one_form(self) -> TextForm | None:
         forms = {p.form: p for p in self.proposals}
@@ -163,8 +166,9 @@ class _Making:
                 raise InputError(f"expected one of {', '.join(outputs)}, found {given!r}", column="--kind")
             return given
         fits = [k for k, c in outputs.items() if c in self.wanted.columns or proposal.candidates[c]]
-        fits = [k for k in fits if not (self.schema.default_kind in fits and outputs[k] in self.schema.inputs)]
-        return self.schema.default_kind if self.schema.default_kind in fits or not fits else fits[0]
+        default = self.schema.default_kind
+        read = {k: sum(bool(proposal.candidates[c]) for c in self.schema.columns_of(k)) for k in fits}
+        return max(fits, key=lambda k: (read[k], k == default), default=default)
 
     def _own(self, path: Path, key: str) -> str | None:
         """What was set for one file alone."""
@@ -179,12 +183,16 @@ class _Making:
 
     def _sources(self, kinds: set[str]) -> dict[str, dict[str, Any]]:
         """For each of the rig's columns what `[columns]` says of it."""
-        needed = ["time_s", *dict.fromkeys(self.schema.outputs[k] for k in kinds)]
-        inputs = [c for c in self.schema.inputs if c in self.wanted.columns or self._candidates(c)]
-        if not inputs and self.schema.inputs_required:
-            needed.append(self.schema.inputs[0])
+        schema, order = self.schema, sorted(kinds)
+        needed = ["time_s", *(schema.outputs[k] for k in order), *(c for k in order for c in schema.motion(k)[:1])]
+        stimuli = dict.fromkeys(c for k in order for c in schema.stimuli(k))
+        inputs = [c for c in stimuli if c in self.wanted.columns or self._candidates(c)]
+        if not inputs and schema.inputs_required:
+            needed.append(next(iter(stimuli)))
+        read = {c for k in order for c in schema.columns_of(k)}
+        others = [c for c in (*schema.optional, *schema.imposed) if c in read]
         sources = {}
-        for column in dict.fromkeys([*needed, *inputs[:1], *self.schema.optional]):
+        for column in dict.fromkeys([*needed, *inputs[:1], *others]):
             source = self._source(column, column in needed)
             if source is not None:
                 sources[column] = source

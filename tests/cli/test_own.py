@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from fes_pin.cli import main, own
+from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
 
 LENGTH, MASS, DAMPING, FRICTION = 0.4, 1.2, 0.05, 0.1
@@ -124,6 +125,29 @@ def test_all_that_is_missing_is_said_at_once(monkeypatch, capsys, tmp_path):
     assert "--column angle_rad=Angle:UNIT" in said and "--set moment_arm_m=NUMBER (m)" in said
     assert "--set load_kg=NUMBER (kg)" in said and "foot_mass_kg" not in said
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_kinds_are_told_by_what_they_read(monkeypatch, capsys, tmp_path):
+    time, angle, effort = TRIALS[0]
+    pulses, force = (np.arange(len(time)) % 40 == 5).astype(float), 5.0 + angle
+    muscle = tmp_path / "muscle" / "a.csv"
+    muscle.parent.mkdir()
+    muscle.write_text(plain((time, pulses, 30.0 + angle, force), ("time_s", "stim", "length_mm", "force_N")))
+    start = ("--set", "gain=10", "--set", "time_constant_s=0.05")
+    assert run(monkeypatch, "new-study", muscle, "--rig", "muscle", *start) == 0
+    (trial,) = read_study(muscle.parent).trials
+    if "imposed" in known_rigs()["muscle"].outputs:
+        assert trial.kind == "imposed" and np.allclose(trial["length_m"], 0.03 + 1e-3 * angle, atol=1e-8)
+    else:
+        assert trial.kind == "isometric" and 'ignored = ["length_mm"]' in (muscle.parent / "study.toml").read_text()
+    joint = tmp_path / "joint" / "a.csv"
+    joint.parent.mkdir()
+    joint.write_text(plain((time, angle, effort), ("time_s", "angle_rad", "torque_Nm")))
+    capsys.readouterr()
+    assert run(monkeypatch, "new-study", joint, "--rod", 0.4, 1.2) == 0
+    assert "where the motion drives: --set kind=imposed" in capsys.readouterr().out
+    assert run(monkeypatch, "new-study", joint, "--rod", 0.4, 1.2, "--set", "kind=imposed", "--force") == 0
+    assert read_study(joint.parent).trials[0].kind == "imposed"
 
 
 def test_at_a_terminal_it_asks(monkeypatch, capsys, tmp_path):

@@ -103,7 +103,7 @@ class Columns:
         time = self._time(recording, taken.get("time_s"))
         half = taken["time_s"] if "time_s" in taken else Source("")
         half_digit = abs(half.scale * half.factor) * recording.half_digit(half.name) if half.name else 0.0
-        time, columns, rows, said = self._regular(recording, time, columns, schema, called)
+        time, columns, rows, said = self._regular(recording, time, columns, schema.stimuli(kind), called)
         table = Table(
             path=Path(path),
             names=("time_s", *columns),
@@ -119,9 +119,13 @@ class Columns:
 
     def _taken(self, recording: Recording, schema: RigSchema, kind: str, inputs_only: bool) -> dict[str, Source]:
         """Sources of this file's columns; refuses what nobody has spoken for."""
-        needed = {"time_s", *schema.inputs, *(() if inputs_only else (schema.outputs[kind],))}
+        measured = () if inputs_only else (schema.outputs[kind],)
+        needed = {"time_s", *schema.stimuli(kind), *schema.motion(kind)[:1], *measured}
+        known = schema.columns_of(kind)
         taken = {}
         for column, source in self.sources.items():
+            if column not in known:  # read in trials of another kind
+                continue
             if source.name and source.name not in recording.names:
                 if column in needed:
                     message = f"missing; [columns] takes {column} from it, and this file has {_list(recording.names)}"
@@ -132,8 +136,8 @@ class Columns:
         for name in recording.names:
             if name in spoken_for:
                 continue
-            if name not in schema.columns or name in taken:
-                expected = f"this rig reads {', '.join(schema.columns)}"
+            if name not in known or name in taken:
+                expected = f"this rig reads {', '.join(known)}"
                 raise recording.error(f"expected it in [columns], or there among `ignored`; {expected}", name)
             taken[name] = Source(name)
         return {c: taken[c] for c in ("time_s", *(n for n in taken if n != "time_s")) if c in taken}
@@ -151,7 +155,7 @@ class Columns:
         recording: Recording,
         time: np.ndarray,
         columns: dict[str, np.ndarray],
-        schema: RigSchema,
+        held: tuple[str, ...],
         called: Mapping[str, str],
     ) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray, str]:
         """Times and columns without holes, the row of each sample, and what was done, in words."""
@@ -166,12 +170,12 @@ class Columns:
                 sample = int(np.argmax(np.isnan(values)))
                 raise recording.error(f"expected a number, found nothing; {hint}", called[name], sample)
         if self.fills:
-            columns, count = filled(recording, time, columns, schema.inputs, called)
+            columns, count = filled(recording, time, columns, held, called)
             said += [f"{count} missing samples are filled in"] if count else []
         rows = recording.rows
         if self.resample_hz is not None:
             steps = np.diff(time)
-            grid, columns = resampled(recording, time, columns, schema.inputs, called, self.resample_hz)
+            grid, columns = resampled(recording, time, columns, held, called, self.resample_hz)
             rows = rows[np.searchsorted(time, grid + 1e-9, side="right") - 1]
             time = grid
             was = f"{1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms"
