@@ -13,7 +13,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fes_pin as fp
+from fes_pin.cli.own import new_study
+from fes_pin.data.recorded.columns import FILE_KEYS, columns_of
 from fes_pin.data.schema import known_rigs
+from fes_pin.data.units import UNITS
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -158,8 +161,20 @@ def test_getting_started_is_a_study_that_can_be_read_and_fitted(tmp_path, monkey
     assert names["fitted"].values["damping"] == pytest.approx(damping, rel=1e-2)
 
 
+def test_getting_started_has_every_option_of_new_study():
+    page = (DOCS / "getting_started.md").read_text()
+    own = {"files": "", "setting": "set", "force": "", "library": "", "name": ""}
+    for name in inspect.signature(new_study).parameters:
+        assert not (option := own.get(name, name)) or f"--{option}" in page, name
+
+
 def test_the_study_format_shows_toml():
-    first, walking = blocks("study_format.md", "toml")
+    first, own, walking = blocks("study_format.md", "toml")
+    read = columns_of(tomllib.loads(own)["columns"], known_rigs()["joint"], True, AssertionError)
+    assert set(tomllib.loads(own)["columns"]["file"]) == set(FILE_KEYS)
+    assert read.sources["position"](np.array([90.0, 0.0])).tolist() == pytest.approx([0.0, np.pi / 2])
+    for units in UNITS.values():
+        assert all(unit in (DOCS / "study_format.md").read_text() for unit in units)
     assert tomllib.loads(first)["trial"][0]["role"] == "fit"
     assert set(tomllib.loads(walking)["trial"][0]) <= {"coordinates", "ground_reaction", "belt_speed_mps"}
 
