@@ -37,7 +37,7 @@ MOST_LOOKED_AT = 8
 LEAST_SHIFT_S = 0.1
 """Seconds by which a trial must be shifted beyond the others: muscles answer within a tenth of a second, and dry
 friction delays a motion by some hundredths."""
-SHIFTED = 0.25
+SHIFTED = 0.1
 """Share of its squared error that a shifted trial must be left with to be called so."""
 REVERSED = 0.3
 """Share of the squared error that must be left with an effort that counts the other way."""

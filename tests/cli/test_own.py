@@ -127,6 +127,19 @@ def test_all_that_is_missing_is_said_at_once(monkeypatch, capsys, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_unit_gives_a_column_away_where_no_word_does(monkeypatch, tmp_path):
+    time, angle, effort = TRIALS[0]
+    rows = "".join(
+        f"{1e3 * t:.0f};{np.degrees(q):.2f};{u:.3f};ok\n".replace(".", ",")
+        for t, q, u in zip(time, angle, effort, strict=True)
+    )
+    head = "LabDAQ 7;;;\n\nZeit;Kniegelenk;Drehmoment;Status\n[ms];[°];[Nm];\n"
+    (tmp_path / "a.csv").write_bytes((head + rows).encode("cp1252"))
+    assert run(monkeypatch, "new-study", tmp_path / "a.csv", "--rod", 0.4, 1.2) == 0
+    (trial,) = read_study(tmp_path).trials
+    assert np.allclose(trial["position"], angle, atol=1e-4) and np.allclose(trial["effort"], effort, atol=1e-3)
+
+
 def test_kinds_are_told_by_what_they_read(monkeypatch, capsys, tmp_path):
     time, angle, effort = TRIALS[0]
     pulses, force = (np.arange(len(time)) % 40 == 5).astype(float), 5.0 + angle

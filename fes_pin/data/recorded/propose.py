@@ -68,7 +68,9 @@ def propose(path: Path, schema: RigSchema, revolute: bool | None) -> Proposal:
         units = {name: stated[k] for k, name in enumerate(recording.names) if stated.get(k)}
     for name in recording.columns:
         units.setdefault(name, split_header(name)[1])
-    candidates = {c: tuple(_candidates(c, recording.columns, units, revolute)) for c in schema.columns}
+    named = {c: tuple(_candidates(c, recording.columns, units, revolute)) for c in schema.columns}
+    named = _without_doubles(named)
+    candidates = {c: found or _by_unit(c, named, units, revolute) for c, found in named.items()}
     return Proposal(recording, form, _without_doubles(candidates), units)
 
 
@@ -99,6 +101,15 @@ def _candidates(
         words = _words(bare)
         if name == column or without_unit(column) == "_".join(words) or words & _meant(column):
             yield name
+
+
+def _by_unit(
+    column: str, named: Mapping[str, tuple[str, ...]], units: Mapping[str, str], revolute: bool | None
+) -> tuple[str, ...]:
+    """Columns that no word of theirs gives away and whose unit is one of this quantity: `Kniewinkel [deg]`."""
+    taken = {name for names in named.values() for name in names}
+    quantities = quantities_of(column, revolute)
+    return tuple(n for n, unit in units.items() if unit and n not in taken and known_unit(unit, quantities))
 
 
 def _meant(column: str) -> frozenset[str]:
