@@ -7,7 +7,7 @@ measured. With the rig's inertia J and its torque tau_n(q, v, act, u) the torque
 
 which to first order is J d'' + damping d' + stiffness d, with the nominal inertia, damping and local stiffness; it is
 not cut at first order. It is in N m for a revolute joint, in N for a prismatic one. Where nothing moves the missing
-force is the smoothed residual itself, N.
+force is the smoothed residual itself, N; where the motion is imposed, so is the missing effort.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+from fes_pin.data.imposed import imposed_motion
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.noise import low_pass, thin
 from fes_pin.models.model import Model
@@ -46,7 +48,7 @@ class Missing:
     trial
         Name of the trial.
     kind
-        "torque" or "force".
+        "torque" or "force"; "effort" of an imposed motion.
     unit
         "N m" or "N".
     value
@@ -84,6 +86,11 @@ def missing_input(model: Model, measured: Trial, simulated: Trial) -> Missing:
     driven = {n: thin(v, count) for n, v in activation(rig, measured).items()}
     shown = {n: v for n, v in stimulus.items() if n != "stim"}  # a pulse is an event, not a value to plot against
     against = {"time_s": thin(measured.time - measured.time[0], count), **driven, **shown}
+    force = rig.constants.get("revolute", 1.0) == 0.0
+    if measured.kind == IMPOSED:
+        position, velocity, _ = (thin(v, count) for v in imposed_motion(measured, rig.schema.imposed).values)
+        against = {"angle": position, "rate": velocity, "time_s": against["time_s"]}
+        return Missing(measured.name, "effort", "N" if force else "N m", residual, against)
     if "v" not in rig.states(measured.kind):
         return Missing(measured.name, "force", "N", residual, against)
     q = thin(simulated[output], count)
@@ -92,7 +99,6 @@ def missing_input(model: Model, measured: Trial, simulated: Trial) -> Missing:
     moved, _ = nominal_torque(rig, measured, q + residual, v + rate, {**driven, **stimulus})
     value = inertia * np.gradient(rate, step) - (moved - without)
     against = {"angle": q + residual, "rate": v + rate, **against}
-    force = rig.constants.get("revolute", 1.0) == 0.0
     return Missing(measured.name, "force" if force else "torque", "N" if force else "N m", value, against)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.replay import Replay
 from fes_pin.diagnose.result import Diagnosis
@@ -30,7 +31,7 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
     before = _missing(diagnosis, diagnosis.nominal.model, [r.nominal for r in replays], replays)
     after = _missing(diagnosis, diagnosis.model, [r.extended for r in replays], replays) if diagnosis.causes else []
     unit = position_unit(diagnosis)
-    along = diagnosis.ahead is not None and can_track(diagnosis.model)
+    along = diagnosis.ahead is not None and any(_is_tracked(diagnosis.model, r.measured) for r in replays)
     how = (
         "the effort of a stiff servo that keeps the model on the measured motion. No free simulation takes part, for "
         "this rig's would run away"
@@ -62,9 +63,18 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
 def _missing(
     diagnosis: Diagnosis, model: Model, simulated: Sequence[Trial], replays: Sequence[Replay]
 ) -> list[Missing]:
-    if diagnosis.ahead is not None and can_track(model):
-        return [missing_along(model, r.measured) for r in replays]
-    return [missing_input(model, r.measured, one) for r, one in zip(replays, simulated, strict=True)]
+    runs_away = diagnosis.ahead is not None
+    return [
+        missing_along(model, r.measured)
+        if runs_away and _is_tracked(model, r.measured)
+        else missing_input(model, r.measured, one)
+        for r, one in zip(replays, simulated, strict=True)
+    ]
+
+
+def _is_tracked(model: Model, trial: Trial) -> bool:
+    """True where a servo can keep the model on the motion: an imposed one needs none."""
+    return can_track(model) and trial.kind != IMPOSED
 
 
 def trials_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Markup]:

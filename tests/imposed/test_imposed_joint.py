@@ -17,6 +17,7 @@ from fes_pin.models.predict import predict
 from fes_pin.models.rigs.rigid import load_urdf
 from fes_pin.models.simulate import simulate
 from fes_pin.models.store import load_model, save_model
+from fes_pin.view.missing import missing_input
 
 COLUMNS = ("position", "velocity")
 
@@ -99,3 +100,12 @@ def test_a_spring_and_damper_in_series_begin_relaxed(tmp_path):
     with_it = simulate(model + PassiveRelaxation(stiffness_nm_per_rad=2.0, relaxation_s=0.3), trial)["effort"]
     assert abs(with_it[0] - simulate(model, trial)["effort"][0]) < 1e-6
     assert isinstance(model, Model)
+
+
+def test_the_missing_effort_of_an_imposed_motion_is_the_friction_that_hides_in_it(tmp_path):
+    made, model = arm(tmp_path)
+    measured = simulate(model + CoulombFriction(torque_nm=0.5), made.trials[0])
+    found = missing_input(model, measured, simulate(model, made.trials[0]))
+    assert (found.kind, found.unit) == ("effort", "N m") and set(found.against) == {"angle", "rate", "time_s"}
+    fast = np.abs(found.against["rate"]) > 0.2 * np.abs(found.against["rate"]).max()
+    assert np.median(found.value[fast] * np.sign(found.against["rate"][fast])) == pytest.approx(0.5, abs=0.05)

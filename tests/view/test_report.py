@@ -18,9 +18,11 @@ import pytest
 from view.reported import NASTY, ankle_diagnosis, ankle_study, diagnosed, joint_study, muscle_study
 
 import fes_pin as fp
+from fes_pin.diagnose.errors_ahead import Ahead, AheadErrors, RandomPart
 from fes_pin.diagnose.record import diagnosis_record
 from fes_pin.models.describe import equation
 from fes_pin.models.effects import effect
+from fes_pin.models.predictor import Doubt
 from fes_pin.view.mathml import equations
 from fes_pin.view.report import report_html
 from fes_pin.view.report_trials import got_worse
@@ -208,6 +210,41 @@ def test_no_chance_is_zero_and_no_floor_is_a_tiny_number():
     assert "fewer than one study in 10¹²" in text and "below 0.001 %" in text and "e-08" not in text
     assert diagnosis_record(sure)["causes"][0]["p_value"] > 0.0
     assert "5.8e-08" not in str(sure)
+
+
+def driven_diagnosis(folder, free):
+    """A joint whose effort answers the reading, as if judged so; `free` is its free error."""
+    made = diagnosed(joint_study(folder), ("coulomb_friction",))
+    white = dict.fromkeys(("position", "velocity"), 1e-3)
+    doubt = Doubt(white, {"effort": 1e-3}, {"effort": 0.1})
+    before, after = Ahead(2e-4, 9.5, free), Ahead(1e-4, 0.4, free)
+    return replace(
+        made,
+        nominal=replace(made.nominal, doubt=doubt),
+        extended=replace(made.extended, doubt=doubt),
+        ahead=AheadErrors(0.3, before, after, before, after),
+        random=(RandomPart("effort", 1e-3, 0.1, 0.02),),
+        nominal_error=(free, None),
+        extended_error=(free, None),
+    )
+
+
+def test_a_driven_rig_shows_three_errors_side_by_side_and_reasons_along_its_motion(tmp_path):
+    text = checked(driven_diagnosis(tmp_path, 310.0))
+    for words in (
+        "Predicting 0.3 s ahead, the error E falls from 9.5 % to 0.4 %",
+        "one sample ahead below 0.001 %",
+        "free, from the inputs 310 % 310 %",
+        "the effort of a stiff servo that keeps the model on the measured motion",
+        "A random effort of 0.001 N m acts all the time: 2 % of what drives the rig",
+        "Simulated: 0.3 s ahead of what was measured",
+    ):
+        assert words in text, words
+
+
+def test_the_free_error_of_a_rig_that_falls_is_said_to_be_meaningless(tmp_path):
+    text = checked(driven_diagnosis(tmp_path, None))
+    assert "its free error is meaningless" in text and "meaningless: it falls" in text
 
 
 def test_the_same_diagnosis_gives_the_same_page():
