@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,15 @@ SMALLEST = 1e-6
 """Smallest random part, as a share of what drives the rig or of a reading's range: it counts as none."""
 SLOWEST = 0.5
 """Longest time constant of a random process, as a share of the longest trial: a slower one is an offset."""
+
+
+@dataclass(frozen=True)
+class _Told:
+    """Innovations that were seen, of all trials end to end, with their variances; and their cost."""
+
+    cost: float
+    innovations: np.ndarray
+    variances: np.ndarray
 
 
 class LikelihoodProblem:
@@ -79,6 +88,7 @@ class LikelihoodProblem:
         self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
         self.priors = [first_doubt(model, t) for t in starts or self.trials]
         self._predictor: Predictor | None = None
+        self._side_by_side: tuple[int, Predictor] | None = None
 
     @property
     def noise(self) -> dict[str, Noise]:
@@ -110,6 +120,17 @@ class LikelihoodProblem:
         with np.errstate(all="ignore"):
             return self.predictor.run(values, doubt or self.doubt, own)
 
+    def told(self, values: Mapping[str, float], unknowns: Unknowns, doubts: Sequence[Doubt]) -> list[_Told]:
+        """Every trial as foretold by each of several doubts, side by side in the lanes of one run."""
+        count, trials = len(doubts), len(self.trials)
+        if self._side_by_side is None or self._side_by_side[0] != count:
+            made = Predictor(self.model, self.trials * count, (), self.doubt.processes, self.priors * count)
+            self._side_by_side = (count, made)
+        own = [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)] * count
+        with np.errstate(all="ignore"):
+            run = self._side_by_side[1].run(values, [d for d in doubts for _ in range(trials)], own)
+        return [_joined(run[k * trials : (k + 1) * trials]) for k in range(count)]
+
     def foretold(self, values: Mapping[str, float]) -> list[dict[str, np.ndarray]]:
         """What is foretold of each output of each trial, shape (n,), also where nothing was measured."""
         own = [{**begin, **u} for begin, u in zip(self.begins, self.start_unknowns(), strict=True)]
@@ -132,6 +153,14 @@ class LikelihoodProblem:
     def cost(self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None) -> float:
         """Twice the negative log-likelihood."""
         return sum(one.cost() for one in self.innovations(values, unknowns, doubt))
+
+
+def _joined(run: Sequence[Innovations]) -> _Told:
+    return _Told(
+        float(sum(one.cost() for one in run)),
+        np.concatenate([one.values[one.seen] for one in run]),
+        np.concatenate([one.variances[one.seen] for one in run]),
+    )
 
 
 def first_doubt(model: Model, trial: Trial) -> dict[str, float]:
@@ -191,40 +220,39 @@ def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknown
     def at(z: np.ndarray) -> Doubt:
         return problem.doubt.with_values(dict(zip(names, (float(v) for v in np.exp(z)), strict=True)))
 
-    def joined(z: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-        run = problem.innovations(values, unknowns, at(z))
-        parts = [(one.values[one.seen], one.variances[one.seen]) for one in run]
-        cost = float(sum(one.cost() for one in run))
-        return cost, np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+    def at_all(many: np.ndarray) -> list[_Told]:
+        return problem.told(values, unknowns, [at(z) for z in many])
 
-    cost, r, v = joined(z)
+    now, *moved = at_all(z + LOG_STEP * np.eye(1 + len(z), len(z), -1))
     damping = 1e-3
-    for _ in range(steps):
-        if not math.isfinite(cost):
+    for step in range(steps):
+        if not math.isfinite(now.cost):
             break
-        moved = [joined(z + LOG_STEP * one) for one in np.eye(len(z))]
-        dr = np.stack([(m[1] - r) / LOG_STEP for m in moved], axis=1)
-        dv = np.stack([(m[2] - v) / LOG_STEP for m in moved], axis=1) / v[:, None]
-        gradient = (r / v) @ dr + 0.5 * (1.0 - r * r / v) @ dv
-        information = (dr / v[:, None]).T @ dr + 0.5 * dv.T @ dv
-        better = False
-        for _ in range(8):
-            held = ((z <= low) & (gradient > 0)) | ((z >= high) & (gradient < 0))
-            step = _damped_step(information, gradient, ~held, damping)
-            after = np.clip(z - step, low, high)
-            new = joined(after)
-            if new[0] < cost:
-                better = True
-                break
-            damping *= 10.0
-        if not better:
+        gradient, information = _scored(now, moved)
+        held = ((z <= low) & (gradient > 0)) | ((z >= high) & (gradient < 0))
+        tried = damping * 10.0 ** np.arange(1 + len(z))
+        after = np.array([np.clip(z - _damped_step(information, gradient, ~held, d), low, high) for d in tried])
+        costs = [one.cost for one in at_all(after)]
+        best = int(np.argmin(costs))
+        gained = now.cost - costs[best]
+        if not gained > 0.0:
             break
-        gained, (cost, r, v), z = cost - new[0], new, after
-        damping = max(damping * 0.3, 1e-6)
-        if gained < TOLERANCE:
-            break
+        z, damping = after[best], max(0.3 * float(tried[best]), 1e-6)
+        if gained < TOLERANCE or step == steps - 1:
+            problem.doubt = at(z)
+            return float(costs[best])
+        now, *moved = at_all(z + LOG_STEP * np.eye(1 + len(z), len(z), -1))
     problem.doubt = at(z)
-    return cost
+    return now.cost
+
+
+def _scored(now: _Told, moved: Sequence[_Told]) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient and expected information of half the cost, of logarithms; see the module."""
+    r, v = now.innovations, now.variances
+    dr = np.stack([(m.innovations - r) / LOG_STEP for m in moved], axis=1)
+    dv = np.stack([(m.variances - v) / LOG_STEP for m in moved], axis=1) / v[:, None]
+    gradient = (r / v) @ dr + 0.5 * (1.0 - r * r / v) @ dv
+    return gradient, (dr / v[:, None]).T @ dr + 0.5 * dv.T @ dv
 
 
 def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray, damping: float) -> np.ndarray:

@@ -132,7 +132,7 @@ class Predictor:
                 yield members[start : start + WIDTH]
 
     def run(
-        self, values: Mapping[str, float], doubt: Doubt, unknowns: Sequence[Mapping[str, float]]
+        self, values: Mapping[str, float], doubt: Doubt | Sequence[Doubt], unknowns: Sequence[Mapping[str, float]]
     ) -> list[Innovations]:
         """Foretell every trial.
 
@@ -141,13 +141,13 @@ class Predictor:
         values
             Every parameter of the model, by name.
         doubt
-            Of every output that a trial has.
+            Of every output that a trial has; one for all trials, or one for each.
         unknowns
             For each trial its start, and what effects have of each trial's own.
         """
         out: dict[int, Innovations] = {}
         for block in self._blocks:
-            y, s = block.run(values, doubt, unknowns, self._delay(values))
+            y, s = block.run(values, self._doubts(doubt), unknowns, self._delay(values))
             out.update(zip(block.lanes, block.innovations(y, s, len(self.columns)), strict=True))
         return [out[i] for i in range(len(self.trials))]
 
@@ -157,9 +157,14 @@ class Predictor:
         """What is foretold of every output of every trial, shape (n,) by name, measured or not; see `run`."""
         out: dict[int, dict[str, np.ndarray]] = {}
         for block in self._blocks:
-            y, _ = block.run(values, doubt, unknowns, self._delay(values))
+            y, _ = block.run(values, self._doubts(doubt), unknowns, self._delay(values))
             out.update(zip(block.lanes, block.foretold(y), strict=True))
         return [out[i] for i in range(len(self.trials))]
+
+    def _doubts(self, doubt: Doubt | Sequence[Doubt]) -> list[dict[str, float]]:
+        if isinstance(doubt, Doubt):
+            return [doubt.values()] * len(self.trials)
+        return [one.values() for one in doubt]
 
     def _delay(self, values: Mapping[str, float]) -> float:
         return total_delay(self.model, values) if self._delayed else 0.0
@@ -223,14 +228,19 @@ class _Block:
         return self._given[1]
 
     def run(
-        self, values: Mapping[str, float], doubt: Doubt, unknowns: Sequence[Mapping[str, float]], delay: float
+        self,
+        values: Mapping[str, float],
+        doubts: Sequence[Mapping[str, float]],
+        unknowns: Sequence[Mapping[str, float]],
+        delay: float,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What the program gives of all lanes; see `Program`."""
+        """What the program gives of all lanes; see `Program`. `doubts` are those of all trials, by name."""
         p = lane_values(self.layout, values, [unknowns[i] for i in self.lanes])
         shift = tuple(math.floor(delay / t.dt + 1e-9) for t in self.trials)
-        constants, known = self.constants.copy(), doubt.values()
+        constants, known = self.constants.copy(), [doubts[i] for i in self.lanes]
+        known += [known[-1]] * (WIDTH - len(known))
         for name in self.doubtful:
-            constants[self.layout.constants.index(name)] = known[name]
+            constants[self.layout.constants.index(name)] = [one[name] for one in known]
         constants[self.layout.constants.index("shift"), : len(shift)] = shift
         return self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
 
