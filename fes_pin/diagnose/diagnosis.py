@@ -21,8 +21,8 @@ from fes_pin.diagnose.long_records import searched_part, thinned
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
-from fes_pin.diagnose.search.simulation_search import NominalFitError, SimulationSearch
+from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
+from fes_pin.diagnose.search.simulation_search import NominalFitError, Searched, SimulationSearch
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.models.catalogue import Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
@@ -78,14 +78,21 @@ def diagnose(
     effects = catalogue.effects_for(nominal.rig)
     with one_thread_each():
         recorded = train if said else [t for t in study.trials if t.role != "held_out"]
+
+        def by_likelihood() -> LikelihoodSearch:
+            return LikelihoodSearch(LikelihoodFits(nominal, train, effects), seed, tell)
+
         search: SimulationSearch | LikelihoodSearch
         if any(t.kind == IMPOSED for t in train) or is_fed_back(nominal.rig, train):
-            search = LikelihoodSearch(LikelihoodFits(nominal, train, effects), seed, tell)
+            search = by_likelihood()
         else:
             search = SimulationSearch(nominal, train, recorded, seed, tell, effects)
         try:
             with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
-                searched = search.run()
+                searched: Searched | Found = search.run()
+                if isinstance(searched, Searched) and _is_undecided(searched, test):
+                    search = by_likelihood()
+                    searched = search.run()
             tell(0.88, "held-out gain")
             if isinstance(search, LikelihoodSearch):
                 diagnosis = driven_diagnosis(study, search, searched, (train, test), seed)  # type: ignore[arg-type]
@@ -102,6 +109,17 @@ def diagnose(
         warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
     found = replace(diagnosis, left_out=left_out, warnings=tuple(warnings), catalogue=catalogue)
     return replace(found, provenance=made, wall_s=time.perf_counter() - began)
+
+
+def _is_undecided(searched: Searched, test: Sequence[Trial]) -> bool:
+    """True where no set of causes leaves only noise of the reading, and there is no second trial to compare sets by.
+
+    Something acts in the rig itself then; it is a random effort to the likelihood, which one trial is enough for.
+    """
+    trials = searched.nominal.trials
+    if searched.complete or searched.stopped or len(trials) > 1 or test:
+        return False
+    return bool(searched.nominal.model.rig.driving_sizes(trials))
 
 
 def despiked_study(study: Study) -> tuple[Study, dict[str, dict[str, tuple[int, ...]]]]:
