@@ -339,7 +339,7 @@ def _covariance(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
     out = np.zeros_like(hessian)
     inner = hessian[np.ix_(free, free)]
     diagonal = np.diag(inner).copy()
-    seen = diagonal > 0
+    seen = diagonal > np.finfo(float).tiny  # the variance of what is felt less is no number
     scale = np.sqrt(np.where(seen, diagonal, 1.0))
     values, vectors = np.linalg.eigh(inner / np.outer(scale, scale) + np.diag(np.where(seen, 0.0, 1.0)))
     weak = values <= UNIDENTIFIED * max(values.max(initial=0.0), 1e-300)
