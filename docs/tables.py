@@ -5,6 +5,7 @@ Nothing here imports Sphinx: `write` makes files below `docs/_generated` and `do
 
 from __future__ import annotations
 
+import ast
 import inspect
 import math
 from collections.abc import Iterable, Sequence
@@ -218,12 +219,83 @@ def public_text() -> str:
     return table(("name", "what it is"), rows)
 
 
+REASONED = ("diagnose", "identify", "contrast")
+"""Rooms whose numbers are listed with their reasons."""
+DECIDING = {
+    "PARAMETER_PRICE",
+    "COEFFICIENT_PRICE",
+    "CLAIM_LEVEL",
+    "EXTEND_LEVEL",
+    "REFINE_LEVEL",
+    "REFUSED_LEVEL",
+    "REMAINDER_LEVEL",
+    "STRONG_LEVEL",
+    "LEVEL",
+    "CERTAIN",
+    "SHARES",
+    "FORM_SHARE",
+    "LARGE_SHARE",
+    "WHITE_SHARE",
+    "AVERAGED_S",
+    "COMPLETE_BELOW",
+    "SLOWEST_NOISE",
+    "SHORT_NOISE",
+    "FULL_NOISE",
+    "MISSPECIFIED",
+    "GROSS",
+    "WIDE",
+    "ABSORBED_BELOW",
+    "SMALL_PERCENT",
+    "FELT",
+    "RUNAWAY",
+    "GROWTH",
+    "MOST_CAUSES",
+}
+"""Those that say what is claimed, what is left and what is not testable; the others say how and how finely."""
+
+
+def numbers() -> list[tuple[str, str, str, str]]:
+    """File, name, value and reason of every number that a room's files name, in their order."""
+    root = Path(fes_pin.__file__).parent
+    files = [path for room in REASONED for path in sorted((root / room).rglob("*.py"))]
+    return [(str(path.relative_to(root)), *one) for path in files for one in _named(path)]
+
+
+def _named(path: Path) -> Iterable[tuple[str, str, str]]:
+    body = ast.parse(path.read_text()).body
+    for one, after in zip(body, [*body[1:], None], strict=True):
+        target = one.targets[0] if isinstance(one, ast.Assign) else getattr(one, "target", None)
+        value = getattr(one, "value", None)
+        if not isinstance(target, ast.Name) or not target.id.isupper() or not _is_numeric(value):
+            continue
+        reason = after.value.value if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) else ""
+        yield target.id, ast.unparse(value), " ".join(str(reason).split())
+
+
+def _is_numeric(value: ast.AST | None) -> bool:
+    parts = ast.walk(value) if value is not None else ()
+    return any(isinstance(x, ast.Constant) and type(x.value) in (int, float) for x in parts)
+
+
+def numbers_text() -> str:
+    """Numbers that decide, then the others, with their reasons."""
+    found = numbers()
+    parts = []
+    for title, wanted in (("Numbers that decide", True), ("How, how long, how finely", False)):
+        rows = [(f"`{n}`", f"`{v}`", reason, f"`{file}`") for file, n, v, reason in found if (n in DECIDING) == wanted]
+        parts.append(
+            f"## {title}\n\n{len(rows)} of {len(found)}.\n\n" + table(("name", "value", "reason", "file"), rows)
+        )
+    return "\n".join(parts)
+
+
 def write(docs: Path) -> None:
     """Write every generated page below a folder of documentation; files that would not change are left alone."""
     pages = {
         "_generated/rigs.md": rigs_text(),
         "_generated/causes.md": causes_text(),
         "_generated/public.md": public_text(),
+        "_generated/numbers.md": numbers_text(),
         **{f"api/{room}.rst": room_text(room, heading) for room, heading in ROOMS.items()},
     }
     for name, text in pages.items():

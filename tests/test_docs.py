@@ -199,3 +199,12 @@ def test_what_the_documentation_needs_is_pinned():
     wanted = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["docs"]
     pinned = {line.split("==")[0].lower() for line in (DOCS / "requirements.lock").read_text().splitlines()}
     assert {re.split(r"[<>=]", one)[0] for one in wanted} <= pinned
+
+
+@pytest.mark.parametrize("number", tables.numbers(), ids=lambda n: f"{n[0]}:{n[1]}")
+def test_every_number_of_a_verdict_has_its_reason(number):
+    assert number[3], f"{number[1]} = {number[2]} in {number[0]}: expected a reason beneath it"
+
+
+def test_the_numbers_that_decide_are_there():
+    assert {n for _, n, _, _ in tables.numbers()} >= tables.DECIDING

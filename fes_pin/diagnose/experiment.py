@@ -21,7 +21,9 @@ SEPARABLE = 2.71
 SURE = 1.645
 """Standard deviations of a likelihood ratio that 95 in 100 stay within, on one side."""
 MOST_REPEATS = 50
+"""A proposal that must be run more often than this is none."""
 SECONDS = 8.0
+"""Length of a trial that is proposed."""
 ROOM = 0.5
 """Share of the measured range by which a proposed trial may leave it on either side: a model is not known beyond."""
 ALIKE = 0.01

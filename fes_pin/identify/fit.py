@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     import pandas
 
 MAX_ITERATIONS = 60
+"""Steps of a fit, at most; what has not converged then says so."""
 CONFIDENCE_95 = normal_quantile(0.975)
+"""Half a 95 % interval of a normal variable, in standard deviations."""
 PARAMETER_PRICE = 3.84
 """Twice the log-likelihood that one more parameter must earn: chi-square with one degree of freedom at 95 %."""
 

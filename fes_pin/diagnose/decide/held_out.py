@@ -17,7 +17,9 @@ from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 
 FOLDS = 5
+"""Parts that trials are dealt to: each is foretold by the other four, which hold most of what is known."""
 RESAMPLES = 2000
+"""Bootstrap draws of a gain: the standard error of its 95 % bounds is 1.5 % of their distance, of a normal gain."""
 RUNAWAY = 10.0
 """A prediction that leaves the trials counts as this many times their largest reading: where it goes says nothing."""
 FAR = 1e6

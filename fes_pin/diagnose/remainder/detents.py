@@ -18,6 +18,7 @@ from fes_pin.models.simulate import Simulator
 from fes_pin.models.stage import Effect, Stage
 
 TURN = 2.0 * np.pi
+"""rad."""
 FEWEST, MOST = 3.0, 30.0
 """Waves within the range of motion: fewer are smooth enough for the library and the polynomials in the angle, more
 would be about a degree long on a joint that moves by half a radian."""

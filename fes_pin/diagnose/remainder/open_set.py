@@ -46,6 +46,7 @@ frequencies, also where a criterion finds it too weak to be worth the coefficien
 STRONG_LEVEL = 1e-12
 """Level at which a remainder counts although it differs from trial to trial: a spasm, not noise."""
 SIGN_DRAWS = 400
+"""Random signs of trials that a statistic's inflation is averaged over."""
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ CLAIM_LEVEL = 0.01
 REFINE_LEVEL = 1e-3
 """Level at which a refinement of an effect's form is adopted: some ten forms are tried for a set."""
 MOST_CAUSES = 3
+"""Causes that are named at most: every further one multiplies the sets."""
 BEAM = 3
 """Sets that each round extends; greedy search (1) loses 5 to 8 points of exact pairs (DESIGN section 6)."""
 JOINT_FITS = 8

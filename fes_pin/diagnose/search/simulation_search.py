@@ -18,6 +18,7 @@ from fes_pin.models.stage import Effect
 from fes_pin.workers import OutOfTime, time_limit
 
 MOST_CAUSES = 3
+"""Causes that are named at most: every further one multiplies the sets."""
 BEAM = 3
 """Sets that each round extends; greedy search (1) loses 5 to 8 points of exact pairs (DESIGN section 6)."""
 SEEDS = 4
