@@ -22,6 +22,9 @@ from fes_pin.models.model import Model
 
 REFUSED_LEVEL = 1e-6
 """Level of a cause at which something is there even if held-out trials refuse the name."""
+OF_THE_MEAN = 100.0
+"""E in percent of a prediction that is nothing but the mean of what was measured, by eq. (2): a set of causes that
+predicts worse than that, on the very trials it was fitted to, explains nothing."""
 CONTENDERS = 4
 """Sets that each fold chooses among anew."""
 
@@ -43,8 +46,14 @@ def judge_free(
         searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
         left = remainder(searched.best, seed)
         causes, held = _causes(searched, left, test, seed)
+    worthless = bool(causes) and _error(searched.best, searched.floor) > OF_THE_MEAN
+    if worthless:
+        searched, causes = search.stopped(()) if searched.stopped else search.settle(()), []
+        left, held = remainder(searched.best, seed), _held_out(searched, test)
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     left, reason = with_error(with_refused(left, refused), searched)
+    if worthless:
+        left, reason = replace(left, unexplained=True), "the best set of causes predicts worse than a mean would"
     if searched.stopped and not causes:
         left, reason = replace(left, unexplained=True), "the search was stopped before a cause earned its place"
     if not causes and not searched.complete and not searched.stopped:

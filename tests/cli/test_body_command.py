@@ -166,6 +166,7 @@ def test_nothing_is_written_or_printed_where_an_option_is_wrong(tmp_path):
         (("view", "a.html", "--mode", "99"), "--mode"),
         (("view", "a.html", "--mode", "1", "--nerve", "right_tibial"), "choose one"),
         (("view", "a.html", "--walk", "none.csv"), "none.csv"),
+        (("view", "a.html", "--walk", "/dev/null"), "/dev/null"),
     ],
 )
 def test_mistakes_are_one_line_and_exit_code_2(arguments, says):

@@ -12,15 +12,13 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library, Probe, near_null
 from fes_pin.diagnose.search.score import Projection, Scored, Scores, best_by_effect
-from fes_pin.diagnose.search.simulation_fits import is_identified
+from fes_pin.diagnose.search.simulation_fits import Names, is_identified, names_of
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.likelihood import ROUNDS, LikelihoodProblem, first_guess, maximise
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
-
-Names = tuple[str, ...]
 
 STARTS = 2
 """Shapes that a fit of a set starts from, largest score first, if it is half the largest at least."""
@@ -161,11 +159,6 @@ class LikelihoodFits:
     def ranked(self, size: int) -> list[Names]:
         """Sets of a size, cheapest first."""
         return sorted((n for n in self.fits if len(n) == size), key=lambda n: (self.fits[n].price, n))
-
-
-def names_of(fitted: Fit) -> Names:
-    """The causes in a fit."""
-    return tuple(sorted(e.name for e in fitted.model.effects))
 
 
 def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
