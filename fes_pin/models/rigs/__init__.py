@@ -18,6 +18,7 @@ __all__ = ["RIGS", "Ankle", "Joint", "Muscle", "Rig", "pulse_period"]
 
 
 def written_here() -> Iterator[type[Rig]]:
+    """The rigs of this folder's files."""
     for file in iter_modules(__path__, f"{__name__}."):
         for one in vars(import_module(file.name)).values():
             if isinstance(one, type) and issubclass(one, Rig) and one.__module__ == file.name and hasattr(one, "name"):
