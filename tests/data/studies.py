@@ -103,6 +103,31 @@ def joint(folder: Path) -> Path:
     return _write(folder, {"study.toml": JOINT, "rig.urdf": URDF, "a.csv": SWING, "b.csv": SWING})
 
 
+OWN = """[columns]
+time_s = { name = "t_ms", unit = "ms" }
+position = { name = "Angle", unit = "deg", zero = 1.5, scale = -1.0 }
+effort = { name = "Torque", unit = "mN m" }
+ignored = ["state"]
+[columns.file]
+delimiter = ";"
+decimal = ","
+header_row = 2
+first_row = 4
+comment = "#"
+missing = "interpolate"
+resample_hz = 80.0
+"""
+RECORDED = "made by hand\nt_ms;Angle;Torque;state\nms;deg;mNm;-\n# begins\n" + "".join(
+    f"{10.2 * k:.1f};{k % 7},5;{'' if k == 5 else f'-{k},25'};on\n".replace(".", ",") for k in range(40)
+)
+
+
+def own(folder: Path) -> Path:
+    """A joint's study whose recordings stay as an instrument wrote them."""
+    text = JOINT.replace("[[trial]]", f"{OWN}[[trial]]", 1)
+    return _write(folder, {"study.toml": text, "rig.urdf": URDF, "a.csv": RECORDED, "b.csv": RECORDED})
+
+
 def muscle(folder: Path) -> Path:
     return _write(folder, {"study.toml": MUSCLE, "a.csv": PULSES})
 

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
+from fes_pin.data.recorded.propose import propose
+from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
 from fes_pin.models.effects import effects_for
 from fes_pin.models.nominal import nominal_model
@@ -22,6 +24,8 @@ FILES = [
     (studies.joint, "rig.urdf"),
     (studies.joint, "a.csv"),
     (studies.muscle, "study.toml"),
+    (studies.own, "study.toml"),
+    (studies.own, "a.csv"),
 ]
 PIECES = [
     b"",
@@ -71,6 +75,19 @@ def test_spoilt_studies(tmp_path_factory, which, edits):
     folder = make(tmp_path_factory.mktemp("fuzz"))
     (folder / file).write_bytes(spoilt((folder / file).read_bytes(), edits))
     one_line_or_none(lambda: read_study(folder))
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(edits=EDITS)
+def test_any_recording_is_proposed_or_refused(tmp_path, edits):
+    path = tmp_path / "a.csv"
+    path.write_bytes(spoilt(studies.RECORDED.encode(), edits))
+    one_line_or_none(lambda: propose(path, known_rigs()["joint"], True))
+
+
+def test_the_recordings_that_are_spoilt_can_be_read(tmp_path):
+    (trial, _) = read_study(studies.own(tmp_path)).trials
+    assert trial.remarks and trial.dt == pytest.approx(1 / 80)
 
 
 NUMBERS = ["1e-200", "1e200", "-1", "0", "1_0", "inf", "1e400", "9" * 400, "", "0x10", "1 2", "{}", '""', "true"]
