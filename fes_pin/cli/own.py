@@ -35,7 +35,7 @@ Libraries = Annotated[
 def new_study(
     files: Annotated[list[Path] | None, typer.Argument(help="Recordings, one a trial.")] = None,
     rig: Annotated[
-        str | None, typer.Option(help="ankle, joint, muscle, or a rig of your own. [default: joint]")
+        str | None, typer.Option(help="ankle, body, joint, muscle, or a rig of your own. [default: joint]")
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help="Of a joint: the rig as it is believed to be.")] = None,
     pendulum: Annotated[
@@ -71,6 +71,7 @@ def new_study(
     With --pendulum, --rod or --slide and no recordings it writes the URDF alone.
     """
     from fes_pin.data.errors import InputError
+    from fes_pin.data.new_body_study import new_body_study
     from fes_pin.data.new_study import new_study as make
     from fes_pin.data.schema import IMPOSED
     from fes_pin.models.catalogue import load_library
@@ -90,7 +91,10 @@ def new_study(
         wanted = _wanted(files, rig, out, name, catalogue, template or urdf, path, resample, fill, given)
         if (wanted.folder / "study.toml").exists() and not force:
             raise InputError("is there already; --force writes over it", file=wanted.folder / "study.toml")
-        made = make(wanted, lambda known: guess_start(wanted.schema.owner, known, path))
+        if wanted.schema.owner is None:
+            made = new_body_study(wanted.files, wanted.folder, wanted.name, wanted.settings)
+        else:
+            made = make(wanted, lambda known: guess_start(wanted.schema.owner, known, path))
     study, warnings = _tried(made, wanted.folder, catalogue)
     write_files(wanted.folder, made.contents)
     for own, theirs, unit in made.taken:
@@ -149,7 +153,9 @@ def _say(study: Study, warnings: Sequence[str]) -> None:
     typer.echo(study)
     for warning in warnings:
         typer.echo(f"odd: {warning}")
-    if not warnings:
+    if study.schema.owner is None:
+        typer.echo("its files can be read; numbers of walking are not judged before a diagnosis")
+    elif not warnings:
         typer.echo("nothing is odd about its numbers")
 
 
@@ -229,9 +235,9 @@ def _wanted(
         schema = rigs[one_of(rig or "joint", tuple(rigs))]
     except ValueError as problem:
         raise InputError(str(problem), column="--rig") from None
-    if schema.owner is None:
-        raise InputError("a study of walking names two files a trial: docs/study_format.md shows one", column="--rig")
-    if ("urdf" in schema.files) != (urdf is not None):
+    if schema.owner is None and (urdf is not None or given["columns"] or resample or fill):
+        raise InputError("expected no URDF, --column, --resample or --fill for walking", column="--rig")
+    if schema.owner is not None and ("urdf" in schema.files) != (urdf is not None):
         told = "--urdf FILE, or --pendulum LENGTH MASS, --rod or --slide" if urdf is None else "no URDF"
         raise InputError(f"expected {told} for rig {schema.name}", column="--urdf")
     if urdf_file is not None and schema.check_files is not None:

@@ -141,9 +141,9 @@ class _Making:
             *self._columns(sources),
         ]
         for place, kind, conditions in zip(places, kinds, trials, strict=True):
-            text += ["", "[[trial]]", f"file = {_quoted(place)}", f"kind = {_quoted(kind)}"]
+            text += ["", "[[trial]]", f"file = {quoted(place)}", f"kind = {quoted(kind)}"]
             text += [f"{key} = {value!r}" for key, value in conditions.items()]
-        contents["study.toml"] = "\n".join([*_HEADER, *text]) + "\n"
+        contents["study.toml"] = "\n".join([*HEADER, *text]) + "\n"
         taken = tuple(
             (c, s.get("name", "from its rate"), _said(s, c, self.wanted.revolute)) for c, s in sources.items()
         )
@@ -343,7 +343,7 @@ class _Making:
             return []
         out = ["", "[columns]  # the rig's columns, as the recordings call them, and their units there"]
         out += [f"{column} = {_inline(source)}" for column, source in sources.items()]
-        out += [f"ignored = [{', '.join(map(_quoted, ignored))}]"] if ignored else []
+        out += [f"ignored = [{', '.join(map(quoted, ignored))}]"] if ignored else []
         about: dict[str, Any] = {k: v for k, v in options.items() if v is not None}
         if form is not None:
             plain_form = TextForm()
@@ -357,7 +357,7 @@ class _Making:
         return {k: n.unit for table in (schema.constants, schema.passive, schema.start) for k, n in table.items()}
 
 
-_HEADER = ("# Written by `fes-pin new-study`; every line may be changed. docs/study_format.md says what each means.",)
+HEADER = ("# Written by `fes-pin new-study`; every line may be changed. docs/study_format.md says what each means.",)
 
 
 def _table(name: str, values: Mapping[str, Any], what: str = "", units: Mapping[str, str] | None = None) -> list[str]:
@@ -371,10 +371,10 @@ def _table(name: str, values: Mapping[str, Any], what: str = "", units: Mapping[
 
 
 def _value(value: Any) -> str:
-    return _quoted(value) if isinstance(value, str) else repr(value)
+    return quoted(value) if isinstance(value, str) else repr(value)
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
     """A TOML string: JSON's escapes are a subset of its own, but for the character 127."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from fes_pin.cli import main, own
+from fes_pin.data.motion import GROUND_REACTION, REQUIRED
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
 
@@ -163,6 +164,23 @@ def test_kinds_are_told_by_what_they_read(monkeypatch, capsys, tmp_path):
     assert read_study(joint.parent).trials[0].kind == "imposed"
 
 
+def test_walking_pairs_coordinates_and_ground_reaction(monkeypatch, capsys, tmp_path):
+    time = np.arange(50) * 0.02
+    angles = np.stack([time, *(0.01 * k + 0 * time for k in range(len(REQUIRED)))])
+    forces = np.stack([time, *(1.0 * k + 0 * time for k in range(len(GROUND_REACTION)))])
+    (tmp_path / "w_grf.csv").write_text(plain(forces, ("time_s", *GROUND_REACTION)))
+    (tmp_path / "w_ik.csv").write_text(plain(angles, ("time_s", *(f"q_{n}" for n in REQUIRED))))
+    words = ["new-study", tmp_path / "w_grf.csv", tmp_path / "w_ik.csv", "--rig", "body", "--set", "mass_kg=70"]
+    assert "please add --set height_m=NUMBER (m)" in fails(monkeypatch, capsys, *words)
+    assert run(monkeypatch, *words, "--set", "height_m=1.8", "--set", "belt_speed_mps=1.1") == 0
+    study = read_study(tmp_path)
+    assert study.constants == {"mass_kg": 70.0, "height_m": 1.8} and study.trials[0].conditions["belt_speed_mps"] == 1.1
+    assert "not judged before a diagnosis" in capsys.readouterr().out
+    assert fails(monkeypatch, capsys, *words[:2], *words[3:], "--force").endswith(
+        "found 0 of coordinates and 1 of ground reaction"
+    )
+
+
 def test_at_a_terminal_it_asks(monkeypatch, capsys, tmp_path):
     time, angle, _ = TRIALS[0]
     path = tmp_path / "a.csv"
@@ -188,7 +206,8 @@ WRONG = {
     "two_urdfs": (("FILE", "--rod", 1, 1, "--slide", 2), "expected one of --pendulum, --rod and --slide"),
     "no_mass": (("FILE", "--rod", 1, 0), "mass: expected a mass above 0 kg"),
     "unknown_rig": (("FILE", "--rig", "knee"), "--rig: expected one of"),
-    "body": (("FILE", "--rig", "body"), "names two files a trial"),
+    "body": (("FILE", "--rig", "body"), "expected UTF-8 text"),
+    "body_with_a_urdf": (("FILE", "--rig", "body", "--rod", 1, 1), "expected no URDF, --column"),
     "unknown_column": (("FILE", "--rod", 1, 1, "--column", "angle=x"), "--column: unknown"),
     "no_such_column": (("FILE", "--rod", 1, 1, "--column", "position=x:deg"), "expected a column of the files"),
     "unknown_setting": (("FILE", "--rod", 1, 1, "--set", "mass=1"), "--set mass"),

@@ -1,0 +1,86 @@
+"""A study of walking made of recordings: which holds coordinates, which the ground reaction, which go together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import inside, read_bytes
+from fes_pin.data.motion import coordinates_of, ground_reaction_of, read_motion
+from fes_pin.data.new_study import HEADER, NewStudy, quoted
+from fes_pin.data.schema import BODY, unknown
+
+
+def new_body_study(files: Sequence[Path], folder: Path, name: str, settings: Mapping[str, str]) -> NewStudy:
+    """Propose a study of a walking body: the first coordinates go with the first ground reaction.
+
+    Parameters
+    ----------
+    files
+        `.mot`, `.sto` or CSV, named as the study format says; files inside the folder stay, others are copied.
+    settings
+        `mass_kg` and `height_m`, and conditions of all trials.
+
+    Raises
+    ------
+    InputError
+        A file that is neither, files that do not pair, numbers that are missing or none.
+    """
+    moves: list[Path] = []
+    pushes: list[Path] = []
+    for path in files:
+        (pushes if _is_ground_reaction(path) else moves).append(path)
+    if len(moves) != len(pushes) or not moves:
+        found = f"{len(moves)} of coordinates and {len(pushes)} of ground reaction"
+        raise InputError(f"expected as many files of joint coordinates as of ground reaction, found {found}")
+    for key in settings:
+        if key not in (known := (*BODY.constants, *BODY.conditions)):
+            raise InputError(unknown(key, known), column=f"--set {key}")
+    missing = [f"--set {key}=NUMBER ({BODY.constants[key].unit})" for key in BODY.either if key not in settings]
+    if missing:
+        raise InputError(f"the files do not say everything; please add {', '.join(missing)}")
+    contents: dict[str, str | bytes] = {}
+    rig = [f"{key} = {_number(key, settings[key])!r}" for key in BODY.either]
+    text = [*HEADER, "", "[study]", f"name = {quoted(name)}", 'rig = "body"', "", "[rig]", *rig]
+    conditions = [f"{key} = {_number(key, settings[key])!r}" for key in BODY.conditions if key in settings]
+    origins: dict[str, Path] = {}
+    for move, push in zip(moves, pushes, strict=True):
+        places = [_place(path, folder, contents) for path in (move, push)]
+        origins.update(zip(places, (move, push), strict=True))
+        text += ["", "[[trial]]", f"coordinates = {quoted(places[0])}", f"ground_reaction = {quoted(places[1])}"]
+        text += conditions
+    contents["study.toml"] = "\n".join(text) + "\n"
+    return NewStudy(contents, (), origins, ("motion",))
+
+
+def _is_ground_reaction(path: Path) -> bool:
+    """True for a ground reaction, False for joint coordinates."""
+    table, in_degrees = read_motion(path)
+    try:
+        ground_reaction_of(table)
+    except InputError:
+        coordinates_of(table, in_degrees)
+        return False
+    return True
+
+
+def _number(key: str, text: str) -> float:
+    known = {**BODY.constants, **BODY.conditions}[key]
+    try:
+        return known.check(float("" if "_" in text else text))
+    except ValueError as problem:
+        words = str(problem) if str(problem).startswith("expected") else f"expected a number, found {text[:40]!r}"
+        raise InputError(words, column=f"--set {key}") from None
+
+
+def _place(path: Path, folder: Path, contents: dict[str, str | bytes]) -> str:
+    try:
+        relative = path.absolute().relative_to(folder.absolute()).as_posix()
+        inside(folder, relative)
+        return relative
+    except ValueError:
+        if path.name in contents or (folder / path.name).exists():
+            raise InputError(f"would be copied to {path.name}, where there is a file already", file=path) from None
+        contents[path.name] = read_bytes(path)
+        return path.name
