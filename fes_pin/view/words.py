@@ -107,7 +107,7 @@ def _round(count: float) -> str:
         return f"{count:.2g}" if count < 100 else f"{round(count, 1 - math.floor(math.log10(count))):.0f}"
     digit, _, power = f"{count:.0e}".partition("e+")
     exponent = str(int(power)).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{digit} × 10{exponent}"
+    return f"10{exponent}" if digit == "1" else f"{digit} × 10{exponent}"
 
 
 def _explains(diagnosis: Diagnosis, share: float) -> str:
@@ -155,9 +155,9 @@ def _nothing(diagnosis: Diagnosis) -> list[tuple[str, Content]]:
     error = diagnosis.nominal_error[1] if diagnosis.nominal_error[1] is not None else diagnosis.nominal_error[0]
     if diagnosis.ahead is not None:
         error = (diagnosis.ahead.nominal_held_out or diagnosis.ahead.nominal).horizon
-        size = f"{percent(error)} of E, {diagnosis.ahead.horizon_s:g} s ahead"
+        size = f"E is {percent(error)}, {diagnosis.ahead.horizon_s:g} s ahead"
     else:
-        size = f"{percent(error)} of E; the noise alone is {percent(diagnosis.ceiling_percent)}"
+        size = f"E is {percent(error)}; the noise alone is {percent(diagnosis.ceiling_percent)}"
     if diagnosis.verdict == "adequate":
         unseen = diagnosis.absorbed
         hidden = f" {len(unseen)} of them could not show in these data: see below." if unseen else ""

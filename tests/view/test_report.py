@@ -160,7 +160,7 @@ def test_the_first_screen_answers_what_a_reader_asks():
     text = checked_page(ankle_page())
     for words in (
         "How large it is torque",
-        "chance alone makes a cause look so strong in one study in 1 × 10⁹",
+        "chance alone makes a cause look so strong in one study in 10⁹",
         "these data cannot tell it from quadratic damping",
         "on the trials that it was fitted to",
         "Run the trial in next_trial.csv",
