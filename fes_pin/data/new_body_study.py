@@ -8,8 +8,9 @@ from pathlib import Path
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, read_motion
-from fes_pin.data.new_study import HEADER, NewStudy, quoted
+from fes_pin.data.new_study import NewStudy
 from fes_pin.data.schema import BODY, unknown
+from fes_pin.data.study_text import HEADER, quoted
 
 
 def new_body_study(files: Sequence[Path], folder: Path, name: str, settings: Mapping[str, str]) -> NewStudy:

@@ -5,8 +5,7 @@ What the files do not say is taken from options, or asked of a person at a termi
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,10 +14,19 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import inside, read_bytes
-from fes_pin.data.recorded.columns import INTERPOLATE, SOURCE_KEYS
+from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.propose import Proposal, propose
 from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.schema import RigSchema, unknown
+from fes_pin.data.study_text import (
+    HEADER,
+    form_in_words,
+    inline_table,
+    quoted,
+    source_from_option,
+    source_in_words,
+    toml_table,
+)
 from fes_pin.data.units import known_unit, own_unit, quantities_of
 
 Ask = Callable[[str], str]
@@ -134,10 +142,10 @@ class _Making:
         files = self._urdf(contents)
         places = [self._place(path, contents) for path in self.wanted.files]
         text = [
-            *_table("study", {"name": self.wanted.name, "rig": self.schema.name}),
-            *_table("rig", {**files, **rig, **known}, "known before the trials, never fitted", self._units()),
-            *_table("rig.passive", passive, "known as well", self._units()),
-            *_table("start", start, "start values of what the nominal model fits", self._units()),
+            *toml_table("study", {"name": self.wanted.name, "rig": self.schema.name}),
+            *toml_table("rig", {**files, **rig, **known}, "known before the trials, never fitted", self._units()),
+            *toml_table("rig.passive", passive, "known as well", self._units()),
+            *toml_table("start", start, "start values of what the nominal model fits", self._units()),
             *self._columns(sources),
         ]
         for place, kind, conditions in zip(places, kinds, trials, strict=True):
@@ -145,7 +153,7 @@ class _Making:
             text += [f"{key} = {value!r}" for key, value in conditions.items()]
         contents["study.toml"] = "\n".join([*HEADER, *text]) + "\n"
         taken = tuple(
-            (c, s.get("name", "from its rate"), _said(s, c, self.wanted.revolute)) for c, s in sources.items()
+            (c, s.get("name", "from its rate"), source_in_words(s, c, self.wanted.revolute)) for c, s in sources.items()
         )
         return NewStudy(contents, taken, dict(zip(places, self.wanted.files, strict=True)), tuple(kinds))
 
@@ -153,7 +161,7 @@ class _Making:
         forms = {p.form: p for p in self.proposals}
         if len(forms) > 1:
             one, other = list(forms.items())[:2]
-            told = " and ".join(f"{p.recording.path.name} has {_form(form)}" for form, p in (one, other))
+            told = " and ".join(f"{p.recording.path.name} has {form_in_words(form)}" for form, p in (one, other))
             raise InputError(f"expected files that are written alike, but {told}; make a study of each kind")
         return self.proposals[0].form
 
@@ -204,7 +212,7 @@ class _Making:
     def _source(self, column: str, is_needed: bool) -> dict[str, Any] | None:
         option = self.wanted.columns.get(column)
         if option is not None:
-            return _from_option(column, option, self.names) if option else None
+            return source_from_option(column, option, self.names) if option else None
         candidates = self._candidates(column)
         if len(candidates) != 1:
             if not is_needed and len(candidates) < 2:
@@ -238,7 +246,7 @@ class _Making:
             self.missing.append(what)
             return None
         answer = self.wanted.ask(what.removeprefix("--column ")).strip().removeprefix(f"{column}=")
-        return _from_option(column, answer, self.names) if answer else None
+        return source_from_option(column, answer, self.names) if answer else None
 
     def _number(self, key: str, unit: str, number: Any, path: Path | None = None) -> float | None:
         """A number that somebody gave; None, and it is missing, if nobody has."""
@@ -342,7 +350,7 @@ class _Making:
         if plain and form is None and self.form is not None and not ignored and not any(options.values()):
             return []
         out = ["", "[columns]  # the rig's columns, as the recordings call them, and their units there"]
-        out += [f"{column} = {_inline(source)}" for column, source in sources.items()]
+        out += [f"{column} = {inline_table(source)}" for column, source in sources.items()]
         out += [f"ignored = [{', '.join(map(quoted, ignored))}]"] if ignored else []
         about: dict[str, Any] = {k: v for k, v in options.items() if v is not None}
         if form is not None:
@@ -350,77 +358,11 @@ class _Making:
             for key in ("delimiter", "decimal", "header_row", "first_row", "comment", "encoding"):
                 if getattr(form, key) != getattr(plain_form, key):
                     about[key] = getattr(form, key)
-        return out + _table("columns.file", about, "how the recordings are written")
+        return out + toml_table("columns.file", about, "how the recordings are written")
 
     def _units(self) -> dict[str, str]:
         schema = self.schema
         return {k: n.unit for table in (schema.constants, schema.passive, schema.start) for k, n in table.items()}
-
-
-HEADER = ("# Written by `fes-pin new-study`; every line may be changed. docs/study_format.md says what each means.",)
-
-
-def _table(name: str, values: Mapping[str, Any], what: str = "", units: Mapping[str, str] | None = None) -> list[str]:
-    if not values:
-        return []
-    out = ["", f"[{name}]" + (f"  # {what}" if what else "")]
-    for key, value in values.items():
-        unit = (units or {}).get(key, "")
-        out.append(f"{key} = {_value(value)}" + (f"  # {unit}" if unit else ""))
-    return out
-
-
-def _value(value: Any) -> str:
-    return quoted(value) if isinstance(value, str) else repr(value)
-
-
-def quoted(text: str) -> str:
-    """A TOML string: JSON's escapes are a subset of its own, but for the character 127."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _inline(source: Mapping[str, Any]) -> str:
-    return "{ " + ", ".join(f"{k} = {_value(v)}" for k, v in source.items()) + " }"
-
-
-def _from_option(column: str, option: str, names: Sequence[str]) -> dict[str, Any]:
-    """`NAME[:UNIT][,key=number ...]`, or `rate=HZ` for a file without times."""
-    where = f"--column {column}"
-    if option in names:  # whatever signs it has
-        return {"name": option}
-    first, *more = option.split(",")
-    if first.startswith("rate=") and column == "time_s":
-        return {"rate_hz": _float(first.removeprefix("rate="), where)}
-    name, colon, unit = first.rpartition(":") if first not in names else (first, "", "")
-    out: dict[str, Any] = {"name": name if colon else first} | ({"unit": unit} if unit and colon else {})
-    if out["name"] not in names:
-        raise InputError(
-            f"expected a column of the files, one of {', '.join(names)}; found {out['name']!r}", column=where
-        )
-    for pair in more:
-        key, equals, value = pair.partition("=")
-        if not equals or key not in SOURCE_KEYS:
-            raise InputError(f"expected NAME:UNIT,zero=NUMBER,scale=NUMBER; found {option!r}", column=where)
-        out[key] = _float(value, where)
-    return out
-
-
-def _float(text: str, where: str) -> float:
-    try:
-        return float("" if "_" in text else text)
-    except ValueError:
-        raise InputError(f"expected a number, found {text[:40]!r}", column=where) from None
-
-
-def _said(source: Mapping[str, Any], column: str, revolute: bool | None) -> str:
-    if "rate_hz" in source:
-        return f"{source['rate_hz']:g} Hz"
-    more = ", ".join(f"{k} {source[k]:g}" for k in ("scale", "zero", "edge") if k in source)
-    return ", ".join(filter(None, [source.get("unit") or own_unit(column, revolute), more]))
-
-
-def _form(form: TextForm | None) -> str:
-    return "another format" if form is None else form.in_words() or "commas, and one header row"
 
 
 def common_folder(files: Iterable[Path]) -> Path:

@@ -1,0 +1,90 @@
+"""A study's TOML as `fes-pin new-study` writes it, and what its options say of a column."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.recorded.columns import SOURCE_KEYS
+from fes_pin.data.recorded.text import TextForm
+from fes_pin.data.units import own_unit
+
+HEADER = ("# Written by `fes-pin new-study`; every line may be changed. docs/study_format.md says what each means.",)
+
+
+def toml_table(
+    name: str, values: Mapping[str, Any], what: str = "", units: Mapping[str, str] | None = None
+) -> list[str]:
+    """Lines of a table, with units as comments; none of an empty one."""
+    if not values:
+        return []
+    out = ["", f"[{name}]" + (f"  # {what}" if what else "")]
+    for key, value in values.items():
+        unit = (units or {}).get(key, "")
+        out.append(f"{key} = {toml_value(value)}" + (f"  # {unit}" if unit else ""))
+    return out
+
+
+def toml_value(value: Any) -> str:
+    """A string or a number as TOML."""
+    return quoted(value) if isinstance(value, str) else repr(value)
+
+
+def quoted(text: str) -> str:
+    """A TOML string: JSON's escapes are a subset of its own, but for the character 127."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def inline_table(source: Mapping[str, Any]) -> str:
+    """A table in one line."""
+    return "{ " + ", ".join(f"{k} = {toml_value(v)}" for k, v in source.items()) + " }"
+
+
+def source_from_option(column: str, option: str, names: Sequence[str]) -> dict[str, Any]:
+    """What an option says of a column: `NAME[:UNIT][,key=number ...]`, or `rate=HZ` for a file without times.
+
+    Raises
+    ------
+    InputError
+        It says something else, or names no column of the files.
+    """
+    where = f"--column {column}"
+    if option in names:  # whatever signs it has
+        return {"name": option}
+    first, *more = option.split(",")
+    if first.startswith("rate=") and column == "time_s":
+        return {"rate_hz": _number_of(first.removeprefix("rate="), where)}
+    name, colon, unit = first.rpartition(":") if first not in names else (first, "", "")
+    out: dict[str, Any] = {"name": name if colon else first} | ({"unit": unit} if unit and colon else {})
+    if out["name"] not in names:
+        raise InputError(
+            f"expected a column of the files, one of {', '.join(names)}; found {out['name']!r}", column=where
+        )
+    for pair in more:
+        key, equals, value = pair.partition("=")
+        if not equals or key not in SOURCE_KEYS:
+            raise InputError(f"expected NAME:UNIT,zero=NUMBER,scale=NUMBER; found {option!r}", column=where)
+        out[key] = _number_of(value, where)
+    return out
+
+
+def _number_of(text: str, where: str) -> float:
+    try:
+        return float("" if "_" in text else text)
+    except ValueError:
+        raise InputError(f"expected a number, found {text[:40]!r}", column=where) from None
+
+
+def source_in_words(source: Mapping[str, Any], column: str, revolute: bool | None) -> str:
+    """Unit, scale and zero of a column, for a person."""
+    if "rate_hz" in source:
+        return f"{source['rate_hz']:g} Hz"
+    more = ", ".join(f"{k} {source[k]:g}" for k in ("scale", "zero", "edge") if k in source)
+    return ", ".join(filter(None, [source.get("unit") or own_unit(column, revolute), more]))
+
+
+def form_in_words(form: TextForm | None) -> str:
+    """How a file is written, for a person."""
+    return "another format" if form is None else form.in_words() or "commas, and one header row"
