@@ -35,6 +35,10 @@ def _walk_is_there() -> bool:
 
 
 READS_WALK = "from fes_pin.body.measured_walk import"
+READS_DATA = "from fes_pin.data.datasets import fetch"
+DATA = (
+    "It needs public measured data, which are not shipped: it runs where `FES_PIN_DATA` names a folder that holds them"
+)
 WALK = "It needs measured walking, which is not shipped: it runs where `FES_PIN_DATA` names a folder that holds it"
 MINUTES = "It takes minutes: it does not run when this documentation is built"
 LONG = ("body_which_nerves", "confounded_pair")
@@ -49,6 +53,8 @@ def shown(walk: bool | None = None) -> dict[str, Shown]:
         Whether the measured walk is there; None looks for it.
     """
     out = {name: Shown(MINUTES, f"analysis/{name}.py", f"{name}.png") for name in LONG}
+    measured = [name for name in names() if READS_DATA in (ROOT / "analysis" / f"{name}.py").read_text()]
+    out |= {name: Shown(DATA, f"analysis/{name}.py", f"{name}.png") for name in measured}
     if _walk_is_there() if walk is None else walk:
         return out
     need = [name for name in names() if READS_WALK in (ROOT / "analysis" / f"{name}.py").read_text()]

@@ -42,7 +42,7 @@ class RandomEffort(RandomProcess):
 class RandomForce(RandomProcess):
     """A random force of a muscle that is held."""
 
-    name, stage, signal, rigs = "random_force", Stage.MUSCLE, "force", ("ankle", "muscle")
+    name, stage, signal, rigs = "random_force", Stage.MUSCLE, "pull", ("ankle", "muscle")
     states, random = ("force",), ("force",)
 
 

@@ -14,8 +14,8 @@ ROTARY = {"q": "rad", "y": "rad", "effort": "N m"}
 """Units of a revolute joint."""
 SLIDING = {"q": "m", "y": "m", "effort": "N"}
 """Units of a prismatic joint."""
-HELD = {**ROTARY, "y": "N"}
-"""Units where force is read."""
+HELD = {"q": "m", "y": "N", "effort": "N"}
+"""Units of a muscle, whose force is read."""
 
 
 @dataclass(frozen=True)

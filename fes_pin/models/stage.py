@@ -56,6 +56,8 @@ class Effect:
         Longest integration step that resolves it, s.
     varies
         True if its amplitudes can be other in each trial: those of what does not begin with the trial.
+    beside
+        Names of effects without which it shows little or nothing: it is screened beside them.
     each_trial
         Its amplitudes are unknowns of each trial, estimated from that trial alone; the fields keep what a trial that
         was not measured is predicted with: their nulls. All other parameters stay common to all trials.
@@ -73,6 +75,7 @@ class Effect:
     dissipative: ClassVar[bool] = False
     max_step_s: ClassVar[float] = math.inf
     varies: ClassVar[bool] = False
+    beside: ClassVar[tuple[str, ...]] = ()
 
     each_trial: bool = dataclasses.field(default=False, kw_only=True)
 

@@ -19,7 +19,7 @@ ANKLE = {
     "theta_r_rad": 1.3,
 }
 JOINT = {"inertia": 0.02, "gravity_cos": 0.1, "gravity_sin": 0.6, "revolute": 1.0}
-MUSCLE = {"threshold_us": 100.0, "saturation_us": 500.0}
+MUSCLE = {"threshold_us": 100.0, "saturation_us": 500.0, "length_m": 0.045}
 RIGS = {
     "ankle": Ankle(0.65, 0.05, 1.05e-3, 0.06, constants=ANKLE),
     "joint": Joint(1.1, 0.02, 0.95, constants=JOINT),
@@ -69,6 +69,11 @@ def trial(rig, kind, rng, n=300, dt=5e-3, **conditions):
         columns = {"pulse_width_us": pulses(rng, n, 150.0, 950.0, dt)}
     elif rig == "muscle":
         columns = {"pulse_width_us": pulses(rng, n, 80.0, 520.0, dt)}
+        if kind == "imposed":
+            columns["length_m"] = 0.045 + sum(
+                rng.uniform(0.5e-3, 2e-3) * np.sin(rng.uniform(1.0, 8.0) * time + rng.uniform(0.0, 6.0))
+                for _ in range(2)
+            )
     elif kind == "imposed":
         waves = [rng.uniform(0.1, 0.4) * np.sin(rng.uniform(2.0, 9.0) * time + rng.uniform(0.0, 6.0)) for _ in range(2)]
         columns = {"position": rng.uniform(-0.3, 0.3) + sum(waves)}

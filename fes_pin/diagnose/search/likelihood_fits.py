@@ -79,13 +79,14 @@ class LikelihoodFits:
     def _probes(self, effect: type[Effect], base: Fit) -> list[Probe]:
         """The effect with every choice of its shapes beside the nominal parameters of a fit.
 
-        Causes that the fit has are left out: the predictor follows what was measured with them or without.
+        Causes that the fit has are left out, but those that the effect shows beside: the predictor follows what was
+        measured with them or without.
         """
-        nominal = Model(base.model.rig)
+        nominal = Model(base.model.rig, tuple(e for e in base.model.effects if e.name in effect.beside))
         assert base.doubt is not None
         out = []
         for one in self.library.grid(effect):
-            key = (effect.name, tuple(one.unused().items()))
+            key = (*(nominal + one).structure(), *(nominal + one).unused_parameters().items())
             if key not in self._probing:  # its columns are those of a fit, which shares the program
                 self._probing[key] = LikelihoodProblem(nominal + one, self.trials, base.doubt)
             problem = self._probing[key]

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names
 from fes_pin.diagnose.search.score import Scored, best_pairs
@@ -26,6 +27,8 @@ REFINE_LEVEL = 1e-3
 """Level at which a refinement of an effect's form is adopted: some ten forms are tried for a set."""
 MOST_CAUSES = 3
 """Causes that are named at most: every further one multiplies the sets."""
+MOST_IMPOSED = 8
+"""The same where motion is imposed: it excites a rig as nothing else does, and a muscle is a set of such causes."""
 BEAM = 3
 """Sets that each round extends; greedy search (1) loses 5 to 8 points of exact pairs (DESIGN section 6)."""
 JOINT_FITS = 8
@@ -97,8 +100,9 @@ class LikelihoodSearch:
 
     def _search(self) -> Found:
         sets, best = self.sets, self._fallback
-        for size in range(1, MOST_CAUSES + 1):
-            self.progress(0.1 + 0.2 * size, f"sets of {size}")
+        imposed = any(t.kind == IMPOSED for t in sets.trials)
+        for size in range(1, (MOST_IMPOSED if imposed else MOST_CAUSES) + 1):
+            self.progress(min(0.1 + 0.2 * size, 0.7), f"sets of {size}")
             self._extend(size)
             first = self._refine_first(size)
             if not self.p_value(sets.fits[first], sets.fits[best]) < CLAIM_LEVEL:

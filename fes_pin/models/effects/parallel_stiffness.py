@@ -8,32 +8,38 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.models.maths import exp, ramp, sqrt
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
+
+FLAT = 1e-6
+"""Squared rate of the exponential that stands for a straight line, 1/m2."""
 
 
 @dataclass(frozen=True)
 class ParallelStiffness(Effect):
     """An extra spring across the joint.
 
-        torque - stiffness x (1 + hardening x^2),   x = q - rest_angle
+        torque - stiffness x (1 + hardening x^2),   x = q - rest_angle                a joint
+        force + stiffness (exp(a x) - 1) / a,   a = sqrt(6 hardening),   x > 0        a muscle on a lever
 
     Tell-tale: the joint is held too softly, at all speeds and activations alike, around some angle of its own.
-    Source: Winters, in Multiple Muscle Systems, Springer 1990: passive joint elasticity; it stiffens with the angle.
+    Source: Zajac, Crit. Rev. Biomed. Eng. 17 (1989), for passive muscle, which only pulls; for joints Winters,
+    in Multiple Muscle Systems, Springer 1990: passive joint elasticity; it stiffens with the angle.
     """
 
     stiffness_nm_per_rad: float = parameter(0.05, unit="{effort}/{q}", null=0.0, lower=-1.0, upper=1e8, scale=0.05)
     rest_angle_rad: float = parameter(1.6, unit="{q}", lower=-20.0, upper=20.0, scale=0.1)
     hardening_per_rad2: float = parameter(
-        0.0, unit="1/{q}2", null=0.0, lower=0.0, upper=100.0, scale=1.0, optional=True, grid=(1.0,)
+        0.0, unit="1/{q}2", null=0.0, lower=0.0, upper=1e7, scale=1.0, optional=True, grid=(1.0,)
     )
 
-    name, stage, signal, rigs = "parallel_stiffness", Stage.JOINT, "torque", ("ankle", "joint")
+    name, stage, signal, rigs = "parallel_stiffness", Stage.JOINT, "torque", ("ankle", "joint", "muscle")
 
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
         """A spring at rest in the middle of the measured motion, or at an end of it."""
-        angles = measured.get("angle_rad", measured.get("position"))
+        angles = next((measured[n] for n in ("angle_rad", "position", "length_m") if n in measured), None)
         if angles is None:
             return super().grids(measured)
         return {
@@ -43,7 +49,7 @@ class ParallelStiffness(Effect):
 
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
         """The spring rests at an angle that the joint comes near; elsewhere it would be a constant torque."""
-        angles = measured.get("angle_rad", measured.get("position"))
+        angles = next((measured[n] for n in ("angle_rad", "position", "length_m") if n in measured), None)
         if angles is None:
             return {}
         low, high = float(np.min(angles)), float(np.max(angles))
@@ -51,4 +57,7 @@ class ParallelStiffness(Effect):
 
     def apply(self, value: Any, s: Any) -> Any:
         x = s.q - self.rest_angle_rad
+        if hasattr(s, "isometric"):
+            rate = sqrt(6.0 * self.hardening_per_rad2 + FLAT)
+            return value - self.stiffness_nm_per_rad * (exp(rate * ramp(x)) - 1.0) / rate
         return value - self.stiffness_nm_per_rad * x * (1.0 + self.hardening_per_rad2 * x * x)

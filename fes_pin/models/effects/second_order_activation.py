@@ -28,7 +28,8 @@ class SecondOrderActivation(Effect):
     max_step_s = 1.25e-3
 
     def apply(self, value: Any, s: Any) -> Any:
+        s.unlagged = value
         return lag(value, s.own.lagged, self.second_s, s.step)[0]
 
     def rate(self, s: Any) -> Mapping[str, Any]:
-        return {"lagged": lag(s.act, s.own.lagged, self.second_s, s.step)[1]}
+        return {"lagged": lag(s.unlagged, s.own.lagged, self.second_s, s.step)[1]}

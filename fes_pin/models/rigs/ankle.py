@@ -18,6 +18,8 @@ from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
 from fes_pin.models.rigs.stimuli import pulse_widths
 from fes_pin.models.stage import Signals
 
+UPRIGHT = 1.5707963267948966
+"""The angle of the largest lever, pi/2 rad, where the muscle's length counts as its reference."""
 CONSTANTS = (
     "foot_mass_kg",
     "com_distance_m",
@@ -100,7 +102,7 @@ class Ankle(Rig):
         return pulse_widths(study, shape)
 
     def signals(self, kind: str) -> tuple[str, ...]:
-        muscle = ("pulse_width", "recruitment", "delay", "time_constant", "activation", "force")
+        muscle = ("pulse_width", "recruitment", "delay", "time_constant", "activation", "fibres", "force", "pull")
         joint = ("load", "net_force", "gravity_angle", "torque", "friction", "driving", "acceleration", "reading")
         return muscle + joint if kind == "motion" else muscle
 
@@ -157,7 +159,8 @@ class Ankle(Rig):
         s.time_constant = s.through("time_constant", self.time_constant_s)
         s.act_rate = (s.r - s.act) / s.time_constant
         s.drive = s.through("activation", s.act)
-        s.force = s.through("force", s.force_scale * s.drive)
+        s.bent = s.q - UPRIGHT
+        s.force = s.through("pull", s.through("force", s.through("fibres", s.force_scale * s.drive)))
         rates = {"act": s.act_rate}
         if s.kind == "motion":
             rates.update(self._joint_rates(s))

@@ -1,33 +1,35 @@
-"""A muscle held at constant length: stimulus in, force out."""
+"""A muscle held at one length, or by a lever that imposes its length: stimulus in, force out."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fes_pin.data.schema import START_S, RigSchema, not_negative, positive
+from fes_pin.data.schema import IMPOSED, START_S, RigSchema, not_negative, positive
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.maths import clip
 from fes_pin.models.parameters import HELD, parameter
-from fes_pin.models.rigs.base import Rig
+from fes_pin.models.rigs.base import Rig, imposed_now
 from fes_pin.models.rigs.stimuli import pulse_widths, trains
 from fes_pin.models.stage import Signals
 
 
 @dataclass(frozen=True)
 class Muscle(Rig):
-    """Isometric muscle: recruitment by pulse width, or by the pulses themselves, and a first-order lag.
+    """A muscle: recruitment by pulse width, or by the pulses themselves, and a first-order lag.
 
         r         = clip((w - threshold) / (saturation - threshold), 0, 1), or the recorded pulses
         tau da/dt = r - a
         F         = gain a
 
     A recorded pulse (`stim`) is an impulse of area P, the usual pulse period of the study: there a train averages
-    r = 1, and `gain` is the mean force that it settles to; one of twice the rate averages r = 2.
+    r = 1, and `gain` is the mean force that it settles to; one of twice the rate averages r = 2. Where a lever imposes
+    its length the nominal force does not depend on that; causes count it from `length_m`, the middle of the study's.
     """
 
     gain: float = parameter(30.0, unit="N", lower=1e-6, upper=1e5, scale=5.0)
@@ -39,8 +41,9 @@ class Muscle(Rig):
         start={"gain": positive(""), "time_constant_s": positive("s")},
         conditions=START_S,
         default_kind="isometric",
-        outputs={"isometric": "force_n"},
+        outputs={"isometric": "force_n", IMPOSED: "force_n"},
         inputs=("pulse_width_us", "stim"),
+        imposed=("length_m",),
     )
     elsewhere = "record the same force with another sensor, or let the muscle move a joint"
 
@@ -48,8 +51,10 @@ class Muscle(Rig):
     def of_study(cls, study: Study) -> Muscle:
         pulsed = [t for t in study.trials if "stim" in t.columns]
         period = {"pulse_period_s": pulse_period(pulsed)} if pulsed else {}
+        ends = [f(t["length_m"]) for t in study.trials if "length_m" in t for f in (np.min, np.max)]
+        middle = {"length_m": 0.5 * float(min(ends) + max(ends))} if ends else {}
         start: dict[str, Any] = dict(study.start)
-        return cls(constants={**study.constants, **period}, **start)
+        return cls(constants={**study.constants, **period, **middle}, **start)
 
     @classmethod
     def steered(cls, study: Study) -> str | None:
@@ -63,11 +68,18 @@ class Muscle(Rig):
     def other_stimuli(cls, study: Study, time: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         yield from ({"stim": train} for train in trains(time))
 
+    def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
+        forces = [t["force_n"] for t in trials if "force_n" in t.columns]
+        return {"force": max(math.sqrt(max((float(np.nanmean(f**2)) for f in forces), default=0.0)), 1e-9)}
+
     def units(self) -> Mapping[str, str]:
         return HELD
 
     def signals(self, kind: str) -> tuple[str, ...]:
-        return ("pulse_width", "recruitment", "delay", "time_constant", "activation", "force", "reading")
+        nerve = ("pulse_width", "recruitment", "delay", "time_constant")
+        if kind == IMPOSED:
+            return (*nerve, "sensitivity", "activation", "fibres", "force", "fibre", "torque", "pull", "reading")
+        return (*nerve, "activation", "force", "pull", "reading")
 
     def changeable(self, kind: str, inputs: tuple[str, ...]) -> tuple[str, ...]:
         without_width = {"pulse_width", "recruitment"} if "stim" in inputs else set()
@@ -83,16 +95,18 @@ class Muscle(Rig):
         return ("force_n",)
 
     def input_columns(self, trial: Trial) -> tuple[str, ...]:
-        return ("stim",) if "stim" in trial.columns else ("pulse_width_us",)
+        stimulus = "stim" if "stim" in trial.columns else "pulse_width_us"
+        return (stimulus, *self.schema.motion(trial.kind))
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
-        return ("threshold_us", "saturation_us", "pulse_period_s")
+        return ("threshold_us", "saturation_us", "pulse_period_s", "length_m")
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         pulsed = [trial] if "stim" in trial.columns else []
         return {
             "threshold_us": float(self.constants.get("threshold_us", 0.0)),
             "saturation_us": float(self.constants.get("saturation_us", 1.0)),
+            "length_m": float(self.constants.get("length_m", 0.0)),
             "pulse_period_s": float(self.constants.get("pulse_period_s", pulse_period(pulsed))),
         }
 
@@ -115,11 +129,40 @@ class Muscle(Rig):
     def rates(self, s: Signals) -> dict[str, Any]:
         s.r = s.delayed(s.m.r, s.m.r_before)
         s.act, s.q, s.v, s.force_scale = s.x.act, 0.0, 0.0, self.gain
+        if s.kind == IMPOSED:
+            s.q, rate, _ = imposed_now(s)
+            s.stretching, s.bent = rate, s.q - s.c.length_m - self._elongation(s)
         s.time_constant = s.through("time_constant", self.time_constant_s)
         s.act_rate = (s.r - s.act) / s.time_constant
-        s.drive = s.through("activation", s.act)
-        s.force = s.sensed = s.through("force", s.force_scale * s.drive)
+        s.drive = s.through("activation", s.through("sensitivity", s.act) if s.kind == IMPOSED else s.act)
+        if s.kind == IMPOSED:
+            s.isometric = s.through("force", s.through("fibres", s.force_scale * s.drive))
+            s.tendon = self._tendon_force(s)
+            passive = -s.through("torque", 0.0)
+            s.force = s.sensed = s.through("pull", s.tendon + passive)
+        else:
+            s.force = s.sensed = s.through("pull", s.through("force", s.force_scale * s.drive))
         return {"act": s.act_rate}
+
+    def _elongation(self, s: Signals) -> Any:
+        """Of what is in series with the fibres, m."""
+        return sum((e.elongation(s.of(e)) for e in s.effects if e.signal == "fibre"), start=0.0)
+
+    def _tendon_force(self, s: Signals) -> Any:
+        """The fibres' force at the speed at which it is also that of what is in series with them.
+
+        A spring of tension y and softness C with a damping time of half a step e holds y + e (u - U) / C, with U the
+        speed at which the muscle shortens and u that of the fibres.
+        """
+        speed = -s.stretching
+        damped = next((e for e in s.effects if hasattr(e, "factor")), None)
+        for elastic in (e for e in s.effects if e.signal == "fibre"):
+            slope = 0.5 * s.step / elastic.softness(s.of(elastic))
+            at_rest = s.own.tension - slope * speed
+            if damped is None:
+                return s.isometric
+            speed = damped.balanced(s.isometric, at_rest, slope)
+        return s.isometric if damped is None else s.isometric * damped.factor(speed)
 
     def readings(self, s: Signals) -> tuple[Any, ...]:
         self.rates(s)

@@ -1,0 +1,36 @@
+"""Force of a train of pulses is not the sum of its twitches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.models.maths import exp, log
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+LEAST = 1e-3
+"""Activation below which powers of it are not told from a straight line: it keeps derivatives finite."""
+
+
+@dataclass(frozen=True)
+class PulseSummation(Effect):
+    """Force of a train of pulses is not the sum of its twitches.
+
+        act -> (1 + saturation) c / (1 + saturation c),   c = act^(1 + cooperation)
+
+    The activation is the calcium that the pulses release; of it the binding sites take a share that saturates.
+
+    Tell-tale: a second pulse adds more than the first made, or less; at high rates force grows no more, and falls late.
+    Source: Ding, Wexler and Binder-Macleod, J. Appl. Physiol. 88 (2000): C / (K + C); Hatze, Biol. Cybern. 25 (1977),
+    and Curtin, Gardner-Medwin and Woledge, J. Exp. Biol. 201 (1998): a power of the calcium that saturates.
+    """
+
+    saturation: float = parameter(1.0, null=0.0, lower=-0.9, upper=200.0, scale=0.5)
+    cooperation: float = parameter(0.0, null=0.0, lower=-0.5, upper=4.0, scale=0.5, optional=True, grid=(1.0,))
+
+    name, stage, signal, rigs = "pulse_summation", Stage.MUSCLE, "activation", ("muscle",)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        bound = value * exp(self.cooperation * log(value * value + LEAST * LEAST) * 0.5)
+        return (1.0 + self.saturation) * bound / (1.0 + self.saturation * bound)

@@ -1,0 +1,69 @@
+"""Tendon and aponeurosis stretch: the fibres are shorter than the muscle, and move later."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fes_pin.models.maths import exp
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+RIGID = 1e-16
+"""Compliance that stands for none, m/N."""
+
+
+@dataclass(frozen=True)
+class SeriesElasticity(Effect):
+    """Tendon and aponeurosis stretch: the fibres are shorter than the muscle, and move later.
+
+        fibre length = muscle length - xi(F),   xi = compliance F + toe (1 - exp(-F / toe_force))
+
+    The fibres shorten at the speed at which their force is the tendon's, which `force_velocity` tells; without it they
+    follow at once, and the tendon only shows through `force_length`. The tendon has a damping time of half an
+    integration step, which keeps the equations regular also where the fibres carry nothing.
+
+    Tell-tale: after a quick release the force drops by the same amount per millimetre at all speeds, then recovers.
+    Source: Zajac, Crit. Rev. Biomed. Eng. 17 (1989): tendon in series, its toe region below a quarter of the largest
+    force.
+    """
+
+    compliance: float = parameter(1e-4, unit="m/N", null=0.0, lower=0.0, upper=1.0, scale=1e-4)
+    toe: float = parameter(0.0, unit="m", null=0.0, lower=0.0, upper=0.1, scale=1e-4, optional=True)
+    toe_force: float = parameter(1.0, unit="N", lower=1e-3, upper=1e4, scale=1.0, optional=True)
+
+    name, stage, signal, rigs = "series_elasticity", Stage.MUSCLE, "fibre", ("muscle",)
+    states = ("tension",)
+    beside = ("force_velocity",)
+
+    @classmethod
+    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """A toe of some hundredths of the way that was imposed, over a quarter of the force."""
+        way, force = (float(np.ptp(measured[n])) if n in measured else 0.0 for n in ("length_m", "reading"))
+        return {**super().grids(measured), "toe": (0.05 * way,), "toe_force": (max(0.25 * force, 1e-3),)}
+
+    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+        """No tendon stretches by more than a tenth of muscle and tendon under the largest force: it tears before."""
+        if "length_m" not in measured:
+            return {}
+        longest = 0.1 * float(np.max(measured["length_m"]))
+        force = max(float(np.nanmax(measured.get("reading", np.ones(1)))), 1e-9)
+        return {"compliance": (0.0, longest / force), "toe": (0.0, longest), "toe_force": (0.05 * force, force)}
+
+    def elongation(self, s: Any) -> Any:
+        """Of the tendon, m."""
+        tension = s.own.tension
+        return self.compliance * tension + self.toe * (1.0 - exp(-tension / self.toe_force))
+
+    def softness(self, s: Any) -> Any:
+        """d(elongation) / d(tension), m/N."""
+        return RIGID + self.compliance + self.toe / self.toe_force * exp(-s.own.tension / self.toe_force)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value
+
+    def rate(self, s: Any) -> Mapping[str, Any]:
+        return {"tension": (s.tendon - s.own.tension) / (0.5 * s.step)}
