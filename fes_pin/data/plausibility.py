@@ -181,7 +181,7 @@ def _imposed(study: Study) -> Iterable[str]:
     motions = [imposed_motion(t, study.schema.imposed) for t in trials]
     ends = [(float(m.values[0].min()), float(m.values[0].max())) for m in motions]
     moved = max(high for _, high in ends) - min(low for low, _ in ends)
-    if not moved > STILL * max(m.doubt[0] for m in motions):
+    if not moved > max(STILL * max(m.doubt[0] for m in motions), 1e-9 * longest):
         message = f"{name} never moves in any imposed trial: nothing but noise of {motions[0].doubt[0]:.2g} is in it"
         raise InputError(message, file=study.folder, column=name)
     bands = [m.bandwidth_hz for m in motions]
