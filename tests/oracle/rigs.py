@@ -9,6 +9,14 @@ from fes_pin.paper.equation_1 import static_torque_nm
 from oracle.causes import fatigue_rate, force_factor, joint_torque, time_constant
 
 
+def _summed(act, p):
+    """What pulses come to together."""
+    if p is None:
+        return act
+    bound = act * math.sqrt(act * act + 1e-6) ** p.get("cooperation", 0.0)
+    return (1.0 + p["saturation"]) * bound / (1.0 + p["saturation"] * bound)
+
+
 class _Muscle:
     """Activation and what follows it, for any rig that has a muscle."""
 
@@ -25,10 +33,10 @@ class _Muscle:
         c, act, wanted = self.causes, x["act"], held["r"]
         tau = time_constant(self.nominal["time_constant_s"], wanted, act, c)
         rates = {"act": (wanted - act) / tau}
-        drive = act
+        drive = summed = _summed(act, c.get("pulse_summation"))
         if "second_order_activation" in c:
             drive = x["second"]
-            rates["second"] = (act - drive) / c["second_order_activation"]["second_s"]
+            rates["second"] = (summed - drive) / c["second_order_activation"]["second_s"]
         if "fatigue" in c:
             rates["lost"] = fatigue_rate(x["lost"], act, c["fatigue"])
         if "potentiation" in c:
@@ -226,7 +234,9 @@ class Muscle(_Muscle):
     def outputs(self, x):
         force = np.array(
             [
-                self.nominal["gain"] * one.get("second", one["act"]) * force_factor(one, 0.0, 0.0, self.causes)
+                self.nominal["gain"]
+                * one.get("second", _summed(one["act"], self.causes.get("pulse_summation")))
+                * force_factor(one, 0.0, 0.0, self.causes)
                 for one in ({n: v[k] for n, v in x.items()} for k in range(len(x["act"])))
             ]
         )

@@ -26,6 +26,7 @@ TYPICAL = {
     "potentiation": {"gain": 0.1, "decay_s": 2.0},
     "electromechanical_delay": {"delay_s": 0.0217},
     "second_order_activation": {"second_s": 0.02},
+    "pulse_summation": {"saturation": 1.0},
     "rise_fall_asymmetry": {"log_ratio": 0.4},
     "force_length": {"slope_per_rad": 0.3, "curvature_per_rad2": 0.6},
     "force_velocity": {"slope_s_per_rad": 0.1},
