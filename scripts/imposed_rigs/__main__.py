@@ -1,0 +1,79 @@
+"""Make rigs follow a motion with known causes hidden, diagnose them, and count."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from fes_pin.diagnose.diagnosis import diagnose
+from imposed_rigs import joint, muscle
+
+RIGS = {"joint": joint, "muscle": muscle}
+
+
+def items(count: int, rig: str) -> list[tuple[str, str]]:
+    """Rig and cause of each of so many studies: every cause in turn, nothing ("") in every fourth."""
+    rows: list[tuple[str, str]] = []
+    for name in RIGS if rig == "all" else (rig,):
+        for k, cause in enumerate(RIGS[name].CAUSES):
+            rows += [(name, cause)] + ([(name, "")] if k % 3 == 2 else [])
+    return [rows[k % len(rows)] for k in range(count)]
+
+
+def judged(rig: str, cause: str, size: float, seed: int) -> dict[str, Any]:
+    """Make a study, diagnose it, and say how the answer compares with the truth."""
+    began = time.process_time()
+    with tempfile.TemporaryDirectory() as folder:
+        made = RIGS[rig].study((cause,) if cause else (), size, np.random.default_rng(seed), Path(folder) / "study")
+        found = diagnose(made)
+    named = [[c.name, *c.equivalents] for c in found.causes]
+    row = {"rig": rig, "cause": cause, "seed": seed, "verdict": found.verdict, "named": named}
+    return {**row, "seconds": round(time.process_time() - began, 1)}
+
+
+def table(rows: list[dict[str, Any]]) -> list[str]:
+    """Counts in words, and every study that was not answered rightly."""
+    nulls, others = ([r for r in rows if bool(r["cause"]) is full] for full in (False, True))
+    first = [r for r in others if r["named"] and r["cause"] in r["named"][0]]
+    anywhere = [r for r in others if any(r["cause"] in names for names in r["named"])]
+    alarms = [r for r in nulls if r["verdict"] != "adequate"]
+    lines = [
+        f"hidden cause in the first set: {len(first)} of {len(others)}; in any: {len(anywhere)} of {len(others)}",
+        f"alarms where nothing is hidden: {len(alarms)} of {len(nulls)}",
+    ]
+    wrong = [r for r in others if r not in first] + alarms
+    return lines + [
+        f"  {r['rig']} {r['cause'] or 'nothing'} (seed {r['seed']}): {r['verdict']} {r['named']}" for r in wrong
+    ]
+
+
+def main(
+    count: Annotated[int, typer.Option(help="How many studies.")] = 100,
+    rig: Annotated[str, typer.Option(help="joint, muscle or all.")] = "all",
+    size: Annotated[float, typer.Option(help="Of what is hidden, as a share of the effort.")] = 0.3,
+    seed: Annotated[int, typer.Option(help="Of the first; each next one has the next seed.")] = 0,
+    results: Annotated[
+        Path | None, typer.Option(help="A file of one line a study, with which a run can go on.")
+    ] = None,
+) -> None:
+    """Hide known causes in rigs that follow a motion, and count what the diagnosis makes of them."""
+    rows = [json.loads(x) for x in results.read_text().splitlines()] if results and results.exists() else []
+    done = {r["seed"] for r in rows}
+    for k, (name, cause) in enumerate(items(count, rig)):
+        if seed + k in done:
+            continue
+        rows.append(judged(name, cause, size, seed + k))
+        if results:
+            with results.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(rows[-1]) + "\n")
+    typer.echo("\n".join(table(rows)))
+
+
+if __name__ == "__main__":
+    typer.run(main)
