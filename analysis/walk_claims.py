@@ -146,6 +146,21 @@ print("neglected by one posture, N m rms")
 for k, name in enumerate(TERMS):
     print(f"{name:24s}" + "".join(f"{rms(one.neglected[k])[i]:22.2f}" for i in shown))
 total = {n: 100 * np.linalg.norm(e.full - e.linear) / np.linalg.norm(e.full) for n, e in variants.items()}
+print(
+    "by the posture that one linearizes at, percent of the torque: whole stance, and the tenth of it about the posture"
+)
+for share in (0.1, 0.3, 0.5, 0.7, 0.9):
+    here = along(rooted, [share])
+    near = np.abs(np.arange(len(rooted.time)) / len(rooted.time) - share) < 0.05
+    still = along(rooted, [share], moving=True)
+    parts = [
+        100 * np.linalg.norm((e.full - e.linear)[rows]) / np.linalg.norm(e.full[rows])
+        for e, rows in ((here, slice(None)), (here, near), (still, slice(None)), (still, near))
+    ]
+    print(
+        f"  at {100 * share:3.0f} % of the stance: at rest {parts[0]:4.0f}, {parts[1]:4.0f}; "
+        f"with E and a0 {parts[2]:4.0f}, {parts[3]:4.0f}"
+    )
 print("all joints together, percent: " + ", ".join(f"{n} {v:.1f}" for n, v in total.items()))
 
 # %% Passive torques

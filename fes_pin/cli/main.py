@@ -90,8 +90,12 @@ def diagnose(
         check_table(table)
     check_folder(out)  # what cannot be read or written is said before any work
     if measured.rig == "body":
+        if library:
+            from fes_pin.data.errors import InputError
+
+            raise InputError("--library brings causes of rigs; walking has none but its own")
         with _progress() as tell:
-            verdict = diagnose_walking(measured, out, seed, tell)
+            verdict = diagnose_walking(measured, out, seed, limit, tell)
         typer.echo(f"{verdict}\nreport: {out / 'report.html'}")
         return
     from fes_pin.diagnose.diagnosis import diagnose as find

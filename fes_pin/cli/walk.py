@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from fes_pin.data.study import Study
 
 
-def diagnose_walking(study: Study, out: Path, seed: int, tell: Callable[[float, str], None]) -> str:
+def diagnose_walking(
+    study: Study, out: Path, seed: int, limit: float | None, tell: Callable[[float, str], None]
+) -> str:
     """Diagnose a study of rig `body`, write its files and give its verdict as text.
 
     Raises
@@ -21,13 +23,17 @@ def diagnose_walking(study: Study, out: Path, seed: int, tell: Callable[[float, 
         The study's files cannot be used, or the folder cannot be written.
     """
     from fes_pin.data.files import write_files
-    from fes_pin.view.walk_report import walk_report_html
+    from fes_pin.view.walk_playback import show_reactions
+    from fes_pin.view.walk_report import PLAYBACK_FILE, walk_report_html
     from fes_pin.walk.diagnosis import diagnose_walk
     from fes_pin.walk.text import NEXT_FILE, verdict_text, walk_files
 
-    diagnosis = diagnose_walk(study, seed=seed, progress=lambda share, words: tell(0.9 * share, words))
+    diagnosis = diagnose_walk(study, seed=seed, limit=limit, progress=lambda share, words: tell(0.9 * share, words))
     tell(0.9, "report")
     files = {**walk_files(diagnosis), "report.html": walk_report_html(diagnosis)}
+    tell(0.95, "playback")
+    first = diagnosis.search.recordings[0]
+    files[PLAYBACK_FILE] = show_reactions(first.motion, first.plates, f"{study.name}, {first.name}").html()
     write_files(out, files, without={NEXT_FILE} - set(files))
     return verdict_text(diagnosis)
 

@@ -27,8 +27,14 @@ OPTIONAL = (
 GROUND_REACTION = tuple(f"{side}_{kind}{axis}" for side in "rl" for kind in ("F", "cop", "T") for axis in "xyz")
 
 _OPENSIM_GROUND = re.compile(
-    r"^(?P<before>1_|r_|l_|)ground_(?P<what>force|torque|moment)_(?:(?P<foot>[rl]|calcn_[rl])_)?(?P<kind>[vpm]?)(?P<axis>[xyz])$"
+    r"^(?P<before>(?:[12rl]|right|left)_|)ground_(?P<what>force|torque|moment)"
+    r"_?(?:(?P<foot>[12rl]|right|left|calcn_[rl])_)?(?P<kind>[vpm]?)(?P<axis>[xyz])$",
+    re.IGNORECASE,
 )
+BESIDE_M = 0.02
+"""How far apart two plates' centres of pressure lie sideways at least, for the right foot's to be told."""
+BENT_RAD, BACK_RAD = 0.7, -0.26
+"""Knees that both pass the first and never the second count flexion positive: none extends 0.7 rad beyond straight."""
 
 
 def read_motion(path: str | Path) -> tuple[Table, bool | None]:
@@ -119,7 +125,16 @@ def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarra
         if name.startswith(("q_", "qd_", "qdd_")):
             angle = name.split("_", 1)[1] not in TRANSLATIONS
             columns[name] = table.column(original) * (np.pi / 180.0 if in_degrees and angle else 1.0)
-    return columns
+    return _knees_as_gait2354(columns)
+
+
+def _knees_as_gait2354(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Flexion negative, as gait2354 has it; Rajagopal's model counts it positive (IEEE Trans. Biomed. Eng. 63:2068)."""
+    knees = [columns[f"q_knee_angle_{side}"] for side in "rl"]
+    if not all(knee.max() > BENT_RAD and knee.min() > BACK_RAD for knee in knees):
+        return columns
+    turned = {f"{kind}_knee_angle_{side}" for kind in ("q", "qd", "qdd") for side in "rl"}
+    return {name: -values if name in turned else values for name, values in columns.items()}
 
 
 def _coordinate(name: str) -> str:
@@ -135,7 +150,8 @@ def read_ground_reaction(path: str | Path) -> tuple[np.ndarray, dict[str, np.nda
     """Ground reaction of both feet at its own sample rate.
 
     A .mot or .sto file may name its columns as OpenSim does. Where it names no foot, `ground_force_...` is the right
-    one and `1_ground_force_...` the left one, as in OpenSim's gait examples.
+    one and `1_ground_force_...` the left one, as in OpenSim's gait examples; of plates 1 and 2 the right foot's is that
+    whose centre of pressure lies further to the right, z in OpenSim's axes.
 
     Returns
     -------
@@ -156,6 +172,11 @@ def read_ground_reaction(path: str | Path) -> tuple[np.ndarray, dict[str, np.nda
 def ground_reaction_of(table: Table) -> dict[str, np.ndarray]:
     """The ground reaction that a table holds; see `read_ground_reaction`."""
     names = {(_ground(name) if table.delimiter is None else name): name for name in table.names[1:]}
+    if "2_Fy" in names:
+        right = _right_plate(table, names)
+        names = {{right: "r", "12".replace(right, ""): "l"}.get(n[0], n[0]) + n[1:]: name for n, name in names.items()}
+    else:
+        names = {("l" if n.startswith("1_") else n[0]) + n[1:]: name for n, name in names.items()}
     for name in GROUND_REACTION:
         if name not in names:
             raise _missing(table, name, table.names)
@@ -163,13 +184,29 @@ def ground_reaction_of(table: Table) -> dict[str, np.ndarray]:
 
 
 def _ground(name: str) -> str:
+    """`ground_force_r_vx` as `r_Fx`, and so without a foot; of a numbered plate `1_Fx`."""
     found = _OPENSIM_GROUND.match(name)
     if not found:
         return name
-    foot = found["foot"] or found["before"]
-    side = foot.strip("_")[-1:] if foot not in ("", "1_") else ("r" if not foot else "l")
-    kind = "T" if found["what"] != "force" or found["kind"] == "m" else {"p": "cop"}.get(found["kind"], "F")
-    return f"{side}_{kind}{found['axis']}"
+    foot = (found["foot"] or found["before"]).lower().strip("_").removeprefix("calcn_")[:1] or "r"
+    kind = found["kind"].lower()
+    kind = "T" if found["what"].lower() != "force" or kind == "m" else {"p": "cop"}.get(kind, "F")
+    return f"{foot}_{kind}{found['axis'].lower()}"
+
+
+def _right_plate(table: Table, names: Mapping[str, str]) -> str:
+    """Which of plates 1 and 2 is under the right foot."""
+    across = {}
+    for plate in "12":
+        if not {f"{plate}_Fy", f"{plate}_copz"} <= set(names):
+            raise table.error("missing", next(n for n in ("Fy", "copz") if f"{plate}_{n}" not in names))
+        load = np.clip(table.column(names[f"{plate}_Fy"]), 0.0, None)
+        across[plate] = float(load @ table.column(names[f"{plate}_copz"]) / max(load.sum(), 1e-9))
+    if abs(across["1"] - across["2"]) < BESIDE_M:
+        raise table.error(
+            "expected columns that name the foot, r_ and l_: the plates' order does not tell it", names["1_Fy"]
+        )
+    return max(across, key=lambda plate: across[plate])
 
 
 def _missing(table: Table, name: str, names: tuple[str, ...]) -> InputError:

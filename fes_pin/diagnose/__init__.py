@@ -11,8 +11,8 @@ class _Chapter(ModuleType):
     """The chapter and its verb share a name, so the chapter answers a call."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """See `fes_pin.diagnose.diagnosis.diagnose`."""
-        from fes_pin.diagnose.diagnosis import diagnose  # noqa: PLC0415
+        """See `fes_pin.verdict.diagnose`."""
+        from fes_pin.verdict import diagnose  # noqa: PLC0415
 
         return diagnose(*args, **kwargs)
 

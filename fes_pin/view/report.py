@@ -30,17 +30,23 @@ from fes_pin.view.report_causes import causes_section, stage_mark, value_and_int
 from fes_pin.view.report_trials import missing_section, position_unit, trials_section
 from fes_pin.view.style import unit_of
 from fes_pin.view.words import answers, title
+from fes_pin.walk.diagnosis import WalkDiagnosis
 
 
-def report(diagnosis: Diagnosis, path: str | Path) -> None:
-    """Write the report of a diagnosis, whole or not at all.
+def report(diagnosis: Diagnosis | WalkDiagnosis, path: str | Path) -> None:
+    """Write the report of a diagnosis, of a rig's or of walking's, whole or not at all.
 
     Raises
     ------
     InputError
         If the file cannot be written.
     """
-    write_text(path, report_html(diagnosis))
+    if isinstance(diagnosis, Diagnosis):
+        write_text(path, report_html(diagnosis))
+        return
+    from fes_pin.view.walk_report import walk_report_html  # noqa: PLC0415
+
+    write_text(path, walk_report_html(diagnosis))
 
 
 def report_html(diagnosis: Diagnosis) -> str:

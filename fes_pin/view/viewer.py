@@ -22,6 +22,7 @@ from fes_pin.body.joints import JOINTS
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode
 from fes_pin.data.errors import InputError
+from fes_pin.view.arrows import Arrow, arrow_commands
 
 FRAMES_A_SECOND = 30
 MODE_SWING_DEG, MODE_PERIOD_S = 12.0, 2.0
@@ -42,14 +43,18 @@ class Scene:
         Text shown on the page.
     fps
         Frames a second of motions.
+    opacity
+        Of the body, 0 to 1: what lies within it is seen through it.
     """
 
     body: Body
     caption: str = ""
     fps: int = FRAMES_A_SECOND
+    opacity: float = 1.0
     frames: list[np.ndarray] = field(default_factory=list)
     roots: list[pin.SE3] = field(default_factory=list)
     balls: list[tuple[np.ndarray, float, int]] = field(default_factory=list)
+    arrows: list[Arrow] = field(default_factory=list)
 
     def pose(self, posture) -> Scene:
         """Show one posture (as `Body.angles` takes it)."""
@@ -107,7 +112,8 @@ class Scene:
         for k, shape in enumerate(shapes.geometryObjects):
             geometry, _ = _meshcat_geometry(shape.geometry)
             red, green, blue = (int(255 * c) for c in shape.meshColor[:3])
-            material = MeshLambertMaterial(color=(red << 16) + (green << 8) + blue)
+            colour = (red << 16) + (green << 8) + blue
+            material = MeshLambertMaterial(color=colour, opacity=self.opacity, transparent=self.opacity < 1.0)
             out.append(SetObject(geometry, material, Place(("meshcat", "body", str(k)))))
         for k, (_, radius, colour) in enumerate(self.balls):
             ball = SetObject(Sphere(radius), MeshLambertMaterial(color=colour), Place(("meshcat", "ball", str(k))))
@@ -127,6 +133,8 @@ class Scene:
                 if len(self.frames) > 1:
                     _key(animation, path, t, matrix)
         out += [SetTransform(_moved(c), Place(("meshcat", "ball", str(k)))) for k, (c, _, _) in enumerate(self.balls)]
+        for number, arrow in enumerate(self.arrows):
+            out += arrow_commands(arrow, str(number), animation)
         if len(self.frames) > 1:
             out.append(SetAnimation(animation, play=True, repetitions=1_000_000))
         return out

@@ -17,6 +17,8 @@ from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.text import BODY_FILE, cause_row, footnotes, headline
 
+PLAYBACK_FILE = "playback.html"
+
 
 def walk_report_html(diagnosis: WalkDiagnosis) -> str:
     """The report as one HTML page that needs nothing else: no network, no script."""
@@ -27,7 +29,7 @@ def walk_report_html(diagnosis: WalkDiagnosis) -> str:
 def _html(diagnosis: WalkDiagnosis) -> str:
     words = headline(diagnosis)
     strides = diagnosis.search.strides.count
-    partly = " partly" if diagnosis.causes and diagnosis.unexplained else ""
+    partly = " partly" if diagnosis.causes and diagnosis.remainder.unexplained else ""
     head = element(
         "header",
         element("p", f"{diagnosis.study.name} · rig body · {strides} strides", class_="eyebrow"),
@@ -54,8 +56,8 @@ def _facts(diagnosis: WalkDiagnosis) -> Markup:
             shown = f"{percent(before[k])} → {percent(after[k])}" if diagnosis.causes else percent(before[k])
             rows.append((f"error E, {where}", shown, "nominal → extended" if diagnosis.causes else "nominal"))
     rows.append(("stride to stride", percent(diagnosis.ceiling_percent), "of E: no model of the mean stride takes it"))
-    state = "something" if diagnosis.unexplained else "nothing"
-    rows.append(("comes again in every stride", state, probability(diagnosis.left_p_value)))
+    state = "something" if diagnosis.remainder.unexplained else "nothing"
+    rows.append(("comes again in every stride", state, probability(diagnosis.remainder.p_value)))
     cells = [element("div", element("dt", t), element("dd", v, element("small", note))) for t, v, note in rows]
     return element("dl", joined(cells), class_="facts")
 
@@ -87,7 +89,10 @@ def _use(diagnosis: WalkDiagnosis) -> list[Markup]:
     python = (
         f'import fes_pin as fp\n\nbody = fp.Body.from_urdf("{BODY_FILE}")\nlinear = fp.linearize(body, "mid_stance")'
     )
-    return [element("p", "The extended body stands beside this page."), element("pre", python)]
+    return [
+        element("p", f"The extended body stands beside this page, the walk to be watched in {PLAYBACK_FILE}."),
+        element("pre", python),
+    ]
 
 
 def _trials(diagnosis: WalkDiagnosis) -> list[Markup]:

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.walk.effect import STAGE
 from fes_pin.walk.experiment import NextExperiment, next_experiment
-from fes_pin.walk.judge import Gain, error_percent, floor_percent, gain, other_leg, remainder, unseen
+from fes_pin.walk.judge import Gain, error_percent, evidence, floor_percent, gain, other_leg, remainder, unseen
 from fes_pin.walk.likelihood import white_level
 from fes_pin.walk.recording import recordings_of
-from fes_pin.walk.search import LEVEL, SEPARABLE, Search, Set
-from fes_pin.workers import one_thread_each
+from fes_pin.walk.search import LEVEL, SEPARABLE, Nulls, Search, Set
+from fes_pin.workers import one_thread_each, time_limit
 
 LEFT_LEVEL = 0.01
 """Level at which what is left counts as something."""
@@ -31,6 +34,14 @@ SURE = 3.0
 Progress = Callable[[float, str], None]
 
 
+class Estimate(NamedTuple):
+    """A value with its standard deviation and unit."""
+
+    value: float
+    std: float
+    unit: str
+
+
 @dataclass(frozen=True)
 class WalkCause:
     """One named cause.
@@ -40,7 +51,7 @@ class WalkCause:
     name, site
         What, and where or how.
     parameters
-        By name: value, standard deviation, unit.
+        By name.
     equivalents
         Other causes that these data cannot tell from it.
     elsewhere
@@ -48,30 +59,50 @@ class WalkCause:
     p_value
         Of such a gain where nothing is wrong, over the whole library.
     gain_fit, gain_held_out
-        On all strides, and on strides that took no part in its size; the second is None for one stride.
+        In percent on all strides, and on strides that took no part in its size; the second is None for one stride.
+    evidence
+        How much likelier strides are that took no part, in percent of what they are unlikely by without it; or None.
     other_leg_percent
         Gain on one leg's single supports of sizes fitted to the other's; only for what belongs to neither leg.
     """
 
     name: str
     site: str
-    parameters: dict[str, tuple[float, float, str]]
+    parameters: dict[str, Estimate]
     equivalents: tuple[str, ...]
     elsewhere: tuple[str, ...]
     p_value: float
-    gain_fit: Gain
+    gain_fit: float
     gain_held_out: Gain | None
+    evidence: Gain | None = None
     other_leg_percent: float | None = None
     stage: str = STAGE
 
     def helps(self) -> bool:
         """Whether what took no part speaks for it: strides held out; for what belongs to neither leg, other stances.
 
+        By likelihood: squared errors are mostly what landmarks and plates make in every session.
+
+        What chance does as well without a cause that was refused is none either.
+
         A single stride leaves nothing out: then only what is certain is named.
         """
-        if self.gain_held_out is None:
+        if self.evidence is None:
             return self.p_value < CERTAIN and (self.other_leg_percent is None or self.other_leg_percent > 0.0)
-        return self.gain_held_out.low > 0.0 and (self.other_leg_percent is None or self.other_leg_percent > 0.0)
+        return (
+            self.p_value < LEVEL
+            and self.evidence.low > 0.0
+            and (self.other_leg_percent is None or self.other_leg_percent > 0.0)
+        )
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Whether what is left comes again in every stride, its p-value, and where it is largest."""
+
+    unexplained: bool
+    p_value: float
+    where: str | None
 
 
 @dataclass(frozen=True)
@@ -84,12 +115,14 @@ class WalkDiagnosis:
         "adequate", "causes_found" or "unexplained".
     causes
         By held-out gain, largest first.
-    unexplained, left_p_value, left_where
-        Whether what is left comes again in every stride, its p-value, and where it is largest.
+    remainder
+        Whether what is left comes again in every stride.
     absorbed
         Causes that these data could not show.
     nominal_error, extended_error
         E in percent: on all strides, and held out.
+    warnings
+        What could not be done, one line each.
     search, best
         The fits behind it.
     """
@@ -97,9 +130,7 @@ class WalkDiagnosis:
     study: Study
     verdict: str
     causes: tuple[WalkCause, ...]
-    unexplained: bool
-    left_p_value: float
-    left_where: str | None
+    remainder: Remainder
     absorbed: tuple[str, ...]
     nominal_error: tuple[float, float | None]
     extended_error: tuple[float, float | None]
@@ -109,6 +140,14 @@ class WalkDiagnosis:
     best: Set = field(repr=False, compare=False)
     cutoff_hz: float = CUTOFF_HZ
     wall_s: float = field(default=0.0, compare=False)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def model(self) -> Body:
+        """The body with the masses, centres and inertias that were found."""
+        from fes_pin.walk.extended import extended_body  # noqa: PLC0415
+
+        return extended_body(self)
 
     def __str__(self) -> str:
         from fes_pin.walk.text import verdict_text  # noqa: PLC0415
@@ -117,7 +156,12 @@ class WalkDiagnosis:
 
 
 def diagnose_walk(
-    study: Study, *, seed: int = 0, cutoff_hz: float = CUTOFF_HZ, progress: Progress | None = None
+    study: Study,
+    *,
+    seed: int = 0,
+    cutoff_hz: float = CUTOFF_HZ,
+    limit: float | None = None,
+    progress: Progress | None = None,
 ) -> WalkDiagnosis:
     """Find out what the believed body and its measurements get wrong in measured walking.
 
@@ -129,6 +173,9 @@ def diagnose_walk(
         Of what is simulated: soft tissue, critical values, bootstrap intervals.
     cutoff_hz
         Of the zero-phase low pass that motion (where its rates are not in the file) and plates go through.
+    limit
+        Seconds that the search may take; then it stops at the best set so far, and says so. Inverse dynamics, and what
+        is done with that set, come on top.
     progress
         Called with a share done and a few words.
 
@@ -147,14 +194,16 @@ def diagnose_walk(
         _, recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
         search = Search(recordings, cutoff_hz, seed)
         tell(0.3, "sets of causes")
-        sizes = search.run()
+        with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
+            sizes = search.run()
         tell(0.7, "critical values")
-        nulls = search.null_gains(sizes[-1], seed)
-        best = _chosen(sizes, max(float(np.quantile(nulls, 1.0 - LEVEL)), 0.0))
+        nulls = search.nulls(sizes[-1], seed)
+        best = _chosen(sizes, nulls.critical(LEVEL))
         tell(0.85, "strides held out")
         out = _judged(study, search, best, nulls, seed)
     tell(1.0, "done")
-    return replace(out, cutoff_hz=cutoff_hz, wall_s=time.perf_counter() - began)
+    stopped = (f"the search was stopped at its limit of {limit:g} s: best set so far",) if search.was_stopped else ()
+    return replace(out, cutoff_hz=cutoff_hz, warnings=stopped, wall_s=time.perf_counter() - began)
 
 
 def _chosen(sizes: list[Set], critical: float) -> Set:
@@ -167,7 +216,7 @@ def _chosen(sizes: list[Set], critical: float) -> Set:
     return best
 
 
-def _judged(study: Study, search: Search, best: Set, nulls: np.ndarray, seed: int) -> WalkDiagnosis:
+def _judged(study: Study, search: Search, best: Set, nulls: Nulls, seed: int) -> WalkDiagnosis:
     many = search.strides.count > 1
     refused = False
     causes = _causes(search, best, nulls, seed)
@@ -181,16 +230,14 @@ def _judged(study: Study, search: Search, best: Set, nulls: np.ndarray, seed: in
         named.append(noise)
     p_value, where = remainder(search, best)
     left = refused or p_value < LEFT_LEVEL
-    order = sorted(named, key=lambda c: -(c.gain_held_out or c.gain_fit).percent)
+    order = sorted(named, key=lambda c: -(c.gain_held_out.percent if c.gain_held_out else c.gain_fit))
     none = search.fit(())
     in_a_set = {n for c in named for n in (c.name, *c.equivalents)}  # these may be what is there
     return WalkDiagnosis(
         study=study,
         verdict="causes_found" if named else ("unexplained" if left else "adequate"),
         causes=tuple(order),
-        unexplained=left,
-        left_p_value=p_value,
-        left_where=where if left else None,
+        remainder=Remainder(left, p_value, where if left else None),
         absorbed=tuple(n for n in unseen(search, best) if n not in in_a_set),
         nominal_error=(error_percent(search, none, False), error_percent(search, none, True) if many else None),
         extended_error=(error_percent(search, best, False), error_percent(search, best, True) if many else None),
@@ -201,7 +248,7 @@ def _judged(study: Study, search: Search, best: Set, nulls: np.ndarray, seed: in
     )
 
 
-def _causes(search: Search, best: Set, nulls: np.ndarray, seed: int) -> list[tuple[int, WalkCause]]:
+def _causes(search: Search, best: Set, nulls: Nulls, seed: int) -> list[tuple[int, WalkCause]]:
     sizes = search.sizes(best)
     spread = np.sqrt(np.diag(best.fitted.covariance))
     owners = [i for i in best.forms for _ in search.forms[i].parameters]
@@ -212,7 +259,7 @@ def _causes(search: Search, best: Set, nulls: np.ndarray, seed: int) -> list[tup
     out = []
     for i in best.forms:
         form, without = search.forms[i], search.fit(tuple(k for k in best.forms if k != i))
-        stds = [s for owner, s in zip(owners, spread, strict=True) if owner == i]
+        stds = [s for owner, s in zip(owners, spread, strict=True) if owner == i] * np.maximum(nulls.spread[i], 1.0)
         instead = [search.forms[k] for r in rivals[i] for k in r.forms if k not in best.forms]
         others = tuple(sorted({f.cause for f in instead} - {form.cause}))
         sites = tuple(dict.fromkeys(f.site for f in instead if f.cause == form.cause))
@@ -224,14 +271,15 @@ def _causes(search: Search, best: Set, nulls: np.ndarray, seed: int) -> list[tup
                     name=form.cause,
                     site=form.site,
                     parameters={
-                        n: (float(v), float(s), u)
+                        n: Estimate(float(v), float(s), u)
                         for n, v, s, u in zip(form.parameters, sizes[i], stds, form.units, strict=True)
                     },
                     equivalents=others,
                     elsewhere=sites,
-                    p_value=_tail(without.price - best.price, nulls),
-                    gain_fit=gain(search, without, best, False, seed),
+                    p_value=nulls.p_value(without.price - best.price),
+                    gain_fit=gain(search, without, best, False, seed).percent,
                     gain_held_out=gain(search, without, best, True, seed) if search.strides.count > 1 else None,
+                    evidence=evidence(search, without, best, seed) if search.strides.count > 1 else None,
                     other_leg_percent=other_leg(search, search.fit((i,))) if either else None,
                 ),
             )
@@ -239,29 +287,30 @@ def _causes(search: Search, best: Set, nulls: np.ndarray, seed: int) -> list[tup
     return out
 
 
-def _tail(value: float, nulls: np.ndarray) -> float:
-    """Chance of at least this where nothing is wrong: the maxima's Gumbel distribution, by moments."""
-    scale = float(np.std(nulls)) * np.sqrt(6.0) / np.pi
-    place = float(np.mean(nulls)) - 0.5772156649 * scale
-    return float(max(-np.expm1(-np.exp(-(value - place) / max(scale, 1e-6))), 1e-300))
+def white_noise(search: Search) -> tuple[float, float, float] | None:
+    """White noise of markers, mm, its standard deviation, and the deviance that it saves; None for a single stride."""
+    if search.strides.count < 2:
+        return None
+    y = search.strides.coefficients([s.residual[:, :, None] for s in search.banks[False].scenes])[..., 0]
+    waves = search.noise.harmonics > 0
+    values, vectors = np.linalg.eigh(search.jitter[..., waves].mean(axis=2))
+    turn = (vectors / np.sqrt(values)).T  # channels in which white noise of the coordinates is independent
+    noise = replace(search.noise, turn=turn)
+    apart = noise.rotated((y - y.mean(axis=0)) * np.sqrt(len(y) / (len(y) - 1.0)))
+    jitter = np.einsum("ai,ijk,aj->ak", turn, search.jitter, turn)
+    level, std, saved = white_level(apart, noise, jitter)
+    return level, std * np.sqrt(len(y) / (len(y) - 1.0)), saved
 
 
 def _marker_noise(search: Search) -> WalkCause | None:
     """White noise on the coordinates that is more than cameras' own, from what differs from stride to stride."""
-    if search.strides.count < 2:
-        return None
-    y = search.strides.coefficients([s.residual[:, :, None] for s in search.banks[False].scenes])[..., 0]
-    apart = search.noise.rotated((y - y.mean(axis=0)) * np.sqrt(len(y) / (len(y) - 1.0)))
-    jitter = np.einsum("ai,ijk,aj->ak", search.noise.turn, search.jitter, search.noise.turn)
-    level, std, saved = white_level(apart, search.noise, jitter)
-    std *= np.sqrt(len(y) / (len(y) - 1.0))
+    level, std, saved = white_noise(search) or (0.0, 0.0, 0.0)
     if level - SURE * std < ORDINARY_MM or saved < SEPARABLE:
         return None
     from scipy.stats import chi2  # noqa: PLC0415
 
-    whole = Gain(0.0, 0.0, 0.0)
-    parameters = {"markers_m": (1e-3 * level, 1e-3 * std, "m")}
-    return WalkCause("marker_noise", "white", parameters, (), (), float(chi2.sf(saved, 1)), whole, whole)
+    parameters = {"markers_m": Estimate(1e-3 * level, 1e-3 * std, "m")}
+    return WalkCause("marker_noise", "white", parameters, (), (), float(chi2.sf(saved, 1)), 0.0, Gain(0.0, 0.0, 0.0))
 
 
 def _experiment(search: Search, best: Set, causes: list[WalkCause]) -> NextExperiment | None:

@@ -1,8 +1,8 @@
-"""What errors in the coordinates do to the residual: soft tissue that moves alike in every stride, and white noise."""
+"""What errors in the coordinates do to the residual: soft tissue, white noise, landmarks that are not quite found."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -17,11 +17,17 @@ PAD_S = 0.3
 TISSUE_M, TISSUE_RAD = 0.002, 0.01
 """Soft tissue's share of a coordinate's wave once a stride; it falls as 1 / h (Leardini et al., Gait Posture 21, 2005:
 some 10 mm on the thigh, a few degrees in its angles). Only proportions matter."""
-TISSUE_WAVES = 4
+TISSUE_WAVES = 8
+"""As far as a walk's low pass lets through."""
 CLUSTER_M = 0.15
 """Half the length of a cluster of markers, m: noise of markers, in m, over this is noise of angles, in rad."""
 
+LANDMARK_M, LANDMARK_RAD = 0.005, 0.026
+"""Ordinary errors of where a coordinate's zero is, as standard deviations: landmarks are found to 6 to 21 mm, and a
+segment's frame is the mean of several (U. Della Croce et al., Gait Posture 21:226, 2005)."""
+
 Disturbance = Callable[[np.ndarray, np.ndarray, bool, np.random.Generator], np.ndarray]
+Errors = dict[str, np.ndarray]
 
 
 def tissue(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
@@ -39,7 +45,36 @@ def white(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.Ge
 
 
 def disturbed(recording: Recording, strides: Strides, kind: Disturbance, draws: int, seed: int) -> np.ndarray:
-    """Changes of the residual's waves in the first stride: (draws, 6, k)."""
+    """Changes of the residual's waves in the first stride by random errors of all coordinates: (draws, 6, k)."""
+    random = np.random.default_rng(seed)
+
+    def errors(names: list[str], clock: np.ndarray, turn: np.ndarray) -> Iterator[Errors]:
+        for _ in range(draws):
+            yield {n: kind(clock, turn, _is_angle(n), random) for n in names}
+
+    return _responses(recording, strides, errors)
+
+
+def misplaced(recording: Recording, strides: Strides) -> np.ndarray:
+    """Changes of the residual's waves by the ordinary error of each coordinate's zero: (coordinates, 6, k)."""
+
+    def errors(names: list[str], clock: np.ndarray, _turn: np.ndarray) -> Iterator[Errors]:
+        for n in names:
+            yield {n: np.full(len(clock), LANDMARK_RAD if _is_angle(n) else LANDMARK_M)}
+
+    return _responses(recording, strides, errors)
+
+
+def _is_angle(name: str) -> bool:
+    return name.removeprefix("q_") not in TRANSLATIONS
+
+
+def _responses(
+    recording: Recording,
+    strides: Strides,
+    errors: Callable[[list[str], np.ndarray, np.ndarray], Iterator[Errors]],
+) -> np.ndarray:
+    """Changes of the residual's waves in the first stride by errors of the coordinates, by name: (errors, 6, k)."""
     _, rows, phase = strides.windows[0]
     time = recording.motion.time[rows]
     near = (recording.coordinates_time >= time[0] - PAD_S) & (recording.coordinates_time <= time[-1] + PAD_S)
@@ -48,7 +83,6 @@ def disturbed(recording: Recording, strides: Strides, kind: Disturbance, draws: 
     turn = (clock - time[0]) / ((time[-1] - time[0]) * len(time) / (len(time) - 1)) + phase[0]
     inside = (clock >= time[0] - 1e-9) & (clock <= time[-1] + 1e-9)
     total = recording.plates.total[rows]
-    random = np.random.default_rng(seed)
 
     def residual(own: dict[str, np.ndarray]) -> np.ndarray:
         motion = motion_of(
@@ -62,7 +96,7 @@ def disturbed(recording: Recording, strides: Strides, kind: Disturbance, draws: 
 
     base = residual(columns)
     out = []
-    for _ in range(draws):
-        moved = {n: c + kind(clock, turn, n.removeprefix("q_") not in TRANSLATIONS, random) for n, c in columns.items()}
+    for one in errors(list(columns), clock, turn):
+        moved = {**columns, **{n: columns[n] + error for n, error in one.items()}}
         out.append((residual(moved) - base)[:, :, None])
     return strides.first(np.concatenate(out, axis=2))

@@ -38,6 +38,10 @@ class Form:
         Whether the parameter is a shift of the plates' clock, which the fit follows beyond the linear.
     positive
         Whether a negative value has no meaning.
+    ordinary
+        Standard deviation of the parameter where nothing is wrong: what is in every session is no cause.
+    reading
+        Where the parameters are to be read off directly: their values (p,) and standard deviations, or None.
     segments
         By segment, the change of its ten mass parameters per unit of each parameter, (10, p), given what is believed.
     """
@@ -50,6 +54,8 @@ class Form:
     columns: Columns = field(repr=False, compare=False)
     shifts: bool = False
     positive: bool = False
+    ordinary: float = 0.0
+    reading: Callable[[Scene], tuple[np.ndarray, float] | None] | None = field(default=None, repr=False, compare=False)
     segments: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]] | None = field(
         default=None, repr=False, compare=False
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from fes_pin.walk.likelihood import fit
+from fes_pin.walk.likelihood import FLOOR_N, fit
 from fes_pin.walk.search import Chosen, Search, Set
 
 ARM = 0.1
@@ -79,6 +79,29 @@ def gain(search: Search, without: Set, with_it: Set, held_out: bool, seed: int) 
     return Gain(float(ratio(parts.sum(axis=(0, 2)))), float(low), float(high))
 
 
+def evidence(search: Search, without: Set, with_it: Set, seed: int) -> Gain:
+    """By how much held-out strides are likelier with the second set's sizes than with the first's, in the same noise.
+
+    Twice the log-likelihood a stride: what the nuisance may take, of landmarks and plates, counts for neither. In
+    percent of what the first set leaves.
+    """
+    variance, nuisance = with_it.fitted.variance[0], search.noise.nuisance[0]
+    flat = nuisance.reshape(variance.size, -1) / np.sqrt(variance).reshape(-1, 1)
+    inner = np.linalg.inv(np.eye(flat.shape[1]) + flat.T @ flat)
+
+    def misfits(one: Set) -> np.ndarray:
+        left = search.noise.rotated(left_by(search, one, held_out=True)) / np.sqrt(variance)
+        white = left.reshape(len(left), -1)
+        taken = white @ flat
+        return np.sum(white**2, axis=1) - np.einsum("ni,ij,nj->n", taken, inner, taken)
+
+    before, after = misfits(without), misfits(with_it)
+    drawn = np.random.default_rng(seed).integers(0, len(before), size=(BOOTSTRAP, len(before)))
+    shares = 100.0 * (before - after)[drawn].sum(axis=1) / before[drawn].sum(axis=1)
+    low, high = np.quantile(shares, [0.025, 0.975])
+    return Gain(float(100.0 * np.sum(before - after) / np.sum(before)), float(low), float(high))
+
+
 def error_percent(search: Search, one: Set, held_out: bool) -> float:
     """E: squared error over the measured reaction's spread about its mean, all channels together."""
     scale = weights(search)[:, None]
@@ -97,8 +120,15 @@ def floor_percent(search: Search) -> float:
 
 
 def other_leg(search: Search, one: Set) -> float | None:
-    """Gain in percent on one leg's single supports of sizes fitted to the other's; None where a leg has none."""
-    scale = weights(search)
+    """Gain in percent on one leg's single supports of sizes fitted to the other's; None where a leg has none.
+
+    Channels count in units of what the set leaves in them.
+    """
+    left = []
+    for scene in search.bank(one.forms).scenes:
+        columns = np.concatenate([search.forms[i].columns(scene) for i in one.forms], axis=2)
+        left.append(scene.residual - columns @ one.fitted.values)
+    scale = 1.0 / np.maximum(np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)), FLOOR_N)
     before, after = 0.0, 0.0
     data: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"left": [], "right": []}
     for scene in search.bank(one.forms).scenes:

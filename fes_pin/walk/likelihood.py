@@ -2,15 +2,17 @@
 
 Residuals are waves of the stride, in the mean over strides: soft tissue moves alike in each, so more strides are no
 more evidence. They are Gaussian, independent from wave to wave and, after a rotation of the six channels, from channel
-to channel, with a variance whose logarithm is a + b h, h the number of waves in a stride: Whittle's likelihood at the
-walk's own frequencies. Means over a stride are known better: momentum comes back to what it was, so a mean force is
-wrong by no more than 0.2 % of the weight, a mean moment by what a centre of mass 5 mm off makes.
+to channel, with a variance whose logarithm is a level of the channel and a course over frequency that all channels
+share: Whittle's likelihood at the walk's own frequencies. What effects and nuisance may have taken from what is left is
+given back before variances are taken from it (the expected squares, not the least). Means over a stride are known
+better: momentum comes back to what it was, so a mean force is wrong by some 0.05 % of the weight (0.5 mm of noise at
+both ends of a stride), a mean moment by what a centre of mass 1 mm off makes.
 
 Sizes of effects are integrated over a normal prior of their plausible sizes (Laplace's evidence, exact as effects are
 linear): that is the price of a parameter, log(1 + d^2) for one seen with d standard deviations of the prior.
 
-Motion is measured with errors, so that the required reaction is larger than the true one where motion is small: every
-set has nuisance parameters that take that up (`nuisance`), and no cause is made of it.
+Every set has nuisance parameters with normal priors, of which no cause is made (`nuisance`): errors of the motion that
+make the required reaction larger or smaller, landmarks that are not quite found, plates as good as their calibration.
 """
 
 from __future__ import annotations
@@ -21,12 +23,19 @@ import numpy as np
 
 ROUNDS = 8
 """Of alternating weights and effects; the last changes a deviance by less than 0.1."""
-SLOPE_SD = 0.5
-"""Standard deviation of what is believed of the slopes b beforehand: a factor e^(1/2) a wave."""
+STEP_SD = 1.0
+"""Standard deviation of what is believed of a step of log variance beforehand: a factor e from one wave to the next."""
+WHITE_TRIED = 0.2, 40.0, 200
+"""Levels of white noise, in units: from, to, how many; a step is less than 3 %."""
+NEAR = 10.0
+"""Of the least deviance: where its curvature is taken."""
+PRIOR_LEFT = 1e-4
+"""Of the prior's weight, in reported sizes: an effect that nothing shows has a hundred times its plausible size."""
 FLOOR_N = 0.3
 """N, or N m: a plate's own noise in a stride's wave; no residual is smaller."""
-MEAN_FORCE, MEAN_ARM_M = 0.002, 0.005
-"""Errors of mean force, in weights, and of mean moment, in weights times m; see above."""
+MEAN_FORCE, MEAN_ARM_M, MEAN_TWIST_NM = 0.0005, 0.001, 1.5
+"""Errors of mean force, in weights, and of mean level moments, in weights times m, beside the nuisance; see above. The
+moment about the vertical has no weight in it: the plates' free moment is what is off there (a round figure)."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +77,9 @@ class Fitted:
     Attributes
     ----------
     values, covariance
-        (p,), (p, p) of the effects.
+        (p,), (p, p) of the effects: most likely under the noise that was found, without the prior of their sizes.
+    believed
+        (p,) with that prior, as the deviance has them.
     taken
         (m,) what the nuisance parameters take, in units of their priors.
     deviance
@@ -79,6 +90,7 @@ class Fitted:
 
     values: np.ndarray
     covariance: np.ndarray
+    believed: np.ndarray
     taken: np.ndarray
     deviance: float
     left: np.ndarray = field(repr=False)
@@ -108,33 +120,55 @@ def fit(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: Noise) -> Fitted
     noise
         What is common.
     """
-    values, covariance, deviance, left, variance, taken = fit_many(y[None], x, prior, noise)
-    return Fitted(values[0], covariance[0], taken[0], float(deviance[0]), left[0], variance[0])
+    return fitted_of(fit_many(y[None], x, prior, noise), 0)
+
+
+def fitted_of(many: tuple[np.ndarray, ...], number: int) -> Fitted:
+    """One of `fit_many`."""
+    values, covariance, deviance, left, variance, taken, believed = (part[number] for part in many)
+    return Fitted(values, covariance, believed, taken, float(deviance), left, variance)
 
 
 def fit_many(
     y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: Noise, rounds: int = ROUNDS
 ) -> tuple[np.ndarray, ...]:
-    """`fit` of many residuals (b, n, 6, k) at once: values, covariances, deviances, left, variances, taken."""
-    count, p = len(y), x.shape[-1]
-    m = noise.nuisance.shape[-1]
-    flat = np.concatenate([x * prior, noise.nuisance[: y.shape[1]]], axis=-1).reshape(y[0].size, p + m)
+    """`fit` of many at once: values, covariances, deviances, left, variances, taken, believed.
+
+    Parameters
+    ----------
+    y
+        (b, n, 6, k).
+    x, prior
+        (n, 6, k, p) and (p,), for all alike, or (b, n, 6, k, p) and (b, p).
+    noise
+        What is common.
+    rounds
+        Of alternating weights and effects.
+    """
+    count, p, size = len(y), x.shape[-1], y[0].size
+    scaled = x * (prior if prior.ndim == 1 else prior[:, None, None, None])
+    scaled = scaled.reshape(1 if prior.ndim == 1 else count, size, p)
+    nuisance = noise.nuisance[: y.shape[1]].reshape(size, -1)
+    flat = np.concatenate([scaled, np.broadcast_to(nuisance, (len(scaled), *nuisance.shape))], axis=2)
     spectra = _Spectra(y, noise)
-    values = np.zeros((count, p + m))
-    gram = np.zeros((count, p + m, p + m))
-    left, variance = y, spectra.update(y)
-    for _ in range(rounds if p + m else 1):
-        weight = (1.0 / variance).reshape(count, -1)
-        gram = flat.T @ (weight[:, :, None] * flat) + np.eye(p + m)
-        right = (weight * y.reshape(count, -1)) @ flat
-        values = np.linalg.solve(gram, right[:, :, None])[:, :, 0]
-        left = y - (values @ flat.T).reshape(y.shape)
-        variance = spectra.update(left)
+    aim = y.reshape(count, size, 1)
+    left, variance = y, spectra.update(y**2)
+    for _ in range(rounds):
+        weighted = flat / variance.reshape(count, size, 1)
+        gram = weighted.transpose(0, 2, 1) @ flat + np.eye(flat.shape[2])
+        inverse = np.linalg.inv(gram)
+        values = inverse @ (weighted.transpose(0, 2, 1) @ aim)
+        left = (aim - flat @ values).reshape(y.shape)
+        doubt = np.sum((flat @ inverse) * flat, axis=2).reshape(y.shape)
+        variance = spectra.update(left**2 + doubt)
     deviance = np.sum(np.log(variance) + left**2 / variance, axis=(1, 2, 3)) + spectra.penalty()
+    values = values[:, :, 0]
     deviance += np.sum(values**2, axis=1) + np.linalg.slogdet(gram)[1]
-    covariance = np.linalg.inv(gram)[:, :p, :p] * np.outer(prior, prior)
-    sizes = values[:, :p] * prior
-    return sizes, covariance, deviance, left, variance, values[:, p:]
+    scale = np.broadcast_to(prior, (count, p))
+    alone = np.linalg.inv(gram - np.diag(np.r_[np.full(p, 1.0 - PRIOR_LEFT), np.zeros(len(gram[0]) - p)]))
+    likely = alone[:, :p] @ (gram @ values[:, :, None])
+    covariance = alone[:, :p, :p] * (scale[:, :, None] * scale[:, None, :])
+    return likely[:, :, 0] * scale, covariance, deviance, left, variance, values[:, p:], values[:, :p] * scale
 
 
 def white_level(y: np.ndarray, noise: Noise, jitter: np.ndarray) -> tuple[float, float, float]:
@@ -156,77 +190,88 @@ def white_level(y: np.ndarray, noise: Noise, jitter: np.ndarray) -> tuple[float,
     level, std, gain
         Of the noise, in units, with its standard deviation; the deviance that it saves.
     """
-    alone, with_it = _Spectra(y[None], replace(noise, jitter=None), True), None
-    with_it = _Spectra(y[None], replace(noise, jitter=np.broadcast_to(jitter, y.shape)), True)
-    deviance = []
-    for spectra in (alone, with_it):
-        for _ in range(4 * ROUNDS):
-            variance = spectra.update(y[None])
-        waves = noise.harmonics > 0
-        terms = np.log(variance) + y[None] ** 2 / variance
-        deviance.append(float(np.sum(terms[..., waves]) + spectra.penalty()[0]))
-    _, curve = with_it._white_score(y[None], variance)
-    level = float(np.sqrt(with_it.white[0]))
-    return level, float(0.5 / np.sqrt(curve[0]) / max(level, 1e-9)), deviance[0] - deviance[1]
+    tried = np.concatenate([[0.0], np.geomspace(*WHITE_TRIED)])
+    many = np.broadcast_to(y, (len(tried), *y.shape))
+    spectra = _Spectra(many, replace(noise, jitter=np.broadcast_to(jitter, y.shape)), True, tried**2)
+    for _ in range(4 * ROUNDS):
+        variance = spectra.update(many**2)
+    waves = noise.harmonics > 0
+    deviance = np.sum((np.log(variance) + many**2 / variance)[..., waves], axis=(1, 2, 3)) + spectra.penalty()
+    best = int(np.argmin(deviance))
+    saved = float(deviance[0] - deviance[best])
+    near = (deviance < deviance[best] + NEAR) & (tried > 0.0)
+    if best == 0 or near.sum() < 3:
+        return float(tried[best]), float("inf"), saved
+    curve, slope, _ = np.polyfit(np.log(tried[near]), deviance[near], 2)
+    if curve <= 0.0:
+        return float(tried[best]), float("inf"), saved
+    level = float(np.exp(-0.5 * slope / curve))
+    return level, level / float(np.sqrt(curve)), saved
 
 
 class _Spectra:
-    """Log-linear variances, updated by Fisher scoring of gamma regression; `falling`: none may grow with frequency."""
+    """Variances exp(level + course over frequency), by Fisher scoring of gamma regression.
 
-    def __init__(self, y: np.ndarray, noise: Noise, falling: bool = False) -> None:
-        count = len(y)
+    The course takes a step at every wave, of any sign with a normal prior; `falling`: no step may go up. `white` (b,)
+    is the variance of white noise on the coordinates, in units of the noise's jitter.
+    """
+
+    def __init__(self, y: np.ndarray, noise: Noise, falling: bool = False, white: np.ndarray | None = None) -> None:
         self.waves = noise.harmonics > 0
-        self.span = float(max(1.0, noise.harmonics.max()))
-        self.h = noise.harmonics[self.waves] / self.span
+        count, h = len(y), noise.harmonics[self.waves]
+        self.kinds, self.kind = np.unique(h, return_inverse=True)
+        self.gather = (self.kind[:, None] == np.arange(len(self.kinds))).astype(float)
+        steps = (self.kinds[:, None] > self.kinds[None, :-1]).astype(float)
+        self.steps = steps - steps.mean(axis=0)
         self.floor = np.maximum((FLOOR_N * noise.turn) ** 2 @ np.ones(6), 1e-12)[:, None]
         self.means = noise.mean_variance[:, None]
         power = np.mean(y[..., self.waves] ** 2, axis=(1, 3))
         self.level = np.log((0.3 if falling else 1.0) * power + self.floor[:, 0])
-        self.slope = np.zeros(count)
+        self.step = np.zeros((count, self.steps.shape[1]))
         self.falling = falling
-        self.white = np.zeros(count)
-        self.jitter = noise.jitter
-        if self.jitter is not None:
-            self.white += 0.7 * np.mean(y[..., self.waves] ** 2, axis=(1, 2, 3)) / np.mean(self.jitter)
+        self.white, self.jitter = white, noise.jitter
 
-    def update(self, left: np.ndarray) -> np.ndarray:
-        variance = self._variance(left.shape)
-        waves, known = left[..., self.waves], variance[..., self.waves]
-        share = self._smooth()[:, None] / known
-        gain = 0.5 * share * (waves**2 / known - 1.0)
-        weight = 0.5 * share**2 + 1e-9
-        w0, w1 = weight.sum(axis=(1, 3)), (weight * self.h).sum(axis=(1, 3))
-        w2 = (weight * self.h**2).sum(axis=(1, 2, 3)) + (self.span * SLOPE_SD) ** -2
-        g0 = gain.sum(axis=(1, 3))
-        g1 = (gain * self.h).sum(axis=(1, 2, 3)) - self.slope / (self.span * SLOPE_SD) ** 2
-        step = (g1 - (w1 * g0 / w0).sum(axis=1)) / np.maximum(w2 - (w1**2 / w0).sum(axis=1), 1e-6)
-        slope = self.slope + np.clip(step, -2.0, 2.0)
+    def update(self, squares: np.ndarray) -> np.ndarray:
+        """One round; `squares` (b, n, 6, k) are expected squares of what is left. Variances of the same shape."""
+        slope, curve = self._scores(squares)
+        moved = np.linalg.solve(curve, slope[:, :, None])[:, :, 0]
+        self.level += np.clip(moved[:, :6], -2.0, 2.0)
+        self.step = self.step + np.clip(moved[:, 6:], -2.0, 2.0)
         if self.falling:
-            slope = np.minimum(slope, 0.0)
-        step = slope - self.slope
-        self.level += np.clip((g0 - w1 * step[:, None]) / w0, -2.0, 2.0)
-        self.slope = slope
-        if self.jitter is not None:
-            slope, curve = self._white_score(left, variance)
-            self.white = np.maximum(self.white + slope / np.maximum(curve, 1e-300), 0.0)
-        return self._variance(left.shape)
+            self.step = np.minimum(self.step, 0.0)
+        return self._variance(squares.shape)
+
+    def _scores(self, squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Slope (b, p) and expected curvature (b, p, p) of the log-likelihood by levels and steps."""
+        variance = self._variance(squares.shape)
+        known = variance[..., self.waves]
+        share = self._smooth()[:, None] / known
+        excess = 0.5 * (squares[..., self.waves] / known - 1.0)
+        gain, weight = self._by_wave(share * excess), self._by_wave(0.5 * share**2) + 1e-9
+        count, size = self.step.shape
+        slope = np.concatenate([gain.sum(axis=2), gain.sum(axis=1) @ self.steps - self.step / STEP_SD**2], axis=1)
+        curve = np.zeros((count, 6 + size, 6 + size))
+        curve[:, range(6), range(6)] = weight.sum(axis=2)
+        curve[:, :6, 6:] = weight @ self.steps
+        curve[:, 6:, :6] = curve[:, :6, 6:].transpose(0, 2, 1)
+        curve[:, 6:, 6:] = (self.steps.T * weight.sum(axis=1)[:, None]) @ self.steps + np.eye(size) / STEP_SD**2
+        return slope, curve
 
     def penalty(self) -> np.ndarray:
-        return (self.slope / (self.span * SLOPE_SD)) ** 2
+        return np.sum((self.step / STEP_SD) ** 2, axis=1)
 
-    def _white_score(self, left: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        share = (self.jitter / variance)[..., self.waves]
-        left, variance = left[..., self.waves], variance[..., self.waves]
-        gain = 0.5 * np.sum(share * (left**2 / variance - 1.0), axis=(1, 2, 3))
-        return gain, 0.5 * np.sum(share**2, axis=(1, 2, 3))
+    def _by_wave(self, values: np.ndarray) -> np.ndarray:
+        """Sums over strides and over the coefficients of one frequency: (b, 6, frequencies)."""
+        return values.sum(axis=1) @ self.gather
 
     def _smooth(self) -> np.ndarray:
-        return self.floor + np.exp(self.level[:, :, None] + self.slope[:, None, None] * self.h)
+        course = (self.step @ self.steps.T)[:, self.kind]
+        return self.floor + np.exp(self.level[:, :, None] + course[:, None])
 
     def _variance(self, shape: tuple[int, ...]) -> np.ndarray:
         out = np.empty(shape)
         out[..., ~self.waves] = self.means
         out[..., self.waves] = self._smooth()[:, None]
-        if self.jitter is not None:
+        if self.jitter is not None and self.white is not None:
             out += self.white[:, None, None, None] * self.jitter
         return out

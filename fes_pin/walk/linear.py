@@ -7,6 +7,7 @@ A(q0) a + g(q0) + dg/dq (q - q0). Their difference is exactly the sum of three t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -52,7 +53,7 @@ def _rms(values: np.ndarray) -> np.ndarray:
     return np.sqrt(np.mean(values**2, axis=0))
 
 
-def along(rooted: Motion, postures: int, moving: bool = False) -> AlongStride:
+def along(rooted: Motion, postures: int | Sequence[float], moving: bool = False) -> AlongStride:
     """Linear against full equations along a motion that stands on one forefoot.
 
     Parameters
@@ -60,7 +61,7 @@ def along(rooted: Motion, postures: int, moving: bool = False) -> AlongStride:
     rooted
         As `rooted_motion` gives it.
     postures
-        How many postures to linearize at, evenly spread over the samples.
+        How many postures to linearize at, evenly spread over the samples; or where, as shares of the stance.
     moving
         Linearize about the motion at these samples, with its rates and accelerations (the term E G' included), not at
         rest in its postures.
@@ -68,7 +69,8 @@ def along(rooted: Motion, postures: int, moving: bool = False) -> AlongStride:
     body, count = rooted.body, len(rooted.time)
     q, v, a = rooted.q[:, 7:], rooted.v[:, 6:], rooted.a[:, 6:]
     model, data = body.model, body.model.createData()
-    at = np.round((np.arange(postures) + 0.5) * count / postures - 0.5).astype(int)
+    shares = (np.arange(postures) + 0.5) / postures if isinstance(postures, int) else np.asarray(postures)
+    at = np.clip(np.round(shares * count - 0.5), 0, count - 1).astype(int)
     nearest = at[np.argmin(np.abs(np.arange(count)[:, None] - at), axis=1)]
     full, linear, neglected = np.empty_like(q), np.empty_like(q), np.zeros((3, *q.shape))
     known = {}

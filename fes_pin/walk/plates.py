@@ -45,6 +45,11 @@ class Plates:
         """Both feet together: (n, 6)."""
         return self.feet["left"] + self.feet["right"]
 
+    def part(self, rows: slice) -> Plates:
+        """Some of the samples."""
+        cut = ({side: values[rows] for side, values in one.items()} for one in (self.feet, self.pressure, self.loaded))
+        return Plates(self.time[rows], *cut)
+
     def support(self) -> np.ndarray:
         """The one foot that stands in every sample: `left`, `right`, `both` or "" for none."""
         left, right = self.loaded["left"], self.loaded["right"]

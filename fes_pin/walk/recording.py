@@ -15,6 +15,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.walk.motion import Motion, motion_of, pelvis_to_hip
 from fes_pin.walk.plates import Plates, plates_of
+from fes_pin.walk.plausible import carried, check_together
 
 
 @dataclass(frozen=True)
@@ -97,16 +98,17 @@ def _as_heavy(body: Body, study: Study) -> Body:
 
 
 def recordings_of(
-    study: Study, *, cutoff_hz: float | None = CUTOFF_HZ, stance: str = "right"
+    study: Study, *, cutoff_hz: float | None = CUTOFF_HZ, stance: str = "right", body: Body | None = None
 ) -> tuple[Body, list[Recording]]:
-    """Every trial of a walking study, each file at its own sample rate.
+    """Every trial of a walking study, each file at its own sample rate; by the body that is given, else the study's.
 
     Raises
     ------
     InputError
         As `body_of`, and for a trial too short to filter.
     """
-    body, hip = body_of(study, stance)
+    believed, hip = body_of(study, stance)
+    body = believed if body is None else body
     return body, [_recording(study, trial, body, hip, cutoff_hz) for trial in study.trials]
 
 
@@ -131,6 +133,13 @@ def _recording(study: Study, trial: Trial, body: Body, hip: np.ndarray, cutoff_h
         plates = plates_of(raw_time, raw, motion.time, cutoff_hz=cutoff_hz, belt_speed_mps=belt, start_s=float(time[0]))
     except InputError as error:
         raise InputError(error.message, file=source, column=error.column) from None
+    try:
+        check_together(motion, plates)
+        rows = carried(motion, plates)
+    except InputError as error:
+        read = study.files.get(f"{trial.name}.ground_reaction", source)
+        raise InputError(error.message, file=read, column=error.column) from None
+    motion, plates = motion.part(rows), plates.part(rows)
     return Recording(
         trial.name, motion, plates, raw_time, raw, time, columns, hip, cutoff_hz, belt, float(time[0]), trial.role
     )

@@ -26,12 +26,15 @@ class Scene:
         On one clock.
     centre
         (n, 3) m: the believed centre of mass.
+    way
+        (n, 3) m: where the plates are, which a treadmill's belt leaves behind; zeros over ground.
     """
 
     name: str
     motion: Motion = field(repr=False)
     plates: Plates = field(repr=False)
     centre: np.ndarray = field(repr=False)
+    way: np.ndarray | None = field(default=None, repr=False)
 
     @cached_property
     def needed(self) -> np.ndarray:
@@ -47,6 +50,13 @@ class Scene:
     def measured(self) -> np.ndarray:
         """Both feet together: (n, 6)."""
         return about(self.plates.total, self.centre)
+
+    @cached_property
+    def rate(self) -> np.ndarray:
+        """How fast the plates' reading changes, about the centre of mass where it is: (n, 6) per s."""
+        way = np.zeros_like(self.centre) if self.way is None else self.way
+        read = about(self.plates.total, way)
+        return about(np.gradient(read, self.dt, axis=0), self.centre - way)
 
     @cached_property
     def feet(self) -> dict[str, np.ndarray]:
@@ -98,6 +108,8 @@ def scene_of(recording: Recording, cutoff_hz: float | None, later_s: float = 0.0
         held = np.clip(recording.motion.time, time[0], time[-1])
         plates = plates_of(
             time, recording.raw_plates, held, cutoff_hz=cutoff_hz, belt_speed_mps=recording.belt_speed_mps,
-            start_s=recording.start_s - later_s,
+            start_s=recording.start_s,
         )  # fmt: skip
-    return Scene(recording.name, recording.motion, plates, centre_of_mass(recording.motion))
+    way = np.zeros((len(recording.motion.time), 3))
+    way[:, 0] = recording.belt_speed_mps * (recording.motion.time - recording.start_s)
+    return Scene(recording.name, recording.motion, plates, centre_of_mass(recording.motion), way)

@@ -14,6 +14,8 @@ from fes_pin.walk.scene import Scene
 
 STILL_S = 1.2
 """Length of a window where nobody steps, s: about a stride."""
+STILL_MPS = 0.05
+"""m/s; one whose centre of mass varies its speed by less stands: swaying is slower by half, walking faster by four."""
 DEBOUNCE_S = 0.15
 """Two contacts of one foot lie further apart than this."""
 
@@ -28,10 +30,13 @@ class Strides:
         For each stride the scene's number, its samples, and the phase of each in [0, 1).
     harmonics
         (k,) number of waves in a stride of every coefficient: 0, 1, 1, 2, 2, ...
+    whole
+        Whether a window ends as it began, so that momentum comes back: a whole stride, or one who stands.
     """
 
     windows: list[tuple[int, slice, np.ndarray]] = field(repr=False)
     harmonics: np.ndarray
+    whole: bool = True
 
     @property
     def count(self) -> int:
@@ -75,12 +80,13 @@ def strides_of(scenes: Sequence[Scene], cutoff_hz: float) -> Strides:
 
     A record without two contacts, as of one standing still, is cut into windows of 1.2 s.
     """
-    windows, longest = [], []
+    windows, longest, whole = [], [], True
     for number, scene in enumerate(scenes):
         time = scene.motion.time
         phase = _phase(time, scene.plates)
         first, last = phase[0], phase[-1] + (phase[-1] - phase[-2])
         count = int(np.floor(last - first + 1e-6))
+        whole &= count > 0 and (_steps(time, scene.plates) or _stands(scene))
         for k in range(count):
             inside = np.flatnonzero((phase >= first + k) & (phase < first + k + 1 - 1e-9))
             rows = slice(int(inside[0]), int(inside[-1]) + 1)
@@ -91,7 +97,17 @@ def strides_of(scenes: Sequence[Scene], cutoff_hz: float) -> Strides:
             longest.append((time[-1] - time[0], len(time)))
     waves = min(max(1, int(cutoff_hz * length)) for length, _ in longest)
     waves = min(waves, *((samples - 2) // 3 for _, samples in longest))
-    return Strides(windows, np.array([0, *(h for h in range(1, waves + 1) for _ in range(2))]))
+    return Strides(windows, np.array([0, *(h for h in range(1, waves + 1) for _ in range(2))]), whole)
+
+
+def _steps(time: np.ndarray, plates: Plates) -> bool:
+    """Whether contacts tell a stride's length: two of a foot, or one of each."""
+    counts = [len(_contacts(time, plates.loaded[side])) for side in SIDES]
+    return max(counts) > 1 or min(counts) > 0
+
+
+def _stands(scene: Scene) -> bool:
+    return bool(np.std(np.gradient(scene.centre, scene.dt, axis=0), axis=0).max() < STILL_MPS)
 
 
 def _phase(time: np.ndarray, plates: Plates) -> np.ndarray:

@@ -11,7 +11,6 @@ import tomli_w
 
 from fes_pin.data.table import format_csv
 from fes_pin.walk.diagnosis import WalkCause, WalkDiagnosis
-from fes_pin.walk.extended import extended_body
 from fes_pin.walk.judge import CHANNELS
 
 DIGITS = 5
@@ -28,7 +27,7 @@ def headline(diagnosis: WalkDiagnosis) -> str:
     count = len(diagnosis.causes)
     if not count:
         return HEADLINES[diagnosis.verdict]
-    rest = ", and something is left" if diagnosis.unexplained else ""
+    rest = ", and something is left" if diagnosis.remainder.unexplained else ""
     return (
         f"{'one cause explains' if count == 1 else f'{count} causes explain'} what the walking model gets wrong{rest}."
     )
@@ -52,9 +51,9 @@ def footnotes(diagnosis: WalkDiagnosis) -> list[str]:
     ]
     noise = f"stride to stride {diagnosis.ceiling_percent:.2f} %; low pass {diagnosis.cutoff_hz:g} Hz"
     lines = [f"error E {', '.join(shown)}; {noise}"]
-    where = f", most in {diagnosis.left_where}" if diagnosis.left_where else ""
-    state = "something comes" if diagnosis.unexplained else "nothing more comes"
-    lines.append(f"{state} again in every stride (p = {diagnosis.left_p_value:.2g}{where})")
+    where = f", most in {diagnosis.remainder.where}" if diagnosis.remainder.where else ""
+    state = "something comes" if diagnosis.remainder.unexplained else "nothing more comes"
+    lines.append(f"{state} again in every stride (p = {diagnosis.remainder.p_value:.2g}{where})")
     for cause in diagnosis.causes:
         if cause.other_leg_percent is not None:
             lines.append(
@@ -66,7 +65,7 @@ def footnotes(diagnosis: WalkDiagnosis) -> list[str]:
         lines.append(f"not testable here: {', '.join(diagnosis.absorbed)}")
     if diagnosis.next_experiment:
         lines.append(f"next experiment: {diagnosis.next_experiment.why}")
-    return lines
+    return [*lines, *(f"warning: {words}" for words in diagnosis.warnings)]
 
 
 def verdict_text(diagnosis: WalkDiagnosis) -> str:
@@ -102,9 +101,9 @@ def walk_record(diagnosis: WalkDiagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "causes": [_cause(c) for c in diagnosis.causes],
         "remainder": {
-            "unexplained": diagnosis.unexplained,
-            "p_value": shown(diagnosis.left_p_value),
-            "where": diagnosis.left_where,
+            "unexplained": diagnosis.remainder.unexplained,
+            "p_value": shown(diagnosis.remainder.p_value),
+            "where": diagnosis.remainder.where,
         },
         "absorbed": list(diagnosis.absorbed),
         "nominal": {"parameters": {}, "error_percent": next(errors)},
@@ -113,6 +112,7 @@ def walk_record(diagnosis: WalkDiagnosis) -> dict[str, Any]:
         "ceiling_percent": shown(diagnosis.ceiling_percent),
         "next_experiment": {"why": plan.why, "separates": list(plan.separates), "trial": trial} if plan else None,
         "cutoff_hz": diagnosis.cutoff_hz,
+        "warnings": list(diagnosis.warnings),
         "wall_s": round(diagnosis.wall_s, 2),
     }
 
@@ -127,7 +127,7 @@ def _cause(cause: WalkCause) -> dict[str, Any]:
         "equivalents": list(cause.equivalents),
         "p_value": shown(cause.p_value),
         "gain_percent": {
-            "fit": shown(cause.gain_fit.percent),
+            "fit": shown(cause.gain_fit),
             "held_out": shown(held.percent) if held else None,
             "ci95": [shown(held.low), shown(held.high)] if held else None,
             "other_leg": shown(cause.other_leg_percent),
@@ -156,7 +156,7 @@ def walk_files(diagnosis: WalkDiagnosis) -> dict[str, str | bytes]:
     files: dict[str, str | bytes] = {
         "diagnosis.json": json.dumps(walk_record(diagnosis), indent=1, allow_nan=False) + "\n",
         "model.toml": tomli_w.dumps(model),
-        BODY_FILE: extended_body(diagnosis).urdf,
+        BODY_FILE: diagnosis.model.urdf,
     }
     plan = diagnosis.next_experiment
     if plan and plan.coordinates is not None:

@@ -19,6 +19,14 @@ ANKLE = {"right": np.array([-0.10501355, -0.97912632, -0.17402245]), "left": np.
 SUBTALAR = {"right": np.array([0.78717961, 0.12094949, 0.60474746]), "left": np.array([-0.78717961, 0.12094949, -0.60474746])}  # fmt: skip  # noqa: E501
 HIP_OF_HEIGHT = np.array([-0.0724376, -0.0677245, 0.0855522]) / 1.80
 WAVES = 8
+LANDMARK_M, LANDMARK_RAD = 0.005, np.radians(1.5)
+"""What is off for a whole session: landmarks are found to 6-21 mm, and a frame is the mean of several of them
+(U. Della Croce et al., Gait Posture 21:226, 2005)."""
+PLATE_N, PLATE_M, PLATE_NM = 1.5, 0.004, 1.2
+"""Plates' forces are 2.5 to 5 N off, centres of pressure 0.6 to 2.3 mm after and 2 to 14 mm before calibration
+(A. Cappello et al., Gait Posture 33:724, 2011)."""
+LEVEL_RAD = 0.004
+"""Plates are level in the cameras' frame to about a quarter of a degree."""
 
 
 def turn(axis, angle):
@@ -90,6 +98,7 @@ class Wrong:
     size: float = 0.0
     tissue: float = 0.6
     markers_m: float = 0.0005
+    placed: float = 1.0
     strides: int = 5
     extra: dict = field(default_factory=dict)
 
@@ -190,6 +199,7 @@ def make(gait, folder, wrong, seed, subject=None):
     recorded = dict(truth)
     tissue_errors(random, recorded, time, phase, period, wrong)
     read = misread(feet, wrong, time, random)
+    misplaced(np.random.default_rng([seed, 1]), recorded, read, feet, wrong)
     write(folder, subject, recorded, read, time, wrong, period)
     return subject
 
@@ -255,6 +265,19 @@ def tissue_errors(random, recorded, time, phase, period, wrong):
                     for h, (a, b) in enumerate(amplitudes, 1))  # fmt: skip
         other = smooth_noise(random, time, period)[0]
         recorded[name] = recorded[name] + wrong.tissue * size * (again + 0.15 * other)
+
+
+def misplaced(random, recorded, read, feet, wrong):
+    """What is off by a constant in every session: where markers and plates are, and what a loaded plate reads."""
+    for name in recorded:
+        size = LANDMARK_M if name.startswith("pelvis_t") and len(name) == 9 else LANDMARK_RAD
+        recorded[name] = recorded[name] + wrong.placed * size * random.normal()
+    tilt = wrong.placed * LEVEL_RAD * random.normal(size=2)
+    for s, (level, cop, free) in read.items():
+        force = level + np.stack([-tilt[0] * level[:, 2], -tilt[1] * level[:, 2], level[:, :2] @ tilt], axis=1)
+        on = wrong.placed * feet[s][3][:, None]
+        off = PLATE_N * random.normal(size=3) * on, PLATE_M * random.normal(size=3) * [1, 1, 0] * on
+        read[s] = force + off[0], cop + off[1], free + PLATE_NM * random.normal() * on * [0, 0, 1]
 
 
 def misread(feet, wrong, time, random):

@@ -43,7 +43,7 @@ def size(residual):
 def clean(gait, tmp_path_factory):
     from walking_matrix.synthetic import Wrong
 
-    return scene(gait, tmp_path_factory.mktemp("clean"), Wrong(tissue=0.0, markers_m=0.0, strides=2))
+    return scene(gait, tmp_path_factory.mktemp("clean"), Wrong(tissue=0.0, markers_m=0.0, placed=0.0, strides=2))
 
 
 def test_where_nothing_is_wrong_the_two_codes_agree(clean):
@@ -56,7 +56,7 @@ def test_where_nothing_is_wrong_the_two_codes_agree(clean):
 def test_the_columns_of_a_cause_take_it_away(gait, clean, tmp_path, cause, site, amount, extra, form, value):
     from walking_matrix.synthetic import Wrong
 
-    wrong = Wrong(cause, site, amount, tissue=0.0, markers_m=0.0, strides=2, extra=extra)
+    wrong = Wrong(cause, site, amount, tissue=0.0, markers_m=0.0, placed=0.0, strides=2, extra=extra)
     hidden = scene(gait, tmp_path, wrong)
     (one,) = (f for f in library() if f.cause == cause and f.site == form)
     inside = slice(10, -10)

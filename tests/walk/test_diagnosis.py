@@ -6,6 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
+import fes_pin as fp
 from fes_pin.body.build import Body
 from fes_pin.data.study import read_study
 from fes_pin.walk.diagnosis import diagnose_walk
@@ -51,6 +52,25 @@ def test_files_are_as_the_contract_says(heavy):
         assert set(plan["separates"]) <= {heavy.causes[0].name, *heavy.causes[0].equivalents}
         assert plan["trial"] is None or plan["trial"]["file"] in files
     assert heavy.causes[0].name in verdict_text(heavy)
+
+
+def test_one_question_for_every_study_and_its_limit_of_time_holds(heavy, tmp_path):
+    """`fp.diagnose` answers for a body as for a rig; with no time it says what it could not do, and names nothing."""
+    study = heavy.study
+    found = fp.diagnose(study, limit=0.0)
+    assert isinstance(found, type(heavy))
+    assert found.warnings == ("the search was stopped at its limit of 0 s: best set so far",)
+    assert not found.causes and not heavy.warnings
+    assert json.loads(walk_files(found)["diagnosis.json"])["warnings"] == list(found.warnings)
+    assert "stopped at its limit" in str(found)
+    assert heavy.model.mass_kg > found.model.mass_kg
+    assert heavy.remainder.p_value <= 1.0 and heavy.causes[0].gain_fit > 0.0
+    value = next(iter(heavy.causes[0].parameters.values()))
+    assert value.std > 0.0
+    fp.report(heavy, tmp_path / "report.html")
+    assert "<svg" in (tmp_path / "report.html").read_text()
+    with pytest.raises(fp.InputError, match="walking has none but its own"):
+        fp.diagnose(study, library="own.py")
 
 
 def test_the_report_is_a_whole_page(heavy):

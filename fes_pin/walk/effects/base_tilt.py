@@ -11,6 +11,9 @@ from fes_pin.body.build import GRAVITY
 from fes_pin.walk.effect import Form, WalkEffect
 from fes_pin.walk.scene import Scene
 
+ORDINARY_RAD = 0.004
+"""Standard deviation where nothing is wrong: frames of cameras and plates are level to a quarter of a degree each way,
+about what a spirit level and a calibration frame tell (a round figure)."""
 _WORDS = {"forward": 0, "left": 1}
 
 
@@ -30,7 +33,11 @@ class BaseTilt(WalkEffect):
         for words in (("forward",), ("left",), ("forward", "left")):
             names = tuple(f"{w}_rad" for w in words)
             columns = partial(_tilted, axes=tuple(_WORDS[w] for w in words))
-            yield Form(cls.name, " and ".join(words), names, ("rad",) * len(words), (0.05,) * len(words), columns)
+            ordinary = ORDINARY_RAD * (len(words) == 1)
+            yield Form(
+                cls.name, " and ".join(words), names, ("rad",) * len(words), (0.05,) * len(words), columns,
+                ordinary=ordinary,
+            )  # fmt: skip
 
 
 def _tilted(scene: Scene, axes: tuple[int, ...]) -> np.ndarray:

@@ -27,4 +27,4 @@ class ClockOffset(WalkEffect):
 
 
 def _rate(scene: Scene) -> np.ndarray:
-    return -np.gradient(scene.measured, scene.dt, axis=0)[:, :, None]
+    return -scene.rate[:, :, None]

@@ -1,0 +1,57 @@
+"""One question for every study: the rig says which diagnosis answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.study import Study
+from fes_pin.models.catalogue import Source
+
+if TYPE_CHECKING:
+    from fes_pin.diagnose.diagnosis import Diagnosis
+    from fes_pin.walk.diagnosis import WalkDiagnosis
+
+
+def diagnose(
+    study: Study,
+    *,
+    library: Source | Sequence[Source] | None = None,
+    seed: int = 0,
+    limit: float | None = None,
+    progress: Callable[[float, str], None] | None = None,
+) -> Diagnosis | WalkDiagnosis:
+    """Find out what the model of a study gets wrong: `diagnose.diagnosis.diagnose`, for a body `diagnose_walk`.
+
+    Both answers have `verdict`, `causes`, `remainder`, `absorbed`, `nominal_error`, `extended_error`,
+    `ceiling_percent`, `next_experiment`, `warnings`, `wall_s`, and the extended `model`: a body's is a `Body`.
+
+    Parameters
+    ----------
+    study
+        The rig and its trials.
+    library
+        Causes beside those written here and installed: files, modules, classes or what `load_library` made of them.
+        Walking has none but its own.
+    seed
+        Of what is simulated: critical values and bootstrap intervals.
+    limit
+        Seconds that the search may take; then it stops at the best set so far, and says so.
+    progress
+        Called with a share done and a few words.
+
+    Raises
+    ------
+    InputError
+        If the study cannot be diagnosed, or a library is given for a body.
+    """
+    if study.rig == "body":
+        from fes_pin.walk.diagnosis import diagnose_walk  # noqa: PLC0415
+
+        if library is not None and library != []:
+            raise InputError("a library brings causes of rigs; walking has none but its own", file=study.folder)
+        return diagnose_walk(study, seed=seed, limit=limit, progress=progress)
+    from fes_pin.diagnose.diagnosis import diagnose as of_a_rig  # noqa: PLC0415
+
+    return of_a_rig(study, library=library, seed=seed, limit=limit, progress=progress)

@@ -1,0 +1,69 @@
+"""A measured walk to look at: the body moves as measured, with the ground reactions that were read and are required."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from fes_pin.view.arrows import Arrow
+from fes_pin.view.viewer import FRAMES_A_SECOND, Scene
+from fes_pin.walk.dynamics import centre_of_mass, required
+from fes_pin.walk.motion import Motion
+from fes_pin.walk.plates import LOADED_N, Plates, centre_of_pressure
+
+METRES_A_NEWTON = 2e-3
+"""An arrow of 1 m is a force of 500 N."""
+SEEN_THROUGH = 0.35
+READ, REQUIRED = 0x17191C, 0xD55E00
+"""Colours of `view.style`: measured, nominal."""
+LONGEST_S = 4.0
+
+
+def show_reactions(motion: Motion, plates: Plates, caption: str = "") -> Scene:
+    """The walk with the ground reaction of both feet together as read (black) and as the motion requires (orange).
+
+    Arrows start where the reactions pierce the ground. The body walks on the spot: its centre of mass's mean way is
+    taken off. A long walk is shown to its first seconds, at about 30 frames a second.
+
+    Parameters
+    ----------
+    motion, plates
+        On one clock.
+    caption
+        Shown before what the arrows are.
+    """
+    every = max(1, round(1.0 / (FRAMES_A_SECOND * motion.dt)))
+    rows = slice(0, int(LONGEST_S / motion.dt) + 1, every)
+    part = motion.part(rows)
+    way = _way(motion)[rows]
+    read = Arrow(*_arrow(plates.total[rows], way), READ)
+    needed = Arrow(*_arrow(required(part), way), REQUIRED)
+    words = "ground reaction of both feet: read (black), required by the motion (orange); 1 m is 500 N"
+    scene = Scene(motion.body, f"{caption}: {words}" if caption else words, fps=round(1.0 / (every * motion.dt)))
+    scene.opacity = SEEN_THROUGH
+    scene.play(part.q[:, 7:])
+    scene.carry([pin.SE3(turn, place) for turn, place in _roots(part, way)])
+    scene.arrows += [read, needed]
+    return scene
+
+
+def _way(motion: Motion) -> np.ndarray:
+    """Where the walk is on average, (n, 3) m: a straight line at steady speed, on the ground."""
+    centre = centre_of_mass(motion)
+    line = np.stack([np.ones_like(motion.time), motion.time - motion.time[0]], axis=1)
+    way = line @ np.linalg.lstsq(line, centre, rcond=None)[0]
+    way[:, 2] = 0.0
+    return way
+
+
+def _roots(part: Motion, way: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    places = (pin.XYZQUATToSE3(q[:7]) for q in part.q)
+    return [(place.rotation, place.translation - off) for place, off in zip(places, way, strict=True)]
+
+
+def _arrow(wrench: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Foot and vector of a reaction; nothing where the feet carry nothing."""
+    up = wrench[:, 2] > LOADED_N
+    pressure = np.where(up[:, None], centre_of_pressure(wrench)[0], 0.0)
+    foot = np.column_stack([pressure, np.zeros(len(wrench))]) - np.where(up[:, None], way, 0.0)
+    return foot, METRES_A_NEWTON * wrench[:, :3] * up[:, None]

@@ -1,0 +1,99 @@
+"""Whether plates and motion can be of one walk: what is refused with a reason, and which part of a record is used."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fes_pin.body.joints import SIDES
+from fes_pin.data.errors import InputError
+from fes_pin.walk.dynamics import centre_of_mass, required
+from fes_pin.walk.misfit import segment_poses
+from fes_pin.walk.motion import Motion
+from fes_pin.walk.plates import LOADED_N, Plates
+
+FAR_M = 1.5
+"""No centre of pressure lies further from the body than this, level: a long step is 1 m."""
+CARRIED = 0.6
+"""Share of the required vertical force below which plates do not carry the whole body: errors of plates and masses are
+below a third (`search.POSSIBLE`)."""
+FULLY = 0.9
+"""Share of what they carry in a stretch's middle that plates carry all through it; else a foot beside them carries."""
+ENOUGH_S = 0.3
+"""Most of a single support, s: less is no record of walking."""
+
+
+def check_together(motion: Motion, plates: Plates) -> None:
+    """Refuse plates that push down, that lie elsewhere than the feet, or whose feet are exchanged.
+
+    Raises
+    ------
+    InputError
+        With what was expected.
+    """
+    up = plates.total[:, 2]
+    if np.mean(up) < 0.0:
+        raise InputError(f"the ground pushes up: the mean vertical force is {np.mean(up):.0f} N", column="r_Fy")
+    centre = centre_of_mass(motion)
+    for side in SIDES:
+        rows = plates.loaded[side]
+        apart = np.linalg.norm((plates.pressure[side] - centre)[rows, :2], axis=1)
+        if len(apart) and np.median(apart) > FAR_M:
+            raise InputError(
+                f"the {side} foot's centre of pressure lies {np.median(apart):.3g} m from the body: expected m, in the "
+                "coordinates' frame (belt_speed_mps on a treadmill)",
+                column=f"{side[0]}_copx",
+            )  # fmt: skip
+    _check_sides(motion, plates)
+
+
+def _check_sides(motion: Motion, plates: Plates) -> None:
+    """The foot that stands alone stands on its own plate."""
+    supports = plates.single_supports()
+    if not supports:
+        return
+    poses = segment_poses(motion)
+    other = {"left": "right", "right": "left"}
+    own, cross = 0.0, 0.0
+    for side, rows in supports:
+        point = plates.pressure[side][rows, :2]
+        for name in (side, other[side]):
+            apart = float(np.sum(np.linalg.norm(poses[f"{name}_hindfoot"][1][rows, :2] - point, axis=1)))
+            own, cross = (own + apart, cross) if name == side else (own, cross + apart)
+    if cross < own:
+        raise InputError("the right plate's centre of pressure lies under the left foot: the feet are exchanged")
+
+
+def carried(motion: Motion, plates: Plates) -> slice:
+    """The longest stretch in which the plates carry the whole body; all of the record, if it is most of it.
+
+    Over ground a walk begins and ends beside the plates, and with one plate each other step is not measured.
+
+    Raises
+    ------
+    InputError
+        No stretch is long enough.
+    """
+    needed, up = required(motion)[:, 2], plates.total[:, 2]
+    whole = up > np.maximum(CARRIED * needed, LOADED_N)
+    whole |= needed < LOADED_N  # in the air nothing is to be carried
+    if whole.mean() > 0.95:
+        return slice(0, len(whole))
+    ends = np.flatnonzero(np.diff(np.r_[False, whole, False].astype(int)))
+    start, stop = max(zip(ends[::2], ends[1::2], strict=True), key=lambda e: e[1] - e[0], default=(0, 0))
+    start, stop = _fully(up / np.maximum(needed, LOADED_N), start, stop)
+    if (stop - start) * motion.dt < ENOUGH_S:
+        raise InputError(
+            f"the plates carry the whole body for {(stop - start) * motion.dt:.2f} s at a time at most, "
+            f"{ENOUGH_S:g} s are needed: does a foot step beside them?",
+            column="r_Fy" if plates.loaded["right"].mean() < plates.loaded["left"].mean() else "l_Fy",
+        )
+    return slice(int(start), int(stop))
+
+
+def _fully(share: np.ndarray, start: int, stop: int) -> tuple[int, int]:
+    """The part of a stretch about its middle in which the share carried is as in the middle."""
+    middle, quarter = (start + stop) // 2, max((stop - start) // 4, 1)
+    usual = np.median(share[max(middle - quarter, 0) : middle + quarter]) if stop > start else 0.0
+    low = np.flatnonzero(share[start:stop] < FULLY * usual) + start
+    before, after = low[low < middle], low[low >= middle]
+    return int(before[-1]) + 1 if len(before) else start, int(after[0]) if len(after) else stop

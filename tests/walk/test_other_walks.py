@@ -1,0 +1,152 @@
+"""Walks of other laboratories: columns named otherwise, knees counted otherwise, one plate, and what cannot be used."""
+
+import numpy as np
+import pytest
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.study import read_study
+from fes_pin.walk.recording import recordings_of
+from fes_pin.walk.scene import scene_of
+from fes_pin.walk.strides import strides_of
+
+pytestmark = pytest.mark.shared
+TOML = """[study]
+name = "walk"
+rig = "body"
+[rig]
+mass_kg = 72.6
+height_m = 1.80
+[[trial]]
+coordinates = "coords.csv"
+ground_reaction = "grf.csv"
+belt_speed_mps = 1.135
+"""
+
+
+def table(path):
+    with path.open() as file:
+        names = file.readline().strip().split(",")
+    return names, np.loadtxt(path, delimiter=",", skiprows=1)
+
+
+def put(path, names, values):
+    np.savetxt(path, values, delimiter=",", header=",".join(names), comments="", fmt="%.9g")
+
+
+@pytest.fixture
+def folder(walk, tmp_path):
+    for source, name in (("coords_mtpfree.csv", "coords.csv"), ("grf_raw_600hz.csv", "grf.csv")):
+        (tmp_path / name).write_bytes((walk / source).read_bytes())
+    (tmp_path / "study.toml").write_text(TOML)
+    return tmp_path
+
+
+def read(folder):
+    return recordings_of(read_study(folder))[1][0]
+
+
+def scaled(path, chosen, factor):
+    names, values = table(path)
+    values[:, [chosen(n) for n in names]] *= factor
+    put(path, names, values)
+
+
+def exchanged(path):
+    names, values = table(path)
+    put(path, [{"r_": "l_", "l_": "r_"}.get(n[:2], n[:2]) + n[2:] for n in names], values)
+
+
+def emptied(path):
+    lines = path.read_text().splitlines()
+    cells = lines[50].split(",")
+    cells[5] = ""
+    path.write_text("\n".join([*lines[:50], ",".join(cells), *lines[51:], ""]))
+
+
+def shortened(path):
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines[:60], *lines[70:], ""]))
+
+
+REFUSED = {  # file, change, words
+    "millimetres": ("grf.csv", lambda p: scaled(p, lambda n: "cop" in n, 1000.0), "580 m from the body: expected m"),
+    "action": ("grf.csv", lambda p: scaled(p, lambda n: n[2:3] == "F", -1.0), "the ground pushes up"),
+    "exchanged": ("grf.csv", exchanged, "the feet are exchanged"),
+    "beside": ("grf.csv", lambda p: scaled(p, lambda n: n != "time", 1e-3), "does a foot step beside them?"),
+    "gap": ("coords.csv", emptied, "row 51, column q_pelvis_ty: expected a number, found nothing"),
+    "samples": ("coords.csv", shortened, "expected a fixed step"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_used_is_refused_in_a_line_that_names_the_file(folder, case):
+    file, change, words = REFUSED[case]
+    change(folder / file)
+    with pytest.raises(InputError) as caught:
+        read(folder)
+    assert words in str(caught.value) and file in str(caught.value) and "\n" not in str(caught.value)
+
+
+NAMES = {  # plate, foot, force or torque, v or p, axis
+    "opencap": lambda p, s, w, k, a: f"{s.upper()}_ground_{w}_{k}{a}",
+    "numbered": lambda p, s, w, k, a: f"ground_{w}_{p}_{k}{a}",
+    "toolbox": lambda p, s, w, k, a: f"ground_{w}{p}_{k}{a}",
+    "calcn": lambda p, s, w, k, a: f"ground_{w}_calcn_{s}_{k}{a}",
+}
+
+
+@pytest.mark.parametrize("case", NAMES)
+def test_columns_of_the_ground_reaction_may_be_named_otherwise(folder, case):
+    usual = read(folder).plates
+    names, values = table(folder / "grf.csv")
+    labels, order = ["time"], [0]
+    for plate, side in ((2, "r"), (1, "l")):
+        for kind, what, letter in (("F", "force", "v"), ("cop", "force", "p"), ("T", "torque", "")):
+            labels += [NAMES[case](plate, side, what, letter, axis) for axis in "xyz"]
+            order += [names.index(f"{side}_{kind}{axis}") for axis in "xyz"]
+    rows = "\n".join("\t".join(f"{v:.9g}" for v in row) for row in values[:, order])
+    (folder / "grf.mot").write_text(f"grf\nnRows={len(values)}\nendheader\n" + "\t".join(labels) + f"\n{rows}\n")
+    (folder / "study.toml").write_text(TOML.replace("grf.csv", "grf.mot"))
+    plates = read(folder).plates
+    for side in ("left", "right"):
+        assert np.allclose(plates.feet[side], usual.feet[side], atol=1e-4)
+
+
+def test_knees_that_count_flexion_positive_are_the_same_walk(folder):
+    usual = read(folder).motion
+    scaled(folder / "coords.csv", lambda n: "knee" in n, -1.0)
+    assert np.allclose(read(folder).motion.q, usual.q, atol=1e-9)
+
+
+def test_of_one_plate_the_stance_on_it_is_used_and_is_no_whole_stride(folder):
+    whole = read(folder)
+    scaled(folder / "grf.csv", lambda n: n.startswith("l_"), 0.0)
+    one = read(folder)
+    supports = [rows for side, rows in whole.plates.single_supports() if side == "right"]
+    longest = max((rows.stop - rows.start) * whole.motion.dt for rows in supports)
+    length = one.motion.time[-1] - one.motion.time[0]
+    assert 0.8 * longest < length < 1.25 * longest
+    assert strides_of([scene_of(whole, 6.0)], 6.0).whole
+    assert not strides_of([scene_of(one, 6.0)], 6.0).whole
+
+
+def test_over_ground_a_late_clock_does_not_move_with_the_body(folder):
+    """The column of a clock is what a small shift changes, whether the belt or the body moves."""
+    for belt in (1.135, 0.0):
+        (folder / "study.toml").write_text(TOML.replace("1.135", str(belt)))
+        if not belt:  # the same walk, seen from the belt
+            for file, chosen in (("coords.csv", "q_pelvis_tx"), ("grf.csv", "cop")):
+                names, values = table(folder / file)
+                for k, name in enumerate(names):
+                    if name == chosen or name in (f"r_{chosen}x", f"l_{chosen}x"):
+                        values[:, k] += 1.135 * values[:, 0]
+                    if name == "qd_pelvis_tx":
+                        values[:, k] += 1.135
+                put(folder / file, names, values)
+        recording = read(folder)
+        now, later = scene_of(recording, 6.0), scene_of(recording, 6.0, 0.004)
+        change = (later.measured - now.measured)[10:-10] / 0.004
+        column = now.rate[10:-10]
+        assert np.sqrt(np.mean((change - column) ** 2)) < 0.2 * np.sqrt(np.mean(column**2))
+        late = np.mean((change - column)[:, 4])
+        assert abs(late) < 0.1 * 1.135 * np.mean(now.measured[:, 2])  # a centre of pressure that is carried along
