@@ -8,6 +8,7 @@ Run the cells, or `python analysis/walk_hidden_cause.py`; picture and page go to
 """
 
 # %% A walk with a secret
+import inspect
 import sys
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from fes_pin.view.walk_playback import show_reactions
 from fes_pin.walk.dynamics import about, centre_of_mass, required
 from fes_pin.walk.recording import recordings_of
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+sys.path.insert(0, str(Path(inspect.getfile(fp)).parents[1] / "scripts"))
 from walking_matrix.synthetic import Wrong, gait_of, make
 
 OUT = Path("out")

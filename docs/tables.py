@@ -32,6 +32,7 @@ ROOMS = {
     "allocate": "Allocation",
     "control": "Position control",
     "view": "Reports and pictures",
+    "verdict": "One question for every study",
     "cohort": "Cohorts",
 }
 """The packages of the API reference, with their headings; `cli` is the command line, which says itself what it does."""

@@ -34,7 +34,7 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.models.store import save_model as save_model
     from fes_pin.muscles.nerve_inputs import controllability as controllability
     from fes_pin.muscles.nerves import Nerves as Nerves
-    from fes_pin.verdict import diagnose as diagnose
+    from fes_pin.verdict.ask import diagnose as diagnose
     from fes_pin.view.report import report as report
     from fes_pin.walk.diagnosis import diagnose_walk as diagnose_walk
 
@@ -58,7 +58,7 @@ _WHERE = {
     "predict": "fes_pin.models.predict",
     "fit": "fes_pin.identify.fit",
     "Fit": "fes_pin.identify.fit",
-    "diagnose": "fes_pin.verdict",
+    "diagnose": "fes_pin.verdict.ask",
     "Diagnosis": "fes_pin.diagnose.result",
     "diagnose_walk": "fes_pin.walk.diagnosis",
     "report": "fes_pin.view.report",

@@ -22,6 +22,7 @@ ALLOWED = {
     "muscles": {"body", "models", "data"},
     "allocate": {"muscles", "body", "data"},
     "control": {"paper", "allocate", "muscles", "identify", "models", "data"},
+    "verdict": {"walk", "diagnose", "models", "data"},
     "cohort": {"view", "walk", "diagnose", "models", "data"},
     "view": {"paper", "diagnose", "identify", "models", "data", "control", "allocate", "muscles", "body", "walk"},
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -11,10 +12,8 @@ class _Chapter(ModuleType):
     """The chapter and its verb share a name, so the chapter answers a call."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """See `fes_pin.verdict.diagnose`."""
-        from fes_pin.verdict import diagnose  # noqa: PLC0415
-
-        return diagnose(*args, **kwargs)
+        """See `fes_pin.verdict.ask.diagnose`, which the package gives by the same name."""
+        return import_module("fes_pin").__getattr__("diagnose")(*args, **kwargs)
 
 
 sys.modules[__name__].__class__ = _Chapter

@@ -1,4 +1,4 @@
-"""One question for every study: the rig says which diagnosis answers."""
+"""The diagnosis of a study, of a rig or of a walk."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fes_pin.data.study import Study
 from fes_pin.models.catalogue import Source
 
 if TYPE_CHECKING:
-    from fes_pin.diagnose.diagnosis import Diagnosis
+    from fes_pin.diagnose.result import Diagnosis
     from fes_pin.walk.diagnosis import WalkDiagnosis
 
 

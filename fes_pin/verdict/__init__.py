@@ -1,0 +1,1 @@
+"""One question for every study: the rig says which diagnosis answers."""
