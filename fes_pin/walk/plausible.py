@@ -16,6 +16,8 @@ FAR_M = 1.5
 CARRIED = 0.6
 """Share of the required vertical force below which plates do not carry the whole body: errors of plates and masses are
 below a third (`search.POSSIBLE`)."""
+NEARER = 0.6
+"""Share of its distance to one ankle at which a centre of pressure is the other foot's; one who stands may share it."""
 FULLY = 0.9
 """Share of what they carry in a stretch's middle that plates carry all through it; else a foot beside them carries."""
 ENOUGH_S = 0.3
@@ -57,9 +59,11 @@ def _check_sides(motion: Motion, plates: Plates) -> None:
     for side, rows in supports:
         point = plates.pressure[side][rows, :2]
         for name in (side, other[side]):
-            apart = float(np.sum(np.linalg.norm(poses[f"{name}_hindfoot"][1][rows, :2] - point, axis=1)))
+            above = "shank" if name == motion.body.stance else "hindfoot"  # links begin at the joint towards the ground
+            ankle = poses[f"{name}_{above}"][1][rows, :2]
+            apart = float(np.sum(np.linalg.norm(ankle - point, axis=1)))
             own, cross = (own + apart, cross) if name == side else (own, cross + apart)
-    if cross < own:
+    if cross < NEARER * own:
         raise InputError("the right plate's centre of pressure lies under the left foot: the feet are exchanged")
 
 
