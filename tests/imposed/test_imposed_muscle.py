@@ -142,3 +142,8 @@ def test_a_length_is_read_in_imposed_trials_only(tmp_path):
     (tmp_path / "b.csv").write_text("time_s,stim,force_n\n0,1,0\n0.1,0,1\n0.2,0,1\n")
     with pytest.raises(InputError, match="has its motion there"):
         read_trial(tmp_path / "b.csv", rig="muscle", kind="imposed")
+
+
+def test_no_motion_is_proposed():
+    """What separates causes on a lever would be a motion, and none is made up."""
+    assert Muscle.conditions_to_try(study_of()) == set()

@@ -95,8 +95,12 @@ class Rig:
 
     @classmethod
     def conditions_to_try(cls, study: Study) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
-        """Kinds and conditions under which a trial may be proposed: those that the study has been run under."""
-        run = ((t.kind, {n: v for n, v in t.conditions.items() if n not in START_S}) for t in study.trials)
+        """Kinds and conditions under which a trial may be proposed: those that the study has been run under.
+
+        No motion that would have to be imposed is proposed.
+        """
+        free = (t for t in study.trials if t.kind != IMPOSED)
+        run = ((t.kind, {n: v for n, v in t.conditions.items() if n not in START_S}) for t in free)
         return {(kind, tuple(sorted(conditions.items()))) for kind, conditions in run}
 
     @classmethod
