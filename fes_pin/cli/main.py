@@ -20,8 +20,10 @@ from fes_pin.cli.own import check, new_study
 from fes_pin.cli.walk import diagnose_walking, print_effects
 
 if TYPE_CHECKING:
+    from fes_pin.data.trial import Trial
     from fes_pin.diagnose.result import Diagnosis
     from fes_pin.models.catalogue import Catalogue
+    from fes_pin.models.model import Model
 
 app = typer.Typer(cls=Commands, pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
@@ -138,9 +140,17 @@ def predict(
     residuals: Annotated[
         bool, typer.Option("--residuals", help="Also what was measured, and measured minus predicted.")
     ] = False,
+    horizon: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            metavar="SECONDS",
+            help="Foretell each sample from what the trial measured up to so long before it.",
+        ),
+    ] = None,
     library: Libraries = None,
 ) -> None:
-    """Predict a trial from its inputs with a saved model."""
+    """Predict a trial from its inputs with a saved model, or so far ahead along a trial that has its outputs."""
     from fes_pin.data.errors import InputError
     from fes_pin.data.files import write_bytes
     from fes_pin.data.study import read_columns
@@ -155,8 +165,8 @@ def predict(
     kind, conditions = _settings(setting or [])
     own = None if columns_of is None else read_columns(columns_of, rigs=catalogue.schemas())
     rig = loaded.rig.described()
-    given = read_trial(trial, rig=rig, kind=kind, conditions=conditions, inputs_only=True, own=own)
-    found = run(loaded, given)
+    given = read_trial(trial, rig=rig, kind=kind, conditions=conditions, inputs_only=horizon is None, own=own)
+    found = run(loaded, given) if horizon is None else _along(model, loaded, given, horizon)
     columns = {"time_s": found.time, **found.columns}
     if residuals:
         measured = [n for n in found.columns if n in given]
@@ -166,6 +176,22 @@ def predict(
         columns |= {f"{n}_residual": given.residual(found, n) for n in measured}
     write_bytes(out, table_bytes(columns, out))
     _say_whose_code(catalogue)
+
+
+def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
+    """A trial's outputs foretold from what was measured so long before."""
+    from dataclasses import replace
+
+    from fes_pin.data.errors import InputError
+    from fes_pin.identify.ahead import foretell
+    from fes_pin.identify.stored import load_random
+
+    random = load_random(path)
+    if random is None:
+        raise InputError(
+            "expected a table [random], as diagnose writes it: --horizon needs to know the noise", file=path
+        )
+    return replace(trial, columns=foretell(model, trial, random, horizon_s))
 
 
 @app.command()

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     import pandas
 
 NOTES = ("description", "subject", "source", "licence", "license", "date", "notes")
+HORIZON = "horizon_s"
+"""Key of `[study]`: how far ahead errors over a horizon look."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -62,6 +64,8 @@ class Study:
         `<trial>.ground_reaction`, which hold the recordings at their own sample rates.
     described
         What studies of the rig must and may hold, if it is not one that is written here or installed.
+    horizon_s
+        How far ahead errors over a horizon look, s; None leaves it to the diagnosis.
     """
 
     name: str
@@ -72,6 +76,7 @@ class Study:
     folder: Path = Path()
     files: Mapping[str, Path] = field(default_factory=dict)
     described: RigSchema | None = None
+    horizon_s: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "trials", tuple(self.trials))
@@ -80,7 +85,16 @@ class Study:
 
     def __reduce__(self) -> tuple[Any, ...]:
         tables = (dict(self.constants), dict(self.start))
-        return Study, (self.name, self.rig, *tables, self.trials, self.folder, dict(self.files), self.described)
+        return Study, (
+            self.name,
+            self.rig,
+            *tables,
+            self.trials,
+            self.folder,
+            dict(self.files),
+            self.described,
+            self.horizon_s,
+        )
 
     @property
     def schema(self) -> RigSchema:
@@ -196,15 +210,21 @@ class _Reader:
         for index, table in enumerate(self._trial_tables()):
             trials.append(self._trial(f"trial[{index}]", table, names[index], files))
         self._check_together(trials, constants)
-        return Study(self.name, self.rig, constants, start, tuple(trials), self.folder, files, self.schema)
+        horizon = self._horizon()
+        return Study(self.name, self.rig, constants, start, tuple(trials), self.folder, files, self.schema, horizon)
+
+    def _horizon(self) -> float | None:
+        table = self.document.table("study")
+        given = {HORIZON: table[HORIZON]} if HORIZON in table else {}
+        return self.document.numbers("study", given, {HORIZON: Number("s", 0.0, required=False)}).get(HORIZON)
 
     def _study_table(self) -> tuple[str, str]:
         if "study" not in self.document.data:
             raise self.error("study", "missing; expected a table [study] with name and rig")
         table = self.document.table("study")
         for key in table:
-            if key not in ("name", "rig", *NOTES):
-                raise self.error(f"study.{key}", unknown(key, ("name", "rig", *NOTES)))
+            if key not in ("name", "rig", HORIZON, *NOTES):
+                raise self.error(f"study.{key}", unknown(key, ("name", "rig", HORIZON, *NOTES)))
         for key in ("name", "rig"):
             if key not in table:
                 raise self.error(f"study.{key}", "missing")
@@ -380,7 +400,8 @@ def write_study(study: Study, folder: str | Path) -> None:
         labels = {n: label for n, label in (("role", trial.role), ("group", trial.group)) if label}
         conditions = {key: float(value) for key, value in trial.conditions.items()}
         tables.append({**dict(zip(schema.recordings, named, strict=True)), "kind": trial.kind, **conditions, **labels})
-    document = {"study": {"name": study.name, "rig": study.rig}, "rig": rig, "start": dict(study.start)}
+    head = {"name": study.name, "rig": study.rig, **({HORIZON: study.horizon_s} if study.horizon_s else {})}
+    document = {"study": head, "rig": rig, "start": dict(study.start)}
     contents["study.toml"] = tomli_w.dumps({**document, "trial": tables})
     write_files(folder, contents)
 

@@ -84,7 +84,12 @@ class Judged:
 
 
 def judge_driven(
-    search: LikelihoodSearch, found: Found, train: Sequence[Trial], test: Sequence[Trial], seed: int
+    search: LikelihoodSearch,
+    found: Found,
+    train: Sequence[Trial],
+    test: Sequence[Trial],
+    seed: int,
+    horizon_s: float | None = None,
 ) -> Judged:
     """Hold out, and judge what is left.
 
@@ -96,6 +101,8 @@ def judge_driven(
         Trials that were fitted, and those that the study itself holds out.
     seed
         Of critical values.
+    horizon_s
+        How far ahead errors over a horizon look; `default_horizon` by default.
     """
     refused: dict[str, float] = {}
     while True:
@@ -109,7 +116,7 @@ def judge_driven(
         found = search.settle(tuple(sorted(n for n in found.without if n != weakest)))
     random = random_parts(found.best)
     left = _left(driven_remainder(found.best, seed), random, refused, search)
-    horizon = default_horizon(train)
+    horizon = horizon_s or default_horizon(train)
     whole = folds or [_Fold(found.nominal, found.best, found.without, tuple(train))]
     falling = falls(found.best.model, train)
     return Judged(
@@ -239,7 +246,7 @@ def driven_diagnosis(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
-    judged = judge_driven(search, found, *trials, seed)
+    judged = judge_driven(search, found, *trials, seed, study.horizon_s)
     found, left = judged.found, judged.left
     best = found.best
     searched = Searched(

@@ -1,4 +1,4 @@
-"""How far ahead a model foretells what a driven rig reads, and what acts on the rig at random."""
+"""How far ahead a model foretells what a rig reads, and what acts on a driven rig at random."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import Errors
-from fes_pin.identify.ahead import one_step, over_horizon
+from fes_pin.identify.ahead import Missed, missed, one_step, over_horizon, own_noise
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import driving_size
+from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel
 
@@ -50,6 +51,12 @@ class Ahead:
     horizon: float
     free: float | None
 
+    @classmethod
+    def of(cls, total: Missed) -> Ahead:
+        """From squared errors."""
+        share = 100.0 / max(total.around, 1e-300)
+        return cls(share * total.one_step, share * total.horizon, share * total.free)
+
 
 @dataclass(frozen=True)
 class AheadErrors:
@@ -77,6 +84,27 @@ def _averaged(std: float, time: float) -> float:
     """
     x = time / AVERAGED_S
     return std * float(np.sqrt(max(2.0 * x * (1.0 - x * (1.0 - np.exp(-1.0 / x))), 0.0)))
+
+
+def free_errors(
+    nominal: Fit,
+    extended: Fit,
+    floor: NoiseModel,
+    horizon_s: float,
+    held_out: tuple[Missed, Missed] | None,
+) -> AheadErrors:
+    """Errors over time of two models that are simulated freely.
+
+    Parameters
+    ----------
+    floor
+        Noise whose deviations weigh the channels.
+    held_out
+        Squared errors of both on trials that took no part, if there are such.
+    """
+    inside = [Ahead.of(missed(f.model, f.trials, own_noise(f), floor, horizon_s)) for f in (nominal, extended)]
+    outside = [Ahead.of(total) for total in held_out] if held_out else [None, None]
+    return AheadErrors(horizon_s, inside[0], inside[1], outside[0], outside[1])
 
 
 def errors_over_horizon(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float) -> Errors:

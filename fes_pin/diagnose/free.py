@@ -12,10 +12,12 @@ from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.decide.doubts import doubts, with_error
 from fes_pin.diagnose.decide.held_out import HeldOut, cross_validate, errors_of, gain, separate
 from fes_pin.diagnose.decide.rivals import absorbed, equivalents, estimates, experiment, ranking
+from fes_pin.diagnose.errors_ahead import free_errors
 from fes_pin.diagnose.remainder.open_set import Remainder, remainder
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.misspecified import under_one_noise
 from fes_pin.diagnose.search.simulation_search import Searched, SimulationSearch
+from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import Fit, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
@@ -33,8 +35,9 @@ def judge_free(
     study: Study, search: SimulationSearch, searched: Searched, test: Sequence[Trial], seed: int
 ) -> Diagnosis:
     """The verdict on what a search found: causes that trials held out bear out, and what is left."""
+    horizon = study.horizon_s or default_horizon(searched.nominal.trials)
     left = remainder(searched.best, seed)
-    causes, held = _causes(searched, left, test, seed)
+    causes, held = _causes(searched, left, test, seed, horizon)
     refused: list[Cause] = []
     if searched.stopped and not all(c.helps(False, True) for c in causes):
         searched = search.stopped(())
@@ -45,11 +48,11 @@ def judge_free(
         refused.append(weakest)
         searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
         left = remainder(searched.best, seed)
-        causes, held = _causes(searched, left, test, seed)
+        causes, held = _causes(searched, left, test, seed, horizon)
     worthless = bool(causes) and _error(searched.best, searched.floor) > OF_THE_MEAN
     if worthless:
         searched, causes = search.stopped(()) if searched.stopped else search.settle(()), []
-        left, held = remainder(searched.best, seed), _held_out(searched, test)
+        left, held = remainder(searched.best, seed), _held_out(searched, test, horizon)
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     left, reason = with_error(with_refused(left, refused), searched)
     if worthless:
@@ -58,7 +61,7 @@ def judge_free(
         left, reason = replace(left, unexplained=True), "the search was stopped before a cause earned its place"
     if not causes and not searched.complete and not searched.stopped:
         searched = search.for_prediction(searched)
-        held = _held_out(searched, test)
+        held = _held_out(searched, test, horizon)
     nominal, best = searched.nominal, searched.best
     verdict = "causes_found" if causes else ("unexplained" if left.unexplained else "adequate")
     in_sample = errors_of(best.model, best.trials, searched.floor)
@@ -80,6 +83,7 @@ def judge_free(
         wall_s=0.0,
         warnings=tuple(doubts(searched, len(causes))),
         reason=reason,
+        ahead=free_errors(nominal, best, searched.floor, horizon, held.ahead if held else None),
     )
 
 
@@ -121,22 +125,22 @@ def _error(fitted: Fit, floor: NoiseModel) -> float:
     return errors_of(fitted.model, fitted.trials, floor).error_percent()
 
 
-def _held_out(searched: Searched, test: Sequence[Trial]) -> HeldOut | None:
+def _held_out(searched: Searched, test: Sequence[Trial], horizon_s: float) -> HeldOut | None:
     if test:
-        return separate(searched.nominal, searched.best, searched.without, test, searched.floor)
+        return separate(searched.nominal, searched.best, searched.without, test, searched.floor, horizon_s)
     if len(searched.nominal.trials) < 2 or searched.stopped:
         return None
     contenders = sorted((f for fits in searched.rivals.values() for f in fits), key=lambda f: f.sse)[:CONTENDERS]
     if not searched.complete:
         contenders = under_one_noise(contenders, searched.best.trials, searched.best.noise)
-    return cross_validate(searched.nominal, searched.best, searched.without, contenders, searched.floor)
+    return cross_validate(searched.nominal, searched.best, searched.without, contenders, searched.floor, horizon_s)
 
 
 def _causes(
-    searched: Searched, left: Remainder, test: Sequence[Trial], seed: int
+    searched: Searched, left: Remainder, test: Sequence[Trial], seed: int, horizon_s: float
 ) -> tuple[list[Cause], HeldOut | None]:
     best, nominal = searched.best, searched.nominal
-    held = _held_out(searched, test)
+    held = _held_out(searched, test, horizon_s)
     inside = {n: errors_of(f.model, f.trials, searched.floor) for n, f in searched.without.items()}
     inside_nominal = errors_of(nominal.model, nominal.trials, searched.floor)
     inside_best = errors_of(best.model, best.trials, searched.floor)

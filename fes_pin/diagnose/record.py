@@ -13,6 +13,7 @@ from fes_pin.data.trial import trial_csv
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.stored import random_table
 from fes_pin.models.store import model_toml
 
 DIGITS = 6
@@ -56,7 +57,7 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
         **_left_out(diagnosis),
         **({"reason": diagnosis.reason} if diagnosis.reason else {}),
         **_library(diagnosis),
-        **_driven(diagnosis),
+        **_over_time(diagnosis),
         "warnings": list(diagnosis.warnings),
         "wall_s": round(diagnosis.wall_s, 2),
         **({"provenance": diagnosis.provenance.record()} if diagnosis.provenance else {}),
@@ -74,7 +75,7 @@ def diagnosis_files(diagnosis: Diagnosis) -> dict[str, str]:
     """Every file of a diagnosis but the report, by name."""
     files = {
         "diagnosis.json": json.dumps(diagnosis_record(diagnosis), indent=1, allow_nan=False) + "\n",
-        "model.toml": model_toml(diagnosis.model),
+        "model.toml": model_toml(diagnosis.model, random_table(diagnosis.extended)),
     }
     if diagnosis.next_experiment and diagnosis.next_experiment.trial is not None:
         files[NEXT_FILE] = trial_csv(diagnosis.next_experiment.trial)
@@ -114,7 +115,7 @@ def _parameters(fitted: Fit) -> dict[str, Any]:
 
 
 def _errors(diagnosis: Diagnosis, which: str) -> dict[str, float | None]:
-    """E of one of the two models: free, fitted and held out; of a driven rig one sample and a horizon ahead as well."""
+    """E of one of the two models: free, fitted and held out; on one of them one sample and a horizon ahead as well."""
     free = getattr(diagnosis, f"{which}_error")
     out = {"fit": shown(free[0]), "held_out": shown(free[1])}
     if diagnosis.ahead is not None:
@@ -124,10 +125,13 @@ def _errors(diagnosis: Diagnosis, which: str) -> dict[str, float | None]:
     return out
 
 
-def _driven(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What a driven study's record holds besides."""
+def _over_time(diagnosis: Diagnosis) -> dict[str, Any]:
+    """How far ahead a horizon looks, and what acts on a driven rig at random."""
     if diagnosis.ahead is None:
         return {}
+    horizon = {"horizon_s": shown(diagnosis.ahead.horizon_s)}
+    if not diagnosis.is_driven:
+        return horizon
     random = {
         r.name: {
             "std": shown(r.std),
@@ -136,7 +140,7 @@ def _driven(diagnosis: Diagnosis) -> dict[str, Any]:
         }
         for r in diagnosis.random
     }
-    return {"horizon_s": shown(diagnosis.ahead.horizon_s), "random": random}
+    return {**horizon, "random": random}
 
 
 def _experiment(diagnosis: Diagnosis) -> dict[str, Any] | None:

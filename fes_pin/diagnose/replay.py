@@ -42,8 +42,8 @@ class Replay:
 def replay(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     """Every trial of the study as both models of a diagnosis predict it, in the order of the study."""
     trials, noise = diagnosis.study.trials, diagnosis.extended.noise
-    nominal = _predicted(diagnosis.nominal, trials, noise, diagnosis.ahead)
-    extended = _predicted(diagnosis.extended, trials, noise, diagnosis.ahead)
+    nominal = _predicted(diagnosis.nominal, trials, noise, diagnosis.over_horizon)
+    extended = _predicted(diagnosis.extended, trials, noise, diagnosis.over_horizon)
     made = []
     for trial, before, after in zip(trials, nominal, extended, strict=True):
         outputs = tuple(n for n in diagnosis.model.rig.outputs(trial.kind) if n in trial)

@@ -97,6 +97,16 @@ class Diagnosis:
     provenance: Provenance | None = field(default=None, compare=False)
 
     @property
+    def is_driven(self) -> bool:
+        """True of a rig whose effort answers what is read: it is judged by what is foretold one sample ahead."""
+        return self.extended.doubt is not None
+
+    @property
+    def over_horizon(self) -> AheadErrors | None:
+        """Errors that a driven rig is judged by; None of one that is simulated freely."""
+        return self.ahead if self.is_driven else None
+
+    @property
     def model(self) -> Model:
         """The extended model."""
         return self.extended.model
@@ -106,9 +116,8 @@ class Diagnosis:
 
         On trials that took no part, where there are such; of a driven rig of the errors over the horizon.
         """
-        if self.ahead is not None:
-            one = self.ahead.nominal_held_out or self.ahead.nominal
-            other = self.ahead.extended_held_out or self.ahead.extended
+        if (ahead := self.over_horizon) is not None:
+            one, other = ahead.nominal_held_out or ahead.nominal, ahead.extended_held_out or ahead.extended
             return float(np.clip(100.0 * (one.horizon - other.horizon) / max(one.horizon, 1e-300), 0.0, 100.0))
         outside = self.nominal_error[1] is not None and self.extended_error[1] is not None
         before, after = (e[1] if outside else e[0] for e in (self.nominal_error, self.extended_error))

@@ -2,20 +2,33 @@
 
 One sample ahead any model is right where sampling is fast; free simulation goes astray where a rig integrates or falls,
 with the best of models; over a horizon in between a model is tried for what it is used for.
+
+What was measured tells the state by a Kalman filter where a random effort acts (`Doubt`), and the reading's noise by
+its autoregression (`NoiseModel`) where a rig is simulated freely:
+
+    y_t = free_t + e_t,    e_(t|t-k) = e_1' A^k (e_(t-k), e_(t-k-1), ...)',    A the companion matrix.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.data.errors import InputError
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.noise import Noise, NoiseModel, thin, thinning
+from fes_pin.identify.per_trial import predictions
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, masked
 from fes_pin.models.simulate import Simulator
+
+Random = Doubt | NoiseModel
+"""What is random about a rig: in its effort and readings, or in its readings alone."""
 
 HORIZON_S = 0.3
 """How far ahead a horizon looks by default, s, or a tenth of the shortest trial if that is less."""
@@ -32,6 +45,119 @@ def default_horizon(trials: Sequence[Trial]) -> float:
     if all(t.kind == IMPOSED for t in trials):
         return max(t.duration for t in trials)
     return min(HORIZON_S, 0.1 * min(t.duration for t in trials))
+
+
+@dataclass(frozen=True)
+class Missed:
+    """Squared errors of a model on trials, in units of the noise: one sample ahead, over a horizon, free; and of the
+    measurement about its mean."""
+
+    one_step: float = 0.0
+    horizon: float = 0.0
+    free: float = 0.0
+    around: float = 0.0
+
+    def __add__(self, other: Missed) -> Missed:
+        return Missed(
+            self.one_step + other.one_step,
+            self.horizon + other.horizon,
+            self.free + other.free,
+            self.around + other.around,
+        )
+
+
+def missed(model: Model, trials: Sequence[Trial], noise: NoiseModel, floor: NoiseModel, horizon_s: float) -> Missed:
+    """Squared errors of a model that is simulated freely.
+
+    Parameters
+    ----------
+    noise
+        By which the residual foretells itself.
+    floor
+        Whose deviations weigh the channels.
+    """
+    total = Missed()
+    for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
+        for k, name in enumerate(model.rig.outputs(trial.kind)):
+            if name not in trial.columns or name not in noise or name not in floor:
+                continue
+            variance, measured = floor[name].std ** 2, trial[name]
+            left = measured - readings[:, k]
+            errors = [left - forecast(left, noise[name], trial.dt, ahead) for ahead in (0.0, horizon_s)]
+            squares = [float(e @ e) / variance for e in (*errors, left, measured - measured.mean())]
+            total += Missed(*squares)
+    return total
+
+
+def own_noise(fitted: Fit) -> NoiseModel:
+    """The noise that the residuals of a fit show: what it gets wrong foretells itself as well."""
+    try:
+        return noise_of(fitted)
+    except (FloatingPointError, np.linalg.LinAlgError):  # a fit that does not stay finite
+        return fitted.noise
+
+
+def forecast(residual: np.ndarray, noise: Noise, dt: float, ahead_s: float) -> np.ndarray:
+    """What autoregressive noise foretells of a residual, shape (n,), from what was seen `ahead_s` before or earlier.
+
+    With `ahead_s` zero, one sample ahead; of noise that is known at a longer step, one such step.
+    """
+    every = thinning(dt, noise.step_s)
+    seen, order = thin(residual, every), len(noise.ar)
+    steps = max(1, round(ahead_s / (every * dt)))
+    foretold = np.zeros(len(seen))
+    if order and len(seen) > steps:
+        weights = _weights(np.array(noise.ar), steps)
+        foretold[steps:] = np.convolve(seen, weights)[: len(seen) - steps]
+    out = np.repeat(foretold, every)
+    return np.pad(out, (0, len(residual) - len(out)), mode="edge") if len(out) else np.zeros(len(residual))
+
+
+def _weights(ar: np.ndarray, steps: int) -> np.ndarray:
+    """First row of the companion matrix to the power of `steps`."""
+    row = ar.copy()
+    for _ in range(steps - 1):
+        row = row[0] * ar + np.append(row[1:], 0.0)
+    return row
+
+
+def foretell(model: Model, trial: Trial, random: Random, horizon_s: float) -> dict[str, np.ndarray]:
+    """What a model foretells of each sample of a trial from what was measured `horizon_s` before it or earlier.
+
+    Parameters
+    ----------
+    trial
+        With its outputs; what it has not is not foretold.
+    random
+        What is random about the rig: see `identify.stored.load_random`.
+    horizon_s
+        s.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,)
+        By output column that the trial has.
+
+    Raises
+    ------
+    InputError
+        If the trial has no output that the model foretells.
+    """
+    outputs = [n for n in model.rig.outputs(trial.kind) if n in trial.columns]
+    if not outputs:
+        expected = " or ".join(model.rig.outputs(trial.kind))
+        raise InputError(f"expected a column {expected}: a prediction over a horizon goes on from what was measured")
+    if isinstance(random, Doubt):
+        return over_horizon(model, trial, random, horizon_s)
+    (readings,) = predictions(model, [trial], random)
+    out = {}
+    for k, name in enumerate(model.rig.outputs(trial.kind)):
+        if name in outputs:
+            free = readings[:, k]
+            out[name] = free + (
+                forecast(trial[name] - free, random[name], trial.dt, horizon_s) if name in random else 0.0
+            )
+    return out
 
 
 def one_step(model: Model, trial: Trial, doubt: Doubt) -> dict[str, np.ndarray]:

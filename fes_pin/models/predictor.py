@@ -212,19 +212,22 @@ class _Block:
         self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
         self.seen = np.zeros((self.count, len(self.outputs), WIDTH), dtype=bool)
         self.measured = np.zeros((self.count, len(self.outputs), WIDTH))
+        self.repeated = np.ones((self.count, len(self.outputs), WIDTH))
         for lane, trial in enumerate(self.trials):
             for k, name in enumerate(self.outputs):
                 column = trial[name]
                 finite = np.isfinite(column)
                 self.seen[: len(trial), k, lane] = finite
                 self.measured[: len(trial), k, lane] = np.where(finite, column, 0.0)
+                self.repeated[: len(trial), k, lane] = repeated(column)
         self._given: tuple[tuple[int, ...], np.ndarray] | None = None
 
     def _driven(self, shift: tuple[int, ...]) -> np.ndarray:
         """Inputs of all lanes, later by whole samples, beside what was measured and whether it was."""
         if self._given is None or self._given[0] != shift:
             driven = lane_inputs(self.rig, self.trials, self.inputs, self.count, shift)
-            self._given = (shift, np.concatenate([driven, self.measured, self.seen.astype(float)], axis=1))
+            read = (self.measured, self.seen.astype(float), self.repeated)
+            self._given = (shift, np.concatenate([driven, *read], axis=1))
         return self._given[1]
 
     def run(
@@ -259,6 +262,13 @@ class _Block:
         for lane, trial in enumerate(self.trials):
             n = len(trial)
             yield {o: self.measured[:n, k, lane] - y[:n, k, lane] for k, o in enumerate(self.outputs)}
+
+
+def repeated(column: np.ndarray) -> np.ndarray:
+    """How often the value of each sample was read in a row, shape (n,): 1 where its neighbours differ."""
+    begins = np.flatnonzero(np.diff(column, prepend=np.nan) != 0.0)  # what is missed differs from everything
+    lengths = np.diff(np.append(begins, len(column)))
+    return np.repeat(lengths, lengths).astype(float)
 
 
 def masked(trial: Trial, outputs: Sequence[str], upto: int) -> Trial:

@@ -26,8 +26,14 @@ EACH_TRIAL = "each_trial"
 """Key of an effect whose amplitudes are each trial's own."""
 
 
-def model_toml(model: Model) -> str:
-    """A model as TOML: rig, constants, parameters to the last bit, effects."""
+def model_toml(model: Model, random: Mapping[str, Any] | None = None) -> str:
+    """A model as TOML: rig, constants, parameters to the last bit, effects; what is random about it, if that is known.
+
+    Parameters
+    ----------
+    random
+        As `identify.stored.random_table` writes it.
+    """
     rig = model.rig
     tables: dict[str, Any] = {
         "format": FORMAT,
@@ -37,6 +43,8 @@ def model_toml(model: Model) -> str:
         "nominal": {n: float(getattr(rig, n)) for n in rig.parameters()},
         "effects": {e.name: _effect_table(e) for e in model.effects},
     }
+    if random:
+        tables["random"] = random
     parts: tuple[Rig | Effect, ...] = (rig, *model.effects)
     foreign = {one.name: Path(where).name for one in parts if (where := origin(type(one)))}
     return tomli_w.dumps({**tables, NEEDS: foreign} if foreign else tables)

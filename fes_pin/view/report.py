@@ -102,7 +102,7 @@ def _errors(diagnosis: Diagnosis) -> list[Markup]:
             "drifts away with the best of models. What counts is the horizon between."
         )
         notes.append(spans)
-        if ahead.extended.free is None:
+        if diagnosis.is_driven and ahead.extended.free is None:
             notes.append("This rig falls over by itself: its free error is meaningless, and is not given.")
         unit = diagnosis.model.rig.units().get("effort", "")
         notes += [

@@ -31,7 +31,7 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
     before = _missing(diagnosis, diagnosis.nominal.model, [r.nominal for r in replays], replays)
     after = _missing(diagnosis, diagnosis.model, [r.extended for r in replays], replays) if diagnosis.causes else []
     unit = position_unit(diagnosis)
-    along = diagnosis.ahead is not None and any(_is_tracked(diagnosis.model, r.measured) for r in replays)
+    along = diagnosis.over_horizon is not None and any(_is_tracked(diagnosis.model, r.measured) for r in replays)
     how = (
         "the effort of a stiff servo that keeps the model on the measured motion. No free simulation takes part, for "
         "this rig's would run away"
@@ -63,7 +63,7 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
 def _missing(
     diagnosis: Diagnosis, model: Model, simulated: Sequence[Trial], replays: Sequence[Replay]
 ) -> list[Missing]:
-    runs_away = diagnosis.ahead is not None
+    runs_away = diagnosis.over_horizon is not None
     return [
         missing_along(model, r.measured)
         if runs_away and _is_tracked(model, r.measured)
@@ -89,11 +89,8 @@ def trials_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mark
 
     worst = set(sorted(range(len(replays)), key=lambda k: -replays[k].nominal_error)[:OPEN])
     others = [k for k in range(len(replays)) if k not in worst]
-    ahead = (
-        f"Simulated: {diagnosis.ahead.horizon_s:g} s ahead of what was measured, for the effort answers the reading. "
-        if diagnosis.ahead
-        else ""
-    )
+    span = diagnosis.over_horizon
+    ahead = f"Simulated: {span.horizon_s:g} s ahead of what was measured, for it is driven. " if span else ""
     text = (
         f"{ahead}Residual = measured - simulated, as it is (faint) and smoothed; its band is twice the standard "
         "deviation of the noise."

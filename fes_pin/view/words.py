@@ -113,14 +113,14 @@ def _round(count: float) -> str:
 def _explains(diagnosis: Diagnosis, share: float) -> str:
     what = "it" if len(diagnosis.causes) == 1 else "they"
     ends = "s" if what == "it" else ""
-    if diagnosis.ahead is not None:
+    if diagnosis.over_horizon is not None:
         one, other = (
-            (diagnosis.ahead.nominal_held_out, diagnosis.ahead.extended_held_out)
-            if diagnosis.ahead.nominal_held_out and diagnosis.ahead.extended_held_out
-            else (diagnosis.ahead.nominal, diagnosis.ahead.extended)
+            (diagnosis.over_horizon.nominal_held_out, diagnosis.over_horizon.extended_held_out)
+            if diagnosis.over_horizon.nominal_held_out and diagnosis.over_horizon.extended_held_out
+            else (diagnosis.over_horizon.nominal, diagnosis.over_horizon.extended)
         )
         return (
-            f"{share:.0f} % of it. Predicting {diagnosis.ahead.horizon_s:g} s ahead, the error E falls from "
+            f"{share:.0f} % of it. Predicting {diagnosis.over_horizon.horizon_s:g} s ahead, the error E falls from "
             f"{percent(one.horizon)} to {percent(other.horizon)}{_outside(diagnosis)}."
         )
     outside = diagnosis.nominal_error[1] is not None and diagnosis.extended_error[1] is not None
@@ -132,8 +132,8 @@ def _explains(diagnosis: Diagnosis, share: float) -> str:
 
 
 def _outside(diagnosis: Diagnosis) -> str:
-    if diagnosis.ahead is not None:
-        outside = diagnosis.ahead.nominal_held_out is not None
+    if diagnosis.over_horizon is not None:
+        outside = diagnosis.over_horizon.nominal_held_out is not None
     else:
         outside = diagnosis.nominal_error[1] is not None and diagnosis.extended_error[1] is not None
     return ", on trials that took no part in finding it" if outside else ", on the trials that it was fitted to"
@@ -153,9 +153,9 @@ def _left(diagnosis: Diagnosis, share: float) -> str:
 def _nothing(diagnosis: Diagnosis) -> list[tuple[str, Content]]:
     left, count = diagnosis.remainder, len(diagnosis.catalogue.effects_for(diagnosis.model.rig))
     error = diagnosis.nominal_error[1] if diagnosis.nominal_error[1] is not None else diagnosis.nominal_error[0]
-    if diagnosis.ahead is not None:
-        error = (diagnosis.ahead.nominal_held_out or diagnosis.ahead.nominal).horizon
-        size = f"E is {percent(error)}, {diagnosis.ahead.horizon_s:g} s ahead"
+    if diagnosis.over_horizon is not None:
+        error = (diagnosis.over_horizon.nominal_held_out or diagnosis.over_horizon.nominal).horizon
+        size = f"E is {percent(error)}, {diagnosis.over_horizon.horizon_s:g} s ahead"
     else:
         size = f"E is {percent(error)}; the noise alone is {percent(diagnosis.ceiling_percent)}"
     if diagnosis.verdict == "adequate":

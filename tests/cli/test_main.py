@@ -14,13 +14,15 @@ from diagnose.hidden import study_of
 
 from fes_pin.cli import main
 from fes_pin.data.study import read_study, write_study
-from fes_pin.data.trial import read_trial
+from fes_pin.data.trial import read_trial, write_trial
 from fes_pin.diagnose.diagnosis import diagnose
 from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files, diagnosis_record
+from fes_pin.identify.noise import estimate_noise
+from fes_pin.identify.stored import load_random
 from fes_pin.models.effects import EFFECTS
 from fes_pin.models.parameters import ROTARY
 from fes_pin.models.simulate import simulate
-from fes_pin.models.store import load_model, save_model
+from fes_pin.models.store import load_model, model_toml, save_model
 
 FILES = {"diagnosis.json", "model.toml", "report.html"}
 
@@ -104,7 +106,7 @@ def test_the_record_is_as_the_contract_says(made):
     found = json.loads((made / "one/diagnosis.json").read_text())
     assert list(found) == [
         *("study", "verdict", "causes", "remainder", "absorbed", "nominal", "extended", "noise"),
-        *("ceiling_percent", "next_experiment", "warnings", "wall_s", "provenance"),
+        *("ceiling_percent", "next_experiment", "horizon_s", "warnings", "wall_s", "provenance"),
     ]
     (cause,) = found["causes"]
     assert list(cause) == ["name", "stage", "parameters", "equivalents", "p_value", "gain_percent"]
@@ -114,6 +116,35 @@ def test_the_record_is_as_the_contract_says(made):
     assert set(found["remainder"]) == {"unexplained", "p_value", "where"}
     assert set(found["noise"]) == {"angle_rad", "force_n"}
     assert found["extended"]["error_percent"]["held_out"] < found["nominal"]["error_percent"]["held_out"]
+    before, after = (found[which]["error_percent"] for which in ("nominal", "extended"))
+    assert set(before) == {"fit", "held_out", "one_step", "horizon", "free"}
+    assert before["one_step"] <= before["horizon"] < before["free"]
+    assert all(after[n] < before[n] for n in after)
+
+
+def test_a_prediction_over_a_horizon_goes_on_from_what_was_measured(made, monkeypatch, capsys, tmp_path):
+    """A nominal model's residual foretells itself: the better, the shorter the horizon."""
+    study, errors = read_study(made / "study"), {}
+    nominal = load_model(made / "one/model.toml") - "coulomb_friction"
+    residual = [t["angle_rad"] - simulate(nominal, t)["angle_rad"] for t in study.trials if t.kind == "motion"]
+    table = {"noise": {"angle_rad": _table(estimate_noise(residual))}}
+    (tmp_path / "model.toml").write_text(model_toml(nominal, table))
+    trial = next(t for t in study.trials if t.kind == "motion")
+    write_trial(trial, tmp_path / "trial.csv")
+    settings = [f"--set={n}={v!r}" for n, v in trial.conditions.items()]
+    for horizon in ("0", "0.05", "0.3", "1e3"):
+        out = tmp_path / "out.csv"
+        given = ("predict", tmp_path / "model.toml", tmp_path / "trial.csv", *settings, "--out", out)
+        assert run(monkeypatch, *given, "--horizon", horizon) == 0
+        errors[horizon] = np.std(np.genfromtxt(out, delimiter=",", names=True)["angle_rad"] - trial["angle_rad"])
+    assert errors["0"] < errors["0.05"] < errors["0.3"] < errors["1e3"]
+    assert errors["1e3"] == pytest.approx(np.std(trial["angle_rad"] - simulate(nominal, trial)["angle_rad"]), rel=1e-6)
+    save_model(nominal, tmp_path / "model.toml")
+    assert "[random]" in fails(monkeypatch, capsys, *given, "--horizon", "0.3")
+
+
+def _table(noise):
+    return {"std": noise.std, "innovation_std": noise.innovation_std, "step_s": noise.step_s, "ar": list(noise.ar)}
 
 
 def test_a_prediction_needs_the_model_alone(made, monkeypatch, tmp_path):
@@ -140,7 +171,9 @@ def test_a_model_on_disk_is_the_fit_to_the_last_bit(made, diagnosis, tmp_path):
     assert loaded.parameters() == diagnosis.model.parameters()
     assert loaded.structure() == diagnosis.model.structure()
     save_model(loaded, tmp_path / "again.toml")
-    assert (tmp_path / "again.toml").read_bytes() == (made / "one/model.toml").read_bytes()
+    whole = (made / "one/model.toml").read_text()
+    assert whole.startswith((tmp_path / "again.toml").read_text())
+    assert load_random(made / "one/model.toml") == diagnosis.extended.noise
 
 
 BAD = [

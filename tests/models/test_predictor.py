@@ -7,7 +7,7 @@ import scipy.linalg
 from fes_pin.data.trial import Trial
 from fes_pin.models.effects import effect
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import STEP_S, Doubt, Predictor
+from fes_pin.models.predictor import STEP_S, Doubt, Predictor, repeated
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import Simulator
 
@@ -43,8 +43,8 @@ def exact(trial: Trial, doubt: Doubt) -> tuple[np.ndarray, np.ndarray]:
     x = np.array([trial["position"][0], 0.3, 0.0])
     p = np.diag([PRIOR["initial_position"] ** 2, PRIOR["initial_velocity"] ** 2, std**2])
     out, variances = [], []
-    for u, y in zip(trial["effort"], trial["position"], strict=True):
-        variance = p[0, 0] + doubt.white["position"] ** 2
+    for u, y, count in zip(trial["effort"], trial["position"], repeated(trial["position"]), strict=True):
+        variance = p[0, 0] + count * doubt.white["position"] ** 2
         out.append(y - x[0] if np.isfinite(y) else 0.0)
         variances.append(variance)
         if np.isfinite(y):
@@ -127,3 +127,27 @@ def test_lags_shorter_than_a_step_do_not_blow_up():
     (without,) = foretold(Model(PENDULUM), [driven(5, 2000)])
     assert np.isfinite(found.sensitivities).all()
     assert found.cost() == pytest.approx(without.cost(), rel=1e-3)
+
+
+def test_a_count_that_is_read_again_and_again_is_one_reading():
+    column = np.array([0.0, 0.1, 0.1, 0.1, np.nan, np.nan, 0.3, 0.3, 0.1])
+    assert repeated(column).tolist() == [1.0, 3.0, 3.0, 3.0, 1.0, 1.0, 2.0, 2.0, 1.0]
+    trial = driven(4)
+    coarse = trial.with_columns(position=np.round(trial["position"] / 0.02) * 0.02)
+    assert repeated(coarse["position"]).mean() > 5.0
+    (one,) = foretold(Model(SLIDE), [coarse])
+    innovations, variances = exact(coarse, DOUBT)
+    assert one.values[:, 0] == pytest.approx(innovations, abs=1e-6)
+    assert one.variances[:, 0] == pytest.approx(variances, rel=1e-6)
+
+
+def test_a_rig_that_stands_is_known_no_better_the_longer_it_is_read():
+    """Without a random effort a hundred equal readings of a rig at rest leave its place as doubtful as one."""
+    still = driven(5, n=100, size=0.0)
+    doubt, white = Doubt({"position": 2e-3}, {"effort": 1e-9}, {"effort": 0.1}), 2e-3**2
+    known = {}
+    for name, column in {"same": np.zeros(100), "noisy": 1e-6 * np.arange(100.0)}.items():
+        (one,) = foretold(Model(SLIDE), [still.with_columns(position=column)], doubt, velocity=0.0)
+        known[name] = one.variances[-1, 0] - repeated(column)[-1] * white
+    assert known["same"] > 0.5 * white
+    assert known["noisy"] < 0.1 * white

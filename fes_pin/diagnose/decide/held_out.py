@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
+from fes_pin.identify.ahead import Missed, default_horizon, missed, own_noise
 from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem, go_on
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
@@ -145,7 +146,7 @@ class HeldOut:
 
     A cause's gain and its `evidence` are what it adds to the other causes of one model, the extension as it was chosen
     on all trials: from `without` to `extended`. `chosen` are the errors of what each fold itself would have chosen,
-    which may be another set.
+    which may be another set. `ahead` are the errors of the nominal model and of the extension over time.
     """
 
     nominal: Errors
@@ -153,10 +154,16 @@ class HeldOut:
     without: dict[str, Errors]
     evidence: dict[str, Evidence]
     chosen: Errors
+    ahead: tuple[Missed, Missed] | None = None
 
 
 def cross_validate(
-    nominal: Fit, best: Fit, without: dict[str, Fit], contenders: Sequence[Fit], floor: NoiseModel
+    nominal: Fit,
+    best: Fit,
+    without: dict[str, Fit],
+    contenders: Sequence[Fit],
+    floor: NoiseModel,
+    horizon_s: float | None = None,
 ) -> HeldOut:
     """Leave trials out in turn, choose among the contenders again on the others, fit, and predict.
 
@@ -164,12 +171,15 @@ def cross_validate(
     ----------
     contenders
         Fits of all sets of causes that came near on the whole; each fold chooses anew among them and `best`.
+    horizon_s
+        How far ahead errors over a horizon look; `default_horizon` of the trials by default.
     """
+    horizon_s = horizon_s or default_horizon(nominal.trials)
     folds = [f for f in folds_of(nominal.trials) if len(f) < len(nominal.trials)]
     many = [nominal, best, *without.values(), *contenders]
     again = iter(in_parallel(lambda pair: _left_out(*pair), [(held, one) for held in folds for one in many]))
     results = in_parallel(
-        lambda pair: _fold(*pair, nominal.trials, list(without), floor),
+        lambda pair: _fold(*pair, nominal.trials, list(without), floor, horizon_s),
         [(held, [next(again) for _ in many]) for held in folds],
     )
     return HeldOut(
@@ -178,6 +188,7 @@ def cross_validate(
         {n: _joined([r.without[n] for r in results]) for n in without},
         {n: sum((r.evidence[n] for r in results), Evidence(0.0, 0.0)) for n in without},
         _joined([r.chosen for r in results]),
+        tuple(sum((r.ahead[k] for r in results if r.ahead), Missed()) for k in (0, 1)),  # type: ignore[arg-type]
     )
 
 
@@ -188,19 +199,32 @@ def _left_out(held: Sequence[int], fitted: Fit) -> Fit:
 
 
 def _fold(
-    held: Sequence[int], fits: Sequence[Fit], trials: Sequence[Trial], names: Sequence[str], floor: NoiseModel
+    held: Sequence[int],
+    fits: Sequence[Fit],
+    trials: Sequence[Trial],
+    names: Sequence[str],
+    floor: NoiseModel,
+    horizon_s: float,
 ) -> HeldOut:
     """What fits of the nominal model, the best, it without each of `names` and the contenders say of held trials."""
     nominal, best, *rest = fits
     without, contenders = dict(zip(names, rest, strict=False)), rest[len(names) :]
     test = [trials[i] for i in held]
     chosen = min((best, *contenders), key=lambda f: f.price)
-    told = separate(nominal, best, without, test, floor)
+    told = separate(nominal, best, without, test, floor, horizon_s)
     return told if chosen is best else replace(told, chosen=errors_of(chosen.model, test, floor))
 
 
-def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Trial], floor: NoiseModel) -> HeldOut:
-    """Errors on trials that the study itself holds out."""
+def separate(
+    nominal: Fit,
+    best: Fit,
+    without: dict[str, Fit],
+    test: Sequence[Trial],
+    floor: NoiseModel,
+    horizon_s: float | None = None,
+) -> HeldOut:
+    """Errors on trials that the study itself holds out; see `cross_validate`."""
+    horizon = horizon_s or default_horizon(test)
     left, extended = _whitened(best, test), errors_of(best.model, test, floor)
     return HeldOut(
         errors_of(nominal.model, test, floor),
@@ -208,7 +232,12 @@ def separate(nominal: Fit, best: Fit, without: dict[str, Fit], test: Sequence[Tr
         {n: errors_of(f.model, test, floor) for n, f in without.items()},
         {n: added_likelihood(_whitened(f, test), left) for n, f in without.items()},
         extended,
+        (_missed(nominal, test, floor, horizon), _missed(best, test, floor, horizon)),
     )
+
+
+def _missed(fitted: Fit, trials: Sequence[Trial], floor: NoiseModel, horizon_s: float) -> Missed:
+    return missed(fitted.model, trials, own_noise(fitted), floor, horizon_s)
 
 
 def _whitened(fitted: Fit, test: Sequence[Trial]) -> np.ndarray:

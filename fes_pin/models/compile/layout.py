@@ -66,8 +66,8 @@ class Sizes:
 
 
 def reading_inputs(measured: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the inputs that carry what was measured, and whether it was."""
-    return (*(f"measured.{n}" for n in measured), *(f"seen.{n}" for n in measured))
+    """Names of the inputs that carry what was measured, whether it was, and how often the same was read in a row."""
+    return tuple(f"{what}.{n}" for what in ("measured", "seen", "repeated") for n in measured)
 
 
 def doubt_constants(model: Model, kind: str, measured: tuple[str, ...]) -> tuple[str, ...]:

@@ -7,13 +7,14 @@ Between samples, with F = df/dx and h the integration step, the transition of on
 
 At a sample, for each measured output y_k in turn, with H = dh_k/dx where it was foretold:
 
-    r = y_k - h_k,   V = H P H' + white_k^2,   K = P H' / V
+    r = y_k - h_k,   V = H P H' + n white_k^2,   K = P H' / V
     x <- x + K r,    P <- P - K V K',    dr/dp = -(H S + h_m R + h_p),   S <- S + K dr/dp
 
 The gains K are taken as they are when sensitivities are formed: what a parameter does to them acts through past
 innovations alone, which are white and independent of what is foretold where the model is right (Ljung, System
-Identification, 2nd ed., section 7.4). A sample that was not seen corrects nothing. What a trial begins with is known as
-its unknowns are: P = X diag(prior^2) X', X the sensitivities of the first states to them.
+Identification, 2nd ed., section 7.4). A sample that was not seen corrects nothing. The same count n times in a
+row, as of an encoder that stands, is one reading and not n: its error is the same each time. What a trial begins with
+is known as its unknowns are: P = X diag(prior^2) X', X the sensitivities of the first states to them.
 
 Source: Jazwinski, Stochastic Processes and Filtering Theory, 1970, section 8.3; Kristensen, Madsen and Jorgensen,
 Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
@@ -143,7 +144,7 @@ def _corrected(d: Tangents, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packe
         foretold = reading + ca.mtimes(row, x - d.x)
         innovation = u[f"measured.{name}"] - foretold
         toward = ca.mtimes(covariance, row.T)
-        variance = ca.mtimes(row, toward) + c[f"white.{name}"] ** 2
+        variance = ca.mtimes(row, toward) + u[f"repeated.{name}"] * c[f"white.{name}"] ** 2
         gain = u[f"seen.{name}"] * toward / variance
         slope = -d.through(reading, (d.x, moved), *inner[1:])
         x, covariance = x + gain * innovation, covariance - ca.mtimes(gain, toward.T)

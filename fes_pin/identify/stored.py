@@ -1,0 +1,65 @@
+"""What is random about a rig, on disk: the table `random` of a `model.toml`.
+
+A rig that is simulated freely has autoregressive noise by output column; one whose effort answers its reading has white
+noise of each column and first-order random processes.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from fes_pin.data.schema import Number
+from fes_pin.data.toml import Document, read_toml
+from fes_pin.identify.ahead import Random
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.noise import Noise
+from fes_pin.models.predictor import Doubt
+
+KEY = "random"
+_PARTS = ("white", "std", "time")
+_NOISE = {"std": Number(""), "innovation_std": Number(""), "step_s": Number("s")}
+
+
+def random_table(fitted: Fit) -> dict[str, Any]:
+    """What is random in a fit, for `model_toml`."""
+    if fitted.doubt is not None:
+        return {part: {n: float(v) for n, v in getattr(fitted.doubt, part).items()} for part in _PARTS}
+    return {"noise": {n: _noise_table(one) for n, one in fitted.noise.items()}}
+
+
+def _noise_table(noise: Noise) -> dict[str, Any]:
+    return {**{n: float(getattr(noise, n)) for n in _NOISE}, "ar": [float(a) for a in noise.ar]}
+
+
+def load_random(path: str | Path) -> Random | None:
+    """What is random about a rig as `diagnose` found it; None of a model that was saved without it.
+
+    Raises
+    ------
+    InputError
+        For a table that is not as `random_table` writes it: names the row and the key.
+    """
+    document = read_toml(path)
+    if KEY not in document.data:
+        return None
+    table = document.table(KEY)
+    if "noise" not in table:
+        return Doubt(**{part: _numbers(document, table, part) for part in _PARTS})
+    channels = document.table(f"{KEY}.noise", table)
+    return {name: _noise(document, name, channels) for name in channels}
+
+
+def _numbers(document: Document, table: dict[str, Any], part: str) -> dict[str, float]:
+    values = document.table(f"{KEY}.{part}", table)
+    return document.numbers(f"{KEY}.{part}", values, dict.fromkeys(values, Number("")))
+
+
+def _noise(document: Document, name: str, channels: dict[str, Any]) -> Noise:
+    key = f"{KEY}.noise.{name}"
+    one = dict(document.table(key, channels))
+    ar = one.pop("ar", None)
+    if not isinstance(ar, list) or not all(isinstance(a, int | float) and not isinstance(a, bool) for a in ar):
+        raise document.error(f"{key}.ar", "expected a list of numbers")
+    numbers = document.numbers(key, one, _NOISE)
+    return Noise(numbers["innovation_std"], tuple(float(a) for a in ar), numbers["std"], numbers["step_s"])
