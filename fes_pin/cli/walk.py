@@ -26,7 +26,7 @@ def diagnose_walking(
     from fes_pin.view.walk_playback import show_reactions
     from fes_pin.view.walk_report import PLAYBACK_FILE, walk_report_html
     from fes_pin.walk.diagnosis import diagnose_walk
-    from fes_pin.walk.text import NEXT_FILE, verdict_text, walk_files
+    from fes_pin.walk.record import NEXT_FILE, walk_files
 
     diagnosis = diagnose_walk(study, seed=seed, limit=limit, progress=lambda share, words: tell(0.9 * share, words))
     tell(0.9, "report")
@@ -35,7 +35,7 @@ def diagnose_walking(
     first = diagnosis.search.recordings[0]
     files[PLAYBACK_FILE] = show_reactions(first.motion, first.plates, f"{study.name}, {first.name}").html()
     write_files(out, files, without={NEXT_FILE} - set(files))
-    return verdict_text(diagnosis)
+    return str(diagnosis)
 
 
 def print_effects() -> None:

@@ -106,7 +106,7 @@ def _files(work: Work) -> dict[str, str | bytes]:
 def _walking(study: Any, seed: int) -> dict[str, str | bytes]:
     from fes_pin.view.walk_report import walk_report_html  # noqa: PLC0415
     from fes_pin.walk.diagnosis import diagnose_walk  # noqa: PLC0415
-    from fes_pin.walk.text import walk_files  # noqa: PLC0415
+    from fes_pin.walk.record import walk_files  # noqa: PLC0415
 
     found = diagnose_walk(study, seed=seed)
     return {**walk_files(found), "report.html": walk_report_html(found)}

@@ -12,10 +12,10 @@ from fes_pin.models.describe import sentence
 from fes_pin.view.page import Content, Markup, element, figure, joined, key, page, section, table
 from fes_pin.view.style import EXTENDED, FAINT, MEASURED, NOMINAL
 from fes_pin.view.svg import WIDTH, inline_svg, styled
-from fes_pin.walk.diagnosis import WalkDiagnosis
 from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.judge import CHANNELS
-from fes_pin.walk.text import BODY_FILE, cause_row, footnotes, headline
+from fes_pin.walk.record import BODY_FILE
+from fes_pin.walk.result import WalkDiagnosis, cause_row
 
 PLAYBACK_FILE = "playback.html"
 
@@ -27,7 +27,7 @@ def walk_report_html(diagnosis: WalkDiagnosis) -> str:
 
 
 def _html(diagnosis: WalkDiagnosis) -> str:
-    words = headline(diagnosis)
+    words = diagnosis.headline()
     strides = diagnosis.search.strides.count
     partly = " partly" if diagnosis.causes and diagnosis.remainder.unexplained else ""
     head = element(
@@ -36,7 +36,7 @@ def _html(diagnosis: WalkDiagnosis) -> str:
         element("h1", words[0].upper() + words[1:], class_=f"verdict {diagnosis.verdict}{partly}"),
         _facts(diagnosis),
     )
-    notes = [element("p", note[0].upper() + note[1:] + ".") for note in footnotes(diagnosis)[1:]]
+    notes = [element("p", note[0].upper() + note[1:] + ".") for note in diagnosis.footnotes()[1:]]
     parts = [
         head,
         section("Causes", *_causes(diagnosis)),

@@ -5,154 +5,29 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
-from fes_pin.walk.effect import STAGE
 from fes_pin.walk.experiment import NextExperiment, next_experiment
 from fes_pin.walk.judge import Gain, error_percent, evidence, floor_percent, gain, other_leg, remainder, unseen
 from fes_pin.walk.likelihood import white_level
 from fes_pin.walk.recording import recordings_of
+from fes_pin.walk.result import Estimate, Remainder, WalkCause, WalkDiagnosis
 from fes_pin.walk.search import LEVEL, SEPARABLE, Nulls, Search, Set
 from fes_pin.workers import one_thread_each, time_limit
 
 LEFT_LEVEL = 0.01
 """Level at which what is left counts as something."""
-CERTAIN = 1e-6
-"""Level of a cause in a single stride."""
 ORDINARY_MM = 2.0
 """Marker noise up to this is no cause: cameras' and fixations' own (L. Chiari et al., Gait Posture 21:197, 2005)."""
 SURE = 3.0
 """Standard deviations by which marker noise must exceed that."""
 
 Progress = Callable[[float, str], None]
-
-
-class Estimate(NamedTuple):
-    """A value with its standard deviation and unit."""
-
-    value: float
-    std: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class WalkCause:
-    """One named cause.
-
-    Attributes
-    ----------
-    name, site
-        What, and where or how.
-    parameters
-        By name.
-    equivalents
-        Other causes that these data cannot tell from it.
-    elsewhere
-        Other sites of the same cause that would do as well.
-    p_value
-        Of such a gain where nothing is wrong, over the whole library.
-    gain_fit, gain_held_out
-        In percent on all strides, and on strides that took no part in its size; the second is None for one stride.
-    evidence
-        How much likelier strides are that took no part, in percent of what they are unlikely by without it; or None.
-    other_leg_percent
-        Gain on one leg's single supports of sizes fitted to the other's; only for what belongs to neither leg.
-    """
-
-    name: str
-    site: str
-    parameters: dict[str, Estimate]
-    equivalents: tuple[str, ...]
-    elsewhere: tuple[str, ...]
-    p_value: float
-    gain_fit: float
-    gain_held_out: Gain | None
-    evidence: Gain | None = None
-    other_leg_percent: float | None = None
-    stage: str = STAGE
-
-    def helps(self) -> bool:
-        """Whether what took no part speaks for it: strides held out; for what belongs to neither leg, other stances.
-
-        By likelihood: squared errors are mostly what landmarks and plates make in every session.
-
-        What chance does as well without a cause that was refused is none either.
-
-        A single stride leaves nothing out: then only what is certain is named.
-        """
-        if self.evidence is None:
-            return self.p_value < CERTAIN and (self.other_leg_percent is None or self.other_leg_percent > 0.0)
-        return (
-            self.p_value < LEVEL
-            and self.evidence.low > 0.0
-            and (self.other_leg_percent is None or self.other_leg_percent > 0.0)
-        )
-
-
-@dataclass(frozen=True)
-class Remainder:
-    """Whether what is left comes again in every stride, its p-value, and where it is largest."""
-
-    unexplained: bool
-    p_value: float
-    where: str | None
-
-
-@dataclass(frozen=True)
-class WalkDiagnosis:
-    """What a model of walking gets wrong.
-
-    Attributes
-    ----------
-    verdict
-        "adequate", "causes_found" or "unexplained".
-    causes
-        By held-out gain, largest first.
-    remainder
-        Whether what is left comes again in every stride.
-    absorbed
-        Causes that these data could not show.
-    nominal_error, extended_error
-        E in percent: on all strides, and held out.
-    warnings
-        What could not be done, one line each.
-    search, best
-        The fits behind it.
-    """
-
-    study: Study
-    verdict: str
-    causes: tuple[WalkCause, ...]
-    remainder: Remainder
-    absorbed: tuple[str, ...]
-    nominal_error: tuple[float, float | None]
-    extended_error: tuple[float, float | None]
-    ceiling_percent: float
-    next_experiment: NextExperiment | None
-    search: Search = field(repr=False, compare=False)
-    best: Set = field(repr=False, compare=False)
-    cutoff_hz: float = CUTOFF_HZ
-    wall_s: float = field(default=0.0, compare=False)
-    warnings: tuple[str, ...] = ()
-
-    @property
-    def model(self) -> Body:
-        """The body with the masses, centres and inertias that were found."""
-        from fes_pin.walk.extended import extended_body  # noqa: PLC0415
-
-        return extended_body(self)
-
-    def __str__(self) -> str:
-        from fes_pin.walk.text import verdict_text  # noqa: PLC0415
-
-        return verdict_text(self)
 
 
 def diagnose_walk(

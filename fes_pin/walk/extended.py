@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
 from xml.etree.ElementTree import tostring
 
 import numpy as np
@@ -11,24 +10,21 @@ from defusedxml.ElementTree import fromstring
 from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
 from fes_pin.walk.effect import central
-
-if TYPE_CHECKING:
-    from fes_pin.walk.diagnosis import WalkDiagnosis
+from fes_pin.walk.search import Search, Set
 
 
-def extended_body(diagnosis: WalkDiagnosis) -> Body:
-    """The body with the segments' masses, centres and inertias that the diagnosis names; the same where it names none.
+def extended_body(search: Search, best: Set) -> Body:
+    """The body with the segments' masses, centres and inertias of a set of causes; the same where it has none.
 
     Raises
     ------
     InputError
         The figures are no body's: a mass that is not positive, say.
     """
-    search = diagnosis.search
     body = search.recordings[0].motion.body
     believed = search.banks[False].scenes[0].parameters
     found = {s: p.copy() for s, p in believed.items()}
-    for i, sizes in search.sizes(diagnosis.best).items():
+    for i, sizes in search.sizes(best).items():
         change = search.forms[i].segments
         if change is not None:
             for segment, columns in change(believed).items():

@@ -12,8 +12,9 @@ import numpy as np
 
 from fes_pin.body.measured_walk import data_folder
 from fes_pin.data.study import read_study
-from fes_pin.walk.diagnosis import WalkDiagnosis, diagnose_walk, white_noise
+from fes_pin.walk.diagnosis import diagnose_walk, white_noise
 from fes_pin.walk.recording import recordings_of
+from fes_pin.walk.result import WalkDiagnosis
 from fes_pin.walk.search import Search
 from walking_matrix.plan import KINDS, drawn
 from walking_matrix.synthetic import Gait, Wrong, gait_of, make

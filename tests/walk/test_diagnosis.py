@@ -14,7 +14,7 @@ from fes_pin.walk.dynamics import required, segment_parameters
 from fes_pin.walk.extended import extended_body, with_segments
 from fes_pin.walk.likelihood import Noise, fit, white_level
 from fes_pin.walk.motion import motion_of
-from fes_pin.walk.text import verdict_text, walk_files
+from fes_pin.walk.record import walk_files
 
 pytestmark = pytest.mark.shared
 
@@ -51,7 +51,7 @@ def test_files_are_as_the_contract_says(heavy):
         plan = record["next_experiment"]
         assert set(plan["separates"]) <= {heavy.causes[0].name, *heavy.causes[0].equivalents}
         assert plan["trial"] is None or plan["trial"]["file"] in files
-    assert heavy.causes[0].name in verdict_text(heavy)
+    assert heavy.causes[0].name in str(heavy)
 
 
 def test_one_question_for_every_study_and_its_limit_of_time_holds(heavy, tmp_path):
@@ -150,7 +150,7 @@ def test_the_extended_body_requires_what_the_column_says(measured, hip):
 
 
 def test_the_extended_body_is_the_diagnosiss(heavy):
-    body = extended_body(heavy)
+    body = extended_body(heavy.search, heavy.best)
     name, site = heavy.causes[0].name, heavy.causes[0].site
     share = heavy.causes[0].parameters.get("share", (0.0,))[0]
     if name == "segment_mass" and site == "trunk":

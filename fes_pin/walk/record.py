@@ -1,4 +1,4 @@
-"""A diagnosis of walking in words, and as `diagnosis.json` and files."""
+"""A diagnosis of walking as `diagnosis.json` and files."""
 
 from __future__ import annotations
 
@@ -10,73 +10,12 @@ import numpy as np
 import tomli_w
 
 from fes_pin.data.table import format_csv
-from fes_pin.walk.diagnosis import WalkCause, WalkDiagnosis
 from fes_pin.walk.judge import CHANNELS
+from fes_pin.walk.result import WalkCause, WalkDiagnosis
 
 DIGITS = 5
 NEXT_FILE = "next_trial.csv"
 BODY_FILE = "body.urdf"
-HEADLINES = {
-    "adequate": "the walking model is adequate: these data justify no extension of it.",
-    "unexplained": "the walking model misses something, and nothing in the library explains it.",
-}
-
-
-def headline(diagnosis: WalkDiagnosis) -> str:
-    """The verdict in one sentence."""
-    count = len(diagnosis.causes)
-    if not count:
-        return HEADLINES[diagnosis.verdict]
-    rest = ", and something is left" if diagnosis.remainder.unexplained else ""
-    return (
-        f"{'one cause explains' if count == 1 else f'{count} causes explain'} what the walking model gets wrong{rest}."
-    )
-
-
-def cause_row(cause: WalkCause) -> tuple[str, str, str, str, str]:
-    """Cause, site, parameters, held-out gain, what it cannot be told from."""
-    values = ", ".join(f"{n} {v:.3g} +- {s:.1g} {u}".strip() for n, (v, s, u) in cause.parameters.items())
-    held = cause.gain_held_out
-    shown = f"{held.percent:.0f} % [{held.low:.0f}, {held.high:.0f}]" if held else "one stride: none"
-    return cause.name, cause.site, values, shown, ", ".join(cause.equivalents) or "-"
-
-
-def footnotes(diagnosis: WalkDiagnosis) -> list[str]:
-    """What stands beneath the table."""
-    before, after = diagnosis.nominal_error, diagnosis.extended_error
-    shown = [
-        f"{b:.2f} -> {a:.2f} % {where}"
-        for b, a, where in zip(before, after, ("fitted", "strides held out"), strict=True)
-        if a is not None and b is not None
-    ]
-    noise = f"stride to stride {diagnosis.ceiling_percent:.2f} %; low pass {diagnosis.cutoff_hz:g} Hz"
-    lines = [f"error E {', '.join(shown)}; {noise}"]
-    where = f", most in {diagnosis.remainder.where}" if diagnosis.remainder.where else ""
-    state = "something comes" if diagnosis.remainder.unexplained else "nothing more comes"
-    lines.append(f"{state} again in every stride (p = {diagnosis.remainder.p_value:.2g}{where})")
-    for cause in diagnosis.causes:
-        if cause.other_leg_percent is not None:
-            lines.append(
-                f"{cause.name}: fitted to one leg's stances it gains {cause.other_leg_percent:.0f} % on the other's"
-            )
-        if cause.elsewhere:
-            lines.append(f"{cause.name}: as well at {'; '.join(cause.elsewhere[:4])}")
-    if diagnosis.absorbed:
-        lines.append(f"not testable here: {', '.join(diagnosis.absorbed)}")
-    if diagnosis.next_experiment:
-        lines.append(f"next experiment: {diagnosis.next_experiment.why}")
-    return [*lines, *(f"warning: {words}" for words in diagnosis.warnings)]
-
-
-def verdict_text(diagnosis: WalkDiagnosis) -> str:
-    """The verdict as plain text."""
-    lines = [f"{diagnosis.study.name}: {headline(diagnosis)}"]
-    rows = [("cause", "site", "parameters", "held-out gain", "cannot be told from")]
-    rows += [cause_row(c) for c in diagnosis.causes]
-    if len(rows) > 1:
-        widths = [max(len(r[k]) for r in rows) for k in range(5)]
-        lines += [" " + "  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows]
-    return "\n".join(lines + [f" {note}" for note in footnotes(diagnosis)])
 
 
 def shown(value: float | None) -> float | None:

@@ -1,0 +1,188 @@
+"""The answer of a diagnosis of walking: causes, how sure, with what gain, what stays open; and it in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from fes_pin.body.build import Body
+from fes_pin.data.smooth import CUTOFF_HZ
+from fes_pin.data.study import Study
+from fes_pin.walk.effect import STAGE
+from fes_pin.walk.experiment import NextExperiment
+from fes_pin.walk.extended import extended_body
+from fes_pin.walk.judge import Gain
+from fes_pin.walk.search import LEVEL, Search, Set
+
+CERTAIN = 1e-6
+"""Level of a cause in a single stride."""
+HEADLINES = {
+    "adequate": "the walking model is adequate: these data justify no extension of it.",
+    "unexplained": "the walking model misses something, and nothing in the library explains it.",
+}
+
+
+class Estimate(NamedTuple):
+    """A value with its standard deviation and unit."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class WalkCause:
+    """One named cause.
+
+    Attributes
+    ----------
+    name, site
+        What, and where or how.
+    parameters
+        By name.
+    equivalents
+        Other causes that these data cannot tell from it.
+    elsewhere
+        Other sites of the same cause that would do as well.
+    p_value
+        Of such a gain where nothing is wrong, over the whole library.
+    gain_fit, gain_held_out
+        In percent on all strides, and on strides that took no part in its size; the second is None for one stride.
+    evidence
+        How much likelier strides are that took no part, in percent of what they are unlikely by without it; or None.
+    other_leg_percent
+        Gain on one leg's single supports of sizes fitted to the other's; only for what belongs to neither leg.
+    """
+
+    name: str
+    site: str
+    parameters: dict[str, Estimate]
+    equivalents: tuple[str, ...]
+    elsewhere: tuple[str, ...]
+    p_value: float
+    gain_fit: float
+    gain_held_out: Gain | None
+    evidence: Gain | None = None
+    other_leg_percent: float | None = None
+    stage: str = STAGE
+
+    def helps(self) -> bool:
+        """Whether what took no part speaks for it: strides held out; for what belongs to neither leg, other stances.
+
+        By likelihood: squared errors are mostly what landmarks and plates make in every session.
+
+        What chance does as well without a cause that was refused is none either.
+
+        A single stride leaves nothing out: then only what is certain is named.
+        """
+        if self.evidence is None:
+            return self.p_value < CERTAIN and (self.other_leg_percent is None or self.other_leg_percent > 0.0)
+        return (
+            self.p_value < LEVEL
+            and self.evidence.low > 0.0
+            and (self.other_leg_percent is None or self.other_leg_percent > 0.0)
+        )
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Whether what is left comes again in every stride, its p-value, and where it is largest."""
+
+    unexplained: bool
+    p_value: float
+    where: str | None
+
+
+def cause_row(cause: WalkCause) -> tuple[str, str, str, str, str]:
+    """Cause, site, parameters, held-out gain, what it cannot be told from."""
+    values = ", ".join(f"{n} {v:.3g} +- {s:.1g} {u}".strip() for n, (v, s, u) in cause.parameters.items())
+    held = cause.gain_held_out
+    shown = f"{held.percent:.0f} % [{held.low:.0f}, {held.high:.0f}]" if held else "one stride: none"
+    return cause.name, cause.site, values, shown, ", ".join(cause.equivalents) or "-"
+
+
+@dataclass(frozen=True)
+class WalkDiagnosis:
+    """What a model of walking gets wrong.
+
+    Attributes
+    ----------
+    verdict
+        "adequate", "causes_found" or "unexplained".
+    causes
+        By held-out gain, largest first.
+    remainder
+        Whether what is left comes again in every stride.
+    absorbed
+        Causes that these data could not show.
+    nominal_error, extended_error
+        E in percent: on all strides, and held out.
+    warnings
+        What could not be done, one line each.
+    search, best
+        The fits behind it.
+    """
+
+    study: Study
+    verdict: str
+    causes: tuple[WalkCause, ...]
+    remainder: Remainder
+    absorbed: tuple[str, ...]
+    nominal_error: tuple[float, float | None]
+    extended_error: tuple[float, float | None]
+    ceiling_percent: float
+    next_experiment: NextExperiment | None
+    search: Search = field(repr=False, compare=False)
+    best: Set = field(repr=False, compare=False)
+    cutoff_hz: float = CUTOFF_HZ
+    wall_s: float = field(default=0.0, compare=False)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def model(self) -> Body:
+        """The body with the masses, centres and inertias that were found."""
+        return extended_body(self.search, self.best)
+
+    def headline(self) -> str:
+        """The verdict in one sentence."""
+        count = len(self.causes)
+        if not count:
+            return HEADLINES[self.verdict]
+        rest = ", and something is left" if self.remainder.unexplained else ""
+        named = "one cause explains" if count == 1 else f"{count} causes explain"
+        return f"{named} what the walking model gets wrong{rest}."
+
+    def footnotes(self) -> list[str]:
+        """What stands beneath the table."""
+        before, after = self.nominal_error, self.extended_error
+        shown = [
+            f"{b:.2f} -> {a:.2f} % {where}"
+            for b, a, where in zip(before, after, ("fitted", "strides held out"), strict=True)
+            if a is not None and b is not None
+        ]
+        noise = f"stride to stride {self.ceiling_percent:.2f} %; low pass {self.cutoff_hz:g} Hz"
+        lines = [f"error E {', '.join(shown)}; {noise}"]
+        where = f", most in {self.remainder.where}" if self.remainder.where else ""
+        state = "something comes" if self.remainder.unexplained else "nothing more comes"
+        lines.append(f"{state} again in every stride (p = {self.remainder.p_value:.2g}{where})")
+        for cause in self.causes:
+            if cause.other_leg_percent is not None:
+                lines.append(
+                    f"{cause.name}: fitted to one leg's stances it gains {cause.other_leg_percent:.0f} % on the other's"
+                )
+            if cause.elsewhere:
+                lines.append(f"{cause.name}: as well at {'; '.join(cause.elsewhere[:4])}")
+        if self.absorbed:
+            lines.append(f"not testable here: {', '.join(self.absorbed)}")
+        if self.next_experiment:
+            lines.append(f"next experiment: {self.next_experiment.why}")
+        return [*lines, *(f"warning: {words}" for words in self.warnings)]
+
+    def __str__(self) -> str:
+        lines = [f"{self.study.name}: {self.headline()}"]
+        rows = [("cause", "site", "parameters", "held-out gain", "cannot be told from")]
+        rows += [cause_row(c) for c in self.causes]
+        if len(rows) > 1:
+            widths = [max(len(r[k]) for r in rows) for k in range(5)]
+            lines += [" " + "  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows]
+        return "\n".join(lines + [f" {note}" for note in self.footnotes()])
