@@ -16,6 +16,7 @@ ALLOWED = {
     "models": {"data"},
     "identify": {"models", "data"},
     "diagnose": {"identify", "models", "data"},
+    "contrast": {"diagnose", "identify", "models", "data"},
     "paper": {"identify", "models", "data"},
     "body": {"data"},
     "walk": {"body", "models", "data"},
@@ -24,7 +25,10 @@ ALLOWED = {
     "control": {"paper", "allocate", "muscles", "identify", "models", "data"},
     "verdict": {"walk", "diagnose", "models", "data"},
     "cohort": {"view", "walk", "diagnose", "models", "data"},
-    "view": {"paper", "diagnose", "identify", "models", "data", "control", "allocate", "muscles", "body", "walk"},
+    "view": {
+        *("paper", "contrast", "diagnose", "identify", "models", "data"),
+        *("control", "allocate", "muscles", "body", "walk"),
+    },
 }
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,10 +11,12 @@ import typer
 from fes_pin.cli.allocate import allocate
 from fes_pin.cli.body import app as body
 from fes_pin.cli.cohort import cohort
+from fes_pin.cli.contrast import contrast
 from fes_pin.cli.datasets import datasets
 from fes_pin.cli.group import Commands
 from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
+from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
 from fes_pin.cli.walk import diagnose_walking, print_effects
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ app.command()(urdf)
 app.command()(datasets)
 app.command()(pulses)
 app.command()(cohort)
+app.command()(contrast)
 
 Libraries = Annotated[
     list[str] | None,
@@ -83,7 +84,7 @@ def diagnose(
     from fes_pin.data.study import read_study
     from fes_pin.data.tabular import SUFFIXES, check_table, table_bytes
 
-    catalogue = _catalogue(library)
+    catalogue = catalogue_with(library)
     measured = read_study(study, rigs=catalogue.schemas())
     table = None if tables is None else f"trajectories.{tables}"
     if table is not None:
@@ -96,7 +97,7 @@ def diagnose(
             from fes_pin.data.errors import InputError
 
             raise InputError("--library brings causes of rigs; walking has none but its own")
-        with _progress() as tell:
+        with progress() as tell:
             verdict = diagnose_walking(measured, out, seed, limit, tell)
         typer.echo(f"{verdict}\nreport: {out / 'report.html'}")
         return
@@ -105,12 +106,12 @@ def diagnose(
     from fes_pin.diagnose.trajectories import trajectories
     from fes_pin.view.report import report_html
 
-    with _progress() as tell:
+    with progress() as tell:
         to_be_said = [catalogue]
 
         def told(share: float, words: str) -> None:
             while to_be_said:  # now that the study is accepted: nothing stands before the line of an input error
-                _say_whose_code(to_be_said.pop())
+                say_whose_code(to_be_said.pop())
             tell(DIAGNOSING * share, words)
 
         diagnosis = by_this_command(find(measured, library=catalogue, seed=seed, limit=limit, progress=told))
@@ -159,7 +160,7 @@ def predict(
     from fes_pin.models.predict import predict as run
     from fes_pin.models.store import load_model
 
-    catalogue = _catalogue(library)
+    catalogue = catalogue_with(library)
     check_table(out)
     loaded = load_model(model, library=catalogue)
     kind, conditions = _settings(setting or [])
@@ -175,7 +176,7 @@ def predict(
         columns |= {f"{n}_measured": given[n] for n in measured}
         columns |= {f"{n}_residual": given.residual(found, n) for n in measured}
     write_bytes(out, table_bytes(columns, out))
-    _say_whose_code(catalogue)
+    say_whose_code(catalogue)
 
 
 def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
@@ -199,23 +200,11 @@ def effects(library: Libraries = None) -> None:
     """List the causes it knows, with stage, equation and parameters."""
     from fes_pin.models.describe import describe
 
-    catalogue = _catalogue(library)
-    _say_whose_code(catalogue)
+    catalogue = catalogue_with(library)
+    say_whose_code(catalogue)
     for one in catalogue.effects:
         typer.echo(describe(one))
     print_effects()
-
-
-def _catalogue(library: list[str] | None) -> Catalogue:
-    from fes_pin.models.catalogue import load_library
-
-    return load_library(*(library or []))
-
-
-def _say_whose_code(catalogue: Catalogue) -> None:
-    """Say on standard error whose code runs beside that of fes-pin, a line for each file or module."""
-    for where, names in catalogue.origins().items():
-        typer.echo(f"fes-pin: runs the code of {where}: {', '.join(names)}", err=True)
 
 
 def _settings(pairs: list[str]) -> tuple[str | None, dict[str, float]]:
@@ -259,21 +248,6 @@ def _print_verdict(diagnosis: Diagnosis) -> None:
         console.print(table)
     for note in diagnosis.footnotes():
         console.print(Text(note))
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[float, str], None]]:
-    """A progress bar on standard error, if a person is watching."""
-    if not sys.stderr.isatty():
-        yield lambda _share, _words: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("reading", total=1.0)
-        yield lambda share, words: bar.update(task, completed=share, description=words)
 
 
 def main() -> None:

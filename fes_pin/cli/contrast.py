@@ -1,0 +1,50 @@
+"""`fes-pin contrast`: what differs between groups of trials, or between two studies of one rig."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
+
+Libraries = Annotated[
+    list[str] | None,
+    typer.Option("--library", help="A Python file, or the name of a module, with causes or rigs. Its code is run."),
+]
+
+
+def contrast(
+    study: Annotated[Path, typer.Argument(help="Folder of a study whose trials have groups, or of what was before.")],
+    out: Annotated[Path, typer.Option(help="Folder for contrast.json and report.html.")],
+    after: Annotated[Path | None, typer.Argument(help="A study of the same rig: what is now.")] = None,
+    by: Annotated[
+        str | None, typer.Option(help="group, or a condition that every trial states. [default: group]")
+    ] = None,
+    groups: Annotated[str | None, typer.Option(help="Which groups, with commas between them.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values.")] = 0,
+    library: Libraries = None,
+) -> None:
+    """Say what differs between groups of trials, by how much, and what did not change."""
+    from fes_pin.contrast.contrast import contrast as find
+    from fes_pin.contrast.record import FILE, contrast_json
+    from fes_pin.contrast.text import contrast_text
+    from fes_pin.data.errors import InputError
+    from fes_pin.data.files import check_folder, write_files
+    from fes_pin.data.study import read_study
+    from fes_pin.view.contrast_report import contrast_html
+
+    if after is not None and by is not None:
+        raise InputError("expected --by, or a second study, found both: two studies are two groups")
+    catalogue = catalogue_with(library)
+    schemas = catalogue.schemas()
+    before = read_study(study, rigs=schemas)
+    now = None if after is None else read_study(after, rigs=schemas)
+    check_folder(out)  # what cannot be read or written is said before any work
+    wanted = [g.strip() for g in groups.split(",") if g.strip()] if groups is not None else None
+    with progress() as tell:
+        found = find(before, now, by=by or "group", groups=wanted, library=catalogue, seed=seed, progress=tell)
+    write_files(out, {FILE: contrast_json(found), "report.html": contrast_html(found)})
+    say_whose_code(catalogue)
+    typer.echo(f"{contrast_text(found)}\nreport: {out / 'report.html'}")

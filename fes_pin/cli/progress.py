@@ -1,0 +1,41 @@
+"""What several commands share: the library that is asked for, whose code runs, a progress bar."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from fes_pin.models.catalogue import Catalogue
+
+
+def catalogue_with(library: list[str] | None) -> Catalogue:
+    """What is known, with the causes and rigs of `--library`."""
+    from fes_pin.models.catalogue import load_library
+
+    return load_library(*(library or []))
+
+
+def say_whose_code(catalogue: Catalogue) -> None:
+    """Say on standard error whose code runs beside that of fes-pin, a line for each file or module."""
+    for where, names in catalogue.origins().items():
+        typer.echo(f"fes-pin: runs the code of {where}: {', '.join(names)}", err=True)
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[float, str], None]]:
+    """A progress bar on standard error, if a person is watching."""
+    if not sys.stderr.isatty():
+        yield lambda _share, _words: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("reading", total=1.0)
+        yield lambda share, words: bar.update(task, completed=share, description=words)

@@ -1,0 +1,291 @@
+"""What differs between groups of trials: which parameter or cause, by how much, and what certainly did not change."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fes_pin.contrast.decide import inflation
+from fes_pin.contrast.fits import Fits, Grouped
+from fes_pin.contrast.grouped import Item
+from fes_pin.contrast.groups import BY_GROUP, grouped_study
+from fes_pin.contrast.search import ContrastSearch, Found, Progress
+from fes_pin.contrast.words import of_cause, of_nominal
+from fes_pin.data.study import Study
+from fes_pin.diagnose.cause import ParameterEstimate
+from fes_pin.diagnose.diagnosis import despiked_study, split
+from fes_pin.diagnose.experiment import SEPARABLE
+from fes_pin.diagnose.plausibility import check_study
+from fes_pin.diagnose.remainder.driven import driven_remainder
+from fes_pin.diagnose.remainder.open_set import Remainder, remainder
+from fes_pin.identify.distributions import normal_quantile
+from fes_pin.identify.feedback import is_fed_back
+from fes_pin.identify.fit import Fit
+from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
+from fes_pin.models.nominal import nominal_model
+from fes_pin.workers import in_parallel, one_thread_each
+
+SEEN = 0.95
+"""Power at which a change that was not found is called excluded."""
+LEVEL = 0.01
+"""Family-wise level of a claim, which a change that is excluded would have reached."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that differs.
+
+    Attributes
+    ----------
+    name
+        A nominal parameter, or a cause.
+    kind
+        "nominal" or "effect".
+    group
+        The group that has a value of its own.
+    words
+        What happened, in plain words.
+    parameters
+        By name and group: of a group that does not have the cause its null, without deviation.
+    equivalents
+        What could have changed instead: read them as one set.
+    p_value
+        Family-wise over the whole library.
+    """
+
+    name: str
+    kind: str
+    group: str
+    words: str
+    parameters: Mapping[str, Mapping[str, ParameterEstimate]]
+    equivalents: tuple[str, ...]
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """What differs between the groups of a study.
+
+    Attributes
+    ----------
+    verdict
+        "nothing_changed", "changed" or "unexplained".
+    changes
+        Surest first.
+    common
+        Causes that act in all groups alike: errors of the model, and no changes.
+    unchanged
+        For each parameter of the model that is not among the changes the size, as a share of its value, beyond which a
+        change would have been seen in 95 of 100.
+    excluded
+        For each cause that no group has, its first parameter: the size beyond which its coming would have been seen.
+    untestable
+        What could have changed unseen.
+    remainder
+        What is left in a group that no other group has.
+    """
+
+    study: Study
+    groups: tuple[str, ...]
+    verdict: str
+    changes: tuple[Change, ...]
+    common: tuple[str, ...]
+    unchanged: Mapping[str, float]
+    excluded: Mapping[str, ParameterEstimate]
+    untestable: tuple[str, ...]
+    remainder: Remainder
+    fit: Fit
+    driven: bool
+    warnings: tuple[str, ...] = ()
+    wall_s: float = field(default=0.0, compare=False)
+
+    def __str__(self) -> str:
+        from fes_pin.contrast.text import contrast_text  # noqa: PLC0415
+
+        return contrast_text(self)
+
+
+def contrast(
+    study: Study,
+    after: Study | None = None,
+    *,
+    by: str = BY_GROUP,
+    groups: Sequence[str] | None = None,
+    library: Source | Sequence[Source] | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Contrast:
+    """Find out what differs between groups of trials of one rig.
+
+    Parameters
+    ----------
+    study
+        With a group in every trial; or what was measured before.
+    after
+        A study of the same rig: the second group.
+    by
+        "group", or a condition that every trial states.
+    groups
+        Those that are compared, in this order; by default all, in the order of the study.
+    library
+        Causes beside those written here and installed; see `diagnose`.
+    seed
+        Of simulated critical values.
+    progress
+        Called with a share done and a few words.
+
+    Returns
+    -------
+    Contrast
+
+    Raises
+    ------
+    InputError
+        For fewer than two groups, groups that do not exist, trials that belong to none, studies of different rigs, and
+        as `diagnose`.
+    """
+    began = time.perf_counter()
+    tell = progress or (lambda _share, _words: None)
+    catalogue = catalogue_of(library)
+    joined, _ = despiked_study(grouped_study(study, after, by, groups))
+    nominal = nominal_model(joined)
+    warnings = list(check_study(joined, nominal))
+    train, _ = split(joined)
+    names = tuple(dict.fromkeys(t.group for t in joined.trials if t.group is not None))
+    trials = {g: [t for t in train if t.group == g] for g in names}
+    driven = is_fed_back(nominal.rig, train)
+    if any(len(many) < 2 for many in trials.values()):
+        warnings.append("a group has one trial only: how much repeats differ is judged from its parts")
+    with one_thread_each():
+        fits = Fits(nominal, trials, catalogue.effects_for(nominal.rig), driven)
+        found = ContrastSearch(fits, seed, tell).run()
+        tell(0.95, "what is left")
+        left, said = _left(fits, found.best, seed)
+    changes = sorted((_change(found, i, names, catalogue) for i in found.best.changes), key=lambda c: c.p_value)
+    unchanged, excluded, untestable = _not_changed(found, driven)
+    tell(1.0, "done")
+    return Contrast(
+        study=joined,
+        groups=names,
+        verdict="changed" if changes else "unexplained" if left.unexplained else "nothing_changed",
+        changes=tuple(changes),
+        common=tuple(i.name for i in found.best.items if i.group is None),
+        unchanged=unchanged,
+        excluded=excluded,
+        untestable=untestable,
+        remainder=left,
+        fit=found.best.fit,
+        driven=driven,
+        warnings=tuple([*warnings, *said]),
+        wall_s=time.perf_counter() - began,
+    )
+
+
+def _left(fits: Fits, best: Grouped, seed: int) -> tuple[Remainder, list[str]]:
+    """What is left in some groups alone; what is left in all is an error of the model, and is said."""
+    parts = in_parallel(lambda g: fits.part(best, g), list(fits.trials))
+    test = driven_remainder if fits.driven else remainder
+    each = dict(zip(fits.trials, in_parallel(lambda f: test(f, seed), parts), strict=True))
+    least = min(each.values(), key=lambda r: r.p_value)
+    open_ = [g for g, r in each.items() if r.unexplained]
+    p = min(1.0, len(each) * least.p_value)
+    if len(open_) == len(each):
+        words = "the model leaves something unexplained in every group; `diagnose` says what"
+        return Remainder(False, p, least.where), [words]
+    said = [f"something is left unexplained in the group {g}" for g in open_]
+    return Remainder(bool(open_) and p < LEVEL, p, least.where if open_ else None), said
+
+
+def _change(found: Found, item: Item, groups: tuple[str, ...], catalogue: Catalogue) -> Change:
+    best, model = found.best, found.best.model
+    assert item.group is not None
+    rest = found.without[item]
+    wider = math.sqrt(max(1.0, inflation(best, rest)[0]))
+    nominal = item.name in found.nominal.model.free
+    paths = [item.name] if nominal else [n for n in model.models[item.group].parameters() if _is_of(item.name, n)]
+    parameters: dict[str, dict[str, ParameterEstimate]] = {}
+    for path in paths:
+        here = model.models[item.group].parameter_info()[path]
+        if here.optional:
+            continue
+        short = path.removeprefix(f"{item.name}.")
+        parameters[short] = {}
+        for group in groups:
+            if path in model.models[group].parameters():
+                key = model.path(path, group)
+                std = best.fit.std(key) * wider if key in best.fit.free else 0.0
+                parameters[short][group] = ParameterEstimate(best.fit.values[key], std, here.unit)
+            elif here.null is not None:
+                parameters[short][group] = ParameterEstimate(here.null, 0.0, here.unit)
+    first = next(iter(parameters.values()))
+    reference = next(g for g in groups if g != item.group)
+    forward = groups.index(reference) < groups.index(item.group)
+    one, two = (reference, item.group) if forward else (item.group, reference)
+    if nominal:
+        words = of_nominal(model.rig, item.name, first[one].value, first[two].value, first[one].unit)
+    else:
+        there = item.name in (e.name for e in model.models[one].effects)
+        words = of_cause(catalogue.effect(item.name), first[one].value, first[two].value, first[one].unit, there)
+    near = [
+        f.items[-1].name
+        for f in found.rivals[item]
+        if (f.price if not _driven(best) else min(f.price, f.fit.sse + best.price - best.fit.sse))
+        < best.price + SEPARABLE
+    ]
+    return Change(
+        name=item.name,
+        kind="nominal" if nominal else "effect",
+        group=item.group,
+        words=f"{words} (from {one} to {two})",
+        parameters=parameters,
+        equivalents=tuple(sorted(set(near) - {item.name})),
+        p_value=found.p_values[item],
+    )
+
+
+def _driven(one: Grouped) -> bool:
+    return any(hasattr(w, "white") for w in one.weights.values())
+
+
+def _is_of(cause: str, path: str) -> bool:
+    return path.split(".", maxsplit=1)[0] == cause
+
+
+def _not_changed(found: Found, driven: bool) -> tuple[dict[str, float], dict[str, ParameterEstimate], tuple[str, ...]]:
+    """How large a change would have been seen: of what the model has as a share, of other causes in their units."""
+    changed = {i.name for i in found.best.items}
+    single = 1.0 - (1.0 - LEVEL) ** (1.0 / found.family.tests)
+    reach = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN)
+    unchanged: dict[str, float] = {}
+    sizes: dict[str, list[tuple[float, str, float]]] = {}
+    model, info = found.best.model, found.best.model.parameter_info()
+    for one in found.promises:
+        if one.item.group is None:
+            continue
+        size = reach * one.deviation * math.sqrt(one.spread)
+        if one.effect is None:
+            path = one.item.name
+            if path in info and path not in changed and model.parameters()[path]:
+                unchanged[path] = max(unchanged.get(path, 0.0), size / abs(model.parameters()[path]))
+        elif one.item.name not in changed:
+            name = one.effect.amplitudes()[0]
+            unit = one.effect.parameters()[name].in_units(model.rig.units()).unit
+            sizes.setdefault(one.item.name, []).append((size, unit, one.kept))
+    excluded = {
+        n: ParameterEstimate(max(s for s, _, _ in many), 0.0, many[0][1])
+        for n, many in sizes.items()
+        if max(k for _, _, k in many) >= ABSORBED_BELOW and np.isfinite(max(s for s, _, _ in many))
+    }
+    unseen = [n for n in sizes if n not in excluded]
+    unseen += [n for n, v in unchanged.items() if not v < 1.0]
+    return {n: v for n, v in unchanged.items() if v < 1.0}, excluded, tuple(sorted(unseen))
+
+
+ABSORBED_BELOW = 0.04
+"""Share of its norm that a sensitivity must keep to be testable, as in a diagnosis."""
+
+__all__ = ["Change", "Contrast", "contrast"]

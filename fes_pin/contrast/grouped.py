@@ -1,0 +1,199 @@
+"""One model for several groups of trials, in which some parameters have a value of their own in one group."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.noise import Noise, NoiseModel
+from fes_pin.identify.problem import Linearized, Problem, Unknowns
+from fes_pin.models.model import Model
+from fes_pin.models.parameters import Parameter
+from fes_pin.models.predictor import Doubt
+from fes_pin.models.rigs.base import Rig
+from fes_pin.models.stage import Effect
+
+Weight = NoiseModel | Doubt
+"""What weighs the residuals of a group: the noise of simulations, or what is random about predictions."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """Something that a grouped model has beside the nominal one.
+
+    Attributes
+    ----------
+    name
+        A cause, or a nominal parameter.
+    group
+        The group that differs; None for a cause that acts in all groups alike.
+    """
+
+    name: str
+    group: str | None = None
+
+
+@dataclass(frozen=True)
+class GroupedModel:
+    """A model for each group; a parameter of the same name is the same in all, but for those in `own`.
+
+    A parameter's name is its path, with "@group" behind it where the group has a value of its own.
+
+    Attributes
+    ----------
+    models
+        By group, in order.
+    own
+        Pairs of path and group.
+    """
+
+    models: Mapping[str, Model]
+    own: frozenset[tuple[str, str]] = frozenset()
+
+    @property
+    def rig(self) -> Rig:
+        """The rig of the first group: all are of one kind."""
+        return next(iter(self.models.values())).rig
+
+    def path(self, name: str, group: str) -> str:
+        """What a parameter of a group's model is called here."""
+        return f"{name}@{group}" if (name, group) in self.own else name
+
+    def parameters(self) -> dict[str, float]:
+        """The value of every parameter, by its path here."""
+        return {self.path(n, g): v for g, m in self.models.items() for n, v in m.parameters().items()}
+
+    def parameter_info(self) -> dict[str, Parameter]:
+        """Unit, null, bounds and scale, by path."""
+        return {self.path(n, g): i for g, m in self.models.items() for n, i in m.parameter_info().items()}
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """What a fit moves."""
+        return tuple(dict.fromkeys(self.path(n, g) for g, m in self.models.items() for n in m.fitted_parameters()))
+
+    def own_unknowns(self) -> tuple[str, ...]:
+        """Unknowns of trials that effects bring: none, amplitudes are each group's here."""
+        return ()
+
+    def of(self, group: str, values: Mapping[str, float]) -> dict[str, float]:
+        """The values of one group's model."""
+        return {n: values[self.path(n, group)] for n in self.models[group].parameters()}
+
+    def with_parameters(self, values: Mapping[str, float]) -> GroupedModel:
+        """The same with other values."""
+        full = {**self.parameters(), **values}
+        return GroupedModel({g: m.with_parameters(self.of(g, full)) for g, m in self.models.items()}, self.own)
+
+    def structure(self) -> tuple[str, ...]:
+        """The rig, and the effects of each group."""
+        return tuple(f"{g}: {n}" for g, m in self.models.items() for n in m.structure())
+
+    def with_item(self, item: Item, effect: Effect | None = None) -> GroupedModel:
+        """The same with one thing more: a parameter or a cause of its own in one group, or a cause in all.
+
+        Parameters
+        ----------
+        effect
+            The cause with its start values, where the group's model does not have it yet.
+        """
+        models, own = dict(self.models), set(self.own)
+        for group in models if item.group is None else (item.group,):
+            if effect is not None and item.name not in (e.name for e in models[group].effects):
+                models[group] = models[group] + effect
+        if item.group is not None:
+            paths = models[item.group].parameters()
+            own |= {(n, item.group) for n in paths if item.name in (n, n.split(".")[0])}
+        return GroupedModel(models, frozenset(own))
+
+    def without(self, item: Item, items: Sequence[Item]) -> GroupedModel:
+        """The same without one of its items."""
+        models, own = dict(self.models), set(self.own)
+        rest = [i for i in items if i != item]
+        if item.group is not None:
+            own -= {(n, g) for n, g in own if g == item.group and item.name in (n, n.split(".")[0])}
+        for group, model in models.items():
+            if item.name in (e.name for e in model.effects) and not any(
+                i.name == item.name and i.group in (None, group) for i in rest
+            ):
+                models[group] = model - item.name
+        left = {(n, g) for n, g in own if n in models[g].parameters()}
+        return _agreed(GroupedModel(models, frozenset(left)))
+
+
+def _agreed(model: GroupedModel) -> GroupedModel:
+    """The same with one value of every parameter that groups share: that of the first group that has it."""
+    values: dict[str, float] = {}
+    for group, one in model.models.items():
+        for name, value in one.parameters().items():
+            values.setdefault(model.path(name, group), value)
+    return model.with_parameters(values)
+
+
+class GroupedProblem:
+    """A grouped model on the trials of all groups; a `Problem` to `Descent`.
+
+    Parameters
+    ----------
+    model
+        Its structure.
+    trials
+        By group, in the order of the model's groups.
+    weights
+        By group: noise, or what is random. Groups have their own: a noisier day is no change of the rig.
+    """
+
+    def __init__(
+        self, model: GroupedModel, trials: Mapping[str, Sequence[Trial]], weights: Mapping[str, Weight]
+    ) -> None:
+        self.model, self.free = model, model.free
+        self.parts: dict[str, Any] = {
+            g: LikelihoodProblem(m, trials[g], w) if isinstance(w, Doubt) else Problem(m, trials[g], w)
+            for (g, m), w in ((one, weights[one[0]]) for one in model.models.items())
+        }
+        self.trials = tuple(t for p in self.parts.values() for t in p.trials)
+        self.unknown_names = tuple(dict.fromkeys(n for p in self.parts.values() for n in p.unknown_names))
+        self.limits = {model.path(n, g): v for g, p in self.parts.items() for n, v in p.limits.items()}
+
+    @property
+    def noise(self) -> dict[str, Noise]:
+        """Noise by column and group."""
+        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.noise.items()}
+
+    def start_unknowns(self) -> Unknowns:
+        """The unknowns of each trial as its first samples suggest."""
+        return [u for p in self.parts.values() for u in p.start_unknowns()]
+
+    def completed(self, unknowns: Unknowns) -> Unknowns:
+        """Unknowns of another model on these trials with what this one has besides."""
+        both = zip(self.start_unknowns(), unknowns, strict=True)
+        return [{n: known.get(n, value) for n, value in start.items()} for start, known in both]
+
+    def by_group(self, rows: Sequence[Any]) -> dict[str, list[Any]]:
+        """What belongs to each trial, cut into groups."""
+        out, at = {}, 0
+        for group, part in self.parts.items():
+            out[group] = list(rows[at : at + len(part.trials)])
+            at += len(part.trials)
+        return out
+
+    def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
+        """Whitened residuals and sensitivities of all trials, group after group."""
+        out: list[Linearized] = []
+        cut = self.by_group(unknowns)
+        for group, part in self.parts.items():
+            at = [self.free.index(self.model.path(n, group)) for n in part.free]
+            own = [self.unknown_names.index(n) for n in part.unknown_names]
+            for one in part.linearize(self.model.of(group, values), cut[group]):
+                jacobian = np.zeros((len(one.residual), len(self.free)))
+                local = np.zeros((len(one.residual), len(self.unknown_names)))
+                jacobian[:, at], local[:, own] = one.jacobian, one.local
+                out.append(dataclasses.replace(one, jacobian=jacobian, local=local))
+        return out

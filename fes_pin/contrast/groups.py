@@ -1,0 +1,76 @@
+"""The groups of a contrast: trials of one study by their label, or two studies of one rig."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
+
+BY_GROUP = "group"
+
+
+def grouped_study(study: Study, other: Study | None, by: str, chosen: Sequence[str] | None) -> Study:
+    """One study whose trials all have a group, and no trials of groups that were not chosen.
+
+    Raises
+    ------
+    InputError
+        For fewer than two groups, groups that do not exist, trials that belong to none, studies of different rigs.
+    """
+    if study.rig == "body":
+        raise InputError("expected a rig whose trials are simulated; walking has no contrast", file=study.folder)
+    labelled = _joined(study, other) if other is not None else _labelled(study, by)
+    groups = list(dict.fromkeys(t.group for t in labelled.trials if t.group is not None))
+    for name in chosen or ():
+        if name not in groups:
+            raise InputError(f"no group {name!r}; expected some of {', '.join(groups)}", file=study.folder)
+    order = list(dict.fromkeys(chosen)) if chosen else groups
+    if len(order) < 2:
+        found = f"only {order[0]!r}" if order else "none"
+        raise InputError(f"expected at least two groups to contrast, found {found}", file=study.folder)
+    trials = [t for g in order for t in labelled.trials if t.group == g]
+    for group in order:
+        if not any(t.group == group and t.role != "held_out" for t in trials):
+            raise InputError(f"group {group!r} has no trial to fit: all have role = held_out", file=study.folder)
+    return replace(labelled, trials=tuple(trials))
+
+
+def _labelled(study: Study, by: str) -> Study:
+    if by == BY_GROUP:
+        labels: list[str | None] = [t.group for t in study.trials]
+        expected = 'group = "..." in every [[trial]]'
+    else:
+        labels = [f"{t.conditions[by]:g}" if by in t.conditions else None for t in study.trials]
+        expected = f"{BY_GROUP}, or a condition that every trial states"
+    for trial, label in zip(study.trials, labels, strict=True):
+        if label is None:
+            message = f"trial {trial.name} has no {by}; expected {expected}"
+            raise InputError(message, file=study.folder / "study.toml", column=by)
+    trials = [replace(t, group=label) for t, label in zip(study.trials, labels, strict=True)]
+    return replace(study, trials=tuple(trials))
+
+
+def _joined(before: Study, after: Study) -> Study:
+    """Two studies of one rig as one, each a group by its name."""
+    if before.rig != after.rig:
+        raise InputError(f"expected a study of the rig {before.rig}, found {after.rig}", file=after.folder)
+    for name in sorted(set(before.constants) | set(after.constants)):
+        one, two = before.constants.get(name), after.constants.get(name)
+        if one != two:
+            message = f"expected the rig of {before.name} with {name} = {one}, found {two}"
+            raise InputError(message, file=after.folder / "study.toml", column=f"rig.{name}")
+    if (before.urdf is None) != (after.urdf is None):
+        raise InputError(f"expected the rig of {before.name}: one has a URDF, the other none", file=after.folder)
+    if before.urdf is not None and after.urdf is not None and before.urdf.read_bytes() != after.urdf.read_bytes():
+        raise InputError(f"expected the URDF of {before.name}, found another", file=after.urdf)
+    if set(before.start) != set(after.start):
+        odd = sorted(set(before.start) ^ set(after.start))[0]
+        raise InputError(f"expected start.{odd} in both studies, or in none", file=after.folder / "study.toml")
+    names = (before.name, after.name) if before.name != after.name else ("before", "after")
+    trials: list[Trial] = []
+    for label, study in zip(names, (before, after), strict=True):
+        trials += [replace(t, name=f"{label}/{t.name}", group=label) for t in study.trials]
+    return replace(before, name=f"{names[0]} and {names[1]}", trials=tuple(trials))

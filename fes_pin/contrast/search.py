@@ -1,0 +1,168 @@
+"""The search for what differs: causes common to all groups and changes of one group compete by one price.
+
+A set's price is twice its negative log-likelihood with `PARAMETER_PRICE` for each parameter. A cause that acts in all
+groups alike stands in the same list as one that acts in one group, so that a model that is wrong in all groups does not
+turn up as a change: of two that explain as much the common one is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.contrast.decide import LEVEL, p_value
+from fes_pin.contrast.fits import Fits, Grouped, Promise
+from fes_pin.contrast.grouped import Item
+from fes_pin.diagnose.decide.significance import Family
+from fes_pin.diagnose.experiment import SEPARABLE
+from fes_pin.identify.fit import PARAMETER_PRICE
+from fes_pin.workers import in_parallel
+
+MOST_ITEMS = 5
+"""Common causes and changes together."""
+FITTED = 10
+"""Items that are fitted beside a set, those of most linear promise."""
+FITTED_DRIVEN = 6
+STARTS = 2
+"""Shapes that a fit starts from."""
+SWAPS = 2
+"""Rounds in which items may be replaced by better ones."""
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass
+class Found:
+    """What a search found.
+
+    Attributes
+    ----------
+    nominal, best
+        Fits: of the nominal model that is the same in all groups, and of the set that was chosen.
+    p_values
+        Of each change, family-wise.
+    without
+        The fit without each change, under the weights of `best`.
+    rivals
+        For each change fits in which another item stood in its place.
+    promises
+        What all items that the best set does not have would add to it.
+    family
+        Of tests.
+    """
+
+    nominal: Grouped
+    best: Grouped
+    p_values: dict[Item, float]
+    without: dict[Item, Grouped]
+    rivals: dict[Item, list[Grouped]]
+    promises: list[Promise]
+    family: Family
+
+
+class ContrastSearch:
+    """One search on the groups of one study."""
+
+    def __init__(self, fits: Fits, seed: int, progress: Progress) -> None:
+        self.fits, self.seed, self.progress = fits, seed, progress
+
+    def run(self) -> Found:
+        """Search forward, swap, take back what is superfluous, under the noise that the set itself leaves."""
+        self.progress(0.05, "one model for all groups")
+        nominal = self.fits.first()
+        promises, scores = self.fits.promises(nominal)
+        self.family = Family(scores, self.seed)
+        best = self._forward(nominal, promises)
+        self.progress(0.6, "swaps")
+        best = self._settled(best)
+        again = self.fits.under_own_noise(best)
+        if not self.fits.driven:
+            promises, _ = self.fits.promises(again)
+            best = self._settled(self._forward(again, promises))
+        self.progress(0.85, "rivals")
+        return self._told(nominal, best)
+
+    def _forward(self, base: Grouped, promises: list[Promise]) -> Grouped:
+        while len(base.items) < MOST_ITEMS:
+            self.progress(0.1 + 0.1 * len(base.items), f"{len(base.items) + 1} beside the nominal model")
+            tried = self._beside(base, promises)
+            if not tried:
+                break
+            best = self._first(tried)
+            if not p_value(self.fits, self.family, best, base) < LEVEL:
+                break
+            base = best
+            promises, _ = self.fits.promises(base)
+        return base
+
+    def _beside(self, base: Grouped, promises: list[Promise], leave: Item | None = None) -> list[Grouped]:
+        """Fits of a set with each of the items of most promise beside it, cheapest first."""
+        ranked: dict[Item, list[Promise]] = {}
+        for one in sorted(promises, key=lambda p: PARAMETER_PRICE * p.degrees - p.gain):
+            if one.item != leave and one.gain > 1.0:
+                ranked.setdefault(one.item, []).append(one)
+        chosen = list(ranked.values())[: FITTED_DRIVEN if self.fits.driven else FITTED]
+        looks = in_parallel(lambda many: self.fits.look(base, many[:STARTS]), chosen)
+        looks = sorted((f for f in looks if np.isfinite(f.fit.sse)), key=lambda f: f.price)
+        return sorted([*in_parallel(self.fits.go_on, looks[:3]), *looks[3:]], key=lambda f: f.price)
+
+    def _first(self, tried: list[Grouped]) -> Grouped:
+        """The cheapest, or a common cause in its place that is as good."""
+        best = tried[0]
+        for one in tried:
+            if one.items[-1].group is None and one.price < best.price + SEPARABLE:
+                return one
+        return best
+
+    def _settled(self, best: Grouped) -> Grouped:
+        """Replace items as long as that helps, then drop those that are not significant."""
+        for _ in range(SWAPS if len(best.items) > 1 else 0):
+            before = best
+            for item in best.items:
+                if item not in best.items:
+                    continue
+                rest = self.fits.without(best, item)
+                tried = self._beside(rest, self.fits.promises(rest)[0], item)
+                if tried and tried[0].price < best.price - 1.0:
+                    best = tried[0]
+            if best is before:
+                break
+        while best.items:
+            without = {i: self.fits.without(best, i) for i in best.items}
+            values = {i: p_value(self.fits, self.family, best, w) for i, w in without.items()}
+            weakest = max(values, key=lambda i: values[i])
+            if values[weakest] < LEVEL:
+                break
+            best = without[weakest]
+        return best
+
+    def _told(self, nominal: Grouped, best: Grouped) -> Found:
+        """Every change with its p-value and its rivals; one that a common cause could replace is none."""
+        while True:
+            p_values, without, rivals = {}, {}, {}
+            for item in best.changes:
+                rest = self.fits.without(best, item)
+                without[item] = self.fits.weighed_as(rest, best)
+                p_values[item] = p_value(self.fits, self.family, best, rest)
+                rivals[item] = self._beside(rest, self.fits.promises(rest)[0], item)
+            doubtful = [
+                (one, item)
+                for item, many in rivals.items()
+                for one in many
+                if one.items[-1].group is None and one.price < best.price + SEPARABLE
+            ]
+            if not doubtful:
+                break
+            best = self._dropped(min(doubtful, key=lambda d: d[0].price)[0])
+        promises, _ = self.fits.promises(best)
+        return Found(nominal, best, p_values, without, rivals, promises, self.family)
+
+    def _dropped(self, best: Grouped) -> Grouped:
+        """The set less the changes that are not significant any more."""
+        for item in best.changes:
+            rest = self.fits.without(best, item)
+            if not p_value(self.fits, self.family, best, rest) < LEVEL:
+                return self._dropped(rest)
+        return best

@@ -1,0 +1,60 @@
+"""Changes in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fes_pin.models.describe import sentence
+from fes_pin.models.rigs.base import Rig
+from fes_pin.models.stage import Effect
+
+
+@dataclass(frozen=True)
+class Words:
+    """How a change of a nominal parameter is told.
+
+    Attributes
+    ----------
+    more, less
+        What happened if the value rose, and if it fell.
+    by_share
+        True if the ratio of the values is told, not their difference.
+    """
+
+    more: str
+    less: str
+    by_share: bool = False
+
+
+NOMINAL: Mapping[str, Words] = {
+    "inertia_scale": Words("inertia was added", "inertia was taken away"),
+    "inertia_kgm2": Words("inertia was added", "inertia was taken away"),
+    "damping": Words("damping was added", "damping was taken away"),
+    "damping_nms": Words("damping was added", "damping was taken away"),
+    "gravity_scale": Words("weight was added", "weight was taken away", True),
+    "gain": Words("the muscle became stronger", "the muscle became weaker", True),
+    "time_constant_s": Words("activation became slower", "activation became faster"),
+}
+"""By the names of the study format; any other parameter rose or fell."""
+
+
+def of_nominal(rig: Rig, name: str, before: float, after: float, unit: str) -> str:
+    """What happened to a nominal parameter, with the size in the unit that it has on the rig."""
+    words = NOMINAL.get(name, Words(f"{name} rose", f"{name} fell", True))
+    happened = words.more if after > before else words.less
+    if words.by_share and before:
+        return f"{happened}, by {abs(100.0 * (after / before - 1.0)):.3g} %"
+    size = abs(after - before)
+    if name == "inertia_scale":
+        size *= float(rig.constants["inertia"])
+        unit = "kg m2" if rig.constants.get("revolute", 1.0) else "kg"
+    return f"{happened}, {size:.3g} {unit}".strip()
+
+
+def of_cause(kind: type[Effect], before: float, after: float, unit: str, there_before: bool) -> str:
+    """What happened to a cause, by its first parameter."""
+    told = sentence(kind).removesuffix(".")
+    if not there_before:
+        return f"new: {told}, {after:.3g} {unit}".strip()
+    return f"changed: {told}, {before:.3g} -> {after:.3g} {unit}".strip()

@@ -1,0 +1,122 @@
+"""Groups between which something was changed on purpose, without the engine: that is named, a repeat is not."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from contrast_pairs.driven import driven_pair
+from contrast_pairs.free import free_pair
+from contrast_pairs.practice import practice_pair
+from data import studies
+
+import fes_pin as fp
+from fes_pin.contrast.record import contrast_record
+from fes_pin.data.errors import InputError
+from fes_pin.view.contrast_report import contrast_html
+
+
+def test_nothing_changed(tmp_path):
+    found = fp.contrast(free_pair("muscle", (), 80.0, 3, tmp_path))
+    assert found.verdict == "nothing_changed"
+    assert not found.changes
+    assert "nothing changed between before and after" in str(found)
+    assert 0.0 < found.unchanged["gain"] < 0.05
+
+
+def test_trials_that_scatter_are_no_change(tmp_path):
+    """Strength that differs from trial to trial by ten times what the noise lets see is no change of a group."""
+    study = free_pair("muscle", (), 80.0, 4, tmp_path)
+    rng = np.random.default_rng(5)
+    scale = {t.name: 1.0 + 0.03 * rng.standard_normal() for t in study.trials}
+    scale[study.trials[0].name] += 0.04  # by chance one group is stronger
+    trials = [t.with_columns(force_n=scale[t.name] * t["force_n"]) for t in study.trials]
+    found = fp.contrast(replace(study, trials=tuple(trials)))
+    assert found.verdict != "changed"
+
+
+def test_one_change_is_named_alone_with_its_size(tmp_path):
+    study = free_pair("muscle", (), 80.0, 6, tmp_path)
+    trials = [t.with_columns(force_n=t["force_n"] + 0.8) if t.group == "after" else t for t in study.trials]
+    found = fp.contrast(replace(study, trials=tuple(trials)))
+    (change,) = found.changes
+    assert (change.name, change.kind, change.group, change.equivalents) == ("sensor_offset", "effect", "after", ())
+    assert change.parameters["offset"]["before"].value == 0.0
+    one = change.parameters["offset"]["after"]
+    assert one.value == pytest.approx(0.8, abs=max(4.0 * one.std, 0.05))
+    assert change.p_value < 1e-3
+    assert "sensor_offset" not in found.excluded
+
+
+def test_two_changes_are_both_named(tmp_path):
+    study = free_pair("muscle", ("gain",), 80.0, 9, tmp_path)
+    trials = [t.with_columns(force_n=t["force_n"] + 0.8) if t.group == "after" else t for t in study.trials]
+    found = fp.contrast(replace(study, trials=tuple(trials)))
+    assert {c.name for c in found.changes} == {"gain", "sensor_offset"}
+
+
+def test_a_nominal_parameter_is_told_in_plain_words(tmp_path):
+    """A driven rig, judged by predictions: inertia is added, and nothing else is."""
+    study = driven_pair(("inertia_scale",), 0.4, 41, tmp_path)
+    found = fp.contrast(study)
+    assert found.driven
+    (change,) = found.changes
+    assert (change.name, change.kind, change.group) == ("inertia_scale", "nominal", "after")
+    assert change.words.startswith("inertia was added, 0.299 kg m2")
+    assert change.parameters["inertia_scale"]["before"].value == pytest.approx(1.0, abs=0.02)
+    record = contrast_record(found)
+    json.dumps(record, allow_nan=False)
+    assert record["changes"][0]["parameters"]["inertia_scale"]["after"]["std"] > 0.0
+    assert record["unchanged"]["damping"]["at_most"] < 0.5
+    page = contrast_html(found)
+    assert "Inertia was added" in page
+    assert "inertia_scale" in page
+
+
+def test_a_common_cause_is_no_change(tmp_path, shared):
+    """Both halves of a study whose sensor is turned the same way by the same amount."""
+    study = practice_pair(fp.read_study(shared / "practice" / "n00_none"), ())
+    moved = [t.with_columns(angle_rad=t["angle_rad"] + 0.02) if t.kind == "motion" else t for t in study.trials]
+    found = fp.contrast(replace(study, trials=tuple(moved)))
+    assert found.verdict == "nothing_changed"
+    assert found.common
+
+
+def _of(study, group):
+    return replace(study, name=group, trials=tuple(t for t in study.trials if t.group == group))
+
+
+def test_two_studies_are_two_groups(tmp_path):
+    study = free_pair("muscle", ("gain",), 80.0, 9, tmp_path)
+    halves = [_of(study, g) for g in ("before", "after")]
+    found = fp.contrast(*halves)
+    assert found.groups == ("before", "after")
+    assert [c.name for c in found.changes] == ["gain"]
+
+
+def _labelled(tmp_path):
+    study = fp.read_study(studies.ankle(tmp_path / "study"))
+    labels = ["a" if k % 2 else "b" for k in range(len(study.trials))]
+    return replace(study, trials=tuple(replace(t, group=g) for t, g in zip(study.trials, labels, strict=True)))
+
+
+@pytest.mark.parametrize(
+    ("change", "asked", "words"),
+    [
+        (lambda s: s, {"groups": ["a", "c"]}, "no group 'c'"),
+        (lambda s: s, {"groups": ["a"]}, "at least two groups"),
+        (lambda s: replace(s, trials=s.trials[:1]), {}, "only 'b'"),
+        (lambda s: replace(s, trials=tuple(replace(t, group=None) for t in s.trials)), {}, "has no group"),
+        (lambda s: s, {"by": "lod_kg"}, "has no lod_kg"),
+    ],
+)
+def test_groups_that_cannot_be_contrasted(change, asked, words, tmp_path):
+    with pytest.raises(InputError, match=words):
+        fp.contrast(change(_labelled(tmp_path)), **asked)
+
+
+def test_studies_of_different_rigs(tmp_path):
+    study = _labelled(tmp_path)
+    constants = {**study.constants, "moment_arm_m": 2.0 * study.constants["moment_arm_m"]}
+    with pytest.raises(InputError, match="moment_arm_m"):
+        fp.contrast(study, replace(study, constants=constants))
