@@ -25,6 +25,7 @@ ROOMS = {
     "models": "Models: rigs, effects, simulation",
     "identify": "Fits, noise",
     "diagnose": "Diagnosis",
+    "contrast": "What changed",
     "paper": "The paper's ankle",
     "body": "The walking body",
     "walk": "Measured walking",

@@ -12,8 +12,8 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.body.build import Body as Body
     from fes_pin.body.linearize import linearize as linearize
     from fes_pin.body.minimal_sets import minimal_sets as minimal_sets
-    from fes_pin.contrast.contrast import Contrast as Contrast
     from fes_pin.contrast.contrast import contrast as contrast
+    from fes_pin.contrast.result import Contrast as Contrast
     from fes_pin.data.errors import InputError as InputError
     from fes_pin.data.study import Study as Study
     from fes_pin.data.study import read_study as read_study
@@ -63,7 +63,7 @@ _WHERE = {
     "diagnose": "fes_pin.verdict.ask",
     "Diagnosis": "fes_pin.diagnose.result",
     "contrast": "fes_pin.contrast.contrast",
-    "Contrast": "fes_pin.contrast.contrast",
+    "Contrast": "fes_pin.contrast.result",
     "diagnose_walk": "fes_pin.walk.diagnosis",
     "report": "fes_pin.view.report",
     "Body": "fes_pin.body.build",

@@ -29,7 +29,7 @@ def contrast(
     """Say what differs between groups of trials, by how much, and what did not change."""
     from fes_pin.contrast.contrast import contrast as find
     from fes_pin.contrast.record import FILE, contrast_json
-    from fes_pin.contrast.text import contrast_text
+    from fes_pin.contrast.result import contrast_text
     from fes_pin.data.errors import InputError
     from fes_pin.data.files import check_folder, write_files
     from fes_pin.data.study import read_study

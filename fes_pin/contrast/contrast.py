@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from fes_pin.contrast.decide import inflation
 from fes_pin.contrast.fits import Fits, Grouped
 from fes_pin.contrast.grouped import Item
 from fes_pin.contrast.groups import BY_GROUP, grouped_study
+from fes_pin.contrast.result import Change, Contrast
 from fes_pin.contrast.search import ContrastSearch, Found, Progress
 from fes_pin.contrast.words import of_cause, of_nominal
 from fes_pin.data.study import Study
@@ -24,7 +24,6 @@ from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.remainder.open_set import Remainder, remainder
 from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.feedback import is_fed_back
-from fes_pin.identify.fit import Fit
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.workers import in_parallel, one_thread_each
@@ -33,80 +32,6 @@ SEEN = 0.95
 """Power at which a change that was not found is called excluded."""
 LEVEL = 0.01
 """Family-wise level of a claim, which a change that is excluded would have reached."""
-
-
-@dataclass(frozen=True)
-class Change:
-    """One thing that differs.
-
-    Attributes
-    ----------
-    name
-        A nominal parameter, or a cause.
-    kind
-        "nominal" or "effect".
-    group
-        The group that has a value of its own.
-    words
-        What happened, in plain words.
-    parameters
-        By name and group: of a group that does not have the cause its null, without deviation.
-    equivalents
-        What could have changed instead: read them as one set.
-    p_value
-        Family-wise over the whole library.
-    """
-
-    name: str
-    kind: str
-    group: str
-    words: str
-    parameters: Mapping[str, Mapping[str, ParameterEstimate]]
-    equivalents: tuple[str, ...]
-    p_value: float
-
-
-@dataclass(frozen=True)
-class Contrast:
-    """What differs between the groups of a study.
-
-    Attributes
-    ----------
-    verdict
-        "nothing_changed", "changed" or "unexplained".
-    changes
-        Surest first.
-    common
-        Causes that act in all groups alike: errors of the model, and no changes.
-    unchanged
-        For each parameter of the model that is not among the changes the size, as a share of its value, beyond which a
-        change would have been seen in 95 of 100.
-    excluded
-        For each cause that no group has, its first parameter: the size beyond which its coming would have been seen.
-    untestable
-        What could have changed unseen.
-    remainder
-        What is left in a group that no other group has.
-    """
-
-    study: Study
-    groups: tuple[str, ...]
-    verdict: str
-    changes: tuple[Change, ...]
-    common: tuple[str, ...]
-    unchanged: Mapping[str, float]
-    excluded: Mapping[str, ParameterEstimate]
-    untestable: tuple[str, ...]
-    remainder: Remainder
-    fit: Fit
-    driven: bool
-    warnings: tuple[str, ...] = ()
-    wall_s: float = field(default=0.0, compare=False)
-
-    def __str__(self) -> str:
-        from fes_pin.contrast.text import contrast_text  # noqa: PLC0415
-
-        return contrast_text(self)
 
 
 def contrast(

@@ -229,7 +229,7 @@ class Fits:
         out = [
             replace(
                 _promise(base.model, m[:3], gram[b, b], along[b], norms),
-                spread=_spread(m[3][:, 0], projection.residual, base.fit.parts) if m[1] is None else 1.0,
+                spread=_spread(m[3][:, 0], projection.residual, base.fit.parts),
             )
             for m, b, norms in zip(made, blocks, before, strict=True)
         ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from fes_pin.contrast.contrast import Change, Contrast
+from fes_pin.contrast.result import Change, Contrast
 from fes_pin.diagnose.record import shown
 
 FILE = "contrast.json"

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from fes_pin.contrast.contrast import Change, Contrast
-from fes_pin.contrast.text import headline, notes
+from fes_pin.contrast.result import Change, Contrast, headline, notes
 from fes_pin.diagnose.cause import ParameterEstimate
 from fes_pin.diagnose.text import probability
 from fes_pin.identify.fit import CONFIDENCE_95

@@ -1,9 +1,87 @@
-"""A contrast in words: what a person reads in the terminal."""
+"""The answer of a contrast, and it in words."""
 
 from __future__ import annotations
 
-from fes_pin.contrast.contrast import Change, Contrast
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from fes_pin.data.study import Study
+from fes_pin.diagnose.cause import ParameterEstimate
+from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.text import probability, quantity
+from fes_pin.identify.fit import Fit
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that differs.
+
+    Attributes
+    ----------
+    name
+        A nominal parameter, or a cause.
+    kind
+        "nominal" or "effect".
+    group
+        The group that has a value of its own.
+    words
+        What happened, in plain words.
+    parameters
+        By name and group: of a group that does not have the cause its null, without deviation.
+    equivalents
+        What could have changed instead: read them as one set.
+    p_value
+        Family-wise over the whole library.
+    """
+
+    name: str
+    kind: str
+    group: str
+    words: str
+    parameters: Mapping[str, Mapping[str, ParameterEstimate]]
+    equivalents: tuple[str, ...]
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """What differs between the groups of a study.
+
+    Attributes
+    ----------
+    verdict
+        "nothing_changed", "changed" or "unexplained".
+    changes
+        Surest first.
+    common
+        Causes that act in all groups alike: errors of the model, and no changes.
+    unchanged
+        For each parameter of the model that is not among the changes the size, as a share of its value, beyond which a
+        change would have been seen in 95 of 100.
+    excluded
+        For each cause that no group has, its first parameter: the size beyond which its coming would have been seen.
+    untestable
+        What could have changed unseen.
+    remainder
+        What is left in a group that no other group has.
+    """
+
+    study: Study
+    groups: tuple[str, ...]
+    verdict: str
+    changes: tuple[Change, ...]
+    common: tuple[str, ...]
+    unchanged: Mapping[str, float]
+    excluded: Mapping[str, ParameterEstimate]
+    untestable: tuple[str, ...]
+    remainder: Remainder
+    fit: Fit
+    driven: bool
+    warnings: tuple[str, ...] = ()
+    wall_s: float = field(default=0.0, compare=False)
+
+    def __str__(self) -> str:
+        return contrast_text(self)
 
 
 def headline(found: Contrast) -> str:
