@@ -25,6 +25,7 @@ MOST_ITEMS = 5
 FITTED = 10
 """Items that are fitted beside a set, those of most linear promise."""
 FITTED_DRIVEN = 6
+"""The same on driven rigs, where a fit is some five times as long and the screen already holds what is random."""
 STARTS = 2
 """Shapes that a fit starts from."""
 SWAPS = 2
