@@ -22,7 +22,6 @@ from fes_pin.cli.walk import diagnose_walking, print_effects
 if TYPE_CHECKING:
     from fes_pin.data.trial import Trial
     from fes_pin.diagnose.result import Diagnosis
-    from fes_pin.models.catalogue import Catalogue
     from fes_pin.models.model import Model
 
 app = typer.Typer(cls=Commands, pretty_exceptions_enable=False)
