@@ -38,6 +38,9 @@ CASES = [
 ]
 """The same with every kind of trial that can feel the effect, but for imposed motion."""
 
+FELT = [(effect, rig) for effect, rig in EFFECTS_OF_RIGS if any((e, r) == (effect, rig) for e, r, _ in CASES)]
+"""Every effect with every rig that feels it in some trial whose motion is not imposed."""
+
 IMPOSED_CASES = [
     (effect, rig, "imposed")
     for effect, rig in EFFECTS_OF_RIGS

@@ -34,7 +34,7 @@ def friction(position, velocity, exponent, **constants):
     known = {**JOINT, **constants}
 
     def torque(effects):
-        s = Signals(effects, x=SimpleNamespace(q=position, v=velocity), u=SimpleNamespace(), step=5e-4)
+        s = Signals(effects, x=SimpleNamespace(q=position, v=velocity), u=SimpleNamespace(), step=5e-4, kind="motion")
         s.c = SimpleNamespace(**known)
         Joint(1.0, 0.0, 1.0, constants=known).rates(s)
         return s.torque

@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 import oracle
 import pytest
-from models.cases import EFFECTS_OF_RIGS, KINDS, RIGS, name_of, trial
+from models.cases import FELT, KINDS, RIGS, name_of, trial
 
 from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.fit import fit_problem
@@ -75,7 +75,7 @@ def rig_with(one, rig):
     return dataclasses.replace(RIGS[rig], fitted=known)
 
 
-@pytest.mark.parametrize(("one", "rig"), EFFECTS_OF_RIGS, ids=name_of)
+@pytest.mark.parametrize(("one", "rig"), FELT, ids=name_of)
 def test_an_effect_recovers_its_own_parameters(one, rig):
     true = Model(rig_with(one, rig)) + typical(one, rig)
     trials = measured(true, rig)
