@@ -43,8 +43,9 @@ FIRST_TIME_S = 0.1
 """Time constant that it begins with."""
 SMALLEST = 1e-6
 """Smallest random part, as a share of what drives the rig or of a reading's range: it counts as none."""
-SLOWEST = 0.5
-"""Longest time constant of a random process, as a share of the longest trial: a slower one is an offset."""
+SLOWEST = 0.1
+"""Longest time constant of a random process, as a share of the longest trial: what does not change some ten times in a
+trial is an offset, and would hide one."""
 
 
 @dataclass(frozen=True)
