@@ -213,4 +213,4 @@ def _not_changed(found: Found, driven: bool) -> tuple[dict[str, float], dict[str
 ABSORBED_BELOW = 0.04
 """Share of its norm that a sensitivity must keep to be testable, as in a diagnosis."""
 
-__all__ = ["Change", "Contrast", "contrast"]
+__all__ = ["contrast"]

@@ -151,4 +151,4 @@ def split(study: Study) -> tuple[list[Trial], list[Trial]]:
     return train, test
 
 
-__all__ = ["Diagnosis", "diagnose", "split"]
+__all__ = ["diagnose", "split"]

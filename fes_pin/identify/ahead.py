@@ -11,6 +11,7 @@ its autoregression (`NoiseModel`) where a rig is simulated freely:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -100,11 +101,12 @@ def own_noise(fitted: Fit) -> NoiseModel:
 def forecast(residual: np.ndarray, noise: Noise, dt: float, ahead_s: float) -> np.ndarray:
     """What autoregressive noise foretells of a residual, shape (n,), from what was seen `ahead_s` before or earlier.
 
-    With `ahead_s` zero, one sample ahead; of noise that is known at a longer step, one such step.
+    With `ahead_s` zero, one sample ahead; of noise that is known at a longer step, one such step. Such a step is
+    foretold as a whole: its first sample, too, uses nothing newer than asked.
     """
     every = thinning(dt, noise.step_s)
     seen, order = thin(residual, every), len(noise.ar)
-    steps = max(1, round(ahead_s / (every * dt)))
+    steps = max(1, math.ceil((ahead_s - dt) / (every * dt) - 1e-9) + 1)
     foretold = np.zeros(len(seen))
     if order and len(seen) > steps:
         weights = _weights(np.array(noise.ar), steps)

@@ -11,7 +11,7 @@ from fes_pin.models.catalogue import Source
 
 if TYPE_CHECKING:
     from fes_pin.diagnose.result import Diagnosis
-    from fes_pin.walk.diagnosis import WalkDiagnosis
+    from fes_pin.walk.result import WalkDiagnosis
 
 
 def diagnose(

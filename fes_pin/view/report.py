@@ -30,7 +30,7 @@ from fes_pin.view.report_causes import causes_section, stage_mark, value_and_int
 from fes_pin.view.report_trials import missing_section, position_unit, trials_section
 from fes_pin.view.style import unit_of
 from fes_pin.view.words import answers, title
-from fes_pin.walk.diagnosis import WalkDiagnosis
+from fes_pin.walk.result import WalkDiagnosis
 
 
 def report(diagnosis: Diagnosis | WalkDiagnosis, path: str | Path) -> None:

@@ -24,13 +24,17 @@ def test_what_is_missed_has_the_variance_of_theory(steps):
     assert np.var(missed[100:]) == pytest.approx(np.sum(response**2), rel=0.05)
 
 
-def test_nothing_later_than_the_horizon_is_used():
-    e, steps, cut = noise(400), 7, 200
+@pytest.mark.parametrize("cut", [200, 201, 202])
+@pytest.mark.parametrize("every", [1, 3])
+@pytest.mark.parametrize("steps", [6, 7])
+def test_nothing_later_than_the_horizon_is_used(steps, every, cut):
+    """Also where the noise is known at a longer step than the samples'."""
+    e = noise(400)
     other = np.where(np.arange(400) < cut, e, 1e3)
-    before, after = (forecast(x, Noise(1.0, AR), DT, steps * DT) for x in (e, other))
+    before, after = (forecast(x, Noise(1.0, AR, 1.0, every * DT), DT, steps * DT) for x in (e, other))
     rows = slice(0, cut + steps)
     assert np.array_equal(before[rows], after[rows])
-    assert before[cut + steps] != after[cut + steps]
+    assert not np.array_equal(before[: cut + steps + 2 * every], after[: cut + steps + 2 * every])
 
 
 def test_white_noise_foretells_nothing():
