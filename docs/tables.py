@@ -26,6 +26,7 @@ ROOMS = {
     "identify": "Fits, noise",
     "diagnose": "Diagnosis",
     "contrast": "What changed",
+    "compare": "Models of the literature, ranked",
     "paper": "The paper's ankle",
     "body": "The walking body",
     "walk": "Measured walking",

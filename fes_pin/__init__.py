@@ -12,6 +12,8 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.body.build import Body as Body
     from fes_pin.body.linearize import linearize as linearize
     from fes_pin.body.minimal_sets import minimal_sets as minimal_sets
+    from fes_pin.compare.compare import compare as compare
+    from fes_pin.compare.result import Comparison as Comparison
     from fes_pin.contrast.contrast import contrast as contrast
     from fes_pin.contrast.result import Contrast as Contrast
     from fes_pin.data.errors import InputError as InputError
@@ -62,6 +64,8 @@ _WHERE = {
     "Fit": "fes_pin.identify.fit",
     "diagnose": "fes_pin.verdict.ask",
     "Diagnosis": "fes_pin.diagnose.result",
+    "compare": "fes_pin.compare.compare",
+    "Comparison": "fes_pin.compare.result",
     "contrast": "fes_pin.contrast.contrast",
     "Contrast": "fes_pin.contrast.result",
     "diagnose_walk": "fes_pin.walk.diagnosis",

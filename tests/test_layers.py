@@ -17,6 +17,7 @@ ALLOWED = {
     "identify": {"models", "data"},
     "diagnose": {"identify", "models", "data"},
     "contrast": {"diagnose", "identify", "models", "data"},
+    "compare": {"diagnose", "identify", "models", "data"},
     "paper": {"identify", "models", "data"},
     "body": {"data"},
     "walk": {"body", "models", "data"},

@@ -11,6 +11,7 @@ import typer
 from fes_pin.cli.allocate import allocate
 from fes_pin.cli.body import app as body
 from fes_pin.cli.cohort import cohort
+from fes_pin.cli.compare import compare
 from fes_pin.cli.contrast import contrast
 from fes_pin.cli.datasets import datasets
 from fes_pin.cli.group import Commands
@@ -34,6 +35,7 @@ app.command()(datasets)
 app.command()(pulses)
 app.command()(cohort)
 app.command()(contrast)
+app.command()(compare)
 
 Libraries = Annotated[
     list[str] | None,

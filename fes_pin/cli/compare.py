@@ -1,0 +1,53 @@
+"""`fes-pin compare`: models from the literature on a study's trials, ranked by what they foretell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
+
+Libraries = Annotated[
+    list[str] | None,
+    typer.Option("--library", help="A Python file, or the name of a module, with causes or rigs. Its code is run."),
+]
+
+
+def compare(
+    study: Annotated[Path, typer.Argument(help="Folder of a study of a muscle or an ankle, or its study.toml.")],
+    models: Annotated[
+        str | None, typer.Option(help="Names with commas between them: nominal,ding2003,hill ... [default: all]")
+    ] = None,
+    model: Annotated[
+        list[Path] | None, typer.Option("--model", help="model.toml of a diagnosis, too; may be repeated.")
+    ] = None,
+    horizon: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="How far ahead. [default: as a diagnosis looks]")
+    ] = None,
+    given: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Also foretell the rest of each trial from its beginning.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for compare.json.")] = None,
+    library: Libraries = None,
+) -> None:
+    """Rank models from the literature by their errors on whole trials left out."""
+    from fes_pin.compare.compare import compare as find
+    from fes_pin.compare.record import FILE, comparison_json
+    from fes_pin.compare.result import comparison_text
+    from fes_pin.data.files import check_folder, write_files
+    from fes_pin.data.study import read_study
+
+    catalogue = catalogue_with(library)
+    measured = read_study(study, rigs=catalogue.schemas())
+    if out is not None:
+        check_folder(out)  # what cannot be read or written is said before any work
+    names = None if models is None else [n.strip() for n in models.split(",") if n.strip()]
+    own = {str(path): path for path in model or ()}
+    with progress() as tell:
+        found = find(measured, names, extended=own, horizon_s=horizon, given_s=given, library=catalogue, progress=tell)
+    if out is not None:
+        write_files(out, {FILE: comparison_json(found)})
+    say_whose_code(catalogue)
+    typer.echo(comparison_text(found))

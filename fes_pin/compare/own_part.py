@@ -1,0 +1,111 @@
+"""What is a trial's own, told by its beginning: parameters that differ from trial to trial about their common value.
+
+Of trial i, with J the sensitivities at the common fit and r the residual,
+
+    r_i = J_i d_i + e_i,   d_i ~ N(0, D),   e_i ~ N(0, s^2 c I).
+
+D and s are estimated from the fitted trials by expectation and maximisation; c, how many samples of e weigh as one, is
+the one of `WORTH` that foretells the rest of the fitted trials best from their beginnings. Of a new trial d is
+estimated from its beginning alone. Laird and Ware, Biometrics 38 (1982).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.noise import thin
+from fes_pin.identify.problem import Problem
+
+STEP_S = 4e-3
+"""Samples are averaged to this time step, s, as the noise's are: `identify.noise.FASTEST_S`."""
+WORTH = (1.0, 3.0, 10.0, 30.0, 100.0)
+"""How many samples may weigh as one: what a model gets wrong is the same for some tenths of a second."""
+TURNS = 40
+"""Of expectation and maximisation; D then moves by less than a hundredth."""
+FEWEST = 4
+"""Trials that can tell how much trials differ."""
+
+Pair = tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class OwnPart:
+    """How much trials differ: D in units of `scale`, s^2 c.
+
+    Attributes
+    ----------
+    covariance
+        Shape (parameters, parameters).
+    scale
+        Shape (parameters,): root mean square of each sensitivity.
+    variance
+        s^2 c.
+    """
+
+    covariance: np.ndarray
+    scale: np.ndarray
+    variance: float
+
+    def left(self, pair: Pair, begun: int) -> np.ndarray:
+        """What is left of the residual after its first `begun` samples, once those have told d; shape (n - begun,)."""
+        r, jacobian = pair[0], pair[1] / self.scale
+        first = jacobian[:begun]
+        prior = np.linalg.inv(self.covariance + 1e-9 * np.trace(self.covariance) * np.eye(len(self.scale)))
+        d = np.linalg.solve(first.T @ first / self.variance + prior, first.T @ r[:begun] / self.variance)
+        return (r - jacobian @ d)[begun:]
+
+
+def pairs_of(fitted: Fit, trials: Sequence[Trial]) -> list[Pair]:
+    """Residuals and sensitivities of trials at a fit, averaged to `STEP_S`, the channels weighed as in the fit."""
+    problem = Problem(fitted.model, trials, fitted.noise)
+    parts = problem.linearize(fitted.values, problem.start_unknowns())
+    out = []
+    for trial, part in zip(trials, parts, strict=True):
+        count = stride(trial)
+        out.append((thin(part.residual, count), thin(part.jacobian, count)))
+    return out
+
+
+def stride(trial: Trial) -> int:
+    """Samples of a trial that are averaged into one."""
+    return max(1, round(STEP_S / trial.dt))
+
+
+def own_part(pairs: Sequence[Pair], begun: Sequence[int]) -> OwnPart | None:
+    """How much trials differ, by what foretells their rest best; None of fewer than `FEWEST`.
+
+    Parameters
+    ----------
+    begun
+        Samples of each trial's beginning.
+    """
+    usable = [(p, b) for p, b in zip(pairs, begun, strict=True) if len(p[0]) > b]
+    if len(usable) < FEWEST:
+        return None
+    tried = [_estimated([p for p, _ in usable], worth) for worth in WORTH]
+    return min(tried, key=lambda one: sum(float(np.mean(one.left(p, b) ** 2)) for p, b in usable))
+
+
+def _estimated(pairs: Sequence[Pair], worth: float) -> OwnPart:
+    sizes = np.array([np.mean(j**2, axis=0) for _, j in pairs])
+    scale = np.sqrt(np.maximum(sizes.mean(axis=0), 1e-300))
+    scaled = [(r, j / scale) for r, j in pairs]
+    width = len(scale)
+    mean_square = max(float(np.mean([np.mean(r**2) for r, _ in pairs])), 1e-300)
+    covariance, variance = mean_square * np.eye(width), mean_square
+    for _ in range(TURNS):
+        inverse = np.linalg.inv(covariance + 1e-9 * np.trace(covariance) * np.eye(width))
+        total, squares, count = np.zeros((width, width)), 0.0, 0
+        for r, j in scaled:
+            spread = np.linalg.inv(j.T @ j / (variance * worth) + inverse)
+            d = spread @ (j.T @ r) / (variance * worth)
+            total += spread + np.outer(d, d)
+            squares += float(np.sum((r - j @ d) ** 2))
+            count += len(r)
+        covariance, variance = total / len(pairs), max(squares / count, 1e-12 * mean_square)
+    return OwnPart(covariance, scale, variance * worth)

@@ -1,0 +1,209 @@
+"""The answer of a comparison: models by their errors on held-out trials, and which of them these trials tell apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import special
+
+from fes_pin.data.study import Study
+from fes_pin.identify.fit import Fit
+
+LEVEL = 0.05
+"""Family-wise error of calling any model worse than the best when it is not."""
+
+
+@dataclass(frozen=True)
+class Apart:
+    """How much more a model misses than the best: the mean over held-out trials of E, and its interval.
+
+    Attributes
+    ----------
+    more, low, high
+        Percent of the spread of the measurement, squared errors; the interval holds for all models at once.
+    """
+
+    more: float
+    low: float
+    high: float
+
+    @property
+    def told(self) -> bool:
+        """True if the interval lies above zero."""
+        return self.low > 0.0
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One model.
+
+    Attributes
+    ----------
+    words, source
+        What it is made of, and where it was published; empty of the study's own.
+    parameters
+        How many are fitted.
+    unfelt
+        Effects of the publication that these trials cannot feel.
+    rmse
+        By output column and then by "free", "horizon", "begun" and "free_rest": root mean squared error over held-out
+        trials, in the unit of the column.
+    percent
+        By the same: E of eq. (2), percent, the mean over held-out trials.
+    squares
+        By the same: shape (trials,), E of each held-out trial.
+    apart
+        By "free" and "horizon": against the best of that kind of error; None of the best.
+    fit
+        To all fitted trials.
+    converged
+        False if one of the fits did not end at an optimum.
+    """
+
+    name: str
+    words: str
+    source: str
+    parameters: int
+    unfelt: tuple[str, ...]
+    rmse: Mapping[str, Mapping[str, float]]
+    percent: Mapping[str, float]
+    squares: Mapping[str, np.ndarray] = field(repr=False)
+    apart: Mapping[str, Apart | None]
+    fit: Fit = field(repr=False)
+    converged: bool = True
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Models ranked on held-out trials.
+
+    Attributes
+    ----------
+    models
+        Least free error first.
+    held_out
+        Names of the trials that were foretold, in the order of `squares`.
+    by
+        "role" if the study holds trials out, else "folds": each trial was foretold by fits without it.
+    horizon_s, given_s
+        How far ahead, and how much of a trial was given; s.
+    """
+
+    study: Study
+    models: tuple[Compared, ...]
+    held_out: tuple[str, ...]
+    by: str
+    horizon_s: float
+    given_s: float | None
+    warnings: tuple[str, ...] = ()
+    wall_s: float = field(default=0.0, compare=False)
+
+    def model(self, name: str) -> Compared:
+        """The model of that name.
+
+        Raises
+        ------
+        KeyError
+            If it was not compared.
+        """
+        for one in self.models:
+            if one.name == name:
+                return one
+        raise KeyError(f"no model {name}; there are {', '.join(m.name for m in self.models)}")
+
+    def best(self, kind: str = "free") -> tuple[str, ...]:
+        """The models that no held-out trial tells from the best by "free" or "horizon" error, the best first."""
+        order = sorted(self.models, key=lambda m: m.percent[kind])
+        return tuple(m.name for m in order if (a := m.apart[kind]) is None or not a.told)
+
+    def __str__(self) -> str:
+        return comparison_text(self)
+
+
+def apart_from(best: np.ndarray, other: np.ndarray, rivals: int, folds: int) -> Apart:
+    """Whether held-out trials tell a model from the best: a t interval of the mean difference of their errors.
+
+    Parameters
+    ----------
+    best, other
+        Shape (trials,): errors of both on the same trials.
+    rivals
+        Models that are held against the best, which share `LEVEL` (Bonferroni).
+    folds
+        Parts that trials were dealt to, 1 for trials that no fit has had. Fits of folds share trials, and the variance
+        of the mean is 1 + folds / (folds - 1) times that of independent differences: Nadeau and Bengio, Machine
+        Learning 52 (2003), with their n2 / n1 = 1 / (folds - 1).
+    """
+    more = other - best
+    count = len(more)
+    mean = float(more.mean())
+    if count < 2:
+        return Apart(mean, -math.inf, math.inf)
+    wider = 1.0 + folds / (folds - 1.0) if folds > 1 else 1.0
+    deviation = float(more.std(ddof=1)) * math.sqrt(wider / count)
+    half = float(special.stdtrit(count - 1, 1.0 - 0.5 * LEVEL / max(rivals, 1))) * deviation
+    return Apart(mean, mean - half, mean + half)
+
+
+def comparison_text(found: Comparison) -> str:
+    """The whole answer as a plain table."""
+    rows = [("model", "fitted", *_heads(found), "worse than the best by, E"), *(_row(found, m) for m in found.models)]
+    widths = [max(len(r[k]) for r in rows) for k in range(len(rows[0]))]
+    lines = [f"{found.study.name}: {headline(found)}"]
+    lines += [" " + "  ".join(cell.ljust(w) for cell, w in zip(r, widths, strict=True)).rstrip() for r in rows]
+    return "\n".join(lines + [f" {note}" for note in notes(found)])
+
+
+def headline(found: Comparison) -> str:
+    """The answer in one sentence."""
+    first, *others = found.best()
+    trials = f"{len(found.held_out)} held-out trials"
+    if not others:
+        return f"{first} foretells {trials} best."
+    return f"{trials} do not tell {first} from {', '.join(others)}."
+
+
+def _heads(found: Comparison) -> tuple[str, ...]:
+    kinds = ["free", f"{found.horizon_s:.3g} s ahead"]
+    kinds += [f"rest, free / first {found.given_s:.3g} s given"] if found.given_s is not None else []
+    return tuple(kinds)
+
+
+def _row(found: Comparison, one: Compared) -> tuple[str, ...]:
+    cells = [_cell(one, ("free",)), _cell(one, ("horizon",))]
+    if found.given_s is not None:
+        cells.append(_cell(one, ("free_rest", "begun")) if "begun" in one.percent else "-")
+    told = []
+    for kind, word in (("free", "free"), ("horizon", "ahead")):
+        apart = one.apart[kind]
+        if apart is None:
+            told.append(f"{word} best")
+        else:
+            interval = f"[{apart.low:.2g}, {apart.high:.2g}]"
+            told.append(f"{word} {apart.more:.2g} {interval} %" + ("" if apart.told else " not told apart"))
+    return one.name, str(one.parameters), *cells, "; ".join(told)
+
+
+def _cell(one: Compared, kinds: Sequence[str]) -> str:
+    columns = [f"{' / '.join(f'{errors[k]:.4g}' for k in kinds)} {_unit(name)}" for name, errors in one.rmse.items()]
+    return ", ".join(columns) + f" ({' / '.join(f'{one.percent[k]:.3g}' for k in kinds)} %)"
+
+
+def _unit(column: str) -> str:
+    return {"force_n": "N", "angle_rad": "rad", "torque_nm": "N m"}.get(column, "")
+
+
+def notes(found: Comparison) -> list[str]:
+    """What stands beneath the table."""
+    how = "each trial by fits without it" if found.by == "folds" else "trials that the study holds out"
+    lines = [f"root mean squared error on whole trials left out ({how}); in brackets E, squared error over spread"]
+    for one in found.models:
+        if one.words:
+            less = f"; not felt here: {', '.join(one.unfelt)}" if one.unfelt else ""
+            lines.append(f"{one.name}: {one.words} ({one.source}){less}")
+        if not one.converged:
+            lines.append(f"{one.name}: a fit did not end at an optimum")
+    return [*lines, *(f"warning: {words}" for words in found.warnings)]
