@@ -28,7 +28,8 @@ class Demands:
 
     Falling modes must be balanced: gains u = target (minus `load` for one degree of lean). Swinging modes may settle
     anywhere within `SETTLE_DEG` of the posture: settle_low <= settle_gains u <= settle_high. Neutral modes are let
-    drift. The centre of pressure lies on the soles: ground_gains u <= ground_room (minus `ground_load` for one degree).
+    drift. Each foot's centre of pressure lies on its sole: ground_gains u <= ground_room (minus `ground_load` for one
+    degree).
     """
 
     falling: tuple[Mode, ...]
@@ -72,7 +73,7 @@ def demands(
     settle_deg
         See `SETTLE_DEG`; infinite: swinging modes are ignored.
     balance
-        Whether the centre of pressure must lie on the soles; without gravity there is none to ask for.
+        Whether each foot's centre of pressure must lie on its sole; without gravity there is none to ask for.
 
     Raises
     ------
@@ -92,7 +93,9 @@ def demands(
     room = -found.values * degree * (settle_deg if np.isfinite(settle_deg) else 0.0)
     ground = _balance(linear, found) if gravity and balance else None
     rows = np.zeros((0, len(found))) if ground is None else ground.at_rest
+    shares = np.zeros((0, linear.n)) if ground is None else ground.per_torque
     hanging = rows[:, hang] / -found.values[hang]  # a swing hangs at F / -mu
+    torques = hanging @ found.shapes[:, hang].T + shares
     return Demands(
         falling=found.falling,
         gains=gains[fall] / size[fall, None],
@@ -101,8 +104,8 @@ def demands(
         settle_gains=gains[swing] / size[swing, None],
         settle_low=(-constant - room)[swing] / size[swing],
         settle_high=(-constant + room)[swing] / size[swing],
-        ground_gains=hanging @ gains[hang],
-        ground_room=np.zeros(0) if ground is None else -ground.constant - hanging @ constant[hang],
+        ground_gains=torques @ inputs.on(linear),
+        ground_room=np.zeros(0) if ground is None else -ground.constant - torques @ linear.C,
         ground_load=rows[:, fall] * degree[fall],
     )
 

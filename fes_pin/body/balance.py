@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import pinocchio as pin
+from scipy.linalg import block_diag
 
+from fes_pin.body.each_foot import share_of_second, without_free
 from fes_pin.body.gait import STILL
-from fes_pin.body.ground import Support, Wrench, centre_of_pressure, ground_wrench, support
+from fes_pin.body.ground import Support, Wrench, centre_of_pressure, ground_wrench, second_foot, support
 from fes_pin.body.joints import SIDES
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.linearize import model_on_slope
@@ -16,16 +19,21 @@ from fes_pin.body.modes import Modes
 
 @dataclass(frozen=True)
 class Balance:
-    """The centre of pressure stays on the soles as long as constant + per_mode eta + per_force F <= 0.
+    """Each foot's centre of pressure stays on its sole as long as these are not above 0.
 
-    Rows are divided by the weight: about how far, m, the centre of pressure lies outside an edge of the soles.
+    constant + per_mode eta + per_force F + per_torque (C + D), with eta'' = mu eta + F and F = phi' (C + D).
+
+    Rows are divided by the weight: about how far, m, the centre of pressure lies outside an edge of a sole, for a foot
+    that bears it all. On one foot the motion alone tells it, on two the torques tell which foot bears what.
 
     Parameters
     ----------
     constant
         At rest in the posture: (e,).
     per_mode, per_force
-        Per modal coordinate eta and per modal force F = phi' (C + D), with eta'' = mu eta + F: (e, r).
+        Per modal coordinate eta and per modal force F: (e, r).
+    per_torque
+        Per joint torque beyond what holds the posture, C + D: (e, n).
     at_rest
         Per modal coordinate of a body that rests there, away from the posture: (e, r).
     """
@@ -33,37 +41,60 @@ class Balance:
     constant: np.ndarray
     per_mode: np.ndarray = field(repr=False)
     per_force: np.ndarray = field(repr=False)
+    per_torque: np.ndarray = field(repr=False)
     at_rest: np.ndarray = field(repr=False)
 
 
-def _ground(linear: LinearBody) -> tuple[Support, Wrench]:
-    body = linear.body
-    q = body.angles(linear.whole_posture, check=False)
-    heels = {side: f"{side}_mtp_extension" in linear.held for side in SIDES}
-    model = model_on_slope(body, linear.slope, linear.gravity)
-    return support(body, q, heels, linear.both_feet), ground_wrench(body, model, q)
+def _feet(linear: LinearBody) -> tuple[str, ...]:
+    return SIDES if linear.both_feet else (linear.body.stance,)
+
+
+def _area(linear: LinearBody, sides: tuple[str, ...]) -> Support:
+    q = linear.body.angles(linear.whole_posture, check=False)
+    return support(linear.body, q, {side: f"{side}_mtp_extension" in linear.held for side in SIDES}, sides)
 
 
 def soles_of(linear: LinearBody) -> Support:
-    """The area on the ground that carries a linearized body."""
-    return _ground(linear)[0]
+    """The area on the ground that carries a linearized body: of all feet together."""
+    return _area(linear, _feet(linear))
+
+
+def _model(linear: LinearBody) -> tuple[pin.Model, np.ndarray]:
+    posture = linear.body.angles(linear.whole_posture, check=False)
+    return model_on_slope(linear.body, linear.slope, linear.gravity), posture
+
+
+def _carried(linear: LinearBody) -> tuple[list[tuple[Support, Wrench]], np.ndarray]:
+    """Each foot's sole and wrench, by the joints that move; and how the wrenches' rows depend on what is free."""
+    model, q = _model(linear)
+    places = [linear.body.joint_names.index(name) for name in linear.joint_names]
+    total = ground_wrench(linear.body, model, q).on(places)
+    if not linear.both_feet:
+        return [(soles_of(linear), total)], np.zeros((6, 0))
+    first, second = sorted(SIDES, key=lambda side: side != linear.body.stance)
+    taken, free = share_of_second(linear, second_foot(linear.body, model, q))
+    feet = [(_area(linear, (first,)), total - taken), (_area(linear, (second,)), taken)]
+    return feet, np.vstack([-free, free])
 
 
 def balance(linear: LinearBody, found: Modes) -> Balance:
-    """The inequalities that keep the centre of pressure on the soles (see `fes_pin.body.ground`).
+    """The inequalities that keep each foot's centre of pressure on its sole (see `fes_pin.body.each_foot`).
 
     Parameters
     ----------
     linear, found
         The body and its modes. A heel carries where its MTP joint is braced; otherwise the forefoot alone does.
     """
-    area, wrench = _ground(linear)
-    places = [linear.body.joint_names.index(name) for name in linear.joint_names]
-    weight = float(np.linalg.norm(wrench.at_rest[:3]))
-    rows = area.rows / weight
-    angle = rows @ wrench.per_angle[:, places] @ found.shapes
-    acceleration = rows @ wrench.per_acceleration[:, places] @ found.shapes
-    return Balance(rows @ wrench.at_rest, angle + acceleration * found.values, acceleration, angle)
+    feet, free = _carried(linear)
+    weight = sum(np.linalg.norm(wrench.at_rest[:3]) for _, wrench in feet)
+    rows = block_diag(*[area.rows for area, _ in feet]) / weight
+    rows = without_free(rows @ free) @ rows
+    constant, angle, acceleration, torque = (
+        rows @ np.concatenate([getattr(wrench, name) for _, wrench in feet])
+        for name in ("at_rest", "per_angle", "per_acceleration", "per_torque")
+    )
+    angle, acceleration = angle @ found.shapes, acceleration @ found.shapes
+    return Balance(constant, angle + acceleration * found.values, acceleration, torque, angle)
 
 
 def place_of_weight(linear: LinearBody) -> tuple[float, str]:
@@ -71,7 +102,7 @@ def place_of_weight(linear: LinearBody) -> tuple[float, str]:
 
     An instant of a walk is not a posture to stand in: there the weight may lie outside, and the next step catches it.
     """
-    area, wrench = _ground(linear)
+    area, wrench = soles_of(linear), ground_wrench(linear.body, *_model(linear))
     outside = area.outside(centre_of_pressure(wrench.at_rest))
     soles = " and ".join(name.replace("_", " ") for name in area.soles)
     if outside <= 0.0:

@@ -124,7 +124,7 @@ def catchable(
     settle_deg
         No mode goes further than this from the posture, on the way and at rest.
     balance
-        Whether the centre of pressure must lie on the soles, at all times.
+        Whether each foot's centre of pressure must lie on its sole, at all times.
     rest_deg
         How far from the posture falling modes may come to rest; `settle_deg` by default, 0 for the posture itself.
     gravity

@@ -1,6 +1,7 @@
 """What the feet stand on: the area that carries the body, the centre of pressure in it, and a second foot.
 
-The ground can push, not pull: the centre of pressure lies within the convex hull of the soles. The total wrench of the
+The ground can push, not pull: the centre of pressure lies within the convex hull of the soles, and each foot's own
+within its own sole (see `fes_pin.body.each_foot`). The total wrench of the
 ground follows from the motion alone, f = m (a_com - g) and moment n about the origin; the centre of pressure is
 (-n_y, n_x) / f_z in the plane of the foot (P. Sardain, G. Bessonnet, "Forces acting on a biped robot", IEEE Trans.
 Syst. Man Cybern. A 34:630-637, 2004). Each edge of the hull is then one linear inequality of the wrench.
@@ -8,6 +9,7 @@ Syst. Man Cybern. A 34:630-637, 2004). Each edge of the hull is then one linear 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -70,11 +72,30 @@ class Wrench:
         In the posture: (6,).
     per_angle, per_acceleration
         Its change with the joints' deviations and with their accelerations: (6, 19), joints in the body's order.
+    per_torque
+        Its change with the joints' torques beyond those of rest, C + D: (6, 19); none of all the ground's, which
+        follows from the motion, but two feet share it by them.
     """
 
     at_rest: np.ndarray
     per_angle: np.ndarray = field(repr=False)
     per_acceleration: np.ndarray = field(repr=False)
+    per_torque: np.ndarray = field(repr=False)
+
+    def on(self, places: Sequence[int]) -> Wrench:
+        """With these of the joints alone."""
+        return Wrench(
+            self.at_rest, self.per_angle[:, places], self.per_acceleration[:, places], self.per_torque[:, places]
+        )
+
+    def __sub__(self, other: Wrench) -> Wrench:
+        """What another wrench leaves of this one."""
+        return Wrench(
+            self.at_rest - other.at_rest,
+            self.per_angle - other.per_angle,
+            self.per_acceleration - other.per_acceleration,
+            self.per_torque - other.per_torque,
+        )
 
 
 def ground_wrench(body: Body, model: pin.Model, q: np.ndarray) -> Wrench:
@@ -100,6 +121,7 @@ def ground_wrench(body: Body, model: pin.Model, q: np.ndarray) -> Wrench:
         np.concatenate([force, moment]),
         np.vstack([np.zeros((3, model.nv)), along]),
         np.vstack([mass * jacobian, turning]),
+        np.zeros((6, model.nv)),
     )
 
 
@@ -142,7 +164,7 @@ def soles(body: Body, q: np.ndarray, side: str, heel: bool) -> np.ndarray:
     return (np.array([[x, y, 0.0] for x in ends for y in (-half, half)]) @ foot.turn.T + foot.place)[:, :2]
 
 
-def support(body: Body, q: np.ndarray, heels: dict[str, bool], both_feet: bool) -> Support:
+def support(body: Body, q: np.ndarray, heels: dict[str, bool], sides: Sequence[str]) -> Support:
     """The area that carries a body.
 
     Parameters
@@ -152,11 +174,11 @@ def support(body: Body, q: np.ndarray, heels: dict[str, bool], both_feet: bool) 
     heels
         By side: whether the MTP joint is held, so that a heel on the ground carries, too. A heel that is off the ground
         never does.
-    both_feet
-        Whether the second foot carries, too.
+    sides
+        The feet that carry.
     """
     names, points = [], []
-    for side in SIDES if both_feet else (body.stance,):
+    for side in sides:
         bent = abs(q[body.joint_names.index(f"{side}_mtp_extension")])
         heel = heels[side] and bent <= np.radians(FLAT_DEG)
         names.append(f"{side}_{'foot' if heel else 'forefoot'}")
@@ -175,11 +197,17 @@ class SecondFoot:
         Jacobian of the second forefoot, which the ground holds: (6, 19); times the deviations it is 0.
     torque, stiffness
         Of the ground's force on it at the joints, (19,) N m, and its derivative by the angles, (19, 19) N m/rad.
+    wrench
+        That force: (f, n) about the origin, (6,) N and N m.
+    place
+        The point whose motion `closure` gives, (3,) m.
     """
 
     closure: np.ndarray
     torque: np.ndarray
     stiffness: np.ndarray
+    wrench: np.ndarray
+    place: np.ndarray
 
 
 def second_foot(body: Body, model: pin.Model, q: np.ndarray) -> SecondFoot:
@@ -215,7 +243,8 @@ def second_foot(body: Body, model: pin.Model, q: np.ndarray) -> SecondFoot:
     closure = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).copy()
     apart = second.place[1] - first.place[1]
     share = float(np.clip((com[1] - first.place[1]) / apart, 0.0, 1.0)) if abs(apart) > LEVEL_M else 0.5
-    lever = data.oMi[joint].actInv(np.array([com[0], second.place[1], 0.0]))
+    under = np.array([com[0], second.place[1], 0.0])
+    lever = data.oMi[joint].actInv(under)
     loaded = pin.Model(model)
     weight = pin.Inertia(share * pin.computeTotalMass(model), lever, np.zeros((3, 3)))
     loaded.appendBodyToJoint(joint, weight, pin.SE3.Identity())
@@ -224,4 +253,7 @@ def second_foot(body: Body, model: pin.Model, q: np.ndarray) -> SecondFoot:
         work = each.createData()
         slopes.append(pin.computeGeneralizedGravityDerivatives(each, work, q).copy())
         torques.append(work.g.copy())
-    return SecondFoot(closure, torques[1] - torques[0], slopes[1] - slopes[0])
+    force = -weight.mass * model.gravity.linear
+    wrench = np.concatenate([force, np.cross(under, force)])
+    place = data.oMi[joint].translation.copy()
+    return SecondFoot(closure, torques[1] - torques[0], slopes[1] - slopes[0], wrench, place)

@@ -136,7 +136,7 @@ def minimal_sets(
         `over_time`: the body is brought back to rest by inputs that change (`fes_pin.body.catchable`); `constant`: a
         constant input holds the lean (`fes_pin.body.attainable`).
     balance
-        Whether the centre of pressure must lie on the soles. Only with `together` and `gravity`.
+        Whether each foot's centre of pressure must lie on its sole. Only with `together` and `gravity`.
 
     Returns
     -------

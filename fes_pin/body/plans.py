@@ -44,7 +44,7 @@ class Plans:
     ----------
     linear, inputs, settle_deg, balance
         The body, its inputs, and the limits: every mode stays within `settle_deg` of the posture, at all times and
-        at the rest that the last input keeps; the centre of pressure stays on the soles.
+        at the rest that the last input keeps; each foot's centre of pressure stays on its sole.
     rest_deg
         How far from the posture falling modes may come to rest, degrees; `settle_deg` by default. 0: in the posture
         itself, as the null-controllable region has it.
@@ -201,18 +201,16 @@ class Plans:
         return _balance(self.linear, self.modes)
 
     def _on_the_soles(self):
-        """Rows and limits that keep the centre of pressure on the soles at every look, and at rest in the end."""
+        """Rows and limits: each foot's centre of pressure on its sole, at every look and at rest in the end."""
         times, which = self._looks
         now = np.zeros((len(times), len(self.pieces)))
         now[np.arange(len(times)), which] = 1.0
         resting = np.where(self.kinds == "neutral", 0.0, -1.0 / np.where(self.modes.values, self.modes.values, 1.0))
-        for e in range(len(self.ground.constant)):
-            row, limit = (
-                np.zeros((len(times), self.inputs.n * len(self.pieces))),
-                np.full(len(times), -self.ground.constant[e]),
-            )
-            end = np.zeros(self.inputs.n)
-            rest = -self.ground.constant[e]
+        shares, constant = self.ground.per_torque @ self.inputs.on(self.linear), self.ground.constant
+        constant = constant + self.ground.per_torque @ self.linear.C
+        for e in range(len(constant)):
+            row, limit = np.kron(now, shares[e]), np.full(len(times), -constant[e])
+            end, rest = shares[e].copy(), -constant[e]
             for i in range(len(self.modes)):
                 response = self.ground.per_mode[e, i] * self._responses[i] + self.ground.per_force[e, i] * now
                 row = row + self._spread(i, response)

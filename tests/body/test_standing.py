@@ -69,7 +69,7 @@ def test_without_a_plate_the_forefoot_alone_carries(body):
     free = linearize(body, "one_leg")
     assert "foot plates" in place_of_weight(free)[1]
     q = body.angles("one_leg")
-    sole, fore = (support(body, q, {"left": h, "right": h}, False).corners for h in (True, False))
+    sole, fore = (support(body, q, {"left": h, "right": h}, ("right",)).corners for h in (True, False))
     assert np.ptp(sole[:, 0]) == pytest.approx(0.2581 / 1.741 * 1.80, rel=1e-9)
     assert np.ptp(fore[:, 0]) == pytest.approx(0.28 * np.ptp(sole[:, 0]))
 
@@ -80,7 +80,7 @@ def test_a_lean_ends_where_the_centre_of_pressure_leaves_the_foot(body, pendulum
     found = attainable(pendulum, strong)
     assert found.lean_deg.max() < attainable(pendulum, strong, balance=False).lean_deg.min() / 5.0
     q = body.angles(pendulum.whole_posture, check=False)
-    area = support(body, q, {"left": True, "right": True}, False)
+    area = support(body, q, {"left": True, "right": True}, ("right",))
     for sign, lean in zip((1.0, -1.0), found.lean_deg[0], strict=True):
         tilted = {**pendulum.whole_posture, ANKLE: pendulum.q[0] + sign * np.radians(lean)}
         place = centre_of_pressure(ground_wrench(body, body.model, body.angles(tilted, check=False)).at_rest)
