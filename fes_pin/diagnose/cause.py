@@ -18,7 +18,10 @@ class ParameterEstimate:
 
 @dataclass(frozen=True)
 class Cause:
-    """One named cause; see contract: `equivalents` cannot be told from it by these data."""
+    """One named cause; see contract: `equivalents` cannot be told from it by these data.
+
+    `trial` is the only trial that it concerns, if it is not the rig's; `words` then say what happened.
+    """
 
     name: str
     stage: str
@@ -28,6 +31,8 @@ class Cause:
     gain_fit: float
     gain_held_out: Gain
     evidence: Evidence | None = None
+    trial: str | None = None
+    words: str = ""
 
     def helps(self, complete: bool, alone: bool) -> bool:
         """True if trials that took no part speak for it.

@@ -11,7 +11,6 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.provenance import provenance
-from fes_pin.data.schema import IMPOSED
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -19,11 +18,11 @@ from fes_pin.diagnose.driven import driven_diagnosis
 from fes_pin.diagnose.free import judge_free, unfitted
 from fes_pin.diagnose.long_records import searched_part, thinned
 from fes_pin.diagnose.plausibility import check_study
+from fes_pin.diagnose.restate import restated_study, search_with_conditions, with_misread
 from fes_pin.diagnose.result import Diagnosis
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
-from fes_pin.diagnose.search.simulation_search import NominalFitError, Searched, SimulationSearch
-from fes_pin.identify.feedback import is_fed_back
+from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnose.search.simulation_search import NominalFitError
+from fes_pin.diagnose.searches import Searches
 from fes_pin.models.catalogue import Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.workers import one_thread_each, time_limit
@@ -79,47 +78,32 @@ def diagnose(
     with one_thread_each():
         recorded = train if said else [t for t in study.trials if t.role != "held_out"]
 
-        def by_likelihood() -> LikelihoodSearch:
-            return LikelihoodSearch(LikelihoodFits(nominal, train, effects), seed, tell)
-
-        search: SimulationSearch | LikelihoodSearch
-        if any(t.kind == IMPOSED for t in train) or is_fed_back(nominal.rig, train):
-            search = by_likelihood()
-        else:
-            search = SimulationSearch(nominal, train, recorded, seed, tell, effects)
+        searches = Searches(nominal, train, recorded, test, effects, seed, tell)
         try:
             with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
-                searched: Searched | Found = search.run()
-                if isinstance(searched, Searched) and _is_undecided(searched, test):
-                    search = by_likelihood()
-                    searched = search.run()
+                search, searched, again = search_with_conditions(nominal, train, searches.run)
             tell(0.88, "held-out gain")
+            whole, stated = study, train
+            if again is not None:
+                train, whole = again.trials, restated_study(study, nominal, again.misread)
             if isinstance(search, LikelihoodSearch):
-                diagnosis = driven_diagnosis(study, search, searched, (train, test), seed)  # type: ignore[arg-type]
+                diagnosis = driven_diagnosis(whole, search, searched, (train, test), seed)  # type: ignore[arg-type]
             else:
-                diagnosis = judge_free(study, search, searched, test, seed)  # type: ignore[arg-type]
+                diagnosis = judge_free(whole, search, searched, test, seed)  # type: ignore[arg-type]
+            if again is not None:
+                diagnosis = with_misread(diagnosis, again, stated, test, seed)
         except NominalFitError as problem:
             diagnosis = unfitted(study, problem.nominal, str(problem), test)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             reason = f"the search met numbers that cannot be calculated with ({problem})"
-            diagnosis = unfitted(study, search.nominal(), reason, test)
+            assert searches.last is not None
+            diagnosis = unfitted(study, searches.last.nominal(), reason, test)
     tell(1.0, "done")
     warnings += diagnosis.warnings
-    if limit is not None and search.was_stopped:
+    if limit is not None and searches.last is not None and searches.last.was_stopped:
         warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
     found = replace(diagnosis, left_out=left_out, warnings=tuple(warnings), catalogue=catalogue)
     return replace(found, provenance=made, wall_s=time.perf_counter() - began)
-
-
-def _is_undecided(searched: Searched, test: Sequence[Trial]) -> bool:
-    """True where no set of causes leaves only noise of the reading, and there is no second trial to compare sets by.
-
-    Something acts in the rig itself then; it is a random effort to the likelihood, which one trial is enough for.
-    """
-    trials = searched.nominal.trials
-    if searched.complete or searched.stopped or len(trials) > 1 or test:
-        return False
-    return bool(searched.nominal.model.rig.driving_sizes(trials))
 
 
 def despiked_study(study: Study) -> tuple[Study, dict[str, dict[str, tuple[int, ...]]]]:

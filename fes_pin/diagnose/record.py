@@ -87,6 +87,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
     return {
         "name": cause.name,
         "stage": cause.stage,
+        **({"trial": cause.trial, "words": cause.words} if cause.trial is not None else {}),
         "parameters": {n: {"value": shown(p.value), "std": shown(p.std)} for n, p in cause.parameters.items()},
         "equivalents": list(cause.equivalents),
         "p_value": _p_shown(cause.p_value),

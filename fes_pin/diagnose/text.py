@@ -48,6 +48,8 @@ CAUSE_COLUMNS = ("cause", "stage", "parameters", "held-out gain", "cannot be tol
 def cause_row(cause: Cause) -> tuple[str, str, str, str, str]:
     """Cause, stage, parameters, held-out gain, what it cannot be told from."""
     values = "\n".join(f"{n} {quantity(p.value, p.std, p.unit)}" for n, p in cause.parameters.items())
+    if cause.trial is not None:
+        values = f"trial {cause.trial}: {values}"
     held = cause.gain_held_out
     gain = f"{held.percent:.0f} % [{held.low:.0f}, {held.high:.0f}]"
     return cause.name, cause.stage, values, gain, ", ".join(cause.equivalents) or "-"

@@ -45,18 +45,18 @@ def predictions(
         start = [{**one, **{n: i[n] for n in i if "." not in n}} for one, i in zip(start, initial, strict=True)]
     if not model.own_unknowns():
         return [s.readings for s in simulator.run(values, start)]
-    halves = [_halves(len(t)) for t in trials]
+    cut = [halves(len(t)) for t in trials]
     even, odd = (
-        simulator.run(values, _estimated(model, trials, noise, start, [half[k] for half in halves])) for k in (1, 0)
+        simulator.run(values, _estimated(model, trials, noise, start, [half[k] for half in cut])) for k in (1, 0)
     )
-    return [_merged(a, b, first) for a, b, (first, _) in zip(even, odd, halves, strict=True)]
+    return [_merged(a, b, first) for a, b, (first, _) in zip(even, odd, cut, strict=True)]
 
 
 def _merged(here: Simulated, there: Simulated, first: np.ndarray) -> np.ndarray:
     return np.where(first[:, None], here.readings, there.readings)
 
 
-def _halves(count: int) -> tuple[np.ndarray, np.ndarray]:
+def halves(count: int) -> tuple[np.ndarray, np.ndarray]:
     """The odd pieces of a trial and the even ones, as masks of shape (n,)."""
     first = (np.arange(count) * SEGMENTS // count) % 2 == 0
     return first, ~first

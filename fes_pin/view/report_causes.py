@@ -56,7 +56,25 @@ def _gain_text(cause: Cause) -> str:
     return f"{held.percent:.0f} % [{held.low:.0f}, {held.high:.0f}]"
 
 
+def _of_one_trial(diagnosis: Diagnosis, cause: Cause) -> Markup:
+    """The card of a cause that concerns one trial, and is no part of the model."""
+    gain = f"Restated, it removes {_gain_text(cause)} of that trial's error above the noise, told by its other parts."
+    return element(
+        "article",
+        element(
+            "div",
+            element("h3", element("code", cause.name), " ", stage_mark(cause.stage)),
+            element("p", f"{cause.words[0].upper()}{cause.words[1:]}."),
+            _estimates(diagnosis.extended, cause),
+            element("p", gain, " Everything else here is told with that value in its place."),
+        ),
+        class_=f"cause {cause.stage}",
+    )
+
+
 def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
+    if cause.trial is not None:
+        return _of_one_trial(diagnosis, cause)
     kind = diagnosis.catalogue.effect(cause.name)
     told = (
         f"These data cannot tell it from {', '.join(cause.equivalents)}: read them as one set."

@@ -29,9 +29,11 @@ def title(diagnosis: Diagnosis) -> str:
         if diagnosis.verdict == "adequate":
             return "The model is adequate"
         return "The model misses something that no known cause explains"
-    names = listed([plain(c.name) for c in diagnosis.causes])
+    lacks = [plain(c.name) for c in diagnosis.causes if c.trial is None]
+    misread = [f"trial {c.trial} was not run as it states" for c in diagnosis.causes if c.trial is not None]
+    said = listed([*misread, *([f"the model lacks {listed(lacks)}"] if lacks else [])])
     rest = " \N{EN DASH} and something more" if diagnosis.remainder.unexplained else ""
-    return f"The model lacks {names}{rest}"
+    return f"{said[0].upper()}{said[1:]}{rest}"
 
 
 def answers(diagnosis: Diagnosis) -> Markup:
@@ -61,6 +63,8 @@ def _found(diagnosis: Diagnosis) -> list[tuple[str, Content]]:
 
 
 def _what(diagnosis: Diagnosis, cause: Cause) -> Markup:
+    if cause.trial is not None:
+        return _text(f"{cause.words[0].upper()}{cause.words[1:]}.")
     kind: type[Effect] = diagnosis.catalogue.effect(cause.name)
     return _text(f"{sentence(kind)} It acts at the {cause.stage}.")
 

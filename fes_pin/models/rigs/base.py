@@ -179,6 +179,22 @@ class Rig:
         """Names of those constants."""
         return ("imposed_start",) if kind == IMPOSED else ()
 
+    def stated(self, trial: Trial) -> dict[str, float]:
+        """What a trial says it was run at, and may have been read wrong, by name: conditions that the equations read.
+
+        Where motion is imposed also its position, by the first sample of its column.
+        """
+        known = set(self.constant_names(trial.kind))
+        out = {n: v for n, v in trial.conditions.items() if n in known}
+        moved = self.schema.motion(trial.kind)
+        return {**out, **({moved[0]: float(trial[moved[0]][0])} if moved else {})}
+
+    def restated(self, trial: Trial, name: str, value: float) -> Trial:
+        """The trial with another value of something that it states; an imposed motion is moved as a whole."""
+        if name in trial.columns:
+            return trial.with_columns(**{name: trial[name] + (value - float(trial[name][0]))})
+        return dataclasses.replace(trial, conditions={**trial.conditions, name: value})
+
     def constant_names(self, kind: str) -> tuple[str, ...]:
         """Names of the constants of rig and trial that the equations read."""
         raise NotImplementedError

@@ -1,0 +1,253 @@
+"""One trial's stated load, angle or length does not fit what it measured: which trial, and the value it must have had.
+
+The model is fitted to all trials but one, and that trial's own condition to it: with z_j the step that trial j would
+take from what it states, in standard deviations by the noise of the others and by their parameters' covariance,
+
+    t = z_i / sqrt(phi),   phi = max(1, mean of z_j^2 over the others)
+
+is Student's with as many degrees of freedom as there are others. So what repeats differ by anyway is no misreading,
+whatever of them scatters. A trial that is restated must then be as well explained as the others are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import special
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.noise import NoiseModel, as_white
+from fes_pin.identify.per_trial import halves
+from fes_pin.identify.problem import Linearized, Problem, normal_equations
+from fes_pin.models.model import Model
+from fes_pin.workers import in_parallel
+
+NAME = "condition_misread"
+LEVEL = 0.01
+"""Family-wise over all trials and conditions, as every round of claims."""
+FEWEST = 4
+"""Trials that state something: the others must tell how much trials differ anyway."""
+CANDIDATES = 3
+"""Trials that are left out in turn, those that the screen finds oddest."""
+LEAST_SCORE = 10.0
+"""Drop in twice the log-likelihood under white noise that a trial must promise: three deviations."""
+STEPS = 8
+"""Gauss-Newton steps of one value, which half a step of its own size usually ends."""
+SHARE = 1e-4
+"""Step of a numerical derivative, of the spread of what trials state, or of its size where all state the same."""
+AS_WELL = 2.0
+"""Times the mean square that the worst explained other trial leaves, beyond which a restated one is not explained."""
+
+
+@dataclass(frozen=True)
+class Misread:
+    """A condition that a trial did not have.
+
+    Attributes
+    ----------
+    trial
+        Its name.
+    condition
+        "load_kg", "angle_rad", "length_m" ...
+    stated, value, std
+        What the trial says, and what it must have been.
+    p_value
+        Over all trials.
+    halves
+        The value that the odd quarters of the trial tell, and that the even ones tell.
+    whole, others
+        Fits to all trials as they are stated, and to all but this one.
+    """
+
+    trial: str
+    condition: str
+    stated: float
+    value: float
+    std: float
+    p_value: float
+    halves: tuple[float, float]
+    whole: Fit = field(repr=False)
+    others: Fit = field(repr=False)
+
+    @property
+    def words(self) -> str:
+        """What happened, in plain words."""
+        return f"trial {self.trial} states {self.condition} = {self.stated:.4g}; it was {self.value:.4g}"
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What one trial says of one of its conditions: its step in units of the condition, with its deviation;
+    and the mean square that is left of it."""
+
+    value: float
+    std: float
+    left: float
+
+    @property
+    def z(self) -> float:
+        return self.value / self.std
+
+
+def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
+    """The trial whose condition was misread, under a model; None if none stands out of the others.
+
+    Parameters
+    ----------
+    model
+        With start values; it is fitted here, by free simulation.
+    trials
+        What was measured, with what was stated.
+    """
+    rig = model.rig
+    wanted = [(i, n) for i, t in enumerate(trials) for n in rig.stated(t)]
+    if len({i for i, _ in wanted}) < FEWEST:
+        return None
+    whole = fit_multistart(Problem(model, trials, rough_noise(model, trials)), model.parameters())
+    if not math.isfinite(whole.sse):
+        return None
+    sizes = _sizes(model, trials)
+    odd = _screen(whole, trials, wanted, sizes)
+    found = [one for pick in odd if (one := _left_out(whole, trials, pick, wanted, sizes)) is not None]
+    return min(found, key=lambda m: m.p_value, default=None)
+
+
+def restated(model: Model, trials: Sequence[Trial], found: Misread) -> list[Trial]:
+    """The trials, one of them with the value that it must have had."""
+    return [model.rig.restated(t, found.condition, found.value) if t.name == found.trial else t for t in trials]
+
+
+def _sizes(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
+    """A step of each condition that is small and felt."""
+    values: dict[str, list[float]] = {}
+    for trial in trials:
+        for name, value in model.rig.stated(trial).items():
+            moved = trial[name] if name in trial.columns else np.array([value])
+            values.setdefault(name, []).extend([float(np.min(moved)), float(np.max(moved))])
+    return {n: SHARE * max(float(np.ptp(v)), 0.1 * float(np.max(np.abs(v))), 1e-6) for n, v in values.items()}
+
+
+def _screen(
+    whole: Fit, trials: Sequence[Trial], wanted: Sequence[tuple[int, str]], sizes: dict[str, float]
+) -> list[tuple[int, str]]:
+    """The conditions of largest score beside everything that the model could move, under white noise."""
+    noise = as_white(noise_of(whole))
+    problem = Problem(whole.model, trials, noise)
+    parts = problem.linearize(whole.values, whole.unknowns)
+    system = normal_equations(parts)
+    inverse = np.linalg.pinv(system.hessian, hermitian=True)
+
+    def score(pick: tuple[int, str]) -> float:
+        i, name = pick
+        column = _column(whole.model, trials[i], name, whole, noise, sizes[name])
+        own = parts[i]
+        column, r, j = (_beside(own.local, x) for x in (column[:, None], own.residual[:, None], own.jacobian))
+        cross = j.T @ column[:, 0]
+        power = float(column[:, 0] @ column[:, 0]) - float(cross @ inverse @ cross)
+        along = float(column[:, 0] @ r[:, 0]) - float(cross @ inverse @ system.gradient)
+        return along**2 / power if power > 1e-9 * max(float(column[:, 0] @ column[:, 0]), 1e-300) else 0.0
+
+    scores = in_parallel(score, list(wanted))
+    return [wanted[k] for k in np.argsort(scores)[::-1][:CANDIDATES] if scores[k] > LEAST_SCORE]
+
+
+def _beside(local: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Columns without what a trial's own unknowns take up."""
+    felt = local[:, local.any(axis=0)]
+    if not felt.shape[1]:
+        return columns
+    basis = np.linalg.qr(felt)[0]
+    return columns - basis @ (basis.T @ columns)
+
+
+def _column(model: Model, trial: Trial, name: str, fitted: Fit, noise: NoiseModel, step: float) -> np.ndarray:
+    """Whitened derivative of a trial's simulation by what it states, shape (m,)."""
+    there = model.rig.stated(trial)[name]
+    low, high = (_residual(model, model.rig.restated(trial, name, there + s), fitted, noise) for s in (-step, step))
+    return (low.residual - high.residual) / (2.0 * step)
+
+
+def _residual(model: Model, trial: Trial, fitted: Fit, noise: NoiseModel) -> Linearized:
+    problem = Problem(model, [trial], noise)
+    return problem.linearize(fitted.values, problem.start_unknowns())[0]
+
+
+def _left_out(
+    whole: Fit,
+    trials: Sequence[Trial],
+    pick: tuple[int, str],
+    wanted: Sequence[tuple[int, str]],
+    sizes: dict[str, float],
+) -> Misread | None:
+    """What one trial's condition must have been by a fit of the others; None if it does not stand out."""
+    i, name = pick
+    others = [k for k in range(len(trials)) if k != i]
+    rest = [trials[k] for k in others]
+    near = fit_problem(Problem(whole.model, rest, as_white(noise_of(whole))), whole.values)
+    noise = noise_of(near)
+    fitted = fit_problem(Problem(whole.model, rest, noise), near.values)
+    if not math.isfinite(fitted.sse):
+        return None
+    own = _step(fitted, trials[i], name, noise, sizes[name])
+    steps = [_step(fitted, trials[k], n, noise, sizes[n], 1) for k, n in wanted if k != i]
+    told = [s for s in steps if math.isfinite(s.z)]
+    if len(told) < FEWEST - 1 or not math.isfinite(own.z):
+        return None
+    phi = max(1.0, float(np.mean([s.z**2 for s in told])))
+    t = abs(own.z) / math.sqrt(phi)
+    p = min(1.0, 2.0 * len(wanted) * float(special.stdtr(len(told), -t)))
+    usual = max(float(part.residual @ part.residual) / len(part.residual) for part in fitted.parts)
+    if not p < LEVEL or own.left > AS_WELL * max(usual, 1.0):
+        return None
+    stated = whole.model.rig.stated(trials[i])[name]
+    told_by = [_step(fitted, trials[i], name, noise, sizes[name], half=k).value for k in (0, 1)]
+    return Misread(
+        trials[i].name,
+        name,
+        stated,
+        stated + own.value,
+        own.std * math.sqrt(phi),
+        p,
+        (stated + told_by[0], stated + told_by[1]),
+        whole,
+        fitted,
+    )
+
+
+def _step(
+    fitted: Fit, trial: Trial, name: str, noise: NoiseModel, size: float, steps: int = STEPS, half: int | None = None
+) -> _Step:
+    """Where a trial would have its condition, by Gauss and Newton, as a step from what it states.
+
+    Parameters
+    ----------
+    half
+        0 or 1: by the odd or by the even quarters of the trial alone.
+    """
+    rig, now = fitted.model.rig, trial
+    begun = rig.stated(trial)[name]
+    covariance = np.where(np.isfinite(fitted.covariance), fitted.covariance, 0.0)
+    for _ in range(steps):
+        part = _residual(fitted.model, now, fitted, noise)
+        column = _beside(part.local, _column(fitted.model, now, name, fitted, noise, size)[:, None])[:, 0]
+        r, j = _beside(part.local, part.residual[:, None])[:, 0], _beside(part.local, part.jacobian)
+        if half is not None:
+            column = np.where(halves(len(column))[half], column, 0.0)
+        power = float(column @ column)
+        if not power > 0.0 or not math.isfinite(power):
+            return _Step(0.0, math.inf, math.inf)
+        move = float(column @ r) / power
+        shift = column @ j / power
+        std = math.sqrt(1.0 / power + max(float(shift @ covariance @ shift), 0.0))
+        now = rig.restated(now, name, rig.stated(now)[name] + move)
+        if abs(move) < 0.01 * std:
+            break
+    r = _beside(part.local, _residual(fitted.model, now, fitted, noise).residual[:, None])[:, 0]
+    return _Step(rig.stated(now)[name] - begun, std, float(r @ r) / max(len(r), 1))
+
+
+__all__ = ["Misread", "find_misread", "restated"]
