@@ -199,12 +199,14 @@ def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
 @app.command()
 def effects(library: Libraries = None) -> None:
     """List the causes it knows, with stage, equation and parameters."""
+    from fes_pin.diagnose.misread import DESCRIBED as MISREAD
     from fes_pin.models.describe import describe
 
     catalogue = catalogue_with(library)
     say_whose_code(catalogue)
     for one in catalogue.effects:
         typer.echo(describe(one))
+    typer.echo(MISREAD)
     print_effects()
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fes_pin.contrast.fits import Fits, Grouped
+from fes_pin.contrast.fits import Fits
+from fes_pin.contrast.grouped import Grouped
 from fes_pin.diagnose.decide.significance import Family, coherence_p_value
 from fes_pin.identify.distributions import f_tail
 
@@ -52,7 +53,7 @@ def inflation(larger: Grouped, smaller: Grouped) -> tuple[float, int]:
     sizes = np.array([float(x @ x) for x, _ in pairs])
     along = np.array([float(x @ r) for x, r in pairs])
     felt = sizes > UNFELT * max(float(sizes.max()), 1e-300)
-    free = int(felt.sum()) - 2
+    free = int(felt.sum()) - 1 - max(1, len(larger.changes))
     if free < 1:
         return 1.0, free
     return float(np.sum(along[felt] ** 2 / sizes[felt])) / free, free

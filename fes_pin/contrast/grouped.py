@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Linearized, Problem, Unknowns
@@ -197,3 +198,37 @@ class GroupedProblem:
                 jacobian[:, at], local[:, own] = one.jacobian, one.local
                 out.append(dataclasses.replace(one, jacobian=jacobian, local=local))
         return out
+
+
+@dataclass(frozen=True)
+class Grouped:
+    """A fitted grouped model.
+
+    Attributes
+    ----------
+    items
+        What it has beside the nominal model, in the order in which it was found.
+    fit
+        Its `model` is the grouped one; `sse` twice the negative log-likelihood, but for a constant.
+    weights
+        By group.
+    """
+
+    items: tuple[Item, ...]
+    fit: Fit
+    weights: Mapping[str, Weight]
+
+    @property
+    def model(self) -> GroupedModel:
+        """The grouped model, fitted."""
+        return self.fit.model  # type: ignore[return-value]
+
+    @property
+    def price(self) -> float:
+        """What the set costs, with what each parameter must earn."""
+        return self.fit.sse + PARAMETER_PRICE * len(self.fit.free)
+
+    @property
+    def changes(self) -> tuple[Item, ...]:
+        """The items that differ in one group."""
+        return tuple(i for i in self.items if i.group is not None)

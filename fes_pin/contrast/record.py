@@ -40,6 +40,7 @@ def _change(change: Change) -> dict[str, Any]:
         "name": change.name,
         "kind": change.kind,
         "group": change.group,
+        **({"trial": change.trial} if change.trial is not None else {}),
         "words": change.words,
         "parameters": {
             n: {g: {"value": shown(p.value), "std": shown(p.std)} for g, p in by_group.items()}

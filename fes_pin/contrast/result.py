@@ -19,9 +19,9 @@ class Change:
     Attributes
     ----------
     name
-        A nominal parameter, or a cause.
+        A nominal parameter, a cause, or "condition_misread".
     kind
-        "nominal" or "effect".
+        "nominal", "effect" or "condition".
     group
         The group that has a value of its own.
     words
@@ -32,6 +32,8 @@ class Change:
         What could have changed instead: read them as one set.
     p_value
         Family-wise over the whole library.
+    trial
+        The only trial that it concerns, of a condition that was misread.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Change:
     parameters: Mapping[str, Mapping[str, ParameterEstimate]]
     equivalents: tuple[str, ...]
     p_value: float
+    trial: str | None = None
 
 
 @dataclass(frozen=True)

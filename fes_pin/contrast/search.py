@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.contrast.decide import LEVEL, p_value
-from fes_pin.contrast.fits import Fits, Grouped, Promise
-from fes_pin.contrast.grouped import Item
+from fes_pin.contrast.fits import Fits
+from fes_pin.contrast.grouped import Grouped, Item
+from fes_pin.contrast.promises import Promise
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.identify.fit import PARAMETER_PRICE
@@ -93,10 +94,28 @@ class ContrastSearch:
                 break
             best = self._first(tried)
             if not p_value(self.fits, self.family, best, base) < LEVEL:
-                break
+                both = self._two_at_once(best, base)
+                if both is None:
+                    break
+                best = both
             base = best
             promises, _ = self.fits.promises(base)
         return base
+
+    def _two_at_once(self, one: Grouped, base: Grouped) -> Grouped | None:
+        """A set with two items more, each significant beside the other, where one alone is not.
+
+        What a second change leaves in the trials of a group makes them differ, and hides the first.
+        """
+        degrees = max(len(one.fit.free) - len(base.fit.free), 1)
+        if len(base.items) + 2 > MOST_ITEMS or not self.family.p_value(base.fit.sse - one.fit.sse, degrees) < LEVEL:
+            return None
+        tried = self._beside(one, self.fits.promises(one)[0])
+        if not tried:
+            return None
+        both = self._first(tried)
+        rests = [self.fits.without(both, item) for item in both.items[len(base.items) :]]
+        return both if all(p_value(self.fits, self.family, both, rest) < LEVEL for rest in rests) else None
 
     def _beside(self, base: Grouped, promises: list[Promise], leave: Item | None = None) -> list[Grouped]:
         """Fits of a set with each of the items of most promise beside it, cheapest first."""

@@ -27,6 +27,13 @@ from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 
 NAME = "condition_misread"
+DESCRIBED = f"""{NAME} (rig; rigs: ankle, joint, muscle)
+  One trial's stated load, angle or length is not what it was.
+      condition of one trial = value
+  Tell-tale: one trial is off as a whole, as another load or length would have it, and all others are right.
+    value, of the condition that the trial states
+"""
+"""As `fes-pin effects` tells it: it is of a trial, not of the rig, and no effect of a model."""
 LEVEL = 0.01
 """Family-wise over all trials and conditions, as every round of claims."""
 FEWEST = 4

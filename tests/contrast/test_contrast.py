@@ -13,6 +13,7 @@ from data import studies
 import fes_pin as fp
 from fes_pin.contrast.record import contrast_record
 from fes_pin.data.errors import InputError
+from fes_pin.identify.fit import CONFIDENCE_95
 from fes_pin.view.contrast_report import contrast_html
 
 
@@ -80,6 +81,23 @@ def test_a_common_cause_is_no_change(tmp_path, shared):
     found = fp.contrast(replace(study, trials=tuple(moved)))
     assert found.verdict == "nothing_changed"
     assert found.common
+
+
+@pytest.mark.parametrize("changes", [(), ("threshold_shift",)])
+def test_a_misread_trial_is_told_as_such(shared, changes):
+    """One trial of a group states another load than it had; that is no change of the rig, and hides none."""
+    study = practice_pair(fp.read_study(shared / "practice" / "n00_none"), changes)
+    late = [t for t in study.trials if t.group == "after" and "load_kg" in t.conditions]
+    odd, load = late[1].name, late[1].conditions["load_kg"]
+    trials = [replace(t, conditions={"load_kg": 1.2 * load}) if t.name == odd else t for t in study.trials]
+    found = fp.contrast(replace(study, trials=tuple(trials)))
+    assert {c.name for c in found.changes} == {"condition_misread", *changes}
+    one = next(c for c in found.changes if c.kind == "condition")
+    assert (one.group, one.trial) == ("after", odd)
+    value = one.parameters["load_kg"]["after"]
+    assert value.value == pytest.approx(load, abs=2.0 * CONFIDENCE_95 * value.std)
+    assert contrast_record(found)["changes"]
+    assert "condition_misread" in contrast_html(found)
 
 
 def _of(study, group):

@@ -1,0 +1,87 @@
+"""A contrast in which one trial was not run as it states: restated if that is cheaper than any change of the rig."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fes_pin.contrast.fits import Fits
+from fes_pin.contrast.result import Change
+from fes_pin.contrast.search import Found
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.cause import ParameterEstimate
+from fes_pin.diagnose.experiment import SEPARABLE
+from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated
+from fes_pin.identify.fit import PARAMETER_PRICE
+from fes_pin.models.model import Model
+
+Trials = Mapping[str, Sequence[Trial]]
+Run = Callable[[Trials], tuple[Fits, Found]]
+
+
+@dataclass(frozen=True)
+class Searched:
+    """A search that has run.
+
+    Attributes
+    ----------
+    fits, found
+        What was searched, and found.
+    group, misread
+        The group of a trial that was restated, and what it must have had; None if none was.
+    """
+
+    fits: Fits
+    found: Found
+    group: str | None = None
+    misread: Misread | None = None
+
+
+def search_with_conditions(nominal: Model, trials: Trials, run: Run) -> Searched:
+    """Search groups of trials, and again with a trial restated that stands out of its own group."""
+    told = [(g, one) for g, many in trials.items() if (one := _found(nominal, many)) is not None]
+    if not told:
+        return Searched(*run(trials))
+    group, misread = min(told, key=lambda pair: pair[1].p_value)
+    other = {**trials, group: restated(nominal, trials[group], misread)}
+    fits, found = run(other)
+    after = Searched(fits, found, group, misread)
+    if not found.best.items:  # nothing changed, and nothing is wrong: no explanation is simpler
+        return after
+    as_stated = Searched(*run(trials))
+    stated = sum(len(nominal.rig.stated(t)) for many in trials.values() for t in many)
+    price = PARAMETER_PRICE + 2.0 * math.log(stated)
+    best = replace(as_stated.found.best, weights=found.best.weights)
+    before = as_stated.fits.converged(best.model, best.items, best.weights, best.fit.unknowns)
+    return after if before.price - found.best.price > price + SEPARABLE else as_stated
+
+
+def _found(nominal: Model, trials: Sequence[Trial]) -> Misread | None:
+    try:
+        return find_misread(nominal, trials)
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return None
+
+
+def misread_change(searched: Searched) -> list[Change]:
+    """The trial that was restated, as a change of its group; none if none was."""
+    one, group = searched.misread, searched.group
+    if one is None or group is None:
+        return []
+    known = searched.fits.nominal.rig.schema.conditions.get(one.condition)
+    estimate = ParameterEstimate(one.value, one.std, known.unit if known is not None else "m")
+    return [
+        Change(
+            name=NAME,
+            kind="condition",
+            group=group,
+            words=one.words,
+            parameters={one.condition: {group: estimate}},
+            equivalents=(),
+            p_value=one.p_value,
+            trial=one.trial,
+        )
+    ]

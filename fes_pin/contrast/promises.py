@@ -1,0 +1,233 @@
+"""What every item of the library promises beside a grouped fit, linearly."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.search.library import Library, near_null
+from fes_pin.diagnose.search.score import Projection, Scores
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.problem import Linearized, Problem
+from fes_pin.models.model import Model
+from fes_pin.models.predictor import Doubt
+from fes_pin.models.stage import Effect
+from fes_pin.workers import in_parallel
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What an item would add to a set, linearly.
+
+    Attributes
+    ----------
+    effect
+        The cause with its start values; None for a parameter, or a cause, that the group's model has.
+    gain
+        Drop in twice the negative log-likelihood.
+    degrees
+        Parameters that it adds.
+    kept
+        Share of its sensitivity that the set does not take up.
+    deviation
+        Standard deviation of its first amplitude.
+    start
+        Value that a parameter would have.
+    spread
+        Variance of what single trials say of it, in units of what the noise explains; at least 1.
+    """
+
+    item: Item
+    effect: Effect | None
+    gain: float
+    degrees: int
+    kept: float
+    deviation: float
+    start: Mapping[str, float]
+    spread: float = 1.0
+
+
+@dataclass(frozen=True)
+class Bench:
+    """The trials of all groups, and the causes that are looked for in them.
+
+    Attributes
+    ----------
+    nominal
+        The rig, without effects.
+    trials
+        By group.
+    library
+        Of all trials together.
+    """
+
+    nominal: Model
+    trials: Mapping[str, Sequence[Trial]]
+    library: Library
+
+
+def promises(bench: Bench, base: Grouped) -> tuple[list[Promise], Scores]:
+    """Every item that a set does not have, scored; and the Gram matrix of what is left of all columns."""
+    projection = Projection(base.fit.parts)
+    before: list[np.ndarray] = []
+    made: list[tuple[Item, Effect | None, tuple[str, ...], np.ndarray]] = []
+    for item, effect, names, columns in _candidates(bench, base):
+        before.append(np.linalg.norm(columns, axis=0))
+        made.append((item, effect, names, projection(np.nan_to_num(columns))))
+    left = np.concatenate([m[3] for m in made], axis=1)
+    gram, along = left.T @ left, left.T @ projection.residual
+    ends = np.cumsum([0, *(m[3].shape[1] for m in made)])
+    blocks = [slice(a, b) for a, b in itertools.pairwise(ends)]
+    out = [
+        replace(
+            _promise(base.model, m[:3], gram[b, b], along[b], norms),
+            spread=_spread(m[3][:, 0], projection.residual, base.fit.parts),
+        )
+        for m, b, norms in zip(made, blocks, before, strict=True)
+    ]
+    tested = [b for m, b in zip(made, blocks, strict=True) if m[0].group is not None]
+    return out, Scores([], gram, along, tested)
+
+
+def _candidates(bench: Bench, base: Grouped) -> Iterator[tuple[Item, Effect | None, tuple[str, ...], np.ndarray]]:
+    """Items with the names of their amplitudes and their whitened columns."""
+    groups, parts = list(bench.trials), base.fit.parts
+    counts = [len(t) for t in bench.trials.values()]
+    ends = np.cumsum([0, *(len(p.residual) for p in parts)])
+    cuts = [ends[k] for k in np.cumsum([0, *counts])]
+    rows = {g: slice(cuts[k], cuts[k + 1]) for k, g in enumerate(groups)}
+    for item in _differing(bench, base):
+        assert item.group is not None
+        yield item, None, *_own_columns(base.model, item, parts, rows[item.group])
+    known = {g: [e.name for e in m.effects] for g, m in base.model.models.items()}
+    wanted = [e for e in bench.library.effects if bench.library.felt(e)]
+    for effect, by_group in zip(wanted, in_parallel(lambda e: _columns(bench, e, base), wanted), strict=True):
+        names = tuple(f"{effect.name}.{n}" for n in effect.amplitudes())
+        for k, one in enumerate(bench.library.grid(effect)):
+            pieces = {g: by_group[g][k] for g in groups}
+            masked = {g: np.zeros((ends[-1], len(names))) for g in groups}
+            for g in groups:
+                masked[g][rows[g]] = pieces[g]
+            if not any(effect.name in n for n in known.values()):
+                yield Item(effect.name), one, names, np.sum(list(masked.values()), axis=0)
+            for g in groups:
+                if effect.name not in known[g]:
+                    yield Item(effect.name, g), one, names, masked[g]
+
+
+def _differing(bench: Bench, base: Grouped) -> Iterator[Item]:
+    """Parameters and causes that a set has, and that could have a value of their own in a group.
+
+    Of two groups it is one and the same which of them has it: the second.
+    """
+    groups = list(bench.trials)
+    common = [i.name for i in base.items if i.group is None]
+    for name in (*bench.nominal.fitted_parameters(), *common):
+        taken = [i.group for i in base.items if i.name == name and i.group is not None]
+        if len(taken) < len(groups) - 1:
+            free = groups[1:] if len(groups) == 2 else groups
+            yield from (Item(name, g) for g in free if g not in taken)
+
+
+def _columns(bench: Bench, effect: type[Effect], base: Grouped) -> dict[str, list[np.ndarray]]:
+    """Sensitivities to an effect's amplitudes for each of its shapes, by group."""
+    out = {}
+    cut = GroupedProblem(base.model, bench.trials, base.weights).by_group(base.fit.unknowns)
+    for group, model in base.model.models.items():
+        bare, trials, weight = Model(model.rig), bench.trials[group], base.weights[group]
+        extended = bare + effect.absent()
+        names = [f"{effect.name}.{n}" for n in effect.amplitudes()]
+        if isinstance(weight, Doubt):
+            problem: Any = LikelihoodProblem(extended, trials, weight)
+            at = [problem.free.index(n) for n in names]
+        else:
+            problem = Problem(extended, trials, weight, tuple(names))
+            at = list(range(len(names)))
+        unknowns = problem.completed(cut[group])
+        out[group] = [
+            np.concatenate([p.jacobian[:, at] for p in problem.linearize((bare + one).parameters(), unknowns)])
+            for one in bench.library.grid(effect)
+        ]
+    return out
+
+
+def _own_columns(
+    model: GroupedModel, item: Item, parts: Sequence[Linearized], rows: slice
+) -> tuple[tuple[str, ...], np.ndarray]:
+    """Columns of a parameter, or a cause's amplitudes, in one group alone."""
+    assert item.group is not None
+    names = [item.name]
+    for effect in model.models[item.group].effects:
+        if effect.name == item.name:
+            names = [f"{effect.name}.{n}" for n in effect.amplitudes()]
+    paths = [model.path(n, item.group) for n in names]
+    at = [model.free.index(p) for p in paths]
+    columns = np.concatenate([p.jacobian for p in parts])[:, at]
+    out = np.zeros_like(columns)
+    out[rows] = columns[rows]
+    return tuple(names), out
+
+
+def _promise(
+    model: GroupedModel,
+    what: tuple[Item, Effect | None, tuple[str, ...]],
+    gram: np.ndarray,
+    along: np.ndarray,
+    norms: np.ndarray,
+) -> Promise:
+    item, effect, names = what
+    size = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    kept = float(np.max(size / np.where(norms > 0.0, norms, np.inf), initial=0.0))
+    degrees = len(names)
+    if effect is not None:
+        degrees = len(effect.fitted_parameters())
+    if kept < 1e-6:
+        return Promise(item, effect, 0.0, degrees, 0.0, np.inf, {})
+    scale = 1.0 / np.maximum(size, 1e-300)
+    inverse = np.linalg.pinv(gram * np.outer(scale, scale), rcond=1e-10, hermitian=True)
+    step = scale * (inverse @ (along * scale))
+    deviation = float(scale[0] * np.sqrt(max(inverse[0, 0], 0.0)))
+    if effect is not None:
+        info = effect.parameters()
+        nulls = np.array([info[n.split(".")[1]].null or 0.0 for n in names])
+        low, high = np.array([[info[n.split(".")[1]].lower, info[n.split(".")[1]].upper] for n in names]).T
+        step = np.clip(step, low - nulls, high - nulls)
+        effect = _started(effect, dict(zip(names, (float(v) for v in step + nulls), strict=True)))
+        start: dict[str, float] = {}
+    else:
+        assert item.group is not None
+        values, limits = model.parameters(), model.parameter_info()
+        start = {}
+        for name, move in zip(names, step, strict=True):
+            path = model.path(name, item.group)
+            wanted = float(np.clip(values[path] + move, limits[path].lower, limits[path].upper))
+            start[f"{name}@{item.group}"] = wanted if wanted else values[path]
+    gain = float(2.0 * along @ step - step @ gram @ step)
+    return Promise(item, effect, gain, degrees, kept, deviation, start)
+
+
+def _started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
+    """The effect at a linear estimate, or a step from its null where that says nothing."""
+    info, values = effect.parameters(), {}
+    for path, value in amplitudes.items():
+        name = path.split(".")[1]
+        null = info[name].null or 0.0
+        values[name] = near_null(type(effect), name) if abs(value - null) < 1e-6 * info[name].scale else value
+    return replace(effect, **values)  # type: ignore[arg-type]
+
+
+def _spread(column: np.ndarray, residual: np.ndarray, parts: Sequence[Linearized]) -> float:
+    """Variance of what each trial says of a parameter, in units of what the noise explains."""
+    ends = np.cumsum([0, *(len(p.residual) for p in parts)])
+    cuts = [slice(a, b) for a, b in itertools.pairwise(ends)]
+    sizes = np.array([float(column[c] @ column[c]) for c in cuts])
+    along = np.array([float(column[c] @ residual[c]) for c in cuts])
+    felt = sizes > 1e-4 * max(float(sizes.max()), 1e-300)
+    free = int(felt.sum()) - 2
+    return max(1.0, float(np.sum(along[felt] ** 2 / sizes[felt])) / free) if free > 0 else 1.0
