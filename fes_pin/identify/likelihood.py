@@ -144,9 +144,9 @@ class LikelihoodProblem:
 
     def _whitened(self, one: Innovations) -> Linearized:
         with np.errstate(all="ignore"):
-            scale = 1.0 / np.sqrt(one.variances[one.seen])
-            residual = one.values[one.seen] * scale
-            moved = -one.sensitivities[one.seen] * scale[:, None]
+            scale = 1.0 / np.sqrt(one.of_seen(one.variances))
+            residual = one.of_seen(one.values) * scale
+            moved = one.of_seen(one.sensitivities) * -scale[:, None]
             logs = -2.0 * float(np.sum(np.log(scale)))
         split = len(self.free)
         return Linearized(residual, moved[:, :split], moved[:, split:], logs)

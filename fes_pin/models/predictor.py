@@ -79,9 +79,13 @@ class Innovations:
     seen: np.ndarray
     sensitivities: np.ndarray
 
+    def of_seen(self, array: np.ndarray) -> np.ndarray:
+        """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
+        return array.reshape(-1, *array.shape[2:]) if self.seen.all() else array[self.seen]
+
     def cost(self) -> float:
         """Twice the negative log-likelihood, but for n log(2 pi); infinite where the prediction runs away."""
-        v, variance = self.values[self.seen], self.variances[self.seen]
+        v, variance = self.of_seen(self.values), self.of_seen(self.variances)
         with np.errstate(all="ignore"):
             total = float(np.sum(v * v / variance + np.log(variance)))
         return total if math.isfinite(total) and bool((variance > 0).all()) else math.inf
@@ -253,8 +257,12 @@ class _Block:
         for lane, trial in enumerate(self.trials):
             n = len(trial)
             seen = self.seen[:n, :, lane]
-            sensitivities = np.zeros((n, k, width))
-            sensitivities[..., self.places] = s[:n, ..., lane]
+            own = s[:n, ..., lane]
+            if self.places == list(range(width)):
+                sensitivities = own
+            else:
+                sensitivities = np.zeros((n, k, width))
+                sensitivities[..., self.places] = own
             yield Innovations(self.outputs, np.where(seen, y[:n, :k, lane], 0.0), y[:n, k:, lane], seen, sensitivities)
 
     def foretold(self, y: np.ndarray) -> Iterator[dict[str, np.ndarray]]:

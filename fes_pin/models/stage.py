@@ -95,6 +95,10 @@ class Effect:
         """States and memories at rest that are not zero."""
         return {}
 
+    def start_variances(self) -> Mapping[str, Any]:
+        """How uncertain a memory that states go into is when a trial begins, beside what they are: unit squared."""
+        return {}
+
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
         """Name and description of every parameter, in order."""

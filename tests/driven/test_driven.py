@@ -42,6 +42,15 @@ def test_dry_friction_is_named_alone_with_its_size(tmp_path):
     assert (after["free"] is None) == (drawn.base == "upright")
 
 
+def test_play_before_the_encoder_is_named_alone_with_its_width(tmp_path):
+    """Within the slack the reading says nothing of the joint: tangents alone would let the filter go astray."""
+    drawn, found = found_in(("backlash",), 15, tmp_path)
+    (cause,) = found.causes
+    assert (cause.name, cause.equivalents) == ("backlash", ())
+    assert cause.parameters["half_width"].value == pytest.approx(drawn.truth["backlash"], rel=0.05)
+    assert found.extended.values["inertia_scale"] == pytest.approx(1.0, abs=0.03)
+
+
 def test_what_no_cause_explains_is_said(tmp_path):
     """An effort that is not recorded, for which noise stands: no set of causes predicts better than a mean."""
     drawn = draw((), 0.3, 14, tmp_path)

@@ -93,7 +93,7 @@ def test_without_randomness_it_is_the_free_simulation():
     assert np.allclose(found.values[:, 0], trial["position"] - free.readings[:, 0], rtol=0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("names", [(), ("coulomb_friction",), ("sensor_lag", "passive_relaxation")])
+@pytest.mark.parametrize("names", [(), ("coulomb_friction",), ("sensor_lag", "passive_relaxation"), ("backlash",)])
 def test_machine_code_and_virtual_machine_agree(names, monkeypatch):
     model = Model(PENDULUM)
     for name in names:
@@ -151,3 +151,74 @@ def test_a_rig_that_stands_is_known_no_better_the_longer_it_is_read():
         known[name] = one.variances[-1, 0] - repeated(column)[-1] * white
     assert known["same"] > 0.5 * white
     assert known["noisy"] < 0.1 * white
+
+
+def discrete(doubt: Doubt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The slide from sample to sample: transition, what an effort does, a root of the covariance of what is random."""
+    tau, std = doubt.time["effort"], doubt.std["effort"]
+    a = np.array([[0.0, 1.0, 0.0], [0.0, -DAMPING / MASS, 1.0 / MASS], [0.0, 0.0, -1.0 / tau]])
+    whole = scipy.linalg.expm(DT * np.block([[a, np.array([[0.0], [1.0 / MASS], [0.0]])], [np.zeros((1, 4))]]))
+    spread = np.diag([0.0, 0.0, 2.0 * std**2 / tau])
+    loan = scipy.linalg.expm(DT * np.block([[-a, spread], [np.zeros((3, 3)), a.T]]))
+    values, vectors = np.linalg.eigh(loan[3:, 3:].T @ loan[:3, 3:])
+    return whole[:3, :3], whole[:3, 3], vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+ROUGH = Doubt({"position": 5e-3}, {"effort": 5.0}, {"effort": 0.05})
+NEAR = {"initial_position": 0.01, "initial_velocity": 0.1}
+
+
+def with_play(width: float, seed: int, n: int = 1500) -> Trial:
+    """A slide that is read through a play, by its exact recursion."""
+    rng, (phi, gamma, root) = np.random.default_rng(seed), discrete(ROUGH)
+    effort = 15.0 * np.cos(6.0 * np.arange(n) * DT)
+    x, read, column = np.array([0.0, 0.3, ROUGH.std["effort"] * rng.normal()]), rng.uniform(-width, width), np.empty(n)
+    for k in range(n):
+        read = float(np.clip(read, x[0] - width, x[0] + width))
+        column[k] = read + ROUGH.white["position"] * rng.normal()
+        x = phi @ x + gamma * effort[k] + root @ rng.normal(size=3)
+    return Trial("play", "motion", {"effort": effort, "position": column}, np.arange(n) * DT)
+
+
+def through_play(model: Model, trial: Trial) -> float:
+    begin = {"initial_position": float(trial["position"][0]), "initial_velocity": 0.3}
+    return Predictor(model, [trial], (), ROUGH.processes, [NEAR]).run(model.parameters(), ROUGH, [begin])[0].cost()
+
+
+def by_particles(trial: Trial, width: float, seed: int, count: int = 8000) -> float:
+    """Twice the negative log-likelihood, but for n log(2 pi), by a bootstrap particle filter."""
+    rng, (phi, gamma, root) = np.random.default_rng(seed), discrete(ROUGH)
+    white, total = ROUGH.white["position"], 0.0
+    x = rng.normal(size=(count, 3)) * [NEAR["initial_position"], NEAR["initial_velocity"], ROUGH.std["effort"]]
+    x += [trial["position"][0], 0.3, 0.0]
+    read = x[:, 0] + rng.uniform(-width, width, size=count)
+    for u, y in zip(trial["effort"], trial["position"], strict=True):
+        read = np.clip(read, x[:, 0] - width, x[:, 0] + width)
+        logs = -0.5 * ((y - read) / white) ** 2
+        weights = np.exp(logs - logs.max())
+        total -= 2.0 * (logs.max() + np.log(weights.mean())) - 2.0 * np.log(white)
+        places = (np.arange(count) + rng.random()) / count
+        kept = np.searchsorted(np.cumsum(weights) / weights.sum(), places).clip(max=count - 1)
+        x = x[kept] @ phi.T + gamma * u + rng.normal(size=(count, 3)) @ root.T
+        read = read[kept]
+    return total
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_through_a_play_it_is_near_the_exact_likelihood(seed):
+    """Against particles: a Gaussian loses up to a quarter of what a play explains, and the true width is the best."""
+    trial, widths = with_play(0.03, seed), (0.015, 0.03, 0.045)
+    model = Model(SLIDE)
+    without = through_play(model, trial)
+    found = [without - through_play(model + effect("backlash")(half_width=w), trial) for w in widths]
+    exact = without - by_particles(trial, 0.03, seed)
+    assert int(np.argmax(found)) == 1
+    assert 0.75 * exact < found[1] < 1.05 * exact
+
+
+def test_a_play_without_width_is_none():
+    trial = driven(6)
+    (one,) = foretold(Model(SLIDE) + effect("backlash")(half_width=0.0), [trial])
+    (none,) = foretold(Model(SLIDE), [trial])
+    assert one.values == pytest.approx(none.values, abs=1e-9)
+    assert one.variances == pytest.approx(none.variances, rel=1e-6)

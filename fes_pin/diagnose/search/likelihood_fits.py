@@ -28,7 +28,10 @@ CONVERGED_SETS = 4
 """Best sets of a size that go on until they converge."""
 FIRST_DOUBTS = (1.0, 30.0)
 """Sizes of random effort that the nominal fit begins with, in units of the smallest: a likelihood can have two optima,
-one in which the model explains and one in which randomness does."""
+one in which the model explains and one in which randomness does. Beside a fit whose random effort is beyond the larger,
+further causes begin also with the smallest."""
+AFRESH_ROUNDS = 3
+"""Turns of parameters and randomness of such a fit, before the best sets converge."""
 
 
 class LikelihoodFits:
@@ -50,6 +53,7 @@ class LikelihoodFits:
         self.fits: dict[Names, Fit] = {}
         self._scores: dict[int, tuple[Fit, Scores]] = {}
         self._converged: set[Names] = set()
+        self._less: dict[tuple[Names, str], Fit] = {}
         self._probing: dict[tuple, LikelihoodProblem] = {}
 
     def nominal(self) -> Fit:
@@ -100,14 +104,22 @@ class LikelihoodFits:
         """A first fit of a base with one more effect, from its shapes of largest score."""
         worth = [s for s in scored[:STARTS] if s.gain >= 0.5 * scored[0].gain]
         starts = [base.model + started(s.probe.effect, s.amplitudes) for s in worth]
-        return min((self._first_fit(s, base) for s in starts), key=lambda f: f.price)
+        return min((*(self._first_fit(s, base) for s in starts), *self._afresh(starts[0], base)), key=lambda f: f.price)
+
+    def _afresh(self, start: Model, base: Fit) -> list[Fit]:
+        """A fit that begins with little that is random, where another's random effort takes what a model should."""
+        assert base.doubt is not None
+        guess = first_guess(self.model, self.trials)
+        if all(base.doubt.std[n] <= FIRST_DOUBTS[-1] * small for n, small in guess.std.items()):
+            return []
+        return [self._maximised(start, guess, rounds=AFRESH_ROUNDS)]
 
     def extend_with_both(self, base: Fit, pair: tuple[Scored, Scored]) -> Fit:
         """Fit a base with two more effects at once, from their linear estimates."""
         model = base.model
         for one in pair:
             model = model + started(one.probe.effect, one.amplitudes)
-        return self._first_fit(model, base)
+        return min((self._first_fit(model, base), *self._afresh(model, base)), key=lambda f: f.price)
 
     def add(self, made: Mapping[Names, Callable[[], Fit]]) -> None:
         """Fit sets side by side; of two fits of a set the better stays."""
@@ -136,10 +148,12 @@ class LikelihoodFits:
     def without(self, names: Names, name: str) -> Fit:
         """The fit of a set less one cause, from the set's own values where that is better."""
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
-        assert whole.doubt is not None
-        own = self._maximised(whole.model - name, whole.doubt, whole.unknowns)
-        if rest not in self.fits or own.price < self.fits[rest].price:
-            self.fits[rest] = own
+        if self._less.get((names, name)) is not whole:
+            assert whole.doubt is not None
+            own = self._maximised(whole.model - name, whole.doubt, whole.unknowns)
+            if rest not in self.fits or own.price < self.fits[rest].price:
+                self.fits[rest] = own
+            self._less[names, name] = whole
         return self.fits[rest]
 
     def refined(self, names: Names) -> Fit | None:

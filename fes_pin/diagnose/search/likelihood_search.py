@@ -23,6 +23,8 @@ from fes_pin.workers import OutOfTime, time_limit
 
 CLAIM_LEVEL = 0.01
 """Family-wise error of each round of claims; with the remainder's 0.02 a diagnosis stays below 5 %."""
+EXTEND_LEVEL = 0.1
+"""Family-wise level that the score of a further cause must reach for larger sets to be fitted."""
 REFINE_LEVEL = 1e-3
 """Level at which a refinement of an effect's form is adopted: some ten forms are tried for a set."""
 MOST_CAUSES = 3
@@ -103,6 +105,8 @@ class LikelihoodSearch:
         imposed = any(t.kind == IMPOSED for t in sets.trials)
         for size in range(1, (MOST_IMPOSED if imposed else MOST_CAUSES) + 1):
             self.progress(min(0.1 + 0.2 * size, 0.7), f"sets of {size}")
+            if best and not self._worth_extending(best):
+                break
             self._extend(size)
             first = self._refine_first(size)
             if not self.p_value(sets.fits[first], sets.fits[best]) < CLAIM_LEVEL:
@@ -113,6 +117,12 @@ class LikelihoodSearch:
     def p_value(self, larger: Fit, smaller: Fit) -> float:
         """Family-wise p-value of what a larger set adds."""
         return self.family.p_value(smaller.sse - larger.sse, max(larger.degrees - smaller.degrees, 1))
+
+    def _worth_extending(self, names: Names) -> bool:
+        """True where the score of a further cause beside a set is not what chance brings."""
+        scored = [s for s in self.sets.scores(self.sets.fits[names]).scored if s.gain > 0.0]
+        single = min((float(chi2_tail(s.gain, max(len(s.amplitudes), 1))) for s in scored), default=1.0)
+        return self.family.adjusted(single) < EXTEND_LEVEL
 
     def _extend(self, size: int) -> None:
         """Fit the sets of a size: the best smaller ones with further causes, and pairs that the screen proposes."""

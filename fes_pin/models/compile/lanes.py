@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Sequence
+from functools import cache
 
 from llvmlite import ir
 
@@ -32,12 +33,25 @@ HALF_PI_LOW = float.fromhex("0x1.3198a2e037073p-69")  # the rest
 
 def splat(value: float) -> ir.Constant:
     """The same number in every lane."""
-    return ir.Constant(VECTOR, [float(value)] * WIDTH)
+    return _splat(float(value).hex())
 
 
+@cache
+def _splat(value: str) -> ir.Constant:
+    """The number of a hexadecimal text in every lane; made once, as is the text that stands for it in assembly."""
+    return ir.Constant(VECTOR, [float.fromhex(value)] * WIDTH)
+
+
+@cache
 def splat_int(value: int) -> ir.Constant:
     """The same integer in every lane."""
     return ir.Constant(INT_VECTOR, [int(value)] * WIDTH)
+
+
+@cache
+def index(value: int) -> ir.Constant:
+    """A place in an array."""
+    return ir.Constant(INT64, value)
 
 
 class LaneFunctions:

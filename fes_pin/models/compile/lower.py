@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 from llvmlite import ir
 
-from fes_pin.models.compile.lanes import CONTRACT, VECTOR, LaneFunctions, select_lanes, splat
+from fes_pin.models.compile.lanes import CONTRACT, VECTOR, LaneFunctions, index, select_lanes, splat
 
 POINTER = ir.PointerType(VECTOR)
 ROUNDED = (*CONTRACT, "arcp")
@@ -107,8 +107,8 @@ class Lowering:
         return self.functions.call(b, _LANE_FUNCTIONS[op], *a)
 
 
-def _element(b: ir.IRBuilder, pointer: ir.Value, index: int) -> ir.Value:
-    return b.gep(pointer, [ir.Constant(ir.IntType(64), index)])
+def _element(b: ir.IRBuilder, pointer: ir.Value, place: int) -> ir.Value:
+    return b.gep(pointer, [index(place)])
 
 
 def _number(b: ir.IRBuilder, mask: ir.Value) -> ir.Value:

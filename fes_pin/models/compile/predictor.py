@@ -16,6 +16,10 @@ Identification, 2nd ed., section 7.4). A sample that was not seen corrects nothi
 row, as of an encoder that stands, is one reading and not n: its error is the same each time. What a trial begins with
 is known as its unknowns are: P = X diag(prior^2) X', X the sensitivities of the first states to them.
 
+A memory that states go into, as the play of a gear does, is as uncertain as they are: it is carried as a state that
+changes at samples alone, m+ = D(x, m). Where D bends within that uncertainty its tangent says little of it: mean, slope
+and what no slope explains are those of differences as long as the uncertainty is, see `_spread`.
+
 Source: Jazwinski, Stochastic Processes and Filtering Theory, 1970, section 8.3; Kristensen, Madsen and Jorgensen,
 Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
@@ -30,11 +34,16 @@ from fes_pin.models.compile.equations import Equations, Tangents, column, functi
 from fes_pin.models.compile.layout import Layout
 from fes_pin.models.model import Model
 
+REACH = 3.0**0.5
+"""Half length of the differences, in standard deviations: right for a Gaussian's fourth moment (Norgaard et al.)."""
+LEAST = 1e-20
+"""Variance that a carried memory and what it follows have at least, in their unit squared: nothing is divided by 0."""
+
 
 class _Doubt:
     """Covariance of the states, and the transition of one integration step, as symbols."""
 
-    def __init__(self, d: Tangents, model: Model) -> None:
+    def __init__(self, d: Carried, model: Model) -> None:
         self.d, self.count = d, d.x.numel()
         self.spread = self._intensities(model)
         self.lower = ca.SX.sym("P", ca.Sparsity.lower(self.count))
@@ -73,12 +82,54 @@ class _Doubt:
             for state, process in zip(e.states, e.random, strict=False):
                 k = at[f"{e.name}.{state}"]
                 out[k, k] = out[k, k] + c[f"std.{process}"] ** 2
+        for k, variance in d.start_variances():
+            out[k, k] = out[k, k] + variance
+        return out
+
+
+class Carried(Tangents):
+    """A model's expressions with the memories that states go into carried as states.
+
+    Attributes
+    ----------
+    carried
+        Places of those memories among the states.
+    followed
+        What each is after a sample.
+    """
+
+    def __init__(self, model: Model, layout: Layout) -> None:
+        super().__init__(model, layout)
+        felt = ca.jacobian(self.after, self.x)
+        places = [k for k in range(self.m.numel()) if felt[k, :].nnz()]
+        others = [k for k in range(self.m.numel()) if k not in places]
+        states = self.x.numel()
+        self.carried = [states + k for k in range(len(places))]
+        self.followed = [self.after[k] for k in places]
+        self._names = [self.sym.memories[k] for k in places]
+        self.x, self.x0 = (column([*ca.vertsplit(v), *(w[k] for k in places)]) for v, w in self._pairs())
+        self.rates = column([*ca.vertsplit(self.rates), *[0.0] * len(places)])
+        self.m, self.m0, self.after = (column([v[k] for k in others]) for v in (self.m, self.m0, self.after))
+
+    def _pairs(self) -> tuple[tuple[Any, Any], ...]:
+        return (self.x, self.m), (self.x0, self.m0)
+
+    def start_variances(self) -> list[tuple[int, Any]]:
+        """Places among the states, and how uncertain a carried memory is there when a trial begins."""
+        out = []
+        for effect in self.sym.signals(self.sym.x, self.sym.m).effects:
+            known = effect.start_variances()
+            out += [
+                (k, known[name.rpartition(".")[2]])
+                for k, name in zip(self.carried, self._names, strict=True)
+                if name.rpartition(".")[0] == effect.name and name.rpartition(".")[2] in known
+            ]
         return out
 
 
 def derive_predictor(model: Model, layout: Layout) -> Equations:
     """Write out a model's predictor; see the module."""
-    d = Tangents(model, layout)
+    d = Carried(model, layout)
     doubt = _Doubt(d, model)
     count, width = doubt.count, len(layout.columns)
     whole = ca.Sparsity.dense(count, width)
@@ -117,7 +168,7 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
     )
 
 
-def _wider(d: Tangents, s: Any, pattern: Any) -> Any:
+def _wider(d: Carried, s: Any, pattern: Any) -> Any:
     """Entries of the memories' sensitivities that can be other than zero where all of the states' can."""
     while True:
         wider = pattern.unite(d.through(d.after, (d.x, s), (d.m, ca.SX.sym("R", pattern))).sparsity())
@@ -126,27 +177,28 @@ def _wider(d: Tangents, s: Any, pattern: Any) -> Any:
         pattern = wider
 
 
-def _ahead(d: Tangents, doubt: _Doubt) -> Any:
+def _ahead(d: Carried, doubt: _Doubt) -> Any:
     """Covariance after an integration step."""
     through, spread = doubt.transition, doubt.spread
     grown = ca.mtimes([through, doubt.covariance, through.T])
     return grown + 0.5 * d.sym.c["step"] * (ca.mtimes([through, spread, through.T]) + spread)
 
 
-def _corrected(d: Tangents, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packed: Any) -> list[Any]:
+def _corrected(d: Carried, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packed: Any) -> list[Any]:
     """State after the measurements of a sample; innovations, their variances, sensitivities of the innovations."""
-    x, covariance, moved = d.x, doubt.covariance, s
-    u, c = d.sym.u, d.sym.c
+    now, covariance, moved = _remembered(d, doubt.covariance, s, inner)
+    x, u, c = now, d.sym.u, d.sym.c
     innovations, variances, slopes = [], [], []
     for name in d.layout.measured:
         reading = d.readings[d.layout.outputs.index(name)]
-        row = ca.jacobian(reading, d.x)
-        foretold = reading + ca.mtimes(row, x - d.x)
+        expressions = (reading, ca.jacobian(reading, d.x), d.through(reading, *inner[1:]))
+        reading, row, beside = (ca.substitute(one, d.x, now) for one in expressions)
+        foretold = reading + ca.mtimes(row, x - now)
         innovation = u[f"measured.{name}"] - foretold
         toward = ca.mtimes(covariance, row.T)
         variance = ca.mtimes(row, toward) + u[f"repeated.{name}"] * c[f"white.{name}"] ** 2
         gain = u[f"seen.{name}"] * toward / variance
-        slope = -d.through(reading, (d.x, moved), *inner[1:])
+        slope = -(beside + ca.mtimes(row, moved))
         x, covariance = x + gain * innovation, covariance - ca.mtimes(gain, toward.T)
         moved = moved + ca.mtimes(gain, slope)
         innovations.append(innovation)
@@ -155,3 +207,68 @@ def _corrected(d: Tangents, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packe
     dr = ca.vertcat(*slopes)
     y = ca.vertcat(column(innovations), column(variances), ca.vec(dr.T) if d.layout.columns else ca.SX(0, 1))
     return [packed(x, moved, covariance), y]
+
+
+def _remembered(d: Carried, covariance: Any, s: Any, inner: tuple[Any, ...]) -> tuple[Any, Any, Any]:
+    """States, their covariance and sensitivities once the memories among them have followed."""
+    x, moved = d.x, s
+    for k, after in zip(d.carried, d.followed, strict=True):
+        mean, slope, rest = _spread(after, d.x, covariance)
+        turned = ca.SX.eye(d.x.numel())
+        turned[k, :] = slope
+        covariance = ca.mtimes([turned, covariance, turned.T])
+        covariance[k, k] = covariance[k, k] + rest
+        own = d.through(mean, (d.x, s), *inner[1:])
+        x, moved = _with_row(x, k, mean), _with_row(moved, k, own)
+    return x, covariance, moved
+
+
+def _with_row(matrix: Any, k: int, row: Any) -> Any:
+    return ca.vertcat(matrix[:k, :], row, matrix[k + 1 :, :])
+
+
+def _spread(f: Any, x: Any, covariance: Any) -> tuple[Any, Any, Any]:
+    """Mean, slope and residual variance of f(x) for a Gaussian x, by differences of its length.
+
+    With L L' = P of the variables that f depends on, h = REACH and f+-, the values at x +- h L_j,
+
+        mean = f + sum (f+ + f- - 2 f) / (2 h^2),   slope' L_j = (f+ - f-) / (2 h),
+        rest = sum (h^2 - 1) / (4 h^4) (f+ + f- - 2 f)^2
+
+    which is exact where f is linear.
+
+    Source: Norgaard, Poulsen and Ravn, New developments in state estimation for nonlinear systems, Automatica 36
+    (2000).
+    """
+    at = ca.jacobian(f, x).sparsity().get_triplet()[1]
+    root = _root([[covariance[i, j] for j in at] for i in at])
+    mean, rest, along = f, ca.SX(0), []
+    for j in range(len(at)):
+        ahead, behind = (_moved(f, x, at, [sign * REACH * row[j] for row in root]) for sign in (1.0, -1.0))
+        bend = ahead + behind - 2.0 * f
+        mean, rest = mean + bend / (2.0 * REACH**2), rest + (REACH**2 - 1.0) / (4.0 * REACH**4) * bend**2
+        along.append((ahead - behind) / (2.0 * REACH))
+    slope = ca.SX(1, x.numel())
+    for i in reversed(range(len(at))):
+        known = sum((root[j][i] * slope[at[j]] for j in range(i + 1, len(at))), ca.SX(0))
+        slope[at[i]] = (along[i] - known) / root[i][i]
+    return mean, slope, rest
+
+
+def _root(p: list[list[Any]]) -> list[list[Any]]:
+    """The lower Cholesky factor of a small matrix of expressions, of its variances and LEAST."""
+    size = len(p)
+    out = [[ca.SX(0)] * size for _ in range(size)]
+    for i in range(size):
+        for j in range(i):
+            out[i][j] = (p[i][j] - sum((out[i][k] * out[j][k] for k in range(j)), ca.SX(0))) / out[j][j]
+        out[i][i] = ca.sqrt(ca.fmax(p[i][i] - sum((v**2 for v in out[i][:i]), ca.SX(0)), 0.0) + LEAST)
+    return out
+
+
+def _moved(f: Any, x: Any, at: list[int], steps: list[Any]) -> Any:
+    """f with some of its variables moved."""
+    there = ca.SX(x)
+    for i, step in zip(at, steps, strict=True):
+        there[i] = there[i] + step
+    return ca.substitute(f, x, there)

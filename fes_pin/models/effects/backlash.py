@@ -48,6 +48,10 @@ class Backlash(Effect):
     def rest(self, s: Any) -> Mapping[str, Any]:
         return {"followed": s.sensed}
 
+    def start_variances(self) -> Mapping[str, Any]:
+        """Where in the slack a trial begins nobody knows: evenly spread over 2 half_width."""
+        return {"followed": self.half_width**2 / 3.0}
+
     def _play(self, position: Any, s: Any) -> Any:
         # strict comparisons, unlike clip, keep the derivative of the side that pulls also at half width 0
         b, low, high = s.own.followed, position - self.half_width, position + self.half_width
