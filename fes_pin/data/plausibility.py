@@ -29,6 +29,8 @@ FEW = 16
 """Samples of a trial below which it can hardly show a motion: a warning."""
 STRONGEST_N = 1e4
 """Force in N that no limb exerts: the strongest knee extensions measured come to about 3 kN at the shank."""
+STRONGEST_NM = 1e3
+"""Torque in N m that no joint exerts: those 3 kN at the shank, a third of a metre from the knee."""
 HEAVIEST_KG = 100.0
 """Load in kg that nobody hangs on an ankle; grams begin there."""
 RUN = 20
@@ -154,9 +156,10 @@ def _units(study: Study) -> Iterable[str]:
         if most > TURN:
             message = f"trial {trial.name}: angle_rad reaches {most:.4g}; no ankle turns so far: is it in degrees?"
             raise InputError(message, file=study.folder, column="angle_rad")
-    strong = [t.name for t in study.trials if "force_n" in t and float(np.abs(t["force_n"]).max()) > STRONGEST_N]
-    if strong:
-        yield f"force_n is beyond {STRONGEST_N:g} N, which no limb exerts, in {_trials(strong)}: is it in mN?"
+    for name, most, unit, small in (("force_n", STRONGEST_N, "N", "mN"), ("torque_nm", STRONGEST_NM, "N m", "mN m")):
+        strong = [t.name for t in study.trials if name in t and float(np.abs(t[name]).max()) > most]
+        if strong:
+            yield f"{name} is beyond {most:g} {unit}, which no limb exerts, in {_trials(strong)}: is it in {small}?"
     whole = [t.name for t in study.trials if t.dt >= 1.0 and (t.time == np.rint(t.time)).all()]
     if whole:
         yield f"time_s counts whole numbers in {_trials(whole)}: is it in ms, or a number of the sample?"

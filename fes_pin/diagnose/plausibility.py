@@ -40,7 +40,13 @@ def check_study(study: Study, model: Model) -> list[str]:
         For what no verdict could follow from: see `data.plausibility`; or a time step much longer than the time
         constants of the model's start values.
     """
-    return [*implausible(study), *_steps(study, model), *_range(study, model), *_swings(study, model)]
+    return [
+        *implausible(study),
+        *_steps(study, model),
+        *_range(study, model),
+        *_swings(study, model),
+        *_turned(model),
+    ]
 
 
 def _steps(study: Study, model: Model) -> Iterable[str]:
@@ -59,6 +65,11 @@ def _steps(study: Study, model: Model) -> Iterable[str]:
             yield f"{told}: what happens between samples is lost; is time_s in another unit?"
         if longest < constant and name != RUN_OUT:
             yield f"the longest trial lasts {longest:.4g} s, and {name} is {constant:.4g} s: is time_s in another unit?"
+
+
+def _turned(model: Model) -> Iterable[str]:
+    if model.rig.constants.get("torque_sign", 1.0) < 0.0:
+        yield "torque_nm falls where the muscle pulls: it is taken as counted the other way, as what moves the ankle"
 
 
 def _range(study: Study, model: Model) -> Iterable[str]:

@@ -27,6 +27,8 @@ COLOURS = {
 LABELS = {
     "angle_rad": ("angle", "rad"),
     "force_n": ("force", "N"),
+    "torque_nm": ("torque", "N m"),
+    "length_m": ("length", "m"),
     "pulse_width_us": ("pulse width", "us"),
     "stim": ("pulses", ""),
     "activation": ("activation", ""),

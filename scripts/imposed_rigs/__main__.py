@@ -12,9 +12,9 @@ import numpy as np
 import typer
 
 from fes_pin.diagnose.diagnosis import diagnose
-from imposed_rigs import joint, muscle
+from imposed_rigs import ankle, joint, muscle
 
-RIGS = {"joint": joint, "muscle": muscle}
+RIGS = {"joint": joint, "muscle": muscle, "ankle": ankle}
 
 
 def items(count: int, rig: str) -> list[tuple[str, str]]:
@@ -55,7 +55,7 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
 
 def main(
     count: Annotated[int, typer.Option(help="How many studies.")] = 100,
-    rig: Annotated[str, typer.Option(help="joint, muscle or all.")] = "all",
+    rig: Annotated[str, typer.Option(help="joint, muscle, ankle or all.")] = "all",
     size: Annotated[float, typer.Option(help="Of what is hidden, as a share of the effort.")] = 0.3,
     seed: Annotated[int, typer.Option(help="Of the first; each next one has the next seed.")] = 0,
     results: Annotated[

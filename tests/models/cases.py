@@ -68,8 +68,13 @@ def trial(rig, kind, rng, n=300, dt=5e-3, **conditions):
     """A random trial without measured outputs."""
     time = np.arange(n) * dt
     if rig == "ankle":
-        conditions = {"load_kg": rng.uniform(0.8, 1.6)} if kind == "motion" else {"angle_rad": rng.uniform(1.5, 2.1)}
         columns = {"pulse_width_us": pulses(rng, n, 150.0, 950.0, dt)}
+        if kind == "imposed":
+            columns["angle_rad"] = 1.7 + sum(
+                rng.uniform(0.05, 0.2) * np.sin(rng.uniform(2.0, 8.0) * time + rng.uniform(0.0, 6.0)) for _ in range(2)
+            )
+        held = {"motion": {"load_kg": rng.uniform(0.8, 1.6)}, "isometric": {"angle_rad": rng.uniform(1.5, 2.1)}}
+        conditions = held.get(kind, {"load_kg": 0.5})
     elif rig == "muscle":
         columns = {"pulse_width_us": pulses(rng, n, 80.0, 520.0, dt)}
         if kind == "imposed":

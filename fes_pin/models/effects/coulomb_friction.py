@@ -127,7 +127,7 @@ class CoulombFriction(Effect):
 
 def _imposed_way(measured: Mapping[str, np.ndarray]) -> float:
     """How far an imposed motion goes, rad or m; 0 where the motion is what is read."""
-    position = measured.get("position", np.empty(0))
+    position = measured.get("position", measured.get("angle_rad", np.empty(0)))
     if not len(position) or np.array_equal(position, measured.get("reading", ())):
         return 0.0
     return float(np.max(position) - np.min(position))

@@ -23,8 +23,8 @@ SMALL = 1e-30
 class ForceVelocity(Effect):
     """Force depends on the shortening velocity, in proportion to activation.
 
-        F = F_M (1 - x + bend x^2),   x = slope v,   v > 0 shortens the muscle                     a joint
-        F = F_M (1 - x / (1 + hill)) / (1 + hill x / (1 + hill)),   x > 0                          a muscle on a lever
+        F = F_M (1 - x + bend x^2),   x = slope v,   v > 0 shortens the muscle                   a joint that is free
+        F = F_M (1 - x / (1 + hill)) / (1 + hill x / (1 + hill)),   x > 0                        imposed motion
         F = F_M (1 - x / (1 - plateau x)),   x < 0
 
     Hill's hyperbola with the slope at rest as its measure: it ends at the speed (1 + hill) / slope, and a muscle that
@@ -32,28 +32,35 @@ class ForceVelocity(Effect):
 
     Tell-tale: fast motion under stimulation is damped, the same motion without it is not.
     Source: Hill, Proc. R. Soc. B 126 (1938), hill = F_0 / a about 4; lengthening: Katz, J. Physiol. 96 (1939). On a
-    joint the hyperbola near rest, with bend about hill.
+    free joint the hyperbola near rest, with bend about hill: what the muscle moves is slow.
     """
 
     slope_s_per_rad: float = parameter(0.05, unit="s/{q}", null=0.0, lower=-100.0, upper=1e4, scale=0.05)
     bend: float = parameter(
         0.0, null=0.0, lower=-20.0, upper=20.0, scale=0.5, optional=True, grid=(0.5,), rigs=("ankle",)
     )
-    hill: float = parameter(
-        0.0, null=0.0, lower=0.0, upper=20.0, scale=1.0, optional=True, grid=(4.0,), rigs=("muscle",)
-    )
-    plateau: float = parameter(
-        PLATEAU, null=PLATEAU, lower=0.0, upper=20.0, scale=1.0, optional=True, grid=(1.0, 4.0), rigs=("muscle",)
-    )
+    hill: float = parameter(0.0, null=0.0, lower=0.0, upper=20.0, scale=1.0, optional=True, grid=(4.0,))
+    plateau: float = parameter(PLATEAU, null=PLATEAU, lower=0.0, upper=20.0, scale=1.0, optional=True, grid=(1.0, 4.0))
 
     name, stage, signal, rigs = "force_velocity", Stage.MUSCLE, "fibres", ("ankle", "muscle")
 
+    @classmethod
+    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """Hill's branches where the motion is imposed, which may be fast; else the bend."""
+        imposed = {"length_m", "torque_nm"} & set(measured)
+        other = ("bend",) if imposed else ("hill", "plateau")
+        return {**super().grids(measured), **dict.fromkeys(other, ())}
+
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
-        """Of a joint, up to half a radian a second; a muscle is damped, not driven, by its velocity."""
-        return {"slope_s_per_rad": (0.0, 1e4) if "length_m" in measured else (-0.5, 2.0)}
+        """Of a joint, down to half a radian a second; an imposed motion shows that a muscle is damped, not driven."""
+        if "length_m" in measured:
+            return {"slope_s_per_rad": (0.0, 1e4)}
+        return {"slope_s_per_rad": (0.0 if "torque_nm" in measured else -0.5, 2.0)}
 
     def apply(self, value: Any, s: Any) -> Any:
         """Of a joint; a muscle on a lever has its fibres' speed from `balanced`, and v = 0 here."""
+        if s.kind == "imposed":
+            return value * self.factor(s.v)
         x = self.slope_s_per_rad * s.v
         return value * (1.0 - x + self.bend * x * x)
 

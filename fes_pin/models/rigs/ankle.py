@@ -1,19 +1,24 @@
-"""The paper's ankle: nerve, muscle and one joint with a load on a cable."""
+"""The paper's ankle: nerve, muscle and one joint with a load on a cable, or on a dynamometer."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
+from scipy.signal import lfilter
 
-from fes_pin.data.schema import START_S, RigSchema, any_number, not_negative, positive
+from fes_pin.data.imposed import imposed_motion
+from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_negative, positive
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.models.least_squares import least_squares
 from fes_pin.models.maths import clip, cos, exp, ramp, sin, where
 from fes_pin.models.parameters import parameter
-from fes_pin.models.rigs.base import GRAVITY, Rig
+from fes_pin.models.rigs.base import GRAVITY, IMPOSED_STOPPING, Rig, imposed_now
 from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
 from fes_pin.models.rigs.stimuli import pulse_widths
 from fes_pin.models.stage import Signals
@@ -45,6 +50,10 @@ class Ankle(Rig):
 
     A motion trial starts at rest and unstimulated, at the static equilibrium of its load. The foot's gravity torque
     comes from Pinocchio, as A cos(theta) + B sin(theta).
+
+    Where a dynamometer imposes the motion its reading is what the ankle exerts on it, the right-hand side of eq. (1)
+    less J theta'', positive where the muscle pulls; `torque_sign` -1 where it counts the other way, as a muscle that
+    would push gives away. It holds no load but one that is stated.
     """
 
     gain: float = parameter(0.65, lower=1e-3, upper=100.0, scale=0.1)
@@ -53,7 +62,7 @@ class Ankle(Rig):
     damping_nms: float = parameter(0.06, unit="N m s", lower=0.0, upper=100.0, scale=0.01)
 
     name, needed = "ankle", CONSTANTS
-    settings = ("--set load_kg=1.5", "--set kind=isometric --set angle_rad=1.9")
+    settings = ("--set load_kg=1.5", "--set kind=isometric --set angle_rad=1.9", "--set kind=imposed")
     schema = RigSchema(
         constants={
             "foot_mass_kg": positive("kg"),
@@ -77,9 +86,19 @@ class Ankle(Rig):
         },
         only={"angle_rad": "isometric"},
         default_kind="motion",
-        outputs={"motion": "angle_rad", "isometric": "force_n"},
+        outputs={"motion": "angle_rad", "isometric": "force_n", IMPOSED: "torque_nm"},
         inputs=("pulse_width_us",),
+        imposed=("angle_rad",),
     )
+
+    @classmethod
+    def of_study(cls, study: Study) -> Ankle:
+        start: dict[str, Any] = dict(study.start)
+        plain = cls(constants=dict(study.constants), **start)
+        measured = [t for t in study.trials if t.kind == IMPOSED and "torque_nm" in t]
+        if not measured or plain.pull_in(measured) >= 0.0:
+            return plain
+        return cls(constants={**study.constants, "torque_sign": -1.0}, **start)
 
     @classmethod
     def conditions_to_try(cls, study: Study) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
@@ -103,8 +122,9 @@ class Ankle(Rig):
 
     def signals(self, kind: str) -> tuple[str, ...]:
         muscle = ("pulse_width", "recruitment", "delay", "time_constant", "activation", "fibres", "force", "pull")
-        joint = ("load", "net_force", "gravity_angle", "torque", "friction", "driving", "acceleration", "reading")
-        return muscle + joint if kind == "motion" else muscle
+        joint = ("load", "net_force", "gravity_angle", "torque", "friction")
+        moved = {"motion": (*joint, "driving", "acceleration", "reading"), IMPOSED: (*joint, "reading")}
+        return (*muscle, *moved.get(kind, ()))
 
     def states(self, kind: str) -> tuple[str, ...]:
         return ("act", "q", "v") if kind == "motion" else ("act",)
@@ -113,19 +133,47 @@ class Ankle(Rig):
         return ("r", "r_before", "rest") if kind == "motion" else ("r", "r_before")
 
     def outputs(self, kind: str) -> tuple[str, ...]:
-        return ("angle_rad",) if kind == "motion" else ("force_n",)
+        return (self.schema.outputs[kind],)
 
     def input_columns(self, trial: Trial) -> tuple[str, ...]:
-        return ("pulse_width_us",)
+        return ("pulse_width_us", *self.schema.motion(trial.kind))
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
-        return (*CONSTANTS, "gravity_cos", "gravity_sin", "load_kg" if kind == "motion" else "angle_rad")
+        own = {"motion": ("load_kg",), "isometric": ("angle_rad",), IMPOSED: ("load_kg", "torque_sign")}
+        return (*CONSTANTS, "gravity_cos", "gravity_sin", *own[kind])
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         known = {name: float(self.constants[name]) for name in CONSTANTS}
-        condition = "load_kg" if trial.kind == "motion" else "angle_rad"
         a, b = _foot_gravity(known["foot_mass_kg"], known["com_distance_m"])
-        return {**known, "gravity_cos": a, "gravity_sin": b, condition: float(trial.conditions[condition])}
+        known.update(gravity_cos=a, gravity_sin=b)
+        if trial.kind == IMPOSED:
+            own = {"load_kg": trial.conditions.get("load_kg", 0.0), "torque_sign": self.constants.get("torque_sign", 1)}
+        else:
+            condition = "load_kg" if trial.kind == "motion" else "angle_rad"
+            own = {condition: trial.conditions[condition]}
+        return {**known, **{name: float(value) for name, value in own.items()}}
+
+    def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
+        """Where a motion is imposed: of a free one the readings alone are judged."""
+        if all(t.kind != IMPOSED for t in trials):
+            return {}
+        read = {n: [t[c] for t in trials if c in t] for n, c in (("effort", "torque_nm"), ("force", "force_n"))}
+        return {n: max(math.sqrt(max(float(np.nanmean(y**2)) for y in many)), 1e-9) for n, many in read.items() if many}
+
+    def pull_in(self, trials: Sequence[Trial]) -> float:
+        """How much of the muscle's torque is in what a dynamometer reads, by a regression; below 0 it counts otherwise.
+
+        Beside it acceleration, velocity and what any function of the angle nearly is: a parabola.
+        """
+        c, rows, read = {n: float(self.constants[n]) for n in CONSTANTS}, [], []
+        for trial in trials:
+            q, v, bend = imposed_motion(trial, self.schema.imposed).values
+            width = (trial["pulse_width_us"] - c["threshold_us"]) / (c["saturation_us"] - c["threshold_us"])
+            pole = math.exp(-trial.dt / self.time_constant_s)
+            act = lfilter([0.0, 1.0 - pole], [1.0, -pole], np.clip(width, 0.0, 1.0))
+            rows.append(np.stack([c["moment_arm_m"] * act * np.sin(q), bend, v, np.ones(len(q)), q, q * q], axis=1))
+            read.append(trial["torque_nm"])
+        return float(least_squares(np.concatenate(rows), np.concatenate(read))[0])
 
     def guess(self, trial: Trial) -> float:
         return 1.75
@@ -134,6 +182,10 @@ class Ankle(Rig):
         for name in vars(s.x):
             setattr(s.x, name, 0.0)
         s.m.r = s.m.r_before = 0.0
+        if s.kind == IMPOSED:
+            s.q, s.v, s.force_scale = s.c.imposed_start, 0.0, self.gain * s.c.force_scale_n
+            s.sensed = s.c.torque_sign * self._joint_torque(s, 0.0)
+            return
         if s.kind == "motion":
             s.x.q, s.x.v, s.m.rest = z, 0.0, z
         s.q = s.sensed = z
@@ -154,7 +206,7 @@ class Ankle(Rig):
         s.arm, s.lever = c.moment_arm_m, c.com_distance_m
         s.force_scale = self.gain * c.force_scale_n
         s.r = s.delayed(s.m.r, s.m.r_before)
-        s.q, s.v = (s.x.q, s.x.v) if s.kind == "motion" else (c.angle_rad, 0.0)
+        s.q, s.v, bend = self._motion(s)
         s.act, s.sensed = s.x.act, s.q
         s.time_constant = s.through("time_constant", self.time_constant_s)
         s.act_rate = (s.r - s.act) / s.time_constant
@@ -163,23 +215,34 @@ class Ankle(Rig):
         s.force = s.through("pull", s.through("force", s.through("fibres", s.force_scale * s.drive)))
         rates = {"act": s.act_rate}
         if s.kind == "motion":
-            rates.update(self._joint_rates(s))
+            s.inertia = self.inertia_kgm2
+            s.torque = s.through("friction", s.through("torque", self._joint_torque(s, s.force)))
+            s.driving = s.through("driving", s.torque / s.inertia)
+            s.acceleration = s.through("acceleration", s.driving)
+            rates.update(q=s.v, v=s.acceleration)
+        elif s.kind == IMPOSED:
+            s.inertia, s.stopping = self.inertia_kgm2, IMPOSED_STOPPING * self.inertia_kgm2
+            s.torque = s.through("friction", s.through("torque", self._joint_torque(s, s.force)))
+            s.sensed = c.torque_sign * (s.torque - s.inertia * bend)
         return rates
 
-    def _joint_rates(self, s: Signals) -> dict[str, Any]:
-        c, q, v = s.c, s.q, s.v
+    def _motion(self, s: Signals) -> tuple[Any, Any, Any]:
+        """Angle, velocity and, where it is imposed, acceleration."""
+        if s.kind == IMPOSED:
+            return imposed_now(s)
+        return (s.x.q, s.x.v, 0.0) if s.kind == "motion" else (s.c.angle_rad, 0.0, 0.0)
+
+    def _joint_torque(self, s: Signals, pull: Any) -> Any:
+        """The right-hand side of eq. (1): what acts on the joint under a force of the muscle."""
+        c, q = s.c, s.q
         s.load = s.through("load", c.load_kg)
-        s.inertia = self.inertia_kgm2
         s.bearing_load = 1.0  # muscle and cable press on the joint by forces that the rig does not tell
-        force = s.through("net_force", s.force)
+        force = s.through("net_force", pull)
         antagonist = where(q > c.theta_r_rad, c.f0_n * (exp(c.f1_per_rad * ramp(q - c.theta_r_rad)) - 1.0), 0.0)
         tilted = s.through("gravity_angle", q)
         gravity = c.gravity_cos * cos(tilted) + c.gravity_sin * sin(tilted)
         cable = c.moment_arm_m * force - c.com_distance_m * (antagonist - s.load * GRAVITY)
-        s.torque = s.through("friction", s.through("torque", cable * sin(q) - gravity - self.damping_nms * v))
-        s.driving = s.through("driving", s.torque / s.inertia)
-        s.acceleration = s.through("acceleration", s.driving)
-        return {"q": v, "v": s.acceleration}
+        return cable * sin(q) - gravity - self.damping_nms * s.v
 
     def readings(self, s: Signals) -> tuple[Any, ...]:
         if s.kind == "motion":
@@ -187,6 +250,9 @@ class Ankle(Rig):
             s.sensed = s.x.q
             return (s.through("reading", s.x.q),)
         self.rates(s)
+        if s.kind == IMPOSED:
+            s.rest_reading = s.idle_reading = 0.0
+            return (s.through("reading", s.sensed),)
         return (s.force,)
 
 

@@ -19,6 +19,9 @@ from fes_pin.models.stage import Effect, Signals
 GRAVITY = 9.81
 """Standard gravity as the paper rounds it, m/s2 (eq. 7)."""
 
+IMPOSED_STOPPING = 1e9
+"""Rate at which friction could stop an imposed motion, 1/s: it does not, and its direction is that of the velocity."""
+
 RUN_OUT = "inertia over damping"
 """What a joint without gravity has for a time constant; lightly damped, it outlasts any trial."""
 

@@ -17,12 +17,10 @@ from fes_pin.data.trial import Trial
 from fes_pin.data.urdf import check_one_joint
 from fes_pin.models.maths import cos, sin, sqrt, where
 from fes_pin.models.parameters import ROTARY, SLIDING, parameter
-from fes_pin.models.rigs.base import RUN_OUT, Rig, first_rate, imposed_now, undone
+from fes_pin.models.rigs.base import IMPOSED_STOPPING, RUN_OUT, Rig, first_rate, imposed_now, undone
 from fes_pin.models.rigs.rigid import gravity_coefficients, is_revolute, joint_inertia, load_urdf
 from fes_pin.models.stage import Signals
 
-IMPOSED_STOPPING = 1e9
-"""Rate at which friction could stop an imposed motion, 1/s: it does not, and its direction is that of the velocity."""
 WEIGHTLESS = 1e-6
 """Gravity's torque over inertia below which a joint counts as balanced, 1/s2: a period above an hour and a half."""
 
