@@ -62,7 +62,7 @@ def disturbed(model: Model, kind: str, processes: tuple[str, ...]) -> Model:
     """The model with those of the processes that a kind of trial can feel; a random force only where no joint moves."""
     signals = model.rig.signals(kind)
     for one in DISTURBANCES:
-        moves = one is RandomForce and RandomEffort.signal in signals
+        moves = one is RandomForce and RandomEffort.signal in signals and model.rig.name in RandomEffort.rigs
         if set(one.random) <= set(processes) and one.signal in signals and not moves and model.rig.name in one.rigs:
             model = model + one()
     return model

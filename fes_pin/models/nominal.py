@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
@@ -10,6 +11,7 @@ from fes_pin.data.study import Study
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.rigs.rigid import joint_inertia, load_urdf
+from fes_pin.models.session import session_of
 
 RUN_OUT_S = 10.0
 """Seconds in which a joint of a laboratory about runs out: inertia over damping, a start value."""
@@ -23,7 +25,9 @@ def nominal_model(study: Study) -> Model:
     InputError
         If the rig has no model of trials.
     """
-    return Model(rig_of(study).of_study(study))
+    rig = rig_of(study).of_study(study)
+    stimulated = [t for t in study.trials if rig.recruited(t) is not None]
+    return Model(replace(rig, session=session_of(stimulated, rig.recruited)))  # type: ignore[arg-type]
 
 
 def rig_of(study: Study) -> type[Rig]:

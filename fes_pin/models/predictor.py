@@ -205,7 +205,7 @@ class _Block:
         self.trials = [trials[i] for i in lanes]
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
-        known = [{**rig.trial_constants(t), **rig.motion_constants(t), **timing(t, self.substeps)} for t in padded]
+        known = [{**rig.constants_of(t), **timing(t, self.substeps)} for t in padded]
         own = [priors[i] for i in lanes] + [priors[lanes[-1]]] * (WIDTH - len(lanes))
         for constants, prior in zip(known, own, strict=True):
             constants.update({f"prior.{n}": prior[n] for n in rig.unknowns(first.kind)})

@@ -229,7 +229,7 @@ class _Block:
         self.substeps = substeps(model, first.dt, max_step_s)
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
-        constants = [{**rig.trial_constants(t), **rig.motion_constants(t), **timing(t, self.substeps)} for t in padded]
+        constants = [{**rig.constants_of(t), **timing(t, self.substeps)} for t in padded]
         self.constants = np.array([[c[n] for c in constants] for n in self.layout.constants]).reshape(-1, WIDTH)
         self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
         self._shifted: tuple[tuple[int, ...] | None, np.ndarray] = None, np.empty(0)

@@ -58,6 +58,8 @@ class Effect:
         True if its amplitudes can be other in each trial: those of what does not begin with the trial.
     beside
         Names of effects without which it shows little or nothing: it is screened beside them.
+    remembers
+        True if earlier trials of the session are in its states at the start: `rest` reads them by `session`.
     each_trial
         Its amplitudes are unknowns of each trial, estimated from that trial alone; the fields keep what a trial that
         was not measured is predicted with: their nulls. All other parameters stay common to all trials.
@@ -76,6 +78,7 @@ class Effect:
     max_step_s: ClassVar[float] = math.inf
     varies: ClassVar[bool] = False
     beside: ClassVar[tuple[str, ...]] = ()
+    remembers: ClassVar[bool] = False
 
     each_trial: bool = dataclasses.field(default=False, kw_only=True)
 

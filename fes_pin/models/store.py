@@ -17,6 +17,7 @@ from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.outside import origin
 from fes_pin.models.rigs.base import Rig
+from fes_pin.models.session import Session
 from fes_pin.models.stage import Effect
 
 FORMAT = 1
@@ -43,6 +44,8 @@ def model_toml(model: Model, random: Mapping[str, Any] | None = None) -> str:
         "nominal": {n: float(getattr(rig, n)) for n in rig.parameters()},
         "effects": {e.name: _effect_table(e) for e in model.effects},
     }
+    if rig.session:
+        tables["session"] = [list(one) for one in rig.session]
     if random:
         tables["random"] = random
     parts: tuple[Rig | Effect, ...] = (rig, *model.effects)
@@ -87,7 +90,7 @@ def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = 
     if missing := set(kind.needed) - set(constants):
         raise document.error("constants", f"expected {', '.join(sorted(missing))} as well")
     _check_possible(document, kind.schema, {"nominal": nominal, "constants": constants})
-    model = Model(kind(**nominal, constants=constants, fitted=tuple(fitted)))
+    model = Model(kind(**nominal, constants=constants, fitted=tuple(fitted), session=_session(document)))
     listed = document.table("effects")
     for name in listed:
         try:
@@ -99,6 +102,17 @@ def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = 
         except ValueError as error:
             raise document.error(f"effects.{name}", str(error)) from None
     return model
+
+
+def _session(document: Document) -> Session:
+    """Stretches of stimulation: each a begin, an end and a mean recruitment."""
+    listed, out = document.data.get("session", []), []
+    for row in listed if isinstance(listed, list) else [None]:
+        numbers = [float(v) for v in row if isinstance(v, int | float)] if isinstance(row, list) else []
+        if len(numbers) != 3 or not all(map(math.isfinite, numbers)) or not numbers[0] < numbers[1]:
+            raise document.error("session", "expected rows of a begin, a later end and a mean recruitment, all finite")
+        out.append((numbers[0], numbers[1], numbers[2]))
+    return tuple(out)
 
 
 def _check_possible(document: Document, schema: RigSchema, tables: Mapping[str, Mapping[str, float]]) -> None:

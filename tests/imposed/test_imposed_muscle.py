@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from imposed_rigs.motion import wandering
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -9,13 +10,14 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.plausibility import implausible
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.identify.likelihood import LikelihoodProblem, first_guess, maximise
 from fes_pin.models.effects import ForceLength, ForceVelocity, ParallelStiffness, PulseSummation, SeriesElasticity
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Muscle
 from fes_pin.models.simulate import Simulator, simulate
 
 MUSCLE = Muscle(12.0, 0.04, constants={"threshold_us": 0.0, "saturation_us": 1.0, "length_m": 0.05})
-DT = 1e-3
+DT, RNG = 1e-3, np.random.default_rng(5)
 TIME = np.arange(800) * DT
 ON = np.where((TIME > 0.1) & (TIME < 0.55), 1.0, 0.0)
 
@@ -142,6 +144,15 @@ def test_a_length_is_read_in_imposed_trials_only(tmp_path):
     (tmp_path / "b.csv").write_text("time_s,stim,force_n\n0,1,0\n0.1,0,1\n0.2,0,1\n")
     with pytest.raises(InputError, match="has its motion there"):
         read_trial(tmp_path / "b.csv", rig="muscle", kind="imposed")
+
+
+def test_a_random_force_acts_on_a_muscle_on_a_lever():
+    """Without it whatever wanders counts against the causes, and some are named where there are none."""
+    study = study_of()
+    trial = study.trials[0].with_columns(force_n=12.0 * activation() + wandering(len(TIME), DT, 0.1, 0.05, RNG))
+    problem = LikelihoodProblem(Model(MUSCLE), [trial], first_guess(Model(MUSCLE), [trial]))
+    found = maximise(problem, Model(MUSCLE).parameters()).doubt
+    assert found.std["force"] == pytest.approx(0.1, rel=0.4) and found.white["force_n"] < 0.02
 
 
 def test_no_motion_is_proposed():

@@ -181,7 +181,7 @@ def test_a_trial_starts_at_rest(one, rig, kind):
     program = VirtualProgram(derive(model, layout))
     timing = {"t0": 0.0, "dt": first.dt, "step": first.dt / 4, "shift": 0.0}
     p = np.array([model.parameters()[n] for n in layout.values])
-    c = np.array([{**RIGS[rig].trial_constants(first), **timing}[n] for n in layout.constants])
+    c = np.array([{**RIGS[rig].constants_of(first), **timing}[n] for n in layout.constants])
     z = newton(lambda z: float(program.equations.rest(z, p, c)[0]), RIGS[rig].guess(first))
     state, memory = program.equations.start(z, p, c)
     held = program.equations.sample(state, memory, [0.0], 0.0, p, c)

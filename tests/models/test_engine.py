@@ -34,7 +34,7 @@ def lanes(model, kind, rng, n):
     delays = np.array([v.get("electromechanical_delay.delay_s", 0.0) for v in values])
     shift = np.floor(delays / trials[0].dt)
     timing = {"t0": 0.3, "dt": trials[0].dt, "step": trials[0].dt / steps}
-    constants = [{**rig.trial_constants(t), **timing, "shift": k} for t, k in zip(trials, shift, strict=True)]
+    constants = [{**rig.constants_of(t), **timing, "shift": k} for t, k in zip(trials, shift, strict=True)]
     p = np.array([[v[name] for v in values] for name in layout.values])
     c = np.array([[k[name] for k in constants] for name in layout.constants])
     return layout, (u, p, c, np.array([rig.guess(t) for t in trials]), steps)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fes_pin.models.model import Model
+from fes_pin.models.session import PAST
 
 WIDTH = 4
 """Lanes that run side by side: one AVX2 register. With eight, models with sensitivities spill (1.4 times slower)."""
@@ -90,13 +91,14 @@ def make_layout(
     """The layout of a model's program for trials of a kind with these input columns."""
     rig = model.rig
     doubt = doubt_constants(model, kind, measured) if measured else ()
+    past = PAST if any(e.remembers for e in model.effects) else ()
     fixed = {n: value for n, value in model.unused_parameters().items() if n not in columns}
     return Layout(
         kind=kind,
         inputs=(*inputs, *reading_inputs(measured)),
         parameters=tuple(n for n in model.parameters() if n not in fixed),
         unknowns=model.unknowns(kind),
-        constants=(*rig.constant_names(kind), *rig.motion_names(kind), *TIMING, *doubt),
+        constants=(*rig.constant_names(kind), *rig.motion_names(kind), *past, *TIMING, *doubt),
         outputs=rig.outputs(kind),
         columns=columns,
         fixed=tuple(fixed.items()),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.parameters import parameter
+from fes_pin.models.session import after_the_past
 from fes_pin.models.stage import Effect, Stage
 
 FLOOR = 0.35
@@ -18,10 +19,12 @@ class Fatigue(Effect):
     """Force capacity falls with use and recovers with rest.
 
         c'  = (1 - c) / recovery - rate act (c - FLOOR)
-        F   = c F_M,   c(0) = 1
+        F   = c F_M,   c = 1 at the start of the session
 
-    Tell-tale: equal stimuli are answered ever more weakly within a trial, in proportion at all levels, and rest
-    restores some.
+    Where trials say when they began, c runs on through them and the pauses between; else it is 1 at the start of each.
+
+    Tell-tale: equal stimuli are answered ever more weakly within a trial, or from trial to trial, in proportion at all
+    levels, and rest restores some.
     Source: Riener and Fuhr, IEEE Trans. Rehab. Eng. 6 (1998), with their floor of capacity; recovery times of 20 to
     60 s there.
     """
@@ -30,10 +33,17 @@ class Fatigue(Effect):
     recovery_s: float = parameter(30.0, unit="s", lower=0.5, upper=300.0, scale=10.0, grid=(30.0, 5.0, 120.0))
 
     name, stage, signal, rigs = "fatigue", Stage.MUSCLE, "force", ("ankle", "muscle")
-    states = ("lost",)
+    states, remembers = ("lost",), True
 
     def apply(self, value: Any, s: Any) -> Any:
         return value * (1.0 - s.own.lost)
+
+    def rest(self, s: Any) -> Mapping[str, Any]:
+        speed, recovery = self.rate_per_s, 1.0 / self.recovery_s
+        lost = after_the_past(
+            s, lambda act: speed * act + recovery, lambda act: speed * act * (1.0 - FLOOR) / (speed * act + recovery)
+        )
+        return {"lost": lost}
 
     def rate(self, s: Any) -> Mapping[str, Any]:
         lost = s.own.lost

@@ -153,6 +153,10 @@ class Ankle(Rig):
             own = {condition: trial.conditions[condition]}
         return {**known, **{name: float(value) for name, value in own.items()}}
 
+    def recruited(self, trial: Trial) -> np.ndarray:
+        low, high = (float(self.constants[n]) for n in ("threshold_us", "saturation_us"))
+        return np.clip((trial["pulse_width_us"] - low) / (high - low), 0.0, 1.0)
+
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         """Where a motion is imposed: of a free one the readings alone are judged."""
         if all(t.kind != IMPOSED for t in trials):
@@ -168,9 +172,8 @@ class Ankle(Rig):
         c, rows, read = {n: float(self.constants[n]) for n in CONSTANTS}, [], []
         for trial in trials:
             q, v, bend = imposed_motion(trial, self.schema.imposed).values
-            width = (trial["pulse_width_us"] - c["threshold_us"]) / (c["saturation_us"] - c["threshold_us"])
             pole = math.exp(-trial.dt / self.time_constant_s)
-            act = lfilter([0.0, 1.0 - pole], [1.0, -pole], np.clip(width, 0.0, 1.0))
+            act = lfilter([0.0, 1.0 - pole], [1.0, -pole], self.recruited(trial))
             rows.append(np.stack([c["moment_arm_m"] * act * np.sin(q), bend, v, np.ones(len(q)), q, q * q], axis=1))
             read.append(trial["torque_nm"])
         return float(least_squares(np.concatenate(rows), np.concatenate(read))[0])

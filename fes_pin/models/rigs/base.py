@@ -14,6 +14,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import ROTARY, Parameter, parameters_of
 from fes_pin.models.rigs.stimuli import both_signs
+from fes_pin.models.session import Session, past_of
 from fes_pin.models.stage import Effect, Signals
 
 GRAVITY = 9.81
@@ -39,6 +40,8 @@ class Rig:
 
     constants: Mapping[str, float] = dataclasses.field(default_factory=dict, kw_only=True)
     fitted: tuple[str, ...] | None = dataclasses.field(default=None, kw_only=True)
+    session: Session = dataclasses.field(default=(), kw_only=True)
+    """What was stimulated when, of trials that say when they began."""
 
     name: ClassVar[str]
     schema: ClassVar[RigSchema]
@@ -177,6 +180,14 @@ class Rig:
     def motion_constants(self, trial: Trial) -> dict[str, float]:
         """Constants of a trial with an imposed motion: where that begins."""
         return {"imposed_start": imposed_motion(trial, self.schema.imposed).start} if trial.kind == IMPOSED else {}
+
+    def constants_of(self, trial: Trial) -> dict[str, float]:
+        """Values of everything that is constant in a trial: of the rig, of its motion, and what was before it."""
+        return {**self.trial_constants(trial), **self.motion_constants(trial), **past_of(self.session, trial)}
+
+    def recruited(self, trial: Trial) -> np.ndarray | None:
+        """Recruitment of the nominal muscle by a trial's stimulus, shape (n,); None of a rig without one."""
+        return None
 
     def motion_names(self, kind: str) -> tuple[str, ...]:
         """Names of those constants."""

@@ -110,6 +110,13 @@ class Muscle(Rig):
             "pulse_period_s": float(self.constants.get("pulse_period_s", pulse_period(pulsed))),
         }
 
+    def recruited(self, trial: Trial) -> np.ndarray:
+        known = self.trial_constants(trial)
+        if "stim" in trial.columns:
+            return trial["stim"] * known["pulse_period_s"] / trial.dt
+        low, high = known["threshold_us"], known["saturation_us"]
+        return np.clip((trial["pulse_width_us"] - low) / (high - low), 0.0, 1.0)
+
     def set_rest(self, s: Signals, z: Any) -> None:
         s.x.act = s.m.r = s.m.r_before = 0.0
         s.q = s.sensed = 0.0

@@ -1,0 +1,83 @@
+"""What was done in a session before a trial: how much a muscle was stimulated, by how long ago that was.
+
+What tires in one trial may be tired in the next. Where trials say when they began (`start_s`) the recruitment of all
+earlier ones is known, and with it the states at which a trial begins of whatever remembers for longer than a trial.
+Such a state follows first-order equations whose rates do not change within a bin of the past, so that a bin takes it
+exactly to where it is after the mean recruitment of that bin. Recruitment stands for the activation, which follows it
+within a tenth of a second. A trial that does not say when it began begins fresh, and so do all where trials overlap:
+they are of more than one session.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.models.maths import exp
+
+Session = tuple[tuple[float, float, float], ...]
+"""Stretches of stimulation: begin and end in s, as `start_s` counts them, and mean recruitment."""
+NEWEST_S, GROWTH, BINS = 0.2, 1.25, 45
+"""The newest bin of the past in s, how much longer each older one reaches, and how many there are: they go an hour
+back, twelve times the longest recovery that is looked for. Within a bin an exponential of its own age differs from its
+mean by 4 % at most."""
+EDGES = np.concatenate([[0.0], NEWEST_S * GROWTH ** np.arange(BINS)])
+"""Ages at which bins begin and end, s."""
+PAST = tuple(f"past_{k:02d}" for k in range(BINS))
+"""Names of the constants of a trial that hold the mean recruitment of each bin, newest first."""
+PIECES, SHORTEST_S = 20, 0.25
+"""A trial is kept in so many pieces, or in fewer that last so long."""
+
+
+def session_of(trials: Sequence[Trial], recruited: Callable[[Trial], np.ndarray]) -> Session:
+    """The stimulation of trials that say when they began; none where two of them overlap.
+
+    Parameters
+    ----------
+    recruited
+        Recruitment of a trial, shape (n,), by its stimulus.
+    """
+    known = sorted((t for t in trials if "start_s" in t.conditions), key=lambda t: t.conditions["start_s"])
+    ends = [t.conditions["start_s"] + t.duration for t in known]
+    if any(end > after.conditions["start_s"] + after.dt for end, after in zip(ends, known[1:], strict=False)):
+        return ()
+    out: list[tuple[float, float, float]] = []
+    for trial in known:
+        count = int(np.clip(round(trial.duration / SHORTEST_S), 1, PIECES))
+        pieces = [p for p in np.array_split(recruited(trial), count) if len(p)]
+        begins = trial.conditions["start_s"] + trial.dt * np.cumsum([0, *map(len, pieces)])
+        out += [(float(a), float(b), float(p.mean())) for a, b, p in zip(begins, begins[1:], pieces, strict=False)]
+    return tuple(out)
+
+
+def past_of(session: Session, trial: Trial) -> dict[str, float]:
+    """Mean recruitment in each bin of a trial's past, by the names of `PAST`; zero where it does not say its start."""
+    if "start_s" not in trial.conditions or not session:
+        return dict.fromkeys(PAST, 0.0)
+    now = trial.conditions["start_s"]
+    begin, end, mean = np.array(session).T
+    before = begin < now - 0.5 * trial.dt  # the trial itself begins now
+    old, new = now - begin[before, None], np.maximum(now - end[before, None], 0.0)
+    shared = np.maximum(np.minimum(old, EDGES[1:]) - np.maximum(new, EDGES[:-1]), 0.0)
+    return dict(zip(PAST, map(float, mean[before] @ shared / np.diff(EDGES)), strict=True))
+
+
+def after_the_past(s: Any, rate: Callable[[Any], Any], towards: Callable[[Any], Any]) -> Any:
+    """A state at the start of a trial that has followed x' = rate(act) (towards(act) - x) from 0 through the past.
+
+    Parameters
+    ----------
+    s
+        The signals: `s.c` holds the constants of `PAST`.
+    rate, towards
+        Of an activation: 1/s, and the state that it leads to.
+    """
+    state: Any = 0.0
+    for name, width in zip(reversed(PAST), np.diff(EDGES)[::-1], strict=True):
+        act = getattr(s.c, name)
+        end = towards(act)
+        state = end + (state - end) * exp(-float(width) * rate(act))
+    return state
