@@ -9,7 +9,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.identify.fit import fit
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
@@ -25,7 +25,7 @@ for name in PRINTED:
     trial = study.trials[0]
     paper = RatioProblem(ankle_of(paper_twin(name)), [trial])
     optimum = least_error(paper)
-    diagnosis = diagnose(study)
+    diagnosis = diagnose_joint(study)
     print(diagnosis, "\n")
     before, after = simulate(paper.model_at(optimum.x), trial), simulate(diagnosis.model, trial)
     answers[name] = (

@@ -14,7 +14,7 @@ import numpy as np
 
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import AnkleDynamics
-from fes_pin.control.endurance import budget, least_rest
+from fes_pin.control.endurance import least_rest, muscle_budget
 from fes_pin.control.loop import sine, steps, track
 from fes_pin.control.margins import delay_margin, margins
 from fes_pin.control.observer import JointObserver
@@ -92,7 +92,7 @@ print(f"hysteresis of +-60 us: RMS {without:.3f} degrees, compensated {undone:.3
 fatigue = Fatigue(rate_per_s=0.068, recovery_s=60.0)
 tiring = replace(twin, fatigue_per_s=0.068, recovery_s=60.0)
 long = sine(low, 15.0, 0.5, 300.0)
-plan = budget(model + fatigue, LOAD, long)
+plan = muscle_budget(model + fatigue, LOAD, long)
 tired = RunningTwin(tiring)
 endured = track(PositionController(model + fatigue, LOAD), tired, long)
 print(
@@ -100,7 +100,7 @@ print(
     f"budget {100 * plan.capacity[-1]:.1f} %; RMS {endured.rms_error_deg():.3f} degrees"
 )
 greedy = sine(low, 20.0, 0.5, 90.0)
-short_at = budget(model + fatigue, LOAD, greedy).short_at_s
+short_at = muscle_budget(model + fatigue, LOAD, greedy).short_at_s
 watcher, joint, warned, over = PositionController(model + fatigue, LOAD), RunningTwin(tiring), [], []
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from fes_pin.models.nominal import nominal_model
 from fes_pin.paper.constants import ANGLE_NOISE_RAD, PRINTED, STEPWISE, paper_study, paper_trial, paper_twin
 from fes_pin.paper.error_region import ellipsoid_floor, error_domain, error_holding, profile_intervals
-from fes_pin.paper.identifiability import identifiability
+from fes_pin.paper.identifiability import ankle_identifiability
 from fes_pin.paper.ratios import RATIOS, UNITS, RatioProblem, ankle_of, least_error
 from fes_pin.paper.twin import record, staircase
 
@@ -117,8 +117,8 @@ have held something that the paper does not name, or ended early. Which of the t
 # %% What cannot be told, said by the tool
 study = paper_study("3-23")
 motion = [t for t in study.trials if t.kind == "motion"]
-print("\nmotion trials alone:\n" + str(identifiability(nominal_model(study), motion)))
-print("with isometric trials:\n" + str(identifiability(nominal_model(study), study.trials)))
+print("\nmotion trials alone:\n" + str(ankle_identifiability(nominal_model(study), motion)))
+print("with isometric trials:\n" + str(ankle_identifiability(nominal_model(study), study.trials)))
 
 # %% The picture: shadows and cuts on three planes
 figure, axes = plt.subplots(2, 3, figsize=(13, 8), constrained_layout=True)

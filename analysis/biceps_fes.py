@@ -18,7 +18,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import fes_pin as fp
-from fes_pin.compare.literature import published
+from fes_pin.compare.literature import published_model
 from fes_pin.compare.own_part import own_part, pairs_of
 from fes_pin.data.datasets import fetch
 from fes_pin.data.errors import InputError
@@ -43,7 +43,7 @@ FORCE = np.array([t["force_n"][:SHORTEST] for t in TRAINS])
 START = np.array([t.conditions["start_s"] for t in TRAINS])
 PULSES = np.array([t["stim"].sum() for t in TRAINS])
 name = ranked.models[0].name
-model = published(name).model(fp.nominal_model(STUDY), TRAINS) if name != "nominal" else fp.nominal_model(STUDY)
+model = published_model(name).model(fp.nominal_model(STUDY), TRAINS) if name != "nominal" else fp.nominal_model(STUDY)
 
 
 def left_out(k):

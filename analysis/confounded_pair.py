@@ -16,9 +16,9 @@ from scipy.optimize import brentq
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.identify.fit import fit
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 from fes_pin.paper.equation_1 import static_torque_nm
@@ -122,12 +122,12 @@ for pair in PAIRS:
         true, other = pair if seed % 2 == 0 else pair[::-1]
         ankle = TrueAnkle(true, seed)
         study = ankle.study()
-        found = [diagnose(study)]
+        found = [diagnose_joint(study)]
         first, promised, came, words = state(found[0], true), [], [], []
         while len(came) < MOST_TRIALS and (plan := found[-1].next_experiment) and plan.trial is not None:
             trial = ankle.run(replace(plan.trial, name=f"next{len(came)}"))
             study = replace(study, trials=(*study.trials, trial))
-            found.append(diagnose(study))
+            found.append(diagnose_joint(study))
             rival = next(n for n in plan.separates[::-1] if n != true)
             before, after = (lead(d, true, rival) for d in found[-2:])
             promised.append(plan.promised[plan.separates.index(true)] if true in plan.separates else math.nan)
@@ -146,7 +146,7 @@ before, trial = found[0].study, found[1].study.trials[-1]
 column = "force_n" if trial.kind == "isometric" else "angle_rad"
 said = {}
 for name in PAIRS[0]:
-    rival = fit(nominal_model(before) + effect(name)(), before.trials, found[0].extended.noise)
+    rival = fit(nominal_model(before) + effect_named(name)(), before.trials, found[0].extended.noise)
     said[name] = simulate(rival.model, trial)[column]
 colours = {DELAY: "tab:orange", LAG: "tab:blue", LOAD: "tab:orange", OFFSET: "tab:blue"}
 words = {DELAY: "delay", LAG: "second lag", LOAD: "load error", OFFSET: "sensor offset"}

@@ -14,7 +14,7 @@ from pathlib import Path
 from pkgutil import iter_modules
 
 import fes_pin
-from fes_pin.data.schema import Number, RigSchema, known_rigs
+from fes_pin.data.schema import NumberKey, RigSchema, known_rigs
 from fes_pin.models.catalogue import shipped
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.models.parameters import ROTARY
@@ -49,7 +49,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines) + "\n"
 
 
-def bound(number: Number) -> str:
+def bound(number: NumberKey) -> str:
     """The bound of a number in words."""
     if not math.isfinite(number.lower):
         return "finite"
@@ -113,7 +113,7 @@ def keys(schema: RigSchema) -> list[tuple[str, ...]]:
     return rows
 
 
-def _needed(schema: RigSchema, key: str, number: Number) -> str:
+def _needed(schema: RigSchema, key: str, number: NumberKey) -> str:
     kinds = [kind for kind, needed in schema.needed.items() if key in needed]
     if kinds:
         return f"in {' and '.join(kinds)} trials" + (" only" if key in schema.only else "")

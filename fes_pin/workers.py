@@ -15,6 +15,8 @@ from threadpoolctl import threadpool_limits
 
 from fes_pin.settings import threads
 
+Progress = Callable[[float, str], None]
+"""What is told of a long search: the share that is done, and what is being done."""
 In = TypeVar("In")
 Out = TypeVar("Out")
 
@@ -84,7 +86,7 @@ def time_limit(seconds: float) -> Iterator[None]:
         _END.reset(token)
 
 
-def check_time() -> None:
+def check_limit() -> None:
     """End the work here if its time is over.
 
     Raises

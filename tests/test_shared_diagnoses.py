@@ -5,7 +5,7 @@ import json
 import pytest
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 
 pytestmark = pytest.mark.shared
 
@@ -15,7 +15,7 @@ STUDIES = [*(f"{n}_one" for n in NAMED), "n00_none", "n01_none", "n02_none"]
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_practice(shared, name):
-    diagnosis = diagnose(read_study(shared / "practice" / name))
+    diagnosis = diagnose_joint(read_study(shared / "practice" / name))
     truth = json.loads((shared / "practice/answers" / name / "answer.json").read_text())["causes"]
     if not truth:
         assert diagnosis.verdict == "adequate", str(diagnosis)

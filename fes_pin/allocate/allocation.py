@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.allocate.certificate import Certificate
-from fes_pin.allocate.problem import Problem
+from fes_pin.allocate.problem import AllocationProblem
 
 REPORTED_NM = 0.5
 """A shortfall is put in words from this size on, N m."""
@@ -52,7 +52,7 @@ class Allocation:
     previous: np.ndarray
     certificate: Certificate
     gap: float
-    problem: Problem
+    problem: AllocationProblem
     note: str = ""
 
     @property
@@ -221,7 +221,7 @@ class AllocationSequence:
     wanted: np.ndarray
     achieved: np.ndarray
     residual: np.ndarray
-    problem: Problem
+    problem: AllocationProblem
 
     @property
     def shortfall(self) -> np.ndarray:

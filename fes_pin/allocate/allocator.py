@@ -11,8 +11,8 @@ from fes_pin.allocate.bounded import BoundedProgram, known_solver, refined, solv
 from fes_pin.allocate.certificate import Certifier
 from fes_pin.allocate.efforts import CUBE_TOLERANCE, error_then_effort, least_cubes
 from fes_pin.allocate.inputs import wanted_torque, wanted_torques
-from fes_pin.allocate.off_or_enough import best_choice, rounded
-from fes_pin.allocate.problem import Options, Problem, problem_of
+from fes_pin.allocate.off_or_enough import best_choice, rounded_to_least
+from fes_pin.allocate.problem import AllocationProblem, Options, problem_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import by_name
 
@@ -45,7 +45,7 @@ class Allocator:
     """
 
     def __init__(self, nerves: Any, q: Any = None, *, v: Any = None, **options: Any) -> None:
-        self.problem: Problem = problem_of(nerves, q, v, Options.of(options))
+        self.problem: AllocationProblem = problem_of(nerves, q, v, Options.of(options))
         p = self.problem
         self.certify = Certifier(p)
         self.squares, self.pull = p.squares, p.pull
@@ -163,7 +163,7 @@ class Allocator:
         p = self.problem
         assert p.least is not None
         if p.rounding:
-            choice = rounded(self.H, f, lower, upper, p.least)
+            choice = rounded_to_least(self.H, f, lower, upper, p.least)
         else:
             choice = best_choice(self.H, f, lower, upper, p.least, seconds=p.seconds)
         on = choice.r > 0.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.allocate.problem import EPSILON, Problem
+from fes_pin.allocate.problem import EPSILON, AllocationProblem
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class Certifier:
         Nothing else is read.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: AllocationProblem) -> None:
         self.problem, self.first_only = problem, problem.lexicographic
         self.weighed = problem.weights / problem.scale
         self.prices = np.zeros(problem.n) if self.first_only else problem.prices

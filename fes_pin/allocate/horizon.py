@@ -13,7 +13,7 @@ from fes_pin.allocate.horizon_program import NO_ROOM, HorizonProgram
 from fes_pin.allocate.inputs import wanted_torques
 from fes_pin.allocate.problem import within_rate
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between, positive, whole
+from fes_pin.data.numbers import between, positive_number, whole
 
 ROUNDED = 1e-13
 """A plan may exceed the rate by so much: its steps are sums, and solvers round; a pulse width by 1e-10 us."""
@@ -36,7 +36,7 @@ class StrengthFatigue:
 
     def __post_init__(self) -> None:
         for name in ("fatigue_s", "recovery_s"):
-            positive(getattr(self, name), name, infinite=True)
+            positive_number(getattr(self, name), name, infinite=True)
         between(self.least, 0.0, 1.0, "least")
 
     def after(self, left: np.ndarray, act: np.ndarray, step_s: float) -> np.ndarray:
@@ -135,7 +135,7 @@ class Horizon:
 
     def __post_init__(self) -> None:
         for name in ("step_s", "time_constant_s"):
-            positive(getattr(self, name), name)
+            positive_number(getattr(self, name), name)
         self.delay_steps = whole(self.delay_steps, "delay_steps", 0, LONGEST - 1)
         self.steps = whole(self.steps, "steps", 1, LONGEST - 1)
         _check(self.program)

@@ -57,7 +57,7 @@ def settled(
     return solve_once(H, f, low, high)
 
 
-def rounded(H: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray, least: np.ndarray) -> Choice:
+def rounded_to_least(H: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray, least: np.ndarray) -> Choice:
     """The cheap choice: solve without least recruitments, round what lies below to off or to its least, solve again.
 
     The gap is measured against the problem without least recruitments: true, but not tight.
@@ -102,7 +102,7 @@ def best_choice(
     model.settings = {**model.settings, "primal_tol": FEASIBLE, "time_limit": min(seconds, WITHOUT_LIMIT)}
     model.setup(curvature, linear, rows, most, np.concatenate([fewest, np.zeros(k)]), sense)
     x, _, flag, info = model.solve()
-    cheap = rounded(H, f, lower, upper, least)
+    cheap = rounded_to_least(H, f, lower, upper, least)
     if flag not in (ENDED, STOPPED):
         return Choice(cheap.r, cheap.cost, cheap.gap, cheap.nodes + info["nodes"])
     on = upper > 0.0

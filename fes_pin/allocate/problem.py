@@ -11,7 +11,7 @@ import numpy as np
 from fes_pin.allocate.inputs import torque_matrix
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between, by_name, positive
+from fes_pin.data.numbers import between, by_name, positive_number
 from fes_pin.muscles.recruitment import ChannelRecruitment, LinearRecruitment
 
 EFFORT = 1e-4
@@ -91,7 +91,7 @@ class Options:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Problem:
+class AllocationProblem:
     """The program of an allocation with its numbers checked; nothing in it changes.
 
         min over r of sum w (R r - torque)^2 / 2 + effort + change / 2 |r - previous|^2,  lower <= r <= upper
@@ -179,7 +179,7 @@ def within_rate(before: np.ndarray, rate: float, lower: np.ndarray, upper: np.nd
     return np.where(least - lower <= dust, lower, least), np.where(upper - most <= dust, upper, most)
 
 
-def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> Problem:
+def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> AllocationProblem:
     """The problem of nerves at a posture and its rates (or of a torque matrix) with options.
 
     Raises
@@ -192,7 +192,7 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> Problem:
     n, count = len(names), len(nominal)
     joints = JOINT_NAMES if count == len(JOINT_NAMES) else tuple(f"joint_{j + 1}" for j in range(count))
     curve = LinearRecruitment() if options.recruitment is None else options.recruitment
-    lower, upper, least = joint_limits(options, names)
+    lower, upper, least = recruitment_limits(options, names)
     weights = checked_weights(options.weights, joints)
     kinds = ("squares", "cubes", "fatigue")
     if options.effort_kind not in kinds:
@@ -206,12 +206,12 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> Problem:
     if options.effort_kind == "fatigue":
         prices = prices / np.maximum(getattr(nerves, "left_over", np.ones(n)), LEAST_LEFT) ** 2
     change = between(options.change, 0.0, LARGEST_PRICE, "change")
-    rate, seconds = (positive(getattr(options, n), n, infinite=True) for n in ("rate", "seconds"))
+    rate, seconds = (positive_number(getattr(options, n), n, infinite=True) for n in ("rate", "seconds"))
     matrix = np.where(upper == 0.0, 0.0, nominal)
     scale = float(np.einsum("ji,j,ji->i", matrix, weights, matrix).max()) or 1.0
     for array in (nominal, matrix, weights, prices, lower, upper, *(() if least is None else (least,))):
         array.setflags(write=False)
-    return Problem(
+    return AllocationProblem(
         names=names,
         joints=joints,
         nominal=nominal,
@@ -267,7 +267,7 @@ def checked_prices(effort: Any, names: tuple[str, ...]) -> np.ndarray:
     return array
 
 
-def joint_limits(options: Options, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+def recruitment_limits(options: Options, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Lower and upper limits and least recruitments, (n,), with dead channels at 0.
 
     Raises

@@ -11,7 +11,7 @@ from fes_pin.allocate.allocation import Allocation
 from fes_pin.allocate.bounded import solve_sequence
 from fes_pin.allocate.certificate import Certifier, residuals
 from fes_pin.allocate.inputs import in_range, wanted_torques
-from fes_pin.allocate.problem import Options, Problem, problem_of
+from fes_pin.allocate.problem import AllocationProblem, Options, problem_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import numbers
 
@@ -42,7 +42,7 @@ class WalkAllocation:
     achieved: np.ndarray
     residual: np.ndarray
     matrices: np.ndarray
-    problem: Problem
+    problem: AllocationProblem
     scale: float
 
     @property

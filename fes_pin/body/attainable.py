@@ -14,8 +14,8 @@ from fes_pin.body.balance import balance as _balance
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, modes
-from fes_pin.body.programs import Answer, Program
-from fes_pin.data.numbers import positive
+from fes_pin.body.programs import LinearProgram, ProgramAnswer
+from fes_pin.data.numbers import positive_number
 
 SETTLE_DEG = 10.0
 """How far a swinging mode may hang from the posture and still count as the posture: ours; linear models reach no
@@ -23,7 +23,7 @@ further. The answers depend on it: it is an option of the command."""
 
 
 @dataclass(frozen=True)
-class Demands:
+class HoldingDemands:
     """What a constant input u must do, one row a mode, scaled so that the largest gain of a row is 1.
 
     Falling modes must be balanced: gains u = target (minus `load` for one degree of lean). Swinging modes may settle
@@ -63,7 +63,7 @@ def demands(
     gravity: bool = True,
     settle_deg: float = SETTLE_DEG,
     balance: bool = True,
-) -> Demands:
+) -> HoldingDemands:
     """The demands of a posture on a set of inputs.
 
     Parameters
@@ -80,7 +80,7 @@ def demands(
     InputError
         `settle_deg` is not positive.
     """
-    settle_deg = positive(settle_deg, "settle_deg", infinite=True)
+    settle_deg = positive_number(settle_deg, "settle_deg", infinite=True)
     found = modes(linear)
     kinds = np.array([mode.kind for mode in found])
     degree = np.radians(1.0) / np.abs(found.shapes).max(axis=0)
@@ -96,7 +96,7 @@ def demands(
     shares = np.zeros((0, linear.n)) if ground is None else ground.per_torque
     hanging = rows[:, hang] / -found.values[hang]  # a swing hangs at F / -mu
     torques = hanging @ found.shapes[:, hang].T + shares
-    return Demands(
+    return HoldingDemands(
         falling=found.falling,
         gains=gains[fall] / size[fall, None],
         target=-constant[fall] / size[fall],
@@ -111,7 +111,7 @@ def demands(
 
 
 @dataclass(frozen=True)
-class Attainable:
+class HeldLeans:
     """What inputs within their bounds can hold.
 
     Parameters
@@ -163,7 +163,7 @@ def attainable(
     gravity: bool = True,
     settle_deg: float = SETTLE_DEG,
     balance: bool = True,
-) -> Attainable:
+) -> HeldLeans:
     """What constant inputs can hold, by linear programs.
 
     Parameters
@@ -190,15 +190,20 @@ def attainable(
             for way, sign in enumerate((1.0, -1.0)):
                 leans[i, way], errors[i, way] = _greatest_lean(wanted, inputs, i, sign)
     named = {} if effort is None else dict(zip(inputs.names, effort.tolist(), strict=True))
-    return Attainable(wanted.falling, effort is not None, named, leans, errors)
+    return HeldLeans(wanted.falling, effort is not None, named, leans, errors)
 
 
 def _solve(
-    wanted: Demands, inputs: Inputs, cost: np.ndarray, balance: np.ndarray, limit: np.ndarray, further: np.ndarray
-) -> Answer:
+    wanted: HoldingDemands,
+    inputs: Inputs,
+    cost: np.ndarray,
+    balance: np.ndarray,
+    limit: np.ndarray,
+    further: np.ndarray,
+) -> ProgramAnswer:
     """Linear program over (u, s): the posture's demands with s times two columns in them; further rows <= 0."""
     target, room = wanted.case()
-    return Program(
+    return LinearProgram(
         cost=cost,
         A_ub=np.vstack([np.column_stack([wanted.limits, limit]), further]),
         b_ub=np.concatenate([room, np.zeros(len(further))]),
@@ -209,7 +214,7 @@ def _solve(
     ).solve()
 
 
-def _least_effort(wanted: Demands, inputs: Inputs) -> np.ndarray | None:
+def _least_effort(wanted: HoldingDemands, inputs: Inputs) -> np.ndarray | None:
     span = np.where(np.isfinite(inputs.upper), inputs.upper, 1.0)
     eye = np.eye(inputs.n)
     share = np.block([[eye, -span[:, None]], [-eye, -span[:, None]]])
@@ -219,7 +224,7 @@ def _least_effort(wanted: Demands, inputs: Inputs) -> np.ndarray | None:
     return None if found.x is None else found.x[:-1]
 
 
-def _greatest_lean(wanted: Demands, inputs: Inputs, i: int, sign: float) -> tuple[float, float]:
+def _greatest_lean(wanted: HoldingDemands, inputs: Inputs, i: int, sign: float) -> tuple[float, float]:
     """Degrees of lean in mode i that can be held, and their error: mu eta + phi'(C + Q u) = 0 in every falling mode."""
     push = np.zeros(len(wanted.target))
     push[i] = sign * wanted.load[i]

@@ -10,15 +10,15 @@ from scipy.linalg import block_diag
 
 from fes_pin.body.each_foot import share_of_second, without_free
 from fes_pin.body.gait import STILL
-from fes_pin.body.ground import Support, Wrench, centre_of_pressure, ground_wrench, second_foot, support
+from fes_pin.body.ground import SupportPolygon, Wrench, centre_of_pressure, ground_wrench, second_foot, support
 from fes_pin.body.joints import SIDES
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.linearize import model_on_slope
-from fes_pin.body.modes import Modes
+from fes_pin.body.modes import ModeSet
 
 
 @dataclass(frozen=True)
-class Balance:
+class GroundRows:
     """Each foot's centre of pressure stays on its sole as long as these are not above 0.
 
     constant + per_mode eta + per_force F + per_torque (C + D), with eta'' = mu eta + F and F = phi' (C + D).
@@ -49,12 +49,12 @@ def _feet(linear: LinearBody) -> tuple[str, ...]:
     return SIDES if linear.both_feet else (linear.body.stance,)
 
 
-def _area(linear: LinearBody, sides: tuple[str, ...]) -> Support:
+def _area(linear: LinearBody, sides: tuple[str, ...]) -> SupportPolygon:
     q = linear.body.angles(linear.whole_posture, check=False)
     return support(linear.body, q, {side: f"{side}_mtp_extension" in linear.held for side in SIDES}, sides)
 
 
-def soles_of(linear: LinearBody) -> Support:
+def soles_of(linear: LinearBody) -> SupportPolygon:
     """The area on the ground that carries a linearized body: of all feet together."""
     return _area(linear, _feet(linear))
 
@@ -64,7 +64,7 @@ def _model(linear: LinearBody) -> tuple[pin.Model, np.ndarray]:
     return model_on_slope(linear.body, linear.slope, linear.gravity), posture
 
 
-def _carried(linear: LinearBody) -> tuple[list[tuple[Support, Wrench]], np.ndarray]:
+def _carried(linear: LinearBody) -> tuple[list[tuple[SupportPolygon, Wrench]], np.ndarray]:
     """Each foot's sole and wrench, by the joints that move; and how the wrenches' rows depend on what is free."""
     model, q = _model(linear)
     places = [linear.body.joint_names.index(name) for name in linear.joint_names]
@@ -77,7 +77,7 @@ def _carried(linear: LinearBody) -> tuple[list[tuple[Support, Wrench]], np.ndarr
     return feet, np.vstack([-free, free])
 
 
-def balance(linear: LinearBody, found: Modes) -> Balance:
+def balance(linear: LinearBody, found: ModeSet) -> GroundRows:
     """The inequalities that keep each foot's centre of pressure on its sole (see `fes_pin.body.each_foot`).
 
     Parameters
@@ -94,7 +94,7 @@ def balance(linear: LinearBody, found: Modes) -> Balance:
         for name in ("at_rest", "per_angle", "per_acceleration", "per_torque")
     )
     angle, acceleration = angle @ found.shapes, acceleration @ found.shapes
-    return Balance(constant, angle + acceleration * found.values, acceleration, torque, angle)
+    return GroundRows(constant, angle + acceleration * found.values, acceleration, torque, angle)
 
 
 def place_of_weight(linear: LinearBody) -> tuple[float, str]:

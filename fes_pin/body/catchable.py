@@ -20,11 +20,11 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, modes
 from fes_pin.body.plans import Plans
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number, positive
+from fes_pin.data.numbers import number, positive_number
 
 
 @dataclass(frozen=True)
-class Catchable:
+class CaughtLeans:
     """From which leans at rest inputs within their bounds can bring the body to rest again.
 
     Parameters
@@ -112,7 +112,7 @@ def catchable(
     balance: bool = True,
     rest_deg: float | None = None,
     gravity: bool = True,
-) -> Catchable:
+) -> CaughtLeans:
     """From which leans inputs that change in time bring the body to rest, by linear programs over a horizon.
 
     Parameters
@@ -150,7 +150,7 @@ def catchable(
                 leans[i, way], errors[i, way] = found.x[-1], found.error
             elif found is not None and found.unbounded:
                 leans[i, way] = np.inf
-    return Catchable(falling, rests, leans, errors, modal_bound(linear, inputs, gravity=gravity))
+    return CaughtLeans(falling, rests, leans, errors, modal_bound(linear, inputs, gravity=gravity))
 
 
 def plans_of(
@@ -172,4 +172,4 @@ def plans_of(
         raise InputError("what inputs catch is asked of a body at rest without damping")
     if rest_deg is not None and number(rest_deg, "rest_deg") < 0.0:
         raise InputError(f"must not be negative, got {rest_deg}", column="rest_deg")
-    return Plans(linear, inputs, positive(settle_deg, "settle_deg"), balance, rest_deg, gravity)
+    return Plans(linear, inputs, positive_number(settle_deg, "settle_deg"), balance, rest_deg, gravity)

@@ -25,7 +25,7 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.linearize import model_on_slope
 from fes_pin.body.plans import PULSE_S, Plans
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import positive
+from fes_pin.data.numbers import positive_number
 
 STEP_S = 0.002
 """Step of the Runge-Kutta integration, s; the fastest falls here double in ten of them."""
@@ -112,7 +112,7 @@ def close_the_loop(
     q, v = linear.q + start, np.zeros(linear.n)
     deviations, outside, lost = [start], -np.inf, ""
     given_inputs: list[np.ndarray] = []
-    for _ in range(round(positive(seconds, "seconds") / PULSE_S)):
+    for _ in range(round(positive_number(seconds, "seconds") / PULSE_S)):
         now = plans
         if moving_arms:
             try:

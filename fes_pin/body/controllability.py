@@ -15,8 +15,8 @@ from scipy import linalg
 
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.modes import Modes, modes
-from fes_pin.data.numbers import positive
+from fes_pin.body.modes import ModeSet, modes
+from fes_pin.data.numbers import positive_number
 
 RELATIVE_TOLERANCE = 1e-9
 """Below this part of the largest gain, an input does not act on a mode: rounding, not muscle."""
@@ -25,7 +25,7 @@ SAME_POLE = 1e-6
 
 
 @dataclass(frozen=True)
-class Controllability:
+class ModalControllability:
     """What a set of inputs can do with the modes of a body.
 
     Parameters
@@ -49,7 +49,7 @@ class Controllability:
     """
 
     linear: LinearBody = field(repr=False)
-    modes: Modes = field(repr=False)
+    modes: ModeSet = field(repr=False)
     inputs: Inputs
     horizon: float
     gains: np.ndarray = field(repr=False)
@@ -90,7 +90,7 @@ class Controllability:
         return "\n".join(out)
 
 
-def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> Controllability:
+def modal_controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> ModalControllability:
     """Controllability of every mode of a body.
 
     Parameters
@@ -107,7 +107,7 @@ def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> Control
     InputError
         Inputs that are none, or a horizon that is not positive.
     """
-    horizon = positive(horizon, "horizon")
+    horizon = positive_number(horizon, "horizon")
     inputs = Inputs.of(inputs, linear)
     found = modes(linear)
     torque = inputs.on(linear)
@@ -120,7 +120,7 @@ def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> Control
     controllable = _independent(found.values, gains)
     with np.errstate(divide="ignore"):
         energy = np.where(controllable, price / squared, np.inf)
-    return Controllability(
+    return ModalControllability(
         linear=linear,
         modes=found,
         inputs=inputs,

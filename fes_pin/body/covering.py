@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import optimize, sparse
 
-from fes_pin.body.programs import FEASIBLE, Program, linprog
+from fes_pin.body.programs import FEASIBLE, LinearProgram, linprog
 
 _CUTS_A_ROUND, _ROWS_A_ROUND = 4, 20
 _DUST = 1e-12
@@ -35,7 +35,7 @@ class Demand:
         Rows of inequalities that were broken before; demands with the same rows may share the list.
     """
 
-    program: Program = field(repr=False)
+    program: LinearProgram = field(repr=False)
     owner: np.ndarray
     watched: list[int] = field(default_factory=list, repr=False)
 

@@ -28,7 +28,7 @@ FLAT_DEG, LEVEL_M = 1.0, 0.005
 
 
 @dataclass(frozen=True)
-class Support:
+class SupportPolygon:
     """The area on the ground that carries a body.
 
     Parameters
@@ -164,7 +164,7 @@ def soles(body: Body, q: np.ndarray, side: str, heel: bool) -> np.ndarray:
     return (np.array([[x, y, 0.0] for x in ends for y in (-half, half)]) @ foot.turn.T + foot.place)[:, :2]
 
 
-def support(body: Body, q: np.ndarray, heels: dict[str, bool], sides: Sequence[str]) -> Support:
+def support(body: Body, q: np.ndarray, heels: dict[str, bool], sides: Sequence[str]) -> SupportPolygon:
     """The area that carries a body.
 
     Parameters
@@ -184,7 +184,7 @@ def support(body: Body, q: np.ndarray, heels: dict[str, bool], sides: Sequence[s
         names.append(f"{side}_{'foot' if heel else 'forefoot'}")
         points.append(soles(body, q, side, heel))
     corners = np.vstack(points)
-    return Support(corners[ConvexHull(corners).vertices], tuple(names))
+    return SupportPolygon(corners[ConvexHull(corners).vertices], tuple(names))
 
 
 @dataclass(frozen=True)

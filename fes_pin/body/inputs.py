@@ -10,7 +10,7 @@ import numpy as np
 from fes_pin.body.joints import JOINT_NAMES, known_joint
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number, positive
+from fes_pin.data.numbers import number, positive_number
 
 
 @dataclass(frozen=True)
@@ -141,5 +141,5 @@ class Inputs:
         InputError
             A factor that is not positive.
         """
-        factor = positive(factor, "factor")
+        factor = positive_number(factor, "factor")
         return Inputs(self.names, self.joint_names, factor * self.matrix, self.lower, self.upper)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from fes_pin.body.build import GRAVITY, Body
-from fes_pin.body.modes import Modes, modes
+from fes_pin.body.modes import ModeSet, modes
 from fes_pin.data.errors import InputError
 
 _RANK = 1e-9
@@ -115,7 +115,7 @@ class LinearBody:
         """Angles of all joints, braced ones too, rad by name."""
         return {**self.held, **self.posture}
 
-    def modes(self) -> Modes:
+    def modes(self) -> ModeSet:
         """The eigenpairs of A^-1 B, n of them on one foot (see `fes_pin.body.modes.modes`)."""
         return modes(self)
 

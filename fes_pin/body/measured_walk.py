@@ -94,7 +94,7 @@ def data_folder() -> Path:
     )
 
 
-def numbers(path: Path, wanted: Sequence[str]) -> dict[str, np.ndarray]:
+def columns_of_numbers(path: Path, wanted: Sequence[str]) -> dict[str, np.ndarray]:
     """Columns of a table of numbers by name, `time` first; columns that are not wanted may hold anything.
 
     Raises
@@ -137,8 +137,8 @@ def read_walk(folder: str | Path | None = None) -> MeasuredWalk:
         elif name in REFERENCE:
             coordinate, sign = REFERENCE[name]
             sources[i] = f"{coordinate}_{side[0]}", sign
-    angles = numbers(folder / ANGLES, ["time", *(f"q_{name}" for name, _ in sources.values())])
-    torques = numbers(folder / TORQUES, ["time", *(f"ID_{name}_moment" for name, _ in sources.values())])
+    angles = columns_of_numbers(folder / ANGLES, ["time", *(f"q_{name}" for name, _ in sources.values())])
+    torques = columns_of_numbers(folder / TORQUES, ["time", *(f"ID_{name}_moment" for name, _ in sources.values())])
     time = angles["time"]
     if len(time) != len(torques["time"]) or np.abs(time - torques["time"]).max() > SAME_TIME:
         raise InputError(f"expected the times of {ANGLES}", file=folder / TORQUES, column="time")

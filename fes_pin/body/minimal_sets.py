@@ -13,16 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.body.attainable import SETTLE_DEG, Demands, attainable, demands, lean_text
+from fes_pin.body.attainable import SETTLE_DEG, HoldingDemands, attainable, demands, lean_text
 from fes_pin.body.catchable import catchable, plans_of
-from fes_pin.body.controllability import controllability
+from fes_pin.body.controllability import modal_controllability
 from fes_pin.body.covering import Demand, smallest
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import SIDES, known_joint
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.programs import Program
+from fes_pin.body.programs import LinearProgram
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number, positive, whole
+from fes_pin.data.numbers import number, positive_number, whole
 
 ORTHOSES: dict[str, tuple[str, ...]] = {
     **{f"{side}_{name}": tuple(f"{side}_{joint}" for joint in joints) for side in SIDES for name, joints in {
@@ -151,7 +151,7 @@ def minimal_sets(
         Unknown brace, joint or stimulation, negative number, a lean that is not positive and finite.
     """
     asked = _Question(
-        positive(lean_deg, "lean_deg"), together, gravity, settle_deg, stimulation, balance, strength_factor
+        positive_number(lean_deg, "lean_deg"), together, gravity, settle_deg, stimulation, balance, strength_factor
     )
     max_braces, alternatives = whole(max_braces, "max_braces"), whole(alternatives, "alternatives", 1)
     inputs = Inputs.of(inputs, linear)
@@ -211,7 +211,7 @@ class _Question:
             )
         if number(self.strength_factor, "strength_factor") < 1.0:
             raise InputError(f"must be 1 or more, got {self.strength_factor}", column="strength_factor")
-        positive(self.settle_deg, "settle_deg", infinite=self.stimulation == "constant")
+        positive_number(self.settle_deg, "settle_deg", infinite=self.stimulation == "constant")
 
 
 def _smallest(linear: LinearBody, inputs: Inputs, asked: _Question, alternatives: int) -> list[tuple[str, ...]]:
@@ -232,13 +232,13 @@ def _smallest(linear: LinearBody, inputs: Inputs, asked: _Question, alternatives
     return [tuple(name for name, z in zip(inputs.names, chosen, strict=True) if z) for chosen in found]
 
 
-def _held(wanted: Demands, inputs: Inputs, lean_deg: float) -> list[Demand]:
+def _held(wanted: HoldingDemands, inputs: Inputs, lean_deg: float) -> list[Demand]:
     """The posture, and a lean each way in each falling mode, held by constant inputs."""
     leans = [(i, sign * lean_deg) for i in range(len(wanted.falling)) for sign in (1.0, -1.0)]
     cases = [wanted.case(*lean) for lean in [(0, 0.0), *leans]]
     nothing, owner = np.zeros(inputs.n), np.arange(inputs.n)
     return [
-        Demand(Program(nothing, wanted.limits, room, wanted.gains, target, inputs.lower, inputs.upper), owner)
+        Demand(LinearProgram(nothing, wanted.limits, room, wanted.gains, target, inputs.lower, inputs.upper), owner)
         for target, room in cases
     ]
 
@@ -252,7 +252,7 @@ def _caught(linear: LinearBody, inputs: Inputs, asked: _Question) -> list[Demand
     return [Demand(plans.program(start, still), plans.owner, watched) for start in [still, *leans, *-leans]]
 
 
-def _in_turn(wanted: Demands, inputs: Inputs, lean_deg: float) -> tuple[np.ndarray, np.ndarray]:
+def _in_turn(wanted: HoldingDemands, inputs: Inputs, lean_deg: float) -> tuple[np.ndarray, np.ndarray]:
     """Rows that every set must cover: in every falling mode the pulls reach a lean both ways, on their own."""
     up = np.maximum(wanted.gains * inputs.upper, wanted.gains * inputs.lower)
     down = np.maximum(-wanted.gains * inputs.upper, -wanted.gains * inputs.lower)
@@ -262,7 +262,7 @@ def _in_turn(wanted: Demands, inputs: Inputs, lean_deg: float) -> tuple[np.ndarr
 
 
 def _priced(linear: LinearBody, inputs: Inputs, chosen: tuple[str, ...], asked: _Question) -> MinimalSet:
-    energies, condition = controllability(linear, inputs).fall_energy
+    energies, condition = modal_controllability(linear, inputs).fall_energy
     leans, error = [], 0.0
     for factor in (1.0 / asked.strength_factor, 1.0, asked.strength_factor):
         scaled = inputs.scaled(factor)

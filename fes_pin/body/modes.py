@@ -136,7 +136,7 @@ class Mode:
 
 
 @dataclass(frozen=True)
-class Modes:
+class ModeSet:
     """All modes of a body, fastest fall first, fastest swing last.
 
     Parameters
@@ -187,7 +187,7 @@ def kind_of(value: float) -> str:
     return "fall" if value > 0.0 else "swing"
 
 
-def modes(linear: Linear) -> Modes:
+def modes(linear: Linear) -> ModeSet:
     """The eigenpairs of A^-1 B with names.
 
     Parameters
@@ -208,7 +208,7 @@ def modes(linear: Linear) -> Modes:
         Mode(float(value), shape, names, share, _name(float(value), share, names, stance))
         for value, shape, share in zip(values, shapes.T, shares.T, strict=True)
     )
-    return Modes(named, values, shapes, linear.conservative)
+    return ModeSet(named, values, shapes, linear.conservative)
 
 
 def poles(linear: Linear) -> np.ndarray:
@@ -224,7 +224,7 @@ def poles(linear: Linear) -> np.ndarray:
     return values[np.lexsort((values.imag, -values.real))]
 
 
-def state_eigenvectors(found: Modes) -> tuple[np.ndarray, np.ndarray]:
+def state_eigenvectors(found: ModeSet) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues and modal matrix of F built from the modes: (2n,), (2n, 2n) complex; the paper's second property."""
     roots = np.emath.sqrt(found.values).astype(complex)
     both = np.concatenate([roots, -roots])

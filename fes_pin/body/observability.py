@@ -18,9 +18,9 @@ import numpy as np
 from fes_pin.body.controllability import RELATIVE_TOLERANCE, _independent
 from fes_pin.body.joints import known_joint
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.modes import Mode, Modes, modes
+from fes_pin.body.modes import Mode, ModeSet, modes
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import positive
+from fes_pin.data.numbers import positive_number
 
 NOISE_DEG, RATE_HZ, LOOK_S = 0.5, 200.0, 0.3
 """Noise of a good flexible goniometer, degrees; its sampling, Hz; the time that a fall leaves for a look, s (ours)."""
@@ -31,7 +31,7 @@ _SETS_AT_ONCE = 20000
 
 
 @dataclass(frozen=True)
-class Observability:
+class ModalObservability:
     """What goniometers at some joints see.
 
     Parameters
@@ -46,7 +46,7 @@ class Observability:
         Deviation of each mode's angle that a look of `LOOK_S` seconds leaves, degrees of its greatest joint: (modes,).
     """
 
-    modes: Modes = field(repr=False)
+    modes: ModeSet = field(repr=False)
     sensors: tuple[str, ...]
     gains: np.ndarray = field(repr=False)
     observable: np.ndarray = field(repr=False)
@@ -67,7 +67,7 @@ class Observability:
         return "\n".join(lines)
 
 
-def observability(linear: LinearBody, sensors: Iterable[str]) -> Observability:
+def observability(linear: LinearBody, sensors: Iterable[str]) -> ModalObservability:
     """Which modes goniometers at these joints see, and how well.
 
     Raises
@@ -83,10 +83,12 @@ def observability(linear: LinearBody, sensors: Iterable[str]) -> Observability:
         if name not in linear.joint_names:
             raise InputError(f"{name!r} is braced: nothing moves there")
     rows = _angles(linear, found, names)
-    return Observability(found, names, rows, _independent(found.values, rows), _posteriors(found.modes, rows[None])[0])
+    return ModalObservability(
+        found, names, rows, _independent(found.values, rows), _posteriors(found.modes, rows[None])[0]
+    )
 
 
-def _angles(linear: LinearBody, found: Modes, names: Sequence[str]) -> np.ndarray:
+def _angles(linear: LinearBody, found: ModeSet, names: Sequence[str]) -> np.ndarray:
     """Angle that each sensor sees per degree of each mode's greatest joint: (modes, sensors)."""
     rows = found.shapes[[linear.joint_names.index(name) for name in names]].T
     rows = rows / np.abs(found.shapes).max(axis=0)[:, None]
@@ -135,7 +137,7 @@ def _posteriors(found: Sequence[Mode], angles: np.ndarray) -> np.ndarray:
 
 def fewest_goniometers(
     linear: LinearBody, candidates: Sequence[str] | None = None, within_deg: float = 1.0
-) -> tuple[Observability, ...]:
+) -> tuple[ModalObservability, ...]:
     """All smallest sets of goniometers that leave every falling mode known well enough; the best first.
 
     Parameters
@@ -150,7 +152,7 @@ def fewest_goniometers(
     InputError
         Unknown joint; a figure that is not positive; or no set sees every fall so well.
     """
-    within_deg = positive(within_deg, "within_deg")
+    within_deg = positive_number(within_deg, "within_deg")
     names = tuple(linear.joint_names if candidates is None else candidates)
     whole = observability(linear, names)
     rows = [i for i, mode in enumerate(whole.modes) if mode.kind == "fall"]
@@ -160,7 +162,7 @@ def fewest_goniometers(
             "they do not see every falling mode"
         )
     for size in range(1, len(names) + 1):
-        sets: list[Observability] = []
+        sets: list[ModalObservability] = []
         combinations = itertools.combinations(range(len(names)), size)
         while some := list(itertools.islice(combinations, _SETS_AT_ONCE)):
             good = np.array(some)

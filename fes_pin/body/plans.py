@@ -15,12 +15,12 @@ from functools import cached_property
 import numpy as np
 
 from fes_pin.body.attainable import SETTLE_DEG
-from fes_pin.body.balance import Balance
+from fes_pin.body.balance import GroundRows
 from fes_pin.body.balance import balance as _balance
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.modes import Modes, modes
-from fes_pin.body.programs import Program
+from fes_pin.body.modes import ModeSet, modes
+from fes_pin.body.programs import LinearProgram
 
 PULSE_S = 0.04
 """Time between pulses, s: 25 a second, within the 20 to 50 of functional stimulation (Peckham, Knutson, Annu. Rev.
@@ -64,7 +64,7 @@ class Plans:
     pulse_s: float = PULSE_S
 
     @cached_property
-    def modes(self) -> Modes:
+    def modes(self) -> ModeSet:
         """The body's modes."""
         return modes(self.linear)
 
@@ -196,7 +196,7 @@ class Plans:
         return np.vstack([np.zeros((0, self.inputs.n * len(self.pieces))), *spread])
 
     @cached_property
-    def ground(self) -> Balance:
+    def ground(self) -> GroundRows:
         """The inequalities of the centre of pressure."""
         return _balance(self.linear, self.modes)
 
@@ -257,7 +257,7 @@ class Plans:
         """The input that each column of a plan belongs to: (m pieces,) int."""
         return np.tile(np.arange(self.inputs.n), len(self.pieces))
 
-    def program(self, eta: np.ndarray, rate: np.ndarray, towards: np.ndarray | None = None) -> Program:
+    def program(self, eta: np.ndarray, rate: np.ndarray, towards: np.ndarray | None = None) -> LinearProgram:
         """The plan that brings a start to rest; with `towards`, from as far that way as it can.
 
         Parameters
@@ -279,9 +279,9 @@ class Plans:
             rows = np.column_stack([rows, -self._free(towards, np.zeros_like(towards))])
             must = np.column_stack([must, -towards[fall] / self.degree[fall]])
             cost, lower, upper = np.append(cost, -1.0), np.append(lower, 0.0), np.append(upper, np.inf)
-        return Program(cost, rows, limits, must, start, lower, upper)
+        return LinearProgram(cost, rows, limits, must, start, lower, upper)
 
-    def gentlest(self, eta: np.ndarray, rate: np.ndarray) -> Program:
+    def gentlest(self, eta: np.ndarray, rate: np.ndarray) -> LinearProgram:
         """The plan whose modes stray least, on the way and at the rest in the end.
 
         Further variables are how far each mode strays, on the way and in the end, as a part of `settle_deg`, and, the
@@ -291,7 +291,7 @@ class Plans:
         plan, reach = self.program(eta, rate), self._reach
         modal = reach.any(axis=1)
         count = reach.shape[1]
-        return Program(
+        return LinearProgram(
             cost=np.concatenate([np.full(len(plan.cost), _SPARED / len(plan.cost)), np.ones(count), [1 / _OUTSIDE_M]]),
             A_ub=np.column_stack([plan.A_ub, -reach, -1.0 * ~modal]),
             b_ub=plan.b_ub - modal,

@@ -32,7 +32,7 @@ def linprog(*arguments, **options):
 
 
 @dataclass(frozen=True)
-class Program:
+class LinearProgram:
     """min c'x with A_ub x <= b_ub, A_eq x = b_eq, lower <= x <= upper.
 
     Raises
@@ -49,12 +49,12 @@ class Program:
     lower: np.ndarray = field(repr=False)
     upper: np.ndarray = field(repr=False)
 
-    def solve(self) -> Answer:
+    def solve(self) -> ProgramAnswer:
         """The answer by HiGHS."""
         equal = len(self.b_eq) > 0
         if not len(self.cost):
             kept = np.all(self.b_ub >= -FEASIBLE) and np.all(np.abs(self.b_eq) <= FEASIBLE)
-            return Answer(np.zeros(0) if kept else None, 0.0)
+            return ProgramAnswer(np.zeros(0) if kept else None, 0.0)
         found = linprog(
             self.cost,
             A_ub=sparse.csr_array(self.A_ub),
@@ -64,8 +64,8 @@ class Program:
             bounds=np.column_stack([self.lower, self.upper]),
         )
         if found.status != 0:
-            return Answer(None, np.inf, unbounded=found.status == 3)
-        return Answer(found.x, self._error(found, equal))
+            return ProgramAnswer(None, np.inf, unbounded=found.status == 3)
+        return ProgramAnswer(found.x, self._error(found, equal))
 
     def _error(self, found, equal: bool) -> float:
         x, z = found.x, np.minimum(found.ineqlin.marginals, 0.0)
@@ -85,7 +85,7 @@ class Program:
 
 
 @dataclass(frozen=True)
-class Answer:
+class ProgramAnswer:
     """What a linear program gave: x, or None where there is none, and the error of its cost."""
 
     x: np.ndarray | None

@@ -130,7 +130,7 @@ def nerves(
     from fes_pin.body.attainable import attainable
     from fes_pin.body.balance import place_of_weight
     from fes_pin.body.catchable import catchable
-    from fes_pin.body.controllability import controllability
+    from fes_pin.body.controllability import modal_controllability
     from fes_pin.body.inputs import Inputs
     from fes_pin.muscles.nerve_inputs import subject_nerves
     from fes_pin.view.influence import influence_table, plot_influence
@@ -142,7 +142,7 @@ def nerves(
     _within(max_braces, "--max-braces", 0, 10)
     chosen = subject_nerves(linear.body, name or (), strength=strength)
     inputs = Inputs.of(chosen, linear)
-    result = controllability(linear, inputs, horizon)
+    result = modal_controllability(linear, inputs, horizon)
     lines = [f"{linear}\n{place_of_weight(linear)[1]}\n\n{result}\n"]
     weak, strong = (attainable(linear, inputs.scaled(f), settle_deg=settle) for f in chosen.strength_band)
     held = attainable(linear, inputs, settle_deg=settle)
@@ -196,7 +196,7 @@ def view(
 ) -> None:
     """A page with the body, or a live one: a posture, a mode in motion, a nerve's influence, or measured walking."""
     from fes_pin.muscles.nerve_inputs import subject_nerves
-    from fes_pin.view.viewer import Scene, show_influence, show_mode
+    from fes_pin.view.viewer import BodyScene, show_influence, show_mode
 
     if sum(choice is not None for choice in (mode, nerve, walk)) > 1:
         raise InputError("choose one of --mode, --nerve and --walk")
@@ -213,7 +213,7 @@ def view(
     elif walk is not None:
         scene = _walking(linear.body, walk)
     else:
-        scene = Scene(linear.body, caption=str(linear.body)).pose(linear.whole_posture)
+        scene = BodyScene(linear.body, caption=str(linear.body)).pose(linear.whole_posture)
     if out is not None:
         try:
             scene.write(out)

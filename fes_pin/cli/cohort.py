@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from fes_pin.cohort.run import Progress
+    from fes_pin.cohort.run import CohortProgress
 
 SAID_EVERY_S = 30.0
 """Seconds between lines of progress where nobody watches."""
@@ -58,12 +58,12 @@ def cohort(
 
 
 @contextmanager
-def _progress() -> Iterator[Callable[[Progress], None]]:
+def _progress() -> Iterator[Callable[[CohortProgress], None]]:
     """A bar with the time left on standard error if a person is watching, a line now and then if not."""
     if not sys.stderr.isatty():
         said = [0.0]
 
-        def line(p: Progress) -> None:
+        def line(p: CohortProgress) -> None:
             if time.monotonic() - said[0] > SAID_EVERY_S or p.done == p.total:
                 said[0] = time.monotonic()
                 typer.echo(f"fes-pin: {p.done} of {p.total}, {p.failed} failed, {_left(p.left_s)}", err=True)

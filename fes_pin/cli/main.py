@@ -102,7 +102,7 @@ def diagnose(
             verdict = diagnose_walking(measured, out, seed, limit, tell)
         typer.echo(f"{verdict}\nreport: {out / 'report.html'}")
         return
-    from fes_pin.diagnose.diagnosis import diagnose as find
+    from fes_pin.diagnose.diagnosis import diagnose_joint as find
     from fes_pin.diagnose.record import NEXT_FILE, by_this_command, diagnosis_files
     from fes_pin.diagnose.trajectories import trajectories
     from fes_pin.view.report import report_html

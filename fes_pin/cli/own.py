@@ -118,7 +118,7 @@ def check(
 ) -> None:
     """Say what is odd about a study before anything is looked for, and what its trials can and cannot show."""
     from fes_pin.data.study import read_study
-    from fes_pin.diagnose.testable import testable
+    from fes_pin.diagnose.testable import testable_causes
     from fes_pin.models.catalogue import load_library
 
     catalogue = load_library(*(library or []))
@@ -126,7 +126,7 @@ def check(
     _say(measured, _checked(measured, catalogue))
     if measured.schema.owner is None:
         return
-    found = testable(measured, catalogue)
+    found = testable_causes(measured, catalogue)
     if isinstance(found, str):
         typer.echo(f"what these trials can show is not known before a diagnosis: {found}")
         return

@@ -95,11 +95,11 @@ def _files(work: Work) -> dict[str, str | bytes]:
     study = read_study(work.folder, rigs=catalogue.schemas())
     if study.rig == "body":
         return _walking(study, work.seed)
-    from fes_pin.diagnose.diagnosis import diagnose  # noqa: PLC0415
+    from fes_pin.diagnose.diagnosis import diagnose_joint  # noqa: PLC0415
     from fes_pin.diagnose.record import diagnosis_files  # noqa: PLC0415
     from fes_pin.view.report import report_html  # noqa: PLC0415
 
-    found = diagnose(study, library=catalogue, seed=work.seed, limit=work.limit)
+    found = diagnose_joint(study, library=catalogue, seed=work.seed, limit=work.limit)
     return {**diagnosis_files(found), "report.html": report_html(found)}
 
 

@@ -12,17 +12,21 @@ from fes_pin.data.provenance import this_command, today, versions
 from fes_pin.diagnose.text import percent, probability
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
-from fes_pin.view.page import Content, Markup, element, figure, folded, joined, page, rounded, section, table
+from fes_pin.view.page import Content, Markup, element, figure, folded, html_table, joined, page, section, value_text
 from fes_pin.view.report_causes import stage_mark
 
-Row = dict[str, Any]
+PageRow = dict[str, Any]
 FOREST = 40
 """Studies of one forest plot; of more only the pooled value is drawn."""
 ROW, NAMES, WIDE = 20.0, 150.0, 420.0
 
 
 def cohort_html(
-    studies: Sequence[Row], causes: Sequence[Row], pooled_: Sequence[Row], prevalence: Sequence[Row], seed: int
+    studies: Sequence[PageRow],
+    causes: Sequence[PageRow],
+    pooled_: Sequence[PageRow],
+    prevalence: Sequence[PageRow],
+    seed: int,
 ) -> str:
     """The page, which links the reports beside it and needs nothing else."""
     good = [r for r in studies if r["verdict"] != "failed"]
@@ -37,7 +41,7 @@ def cohort_html(
     return page("Cohort", joined([p for p in parts if p.text]))
 
 
-def _head(studies: Sequence[Row], good: Sequence[Row], prevalence: Sequence[Row]) -> Markup:
+def _head(studies: Sequence[PageRow], good: Sequence[PageRow], prevalence: Sequence[PageRow]) -> Markup:
     counts = Counter(r["verdict"] for r in good)
     failed = len(studies) - len(good)
     if prevalence:
@@ -62,7 +66,7 @@ def _head(studies: Sequence[Row], good: Sequence[Row], prevalence: Sequence[Row]
     )
 
 
-def _prevalence(rows: Sequence[Row], studies: int) -> list[Markup]:
+def _prevalence(rows: Sequence[PageRow], studies: int) -> list[Markup]:
     if not rows:
         return [element("p", "None.")]
     head = (
@@ -90,14 +94,14 @@ def _prevalence(rows: Sequence[Row], studies: int) -> list[Markup]:
         "A study in which a cause was not named may still have it: small, or such as its trials cannot show. The false "
         "discovery rate is over all causes that were looked for in all studies."
     )
-    return [table(head, cells, (2, 3, 4, 5, 6)), element("p", words, class_="soft")]
+    return [html_table(head, cells, (2, 3, 4, 5, 6)), element("p", words, class_="soft")]
 
 
 def _percent(value: float) -> str:
     return "-" if math.isnan(value) else f"{value:.0f} %"
 
 
-def _pooled(causes: Sequence[Row], rows: Sequence[Row]) -> list[Markup]:
+def _pooled(causes: Sequence[PageRow], rows: Sequence[PageRow]) -> list[Markup]:
     if not rows:
         return [element("p", "No value is known from two studies or more.")]
     words = (
@@ -107,8 +111,8 @@ def _pooled(causes: Sequence[Row], rows: Sequence[Row]) -> list[Markup]:
         "somewhat too large."
     )
     head = ("of", "parameter", "studies", "mean [95 %]", "tau", "next study [95 %]", "I²", "all alike")
-    out = [element("p", words, class_="soft"), table(head, [_pooled_cells(r) for r in rows], (2, 3, 4, 5, 6, 7))]
-    values: dict[tuple[str, str], list[Row]] = defaultdict(list)
+    out = [element("p", words, class_="soft"), html_table(head, [_pooled_cells(r) for r in rows], (2, 3, 4, 5, 6, 7))]
+    values: dict[tuple[str, str], list[PageRow]] = defaultdict(list)
     for row in causes:
         values[row["cause"], row["parameter"]].append(row)
     drawn, shown = [], set()
@@ -119,22 +123,22 @@ def _pooled(causes: Sequence[Row], rows: Sequence[Row]) -> list[Markup]:
     return [*out, element("div", joined(drawn), class_="grid")] if drawn else out
 
 
-def _pooled_cells(r: Row) -> list[Content]:
+def _pooled_cells(r: PageRow) -> list[Content]:
     error = (r["high"] - r["low"]) / 4.0
-    bounds = [rounded(r[n], error) for n in ("next_low", "next_high") if math.isfinite(r[n])]
+    bounds = [value_text(r[n], error) for n in ("next_low", "next_high") if math.isfinite(r[n])]
     return [
         element("code", r["cause"]) if r["cause"] else "the rig",
         element("code", r["parameter"]),
         f"{r['studies']} of {r['of']}",
-        f"{rounded(r['mean'], error)} [{rounded(r['low'], error)}, {rounded(r['high'], error)}]",
-        rounded(r["between"], error),
+        f"{value_text(r['mean'], error)} [{value_text(r['low'], error)}, {value_text(r['high'], error)}]",
+        value_text(r["between"], error),
         f"[{', '.join(bounds)}]" if bounds else "-",
         f"{r['heterogeneity']:.0f} %",
         probability(r["p_alike"]),
     ]
 
 
-def _forest(cause: str, parameter: str, rows: Sequence[Row]) -> Drawing:
+def _forest(cause: str, parameter: str, rows: Sequence[PageRow]) -> Drawing:
     """Values of a parameter study by study with their 95 % intervals, and the pooled mean beneath."""
     known = [r for r in rows if math.isfinite(r["value"])]
     drawn = [r for r in known if math.isfinite(r["std"])] if len(known) <= FOREST else []
@@ -163,7 +167,7 @@ def _forest(cause: str, parameter: str, rows: Sequence[Row]) -> Drawing:
     )
 
 
-def _studies(rows: Sequence[Row]) -> list[Markup]:
+def _studies(rows: Sequence[PageRow]) -> list[Markup]:
     head = ("study", "verdict", "causes", "E nominal", "E extended", "left")
     cells: list[list[Content]] = []
     for r in rows:
@@ -174,11 +178,11 @@ def _studies(rows: Sequence[Row]) -> list[Markup]:
         errors = [percent(r[f"{n}_error_percent"]) for n in ("nominal", "extended")]
         left = "something" if r["unexplained"] else "nothing"
         cells.append([link, r["verdict"].replace("_", " "), r["causes"] or "-", *errors, left])
-    made = table(head, cells, (3, 4))
+    made = html_table(head, cells, (3, 4))
     return [made] if len(rows) <= FOREST else [folded(f"All {len(rows)} studies", made)]
 
 
 def _provenance(seed: int) -> list[Markup]:
     told = ", ".join(f"{n} {v}" for n, v in versions().items())
     rows: list[list[Content]] = [["made", today()], ["seed", str(seed)], ["command", element("code", this_command())]]
-    return [element("div", table(("what", "value"), [*rows, ["versions", told]], prose=True), class_="provenance")]
+    return [element("div", html_table(("what", "value"), [*rows, ["versions", told]], prose=True), class_="provenance")]

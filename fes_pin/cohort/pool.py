@@ -28,7 +28,7 @@ from fes_pin.diagnose.record import LEAST_P
 
 
 @dataclass(frozen=True)
-class Pooled:
+class PooledEffect:
     """A value in the population that the studies are of.
 
     Attributes
@@ -58,7 +58,7 @@ class Pooled:
     p_alike: float
 
 
-def pooled(values: Sequence[float], stds: Sequence[float]) -> Pooled | None:
+def pooled(values: Sequence[float], stds: Sequence[float]) -> PooledEffect | None:
     """Random-effects mean of at least two studies; None for fewer that have a finite value and deviation.
 
     Parameters
@@ -82,7 +82,7 @@ def pooled(values: Sequence[float], stds: Sequence[float]) -> Pooled | None:
     half = float(t.ppf(0.975, k - 1)) * error
     reach = float(t.ppf(0.975, k - 2)) * math.hypot(math.sqrt(square), error) if k > 2 else math.inf
     q = _cochran(y, s, 0.0)
-    return Pooled(
+    return PooledEffect(
         count=k,
         mean=mu * size,
         low=(mu - half) * size,

@@ -29,7 +29,7 @@ from fes_pin.models.catalogue import load_library
 
 
 @dataclass(frozen=True)
-class Progress:
+class CohortProgress:
     """How far a cohort is.
 
     Attributes
@@ -73,7 +73,7 @@ def run_cohort(
     seed: int = 0,
     limit: float | None = None,
     library: Sequence[str] = (),
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[CohortProgress], None] | None = None,
     run: Callable[[Work, str], Answer] = diagnose_one,
 ) -> Cohort:
     """Diagnose every study that is not diagnosed yet, and write what all of them say together.
@@ -115,7 +115,7 @@ def run_cohort(
         done, failed = done + 1, failed + bool(answer.error)
         fresh = done - (len(every) - len(todo))
         left = (time.monotonic() - began) / fresh * (len(every) - done)
-        tell(Progress(done, len(every), failed, left, answer.name))
+        tell(CohortProgress(done, len(every), failed, left, answer.name))
 
     def kept() -> Iterator[Kept]:  # read again for each table: no more than one record is held
         return (one for name in found if (one := store.get(name)) is not None)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from fes_pin.compare.held_out import Parting, fits_of, missed, partings, spreads
-from fes_pin.compare.literature import NOMINAL, RIGS, possible, published
+from fes_pin.compare.held_out import Parting, fits_of, left_out_errors, partings, spreads
+from fes_pin.compare.literature import NOMINAL, RIGS, possible, published_model
 from fes_pin.compare.result import Apart, Compared, Comparison, apart_from
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
@@ -25,9 +25,7 @@ from fes_pin.models.catalogue import Source
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import load_model
-from fes_pin.workers import one_thread_each
-
-Progress = Callable[[float, str], None]
+from fes_pin.workers import Progress, one_thread_each
 
 
 def compare(
@@ -125,7 +123,7 @@ def _chosen(
         if name == NOMINAL:
             out.append(_Chosen(name, nominal))
             continue
-        one = published(name)
+        one = published_model(name)
         model = one.model(nominal, trials)
         out.append(_Chosen(name, model, one.words, one.source, one.unfelt(nominal, trials)))
     for name, given in (extended or {}).items():
@@ -150,7 +148,7 @@ def _compared(
     given_s: float | None,
 ) -> Compared:
     fits = fits_of(one.model, parts, scale)
-    errors = missed(fits, parts, scale, horizon_s, given_s)
+    errors = left_out_errors(fits, parts, scale, horizon_s, given_s)
     white = {n: Noise(s, (), s) for n, s in scale.items()}
     whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(one.model, fitted, white), one.model.parameters())
     columns = np.array([one.model.rig.output(t.kind) for p in parts for t in p.held])

@@ -32,7 +32,7 @@ class Parting:
 
 
 @dataclass(frozen=True)
-class Missed:
+class LeftOutErrors:
     """Mean squared errors of one model, one number a held-out trial, in the unit of its column, squared.
 
     Attributes
@@ -75,16 +75,16 @@ def fits_of(model: Model, parts: Sequence[Parting], scale: Mapping[str, float]) 
     return in_parallel(lambda p: fit_multistart(Problem(model, p.fitted, white), model.parameters()), parts)
 
 
-def missed(
+def left_out_errors(
     fits: Sequence[Fit], parts: Sequence[Parting], scale: Mapping[str, float], horizon_s: float, given_s: float | None
-) -> Missed:
+) -> LeftOutErrors:
     """Errors of one model on every held-out trial, parting after parting."""
     many = in_parallel(lambda pair: _of_parting(*pair, scale, horizon_s, given_s), list(zip(fits, parts, strict=True)))
     free, horizon = (np.concatenate([m[k] for m in many]) for k in (0, 1))
     if given_s is None or any(m[2] is None for m in many):
-        return Missed(free, horizon, None, None)
+        return LeftOutErrors(free, horizon, None, None)
     begun, rest = (np.concatenate([m[k] for m in many]) for k in (2, 3))
-    return Missed(free, horizon, begun, rest)
+    return LeftOutErrors(free, horizon, begun, rest)
 
 
 def _of_parting(

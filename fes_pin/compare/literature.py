@@ -192,7 +192,7 @@ LITERATURE: tuple[Published, ...] = (
 """In the order in which they are listed."""
 
 
-def published(name: str) -> Published:
+def published_model(name: str) -> Published:
     """The model of that name.
 
     Raises

@@ -10,20 +10,20 @@ import numpy as np
 
 from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.result import Change
-from fes_pin.contrast.search import Found
+from fes_pin.contrast.search import ContrastFound
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import ParameterEstimate
 from fes_pin.diagnose.experiment import SEPARABLE
-from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated
+from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated_trials
 from fes_pin.identify.fit import PARAMETER_PRICE
 from fes_pin.models.model import Model
 
 Trials = Mapping[str, Sequence[Trial]]
-Run = Callable[[Trials], tuple[Fits, Found]]
+RunContrast = Callable[[Trials], tuple[Fits, ContrastFound]]
 
 
 @dataclass(frozen=True)
-class Searched:
+class ContrastSearched:
     """A search that has run.
 
     Attributes
@@ -35,23 +35,23 @@ class Searched:
     """
 
     fits: Fits
-    found: Found
+    found: ContrastFound
     group: str | None = None
     misread: Misread | None = None
 
 
-def search_with_conditions(nominal: Model, trials: Trials, run: Run) -> Searched:
+def contrast_with_conditions(nominal: Model, trials: Trials, run: RunContrast) -> ContrastSearched:
     """Search groups of trials, and again with a trial restated that stands out of its own group."""
     told = [(g, one) for g, many in trials.items() if (one := _found(nominal, many)) is not None]
     if not told:
-        return Searched(*run(trials))
+        return ContrastSearched(*run(trials))
     group, misread = min(told, key=lambda pair: pair[1].p_value)
-    other = {**trials, group: restated(nominal, trials[group], misread)}
+    other = {**trials, group: restated_trials(nominal, trials[group], misread)}
     fits, found = run(other)
-    after = Searched(fits, found, group, misread)
+    after = ContrastSearched(fits, found, group, misread)
     if not found.best.items:  # nothing changed, and nothing is wrong: no explanation is simpler
         return after
-    as_stated = Searched(*run(trials))
+    as_stated = ContrastSearched(*run(trials))
     stated = sum(len(nominal.rig.stated(t)) for many in trials.values() for t in many)
     price = PARAMETER_PRICE + 2.0 * math.log(stated)
     best = replace(as_stated.found.best, weights=found.best.weights)
@@ -66,7 +66,7 @@ def _found(nominal: Model, trials: Sequence[Trial]) -> Misread | None:
         return None
 
 
-def misread_change(searched: Searched) -> list[Change]:
+def misread_change(searched: ContrastSearched) -> list[Change]:
     """The trial that was restated, as a change of its group; none if none was."""
     one, group = searched.misread, searched.group
     if one is None or group is None:

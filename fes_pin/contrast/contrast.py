@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.contrast.conditions import Trials, misread_change, search_with_conditions
+from fes_pin.contrast.conditions import Trials, contrast_with_conditions, misread_change
 from fes_pin.contrast.decide import inflation
 from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.grouped import Grouped, Item
 from fes_pin.contrast.groups import BY_GROUP, grouped_study
 from fes_pin.contrast.result import Change, Contrast
-from fes_pin.contrast.search import ContrastSearch, Found, Progress
+from fes_pin.contrast.search import ContrastFound, ContrastSearch
 from fes_pin.contrast.words import of_cause, of_nominal
 from fes_pin.data.study import Study
 from fes_pin.diagnose.cause import ParameterEstimate
@@ -23,12 +23,12 @@ from fes_pin.diagnose.diagnosis import despiked_study, split
 from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.driven import driven_remainder
-from fes_pin.diagnose.remainder.open_set import Remainder, remainder
+from fes_pin.diagnose.remainder.open_set import Remainder, unexplained_remainder
 from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
-from fes_pin.workers import in_parallel, one_thread_each
+from fes_pin.workers import Progress, in_parallel, one_thread_each
 
 SEEN = 0.95
 """Power at which a change that was not found is called excluded."""
@@ -90,11 +90,11 @@ def contrast(
     with one_thread_each():
         effects = catalogue.effects_for(nominal.rig)
 
-        def run(those: Trials) -> tuple[Fits, Found]:
+        def run(those: Trials) -> tuple[Fits, ContrastFound]:
             made = Fits(nominal, those, effects, driven)
             return made, ContrastSearch(made, seed, tell).run()
 
-        searched = search_with_conditions(nominal, trials, run)
+        searched = contrast_with_conditions(nominal, trials, run)
         fits, found = searched.fits, searched.found
         tell(0.95, "what is left")
         left, said = _left(fits, found.best, seed)
@@ -122,7 +122,7 @@ def contrast(
 def _left(fits: Fits, best: Grouped, seed: int) -> tuple[Remainder, list[str]]:
     """What is left in some groups alone; what is left in all is an error of the model, and is said."""
     parts = in_parallel(lambda g: fits.part(best, g), list(fits.trials))
-    test = driven_remainder if fits.driven else remainder
+    test = driven_remainder if fits.driven else unexplained_remainder
     each = dict(zip(fits.trials, in_parallel(lambda f: test(f, seed), parts), strict=True))
     each = {g: _in_single_trials(fits, best, g, r, seed) if r.unexplained else r for g, r in each.items()}
     least = min(each.values(), key=lambda r: r.p_value)
@@ -140,13 +140,13 @@ def _in_single_trials(fits: Fits, best: Grouped, group: str, left: Remainder, se
 
     Trials whose strength or friction differs, of whatever group, leave something beside values that they share.
     """
-    test = driven_remainder if fits.driven else remainder
+    test = driven_remainder if fits.driven else unexplained_remainder
     alone = in_parallel(lambda k: fits.part(best, group, k), range(len(fits.trials[group])))
     p = min(1.0, 2.0 * float(np.median([test(one, seed).p_value for one in alone])))
     return replace(left, unexplained=p < LEVEL, p_value=max(left.p_value, p))
 
 
-def _change(found: Found, item: Item, groups: tuple[str, ...], catalogue: Catalogue) -> Change:
+def _change(found: ContrastFound, item: Item, groups: tuple[str, ...], catalogue: Catalogue) -> Change:
     best, model = found.best, found.best.model
     assert item.group is not None
     rest = found.without[item]
@@ -201,7 +201,9 @@ def _is_of(cause: str, path: str) -> bool:
     return path.split(".", maxsplit=1)[0] == cause
 
 
-def _not_changed(found: Found, driven: bool) -> tuple[dict[str, float], dict[str, ParameterEstimate], tuple[str, ...]]:
+def _not_changed(
+    found: ContrastFound, driven: bool
+) -> tuple[dict[str, float], dict[str, ParameterEstimate], tuple[str, ...]]:
     """How large a change would have been seen: of what the model has as a share, of other causes in their units."""
     changed = {i.name for i in found.best.items}
     single = 1.0 - (1.0 - LEVEL) ** (1.0 / found.family.tests)

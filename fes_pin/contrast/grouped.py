@@ -16,7 +16,7 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Linearized, Problem, Unknowns
 from fes_pin.models.model import Model
-from fes_pin.models.parameters import Parameter
+from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
@@ -71,7 +71,7 @@ class GroupedModel:
         """The value of every parameter, by its path here."""
         return {self.path(n, g): v for g, m in self.models.items() for n, v in m.parameters().items()}
 
-    def parameter_info(self) -> dict[str, Parameter]:
+    def parameter_info(self) -> dict[str, ParameterInfo]:
         """Unit, null, bounds and scale, by path."""
         return {self.path(n, g): i for g, m in self.models.items() for n, i in m.parameter_info().items()}
 

@@ -87,7 +87,7 @@ class Contrast:
         return contrast_text(self)
 
 
-def headline(found: Contrast) -> str:
+def contrast_headline(found: Contrast) -> str:
     """The answer in one sentence."""
     between = " and ".join(found.groups)
     if found.verdict == "unexplained":
@@ -108,7 +108,7 @@ def change_row(change: Change) -> tuple[str, str, str, str, str]:
     return change.name, change.words, "\n".join(lines), shown, ", ".join(change.equivalents) or "-"
 
 
-def notes(found: Contrast) -> list[str]:
+def contrast_notes(found: Contrast) -> list[str]:
     """What stands beneath the changes."""
     lines = []
     if found.common:
@@ -129,9 +129,9 @@ def notes(found: Contrast) -> list[str]:
 
 def contrast_text(found: Contrast) -> str:
     """The whole answer as plain text."""
-    lines = [f"{found.study.name}: {headline(found)}"]
+    lines = [f"{found.study.name}: {contrast_headline(found)}"]
     for change in found.changes:
         name, words, values, shown, others = change_row(change)
         lines.append(f" {name}: {words}; {shown}; cannot be told from {others}")
         lines += [f"   {value}" for value in values.split("\n")]
-    return "\n".join(lines + [f" {note}" for note in notes(found)])
+    return "\n".join(lines + [f" {note}" for note in contrast_notes(found)])

@@ -7,7 +7,6 @@ turn up as a change: of two that explain as much the common one is taken.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,7 @@ from fes_pin.contrast.promises import Promise
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.identify.fit import PARAMETER_PRICE
-from fes_pin.workers import in_parallel
+from fes_pin.workers import Progress, in_parallel
 
 MOST_ITEMS = 5
 """Common causes and changes together."""
@@ -32,11 +31,9 @@ STARTS = 2
 SWAPS = 2
 """Rounds in which items may be replaced by better ones."""
 
-Progress = Callable[[float, str], None]
-
 
 @dataclass
-class Found:
+class ContrastFound:
     """What a search found.
 
     Attributes
@@ -70,7 +67,7 @@ class ContrastSearch:
     def __init__(self, fits: Fits, seed: int, progress: Progress) -> None:
         self.fits, self.seed, self.progress = fits, seed, progress
 
-    def run(self) -> Found:
+    def run(self) -> ContrastFound:
         """Search forward, swap, take back what is superfluous, under the noise that the set itself leaves."""
         self.progress(0.05, "one model for all groups")
         nominal = self.fits.first()
@@ -158,7 +155,7 @@ class ContrastSearch:
             best = without[weakest]
         return best
 
-    def _told(self, nominal: Grouped, best: Grouped) -> Found:
+    def _told(self, nominal: Grouped, best: Grouped) -> ContrastFound:
         """Every change with its p-value and its rivals; one that a common cause could replace is none."""
         while True:
             p_values, without, rivals = {}, {}, {}
@@ -177,7 +174,7 @@ class ContrastSearch:
                 break
             best = self._dropped(min(doubtful, key=lambda d: d[0].price)[0])
         promises, _ = self.fits.promises(best)
-        return Found(nominal, best, p_values, without, rivals, promises, self.family)
+        return ContrastFound(nominal, best, p_values, without, rivals, promises, self.family)
 
     def _dropped(self, best: Grouped) -> Grouped:
         """The set less the changes that are not significant any more."""

@@ -61,7 +61,7 @@ def fatigue_of(model: Model) -> Fatigue | None:
     return next((e for e in model.effects if isinstance(e, Fatigue)), None)
 
 
-def budget(model: Model, load_kg: float, reference_rad: np.ndarray, capacity: float = 1.0) -> Budget:
+def muscle_budget(model: Model, load_kg: float, reference_rad: np.ndarray, capacity: float = 1.0) -> Budget:
     """What a schedule costs a muscle, from the fatigue that was identified.
 
     Parameters
@@ -118,7 +118,7 @@ def least_rest(model: Model, load_kg: float, bout_rad: np.ndarray, bouts: int) -
     rest_angle = AnkleDynamics.of(model, load_kg).rest_angle()
 
     def fits(rest_s: float) -> bool:
-        return budget(model, load_kg, scheduled(bout_rad, bouts, rest_s, rest_angle)).respected
+        return muscle_budget(model, load_kg, scheduled(bout_rad, bouts, rest_s, rest_angle)).respected
 
     low, high = 0.0, LONGEST_REST_S
     if fits(low):

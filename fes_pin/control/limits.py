@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fes_pin.control.dynamics import ANGLES_RAD, PULSE_S
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import as_number, between, positive
+from fes_pin.data.numbers import as_number, between, positive_number
 
 BURST = 0.2
 """Share of a second's charge that may be given at once; the rest is what may be given steadily. Together they are what
@@ -50,9 +50,9 @@ class StimulationLimits:
 
     def __post_init__(self) -> None:
         for name in ("pulse_width_us", "rate_us_per_s", "charge_uc_per_s"):
-            positive(getattr(self, name), name, infinite=True)
+            positive_number(getattr(self, name), name, infinite=True)
         if self.current_ma is not None:
-            positive(self.current_ma, "current_ma")
+            positive_number(self.current_ma, "current_ma")
         elif self.charge_uc_per_s < math.inf:
             raise InputError("charge_uc_per_s: a limit of charge needs current_ma")
         between(self.ramp_s, 0.0, 1.0, "ramp_s")

@@ -13,7 +13,7 @@ from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S
 
 
-class Joint(Protocol):
+class StimulatedJoint(Protocol):
     """Something that is stimulated and moves: a rig, or a twin."""
 
     @property
@@ -52,7 +52,7 @@ class Tracking:
 
 def track(
     controller: PositionController,
-    joint: Joint,
+    joint: StimulatedJoint,
     reference_rad: np.ndarray,
     noise_std_rad: float = 2e-3,
     seed: int = 0,

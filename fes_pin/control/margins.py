@@ -20,7 +20,7 @@ FREQUENCIES = 4000
 
 
 @dataclass(frozen=True)
-class Margins:
+class StabilityMargins:
     """How far a stable loop is from instability.
 
     Attributes
@@ -44,7 +44,7 @@ class Margins:
     distance_hz: float
 
 
-def margins(loop: Loop) -> Margins:
+def margins(loop: Loop) -> StabilityMargins:
     """Margins of a loop, from its frequency response up to half the pulse rate."""
     hz = np.linspace(0.0, 0.5 / PULSE_S, FREQUENCIES + 1)[1:]
     answer = loop.opened(hz)
@@ -54,7 +54,7 @@ def margins(loop: Loop) -> Margins:
     ones = np.diff(np.sign(size - 1.0)) != 0
     lag = np.mod(turn[1:][ones] + math.pi, 2.0 * math.pi)
     least = int(np.argmin(np.abs(1.0 + answer)))
-    return Margins(
+    return StabilityMargins(
         min(crossing, default=math.inf),
         math.degrees(min(lag, default=math.inf)),
         float(min(lag / (2.0 * math.pi * hz[1:][ones]), default=math.inf)),

@@ -26,6 +26,11 @@ def as_number(value: object) -> float | None:
         return math.inf
 
 
+def printed(value: float | None, digits: int) -> float | None:
+    """A number with so many significant digits, as results are written; None for what is not finite."""
+    return None if value is None or not math.isfinite(value) else float(f"{value:.{digits}g}")
+
+
 def number(value: object, name: str, infinite: bool = False) -> float:
     """A value as a number.
 
@@ -63,7 +68,7 @@ def between(value: object, low: float, high: float, name: str) -> float:
     return found
 
 
-def positive(value: object, name: str, infinite: bool = False) -> float:
+def positive_number(value: object, name: str, infinite: bool = False) -> float:
     """A number above 0.
 
     Raises

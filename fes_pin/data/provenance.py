@@ -57,7 +57,7 @@ def this_command() -> str:
     return shlex.join(["fes-pin", *sys.argv[1:]])
 
 
-def provenance(study: Study, seed: int) -> Provenance:
+def provenance_now(study: Study, seed: int) -> Provenance:
     """Where what is made of a study now comes from."""
     return Provenance(today(), versions(), hashes(study.folder), seed)
 

@@ -55,7 +55,7 @@ MEANT: Mapping[str, set[str]] = {
 
 
 @dataclass(frozen=True)
-class Number:
+class NumberKey:
     """A number that a table of the study holds: its unit and its bounds."""
 
     unit: str
@@ -88,19 +88,19 @@ class Number:
         return f" in {self.unit}" if self.unit else ""
 
 
-def positive(unit: str, required: bool = True) -> Number:
+def positive(unit: str, required: bool = True) -> NumberKey:
     """A number above 0."""
-    return Number(unit, 0.0, True, required)
+    return NumberKey(unit, 0.0, True, required)
 
 
-def not_negative(unit: str, required: bool = True) -> Number:
+def not_negative(unit: str, required: bool = True) -> NumberKey:
     """A number of at least 0."""
-    return Number(unit, 0.0, False, required)
+    return NumberKey(unit, 0.0, False, required)
 
 
-def any_number(unit: str, required: bool = True) -> Number:
+def any_number(unit: str, required: bool = True) -> NumberKey:
     """A finite number."""
-    return Number(unit, required=required)
+    return NumberKey(unit, required=required)
 
 
 @dataclass(frozen=True)
@@ -144,16 +144,16 @@ class RigSchema:
         The class that models it, which this chapter only carries; None if there is no model of a single trial.
     """
 
-    constants: Mapping[str, Number]
-    start: Mapping[str, Number]
-    conditions: Mapping[str, Number]
+    constants: Mapping[str, NumberKey]
+    start: Mapping[str, NumberKey]
+    conditions: Mapping[str, NumberKey]
     default_kind: str
     outputs: Mapping[str, str]
     inputs: tuple[str, ...] = ()
     inputs_required: bool = True
     optional: tuple[str, ...] = ()
     imposed: tuple[str, ...] = ()
-    passive: Mapping[str, Number] = field(default_factory=dict)
+    passive: Mapping[str, NumberKey] = field(default_factory=dict)
     files: Mapping[str, bool] = field(default_factory=dict)
     either: tuple[str, ...] = ()
     start_may_be_known: bool = False

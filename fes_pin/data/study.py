@@ -19,7 +19,7 @@ from fes_pin.data.motion import GROUND_REACTION
 from fes_pin.data.recorded.columns import Columns, columns_of
 from fes_pin.data.schema import (
     ROLES,
-    Number,
+    NumberKey,
     Rigs,
     RigSchema,
     check_conditions,
@@ -216,7 +216,7 @@ class _Reader:
     def _horizon(self) -> float | None:
         table = self.document.table("study")
         given = {HORIZON: table[HORIZON]} if HORIZON in table else {}
-        return self.document.numbers("study", given, {HORIZON: Number("s", 0.0, required=False)}).get(HORIZON)
+        return self.document.numbers("study", given, {HORIZON: NumberKey("s", 0.0, required=False)}).get(HORIZON)
 
     def _study_table(self) -> tuple[str, str]:
         if "study" not in self.document.data:
@@ -244,7 +244,7 @@ class _Reader:
         paths = {key: table.pop(key) for key in self.schema.files if key in table}
         known = dict(self.schema.constants)
         if self.schema.start_may_be_known:
-            known |= {key: Number(n.unit, n.lower, n.strict, False) for key, n in self.schema.start.items()}
+            known |= {key: NumberKey(n.unit, n.lower, n.strict, False) for key, n in self.schema.start.items()}
         constants = self.document.numbers("rig", table, known, also=(*self.schema.files,))
         constants |= self.document.numbers("rig.passive", passive, self.schema.passive)
         for key, required in self.schema.files.items():

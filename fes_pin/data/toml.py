@@ -12,7 +12,7 @@ from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import inside, read_text, what_is_at
-from fes_pin.data.schema import Number, unknown
+from fes_pin.data.schema import NumberKey, unknown
 
 _TABLE = re.compile(r"^\s*(\[\[?)\s*([^\]#]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*'))*)\s*=""")
@@ -47,7 +47,7 @@ class Document:
         return value
 
     def numbers(
-        self, where: str, table: Mapping[str, Any], known: Mapping[str, Number], also: tuple[str, ...] = ()
+        self, where: str, table: Mapping[str, Any], known: Mapping[str, NumberKey], also: tuple[str, ...] = ()
     ) -> dict[str, float]:
         """Numbers of a table by key.
 

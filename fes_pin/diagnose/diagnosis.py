@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.provenance import provenance
+from fes_pin.data.provenance import provenance_now
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -25,12 +25,10 @@ from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.diagnose.searches import Searches
 from fes_pin.models.catalogue import Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
-from fes_pin.workers import one_thread_each, time_limit
-
-Progress = Callable[[float, str], None]
+from fes_pin.workers import Progress, one_thread_each, time_limit
 
 
-def diagnose(
+def diagnose_joint(
     study: Study,
     *,
     library: Source | Sequence[Source] | None = None,
@@ -67,7 +65,7 @@ def diagnose(
     """
     began = time.perf_counter()
     tell = progress or (lambda _share, _words: None)
-    catalogue, made = catalogue_of(library), provenance(study, seed)
+    catalogue, made = catalogue_of(library), provenance_now(study, seed)
     study, left_out = despiked_study(study)
     nominal = nominal_model(study)
     warnings = check_study(study, nominal)
@@ -135,4 +133,4 @@ def split(study: Study) -> tuple[list[Trial], list[Trial]]:
     return train, test
 
 
-__all__ = ["diagnose", "split"]
+__all__ = ["diagnose_joint", "split"]

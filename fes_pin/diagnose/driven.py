@@ -15,7 +15,7 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
-from fes_pin.diagnose.decide.held_out import Errors, Evidence, folds_of, gain
+from fes_pin.diagnose.decide.held_out import Errors, Evidence, folds_of, held_out_gain
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
 from fes_pin.diagnose.errors_ahead import (
     Ahead,
@@ -267,7 +267,7 @@ def driven_diagnosis(
             equivalents=alternatives(best, found.rivals[one.name], one.name),
             p_value=found.p_values[one.name],
             gain_fit=judged.gain_fit(one.name),
-            gain_held_out=gain(judged.nominal, judged.without[one.name], judged.extended, seed),
+            gain_held_out=held_out_gain(judged.nominal, judged.without[one.name], judged.extended, seed),
             evidence=judged.evidence.get(one.name),
         )
         for one in best.model.effects

@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import Errors
-from fes_pin.identify.ahead import Missed, missed, one_step, over_horizon, own_noise
+from fes_pin.identify.ahead import SquaredErrors, forecast_errors, one_step, over_horizon, own_noise
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import driving_size
 from fes_pin.identify.noise import NoiseModel
@@ -52,7 +52,7 @@ class Ahead:
     free: float | None
 
     @classmethod
-    def of(cls, total: Missed) -> Ahead:
+    def of(cls, total: SquaredErrors) -> Ahead:
         """From squared errors."""
         share = 100.0 / max(total.around, 1e-300)
         return cls(share * total.one_step, share * total.horizon, share * total.free)
@@ -91,7 +91,7 @@ def free_errors(
     extended: Fit,
     floor: NoiseModel,
     horizon_s: float,
-    held_out: tuple[Missed, Missed] | None,
+    held_out: tuple[SquaredErrors, SquaredErrors] | None,
 ) -> AheadErrors:
     """Errors over time of two models that are simulated freely.
 
@@ -102,7 +102,7 @@ def free_errors(
     held_out
         Squared errors of both on trials that took no part, if there are such.
     """
-    inside = [Ahead.of(missed(f.model, f.trials, own_noise(f), floor, horizon_s)) for f in (nominal, extended)]
+    inside = [Ahead.of(forecast_errors(f.model, f.trials, own_noise(f), floor, horizon_s)) for f in (nominal, extended)]
     outside = [Ahead.of(total) for total in held_out] if held_out else [None, None]
     return AheadErrors(horizon_s, inside[0], inside[1], outside[0], outside[1])
 

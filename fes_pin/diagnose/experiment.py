@@ -196,13 +196,13 @@ def _inside(values: np.ndarray, limits: tuple[float, float]) -> bool:
     return bool(np.isfinite(values).all() and values.min() >= limits[0] and values.max() <= limits[1])
 
 
-Found = tuple[dict[str, Discrimination], Trial]
+BestTrial = tuple[dict[str, Discrimination], Trial]
 
 
-def _best(best: Fit, rivals: Mapping[str, Fit], trials: Sequence[Trial], study: Study) -> Found | None:
+def _best(best: Fit, rivals: Mapping[str, Fit], trials: Sequence[Trial], study: Study) -> BestTrial | None:
     """The trial that separates the closest rival best, and what it tells of each."""
     each = {n: discriminations(best, rival, trials, study) for n, rival in rivals.items()}
-    found: list[Found] = []
+    found: list[BestTrial] = []
     for k, trial in enumerate(trials):
         of_trial = {n: p for n, many in each.items() if (p := many[k]) is not None and np.isfinite(p.worth)}
         if len(of_trial) == len(rivals):
@@ -210,11 +210,11 @@ def _best(best: Fit, rivals: Mapping[str, Fit], trials: Sequence[Trial], study: 
     return max(found, key=_worth, default=None)
 
 
-def _worth(found: Found) -> float:
+def _worth(found: BestTrial) -> float:
     return min(p.worth for p in found[0].values())
 
 
-def _refined(best: Fit, rivals: Mapping[str, Fit], found: Found, study: Study) -> Found:
+def _refined(best: Fit, rivals: Mapping[str, Fit], found: BestTrial, study: Study) -> BestTrial:
     """The trial with stretches of its stimulus held at other levels, where that separates better."""
     rng = np.random.default_rng(7)
     column = rig_of(study).steered(study)

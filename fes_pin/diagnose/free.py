@@ -10,10 +10,10 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.decide.doubts import doubts, with_error
-from fes_pin.diagnose.decide.held_out import HeldOut, cross_validate, errors_of, gain, separate
+from fes_pin.diagnose.decide.held_out import HeldOut, cross_validate, errors_of, held_out_gain, separate
 from fes_pin.diagnose.decide.rivals import absorbed, equivalents, estimates, experiment, ranking
 from fes_pin.diagnose.errors_ahead import free_errors
-from fes_pin.diagnose.remainder.open_set import Remainder, remainder
+from fes_pin.diagnose.remainder.open_set import Remainder, unexplained_remainder
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.misspecified import under_one_noise
 from fes_pin.diagnose.search.simulation_search import Searched, SimulationSearch
@@ -36,23 +36,23 @@ def judge_free(
 ) -> Diagnosis:
     """The verdict on what a search found: causes that trials held out bear out, and what is left."""
     horizon = study.horizon_s or default_horizon(searched.nominal.trials)
-    left = remainder(searched.best, seed)
+    left = unexplained_remainder(searched.best, seed)
     causes, held = _causes(searched, left, test, seed, horizon)
     refused: list[Cause] = []
     if searched.stopped and not all(c.helps(False, True) for c in causes):
         searched = search.stopped(())
-        left = remainder(searched.best, seed)
+        left = unexplained_remainder(searched.best, seed)
         causes, held = [], None
     while not searched.stopped and (weak := [c for c in causes if not c.helps(searched.complete, len(causes) == 1)]):
         weakest = min(weak, key=lambda c: c.gain_held_out.low)
         refused.append(weakest)
         searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
-        left = remainder(searched.best, seed)
+        left = unexplained_remainder(searched.best, seed)
         causes, held = _causes(searched, left, test, seed, horizon)
     worthless = bool(causes) and _error(searched.best, searched.floor) > OF_THE_MEAN
     if worthless:
         searched, causes = search.stopped(()) if searched.stopped else search.settle(()), []
-        left, held = remainder(searched.best, seed), _held_out(searched, test, horizon)
+        left, held = unexplained_remainder(searched.best, seed), _held_out(searched, test, horizon)
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     left, reason = with_error(with_refused(left, refused), searched)
     if worthless:
@@ -155,8 +155,8 @@ def _causes(
                 parameters=estimates(best, name),
                 equivalents=equivalents(searched, name, left),
                 p_value=searched.p_values[name],
-                gain_fit=gain(inside_nominal, inside[name], inside_best, seed).percent,
-                gain_held_out=gain(measured.nominal, measured.without[name], measured.extended, seed),
+                gain_fit=held_out_gain(inside_nominal, inside[name], inside_best, seed).percent,
+                gain_held_out=held_out_gain(measured.nominal, measured.without[name], measured.extended, seed),
                 evidence=measured.evidence.get(name),
             )
         )

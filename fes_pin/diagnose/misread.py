@@ -123,7 +123,7 @@ def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
     return min(found, key=lambda m: m.p_value, default=None)
 
 
-def restated(model: Model, trials: Sequence[Trial], found: Misread) -> list[Trial]:
+def restated_trials(model: Model, trials: Sequence[Trial], found: Misread) -> list[Trial]:
     """The trials, one of them with the value that it must have had."""
     return [model.rig.restated(t, found.condition, found.value) if t.name == found.trial else t for t in trials]
 
@@ -257,4 +257,4 @@ def _step(
     return _Step(rig.stated(now)[name] - begun, std, float(r @ r) / max(len(r), 1))
 
 
-__all__ = ["Misread", "find_misread", "restated"]
+__all__ = ["Misread", "find_misread", "restated_trials"]

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from fes_pin.data.numbers import printed
 from fes_pin.data.provenance import this_command
 from fes_pin.data.trial import trial_csv
 from fes_pin.diagnose.cause import Cause
@@ -25,9 +26,7 @@ NEXT_FILE = "next_trial.csv"
 
 def shown(value: float | None) -> float | None:
     """A number as printed; None for what is not finite."""
-    if value is None or not math.isfinite(value):
-        return None
-    return float(f"{value:.{DIGITS}g}")
+    return printed(value, DIGITS)
 
 
 def _p_shown(value: float) -> float | None:

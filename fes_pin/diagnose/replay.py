@@ -39,7 +39,7 @@ class Replay:
     extended_error: float
 
 
-def replay(diagnosis: Diagnosis) -> tuple[Replay, ...]:
+def replayed_trials(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     """Every trial of the study as both models of a diagnosis predict it, in the order of the study."""
     trials, noise = diagnosis.study.trials, diagnosis.extended.noise
     nominal = _predicted(diagnosis.nominal, trials, noise, diagnosis.over_horizon)
@@ -47,7 +47,7 @@ def replay(diagnosis: Diagnosis) -> tuple[Replay, ...]:
     made = []
     for trial, before, after in zip(trials, nominal, extended, strict=True):
         outputs = tuple(n for n in diagnosis.model.rig.outputs(trial.kind) if n in trial)
-        errors = (error_percent(trial, one, outputs, noise) for one in (before, after))
+        errors = (trial_error_percent(trial, one, outputs, noise) for one in (before, after))
         made.append(Replay(trial, before, after, outputs, *errors))
     return tuple(made)
 
@@ -73,7 +73,7 @@ def _shown(readings: np.ndarray, trial: Trial, name: str) -> np.ndarray:
     return within(readings, most if most > 0.0 else 1.0)
 
 
-def error_percent(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> float:
+def trial_error_percent(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> float:
     """E of eq. (2): squared error over the measurement's squares about its mean, percent.
 
     With more than one output each is taken in units of its noise.

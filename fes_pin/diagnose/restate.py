@@ -16,14 +16,14 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause, ParameterEstimate
-from fes_pin.diagnose.decide.held_out import Errors, cross_validate, errors_of, gain, separate
+from fes_pin.diagnose.decide.held_out import Errors, cross_validate, errors_of, held_out_gain, separate
 from fes_pin.diagnose.errors_ahead import Ahead
 from fes_pin.diagnose.experiment import SEPARABLE
-from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated
+from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated_trials
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.diagnose.searches import Result, Search
-from fes_pin.identify.ahead import missed, own_noise
+from fes_pin.identify.ahead import forecast_errors, own_noise
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
@@ -90,12 +90,12 @@ def _found(model: Model, trials: Sequence[Trial]) -> Misread | None:
 
 def _restated(nominal: Model, trials: Sequence[Trial], misread: Misread, run: Run) -> Restated:
     """A search of the restated trials; once more with the value beside the causes that it finds."""
-    other = restated(nominal, trials, misread)
+    other = restated_trials(nominal, trials, misread)
     search, searched = run(other)
     if searched.best.model.effects and not search.was_stopped:
         again = _found(searched.best.model, trials)
         if again is not None and (again.trial, again.condition) == (misread.trial, misread.condition):
-            misread, other = again, restated(nominal, trials, again)
+            misread, other = again, restated_trials(nominal, trials, again)
             search, searched = run(other)
     return Restated(misread, other, search, searched)
 
@@ -119,7 +119,7 @@ def _saved(one: Fit, trials: Sequence[Trial], other: Fit, restated_trials: Seque
 
 def restated_study(study: Study, nominal: Model, misread: Misread) -> Study:
     """The study with the trial's value in the place of what it states."""
-    return replace(study, trials=tuple(restated(nominal, study.trials, misread)))
+    return replace(study, trials=tuple(restated_trials(nominal, study.trials, misread)))
 
 
 def with_misread(
@@ -138,7 +138,7 @@ def with_misread(
         before = fit_multistart(Problem(bare, trials, before.noise), bare.parameters())
     floor = rough_noise(before.model, trials)
     pair = (errors_of(before.model, trials, floor), errors_of(diagnosis.nominal.model, made.trials, floor))
-    cause = _cause(made, gain(pair[0], *pair, seed).percent, trials, seed)
+    cause = _cause(made, held_out_gain(pair[0], *pair, seed).percent, trials, seed)
     told = replace(diagnosis, causes=(cause, *diagnosis.causes), verdict="causes_found")
     if before.doubt is not None or diagnosis.ahead is None:
         return told
@@ -149,7 +149,7 @@ def with_misread(
         else cross_validate(before, before, {}, [], floor, horizon)
     )
     assert held.ahead is not None
-    inside = Ahead.of(missed(before.model, trials, own_noise(before), floor, horizon))
+    inside = Ahead.of(forecast_errors(before.model, trials, own_noise(before), floor, horizon))
     ahead = replace(diagnosis.ahead, nominal=inside, nominal_held_out=Ahead.of(held.ahead[0]))
     return replace(told, nominal_error=(pair[0].error_percent(), held.nominal.error_percent()), ahead=ahead)
 
@@ -168,7 +168,7 @@ def _cause(made: Restated, gain_fit: float, trials: Sequence[Trial], seed: int) 
         equivalents=(),
         p_value=misread.p_value,
         gain_fit=gain_fit,
-        gain_held_out=gain(stated, stated, told, seed),
+        gain_held_out=held_out_gain(stated, stated, told, seed),
         trial=misread.trial,
         words=misread.words,
     )

@@ -72,7 +72,7 @@ class Testable:
     warnings: tuple[str, ...]
 
 
-def testable(study: Study, catalogue: Catalogue | None = None) -> Testable | str:
+def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testable | str:
     """What the trials of a study can show, of the causes that its rig can have.
 
     Returns

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fes_pin.diagnose.replay import replay
+from fes_pin.diagnose.replay import replayed_trials
 from fes_pin.diagnose.result import Diagnosis
 
 
@@ -22,7 +22,7 @@ def trajectories(diagnosis: Diagnosis) -> tuple[list[str], dict[str, np.ndarray]
     """
     trials: list[str] = []
     rows: list[dict[str, np.ndarray]] = []
-    for one in replay(diagnosis):
+    for one in replayed_trials(diagnosis):
         columns = {"time_s": one.measured.time, **one.measured.columns}
         for name in diagnosis.model.rig.outputs(one.measured.kind):
             columns[f"{name}_nominal"], columns[f"{name}_extended"] = one.nominal[name], one.extended[name]

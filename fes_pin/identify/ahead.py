@@ -49,7 +49,7 @@ def default_horizon(trials: Sequence[Trial]) -> float:
 
 
 @dataclass(frozen=True)
-class Missed:
+class SquaredErrors:
     """Squared errors of a model on trials, in units of the noise: one sample ahead, over a horizon, free; and of the
     measurement about its mean."""
 
@@ -58,8 +58,8 @@ class Missed:
     free: float = 0.0
     around: float = 0.0
 
-    def __add__(self, other: Missed) -> Missed:
-        return Missed(
+    def __add__(self, other: SquaredErrors) -> SquaredErrors:
+        return SquaredErrors(
             self.one_step + other.one_step,
             self.horizon + other.horizon,
             self.free + other.free,
@@ -67,7 +67,9 @@ class Missed:
         )
 
 
-def missed(model: Model, trials: Sequence[Trial], noise: NoiseModel, floor: NoiseModel, horizon_s: float) -> Missed:
+def forecast_errors(
+    model: Model, trials: Sequence[Trial], noise: NoiseModel, floor: NoiseModel, horizon_s: float
+) -> SquaredErrors:
     """Squared errors of a model that is simulated freely.
 
     Parameters
@@ -77,7 +79,7 @@ def missed(model: Model, trials: Sequence[Trial], noise: NoiseModel, floor: Nois
     floor
         Whose deviations weigh the channels.
     """
-    total = Missed()
+    total = SquaredErrors()
     for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
         for k, name in enumerate(model.rig.outputs(trial.kind)):
             if name not in trial.columns or name not in noise or name not in floor:
@@ -86,7 +88,7 @@ def missed(model: Model, trials: Sequence[Trial], noise: NoiseModel, floor: Nois
             left = measured - readings[:, k]
             errors = [left - forecast(left, noise[name], trial.dt, ahead) for ahead in (0.0, horizon_s)]
             squares = [float(e @ e) / variance for e in (*errors, left, measured - measured.mean())]
-            total += Missed(*squares)
+            total += SquaredErrors(*squares)
     return total
 
 

@@ -29,7 +29,7 @@ from fes_pin.identify.fit import Fit, fit_problem, rough_noise
 from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Linearized, Unknowns, limits_of
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt, Innovations, Predictor
+from fes_pin.models.predictor import Doubt, ForetoldTrial, Predictor
 
 ROUNDS = 12
 """Turns of parameters and randomness, at most."""
@@ -115,7 +115,7 @@ class LikelihoodProblem:
 
     def innovations(
         self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None
-    ) -> list[Innovations]:
+    ) -> list[ForetoldTrial]:
         """Every trial as foretold, with sensitivities to `free` and to the effects' unknowns."""
         own = [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)]
         with np.errstate(all="ignore"):
@@ -142,7 +142,7 @@ class LikelihoodProblem:
         """Innovations over their deviations, and sensitivities, at a parameter value."""
         return [self._whitened(one) for one in self.innovations(values, unknowns)]
 
-    def _whitened(self, one: Innovations) -> Linearized:
+    def _whitened(self, one: ForetoldTrial) -> Linearized:
         with np.errstate(all="ignore"):
             scale = 1.0 / np.sqrt(one.of_seen(one.variances))
             residual = one.of_seen(one.values) * scale
@@ -156,7 +156,7 @@ class LikelihoodProblem:
         return sum(one.cost() for one in self.innovations(values, unknowns, doubt))
 
 
-def _joined(run: Sequence[Innovations]) -> _Told:
+def _joined(run: Sequence[ForetoldTrial]) -> _Told:
     return _Told(
         float(sum(one.cost() for one in run)),
         np.concatenate([one.values[one.seen] for one in run]),

@@ -156,7 +156,7 @@ def noise_step(steps: Sequence[float]) -> float:
     return max(1, math.floor(FASTEST_S / slowest + 1e-6)) * slowest
 
 
-def low_pass(values: np.ndarray, pole: float) -> np.ndarray:
+def first_order_low_pass(values: np.ndarray, pole: float) -> np.ndarray:
     """First-order low pass y_t = pole y_(t-1) + (1 - pole) x_t from rest, along an axis of shape (n,)."""
     bands = np.ones((2, len(values)))
     bands[1] = -pole

@@ -13,7 +13,7 @@ from fes_pin.identify.noise import NoiseModel, thinning
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Abreast, Simulated, Simulator
-from fes_pin.workers import check_time
+from fes_pin.workers import check_limit
 
 Unknowns = list[dict[str, float]]
 SINGULAR = 1e-12
@@ -111,7 +111,7 @@ class Problem:
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Whitened residuals and sensitivities at a parameter value; ends where a limit of time does."""
-        check_time()
+        check_limit()
         out: list[Linearized | None] = [None] * len(self.trials)
         for block in self.simulator.run_abreast(values, unknowns):
             for i, part in zip(block.trials, self._whitened(block), strict=True):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from fes_pin.data.schema import Number
+from fes_pin.data.schema import NumberKey
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.identify.ahead import Random
 from fes_pin.identify.fit import Fit
@@ -18,7 +18,7 @@ from fes_pin.models.predictor import Doubt
 
 KEY = "random"
 _PARTS = ("white", "std", "time")
-_NOISE = {"std": Number(""), "innovation_std": Number(""), "step_s": Number("s")}
+_NOISE = {"std": NumberKey(""), "innovation_std": NumberKey(""), "step_s": NumberKey("s")}
 
 
 def random_table(fitted: Fit) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def load_random(path: str | Path) -> Random | None:
 
 def _numbers(document: Document, table: dict[str, Any], part: str) -> dict[str, float]:
     values = document.table(f"{KEY}.{part}", table)
-    return document.numbers(f"{KEY}.{part}", values, dict.fromkeys(values, Number("")))
+    return document.numbers(f"{KEY}.{part}", values, dict.fromkeys(values, NumberKey("")))
 
 
 def _noise(document: Document, name: str, channels: dict[str, Any]) -> Noise:

@@ -21,9 +21,9 @@ from fes_pin.models.stage import Effect, Stage
 SHARP = 10.0
 """Of a smoothed sign: it turns within a tenth of the range."""
 
-Function = Callable[[Any], Any]
+FeatureFunction = Callable[[Any], Any]
 
-MOTION: Mapping[str, Function] = {
+MOTION: Mapping[str, FeatureFunction] = {
     "offset: 1": lambda f: 1.0,
     "time: t": lambda f: f.t,
     "time: t2": lambda f: f.t * f.t,
@@ -56,8 +56,8 @@ WAVES = (1, 2, 4, 8)
 """Waves over a trial, and half waves over the range of the angle."""
 
 
-def _waves() -> dict[str, Function]:
-    out: dict[str, Function] = {}
+def _waves() -> dict[str, FeatureFunction]:
+    out: dict[str, FeatureFunction] = {}
     for k in WAVES:
         out[f"time: sin {k}"] = lambda f, k=k: sin(2.0 * math.pi * k * f.t)  # type: ignore[misc]
         out[f"time: cos {k}"] = lambda f, k=k: cos(2.0 * math.pi * k * f.t)  # type: ignore[misc]
@@ -66,9 +66,9 @@ def _waves() -> dict[str, Function]:
     return out
 
 
-EFFORTS: Mapping[str, Function] = {**MOTION, **_waves()}
+EFFORTS: Mapping[str, FeatureFunction] = {**MOTION, **_waves()}
 """Features as an effort, by "variable: function"."""
-READINGS: Mapping[str, Function] = {
+READINGS: Mapping[str, FeatureFunction] = {
     n: MOTION[n] for n in ("offset: 1", "time: t", "time: t2", "rate: v", "rate: sign v", "angle: q2", "angle: q3")
 }
 """Features as a part of the reading."""
@@ -79,7 +79,7 @@ SCALES = ("centre", "reach", "speed", "drive", "duration")
 class _Features(Effect):
     """A sum of features, each with an amplitude; subclasses are dataclasses made below."""
 
-    functions: Mapping[str, Function]
+    functions: Mapping[str, FeatureFunction]
     rigs = ("ankle", "joint", "muscle")
 
     def apply(self, value: Any, s: Any) -> Any:
@@ -100,7 +100,7 @@ class _Features(Effect):
         )
 
 
-def _made(name: str, stage: Stage, signal: str, functions: Mapping[str, Function]) -> type[_Features]:
+def _made(name: str, stage: Stage, signal: str, functions: Mapping[str, FeatureFunction]) -> type[_Features]:
     scales = [(n, float, parameter(1.0, fitted=False)) for n in SCALES]
     amplitudes = [(f"a{k:02d}", float, parameter(0.0, null=0.0)) for k in range(len(functions))]
     title = "".join(part.capitalize() for part in name.split("_"))

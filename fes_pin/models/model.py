@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.trial import Trial
-from fes_pin.models.parameters import Parameter
+from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, in_order
 
@@ -44,7 +44,7 @@ class Model:
             values.update({f"{effect.name}.{n}": float(getattr(effect, n)) for n in effect.common()})
         return values
 
-    def parameter_info(self) -> dict[str, Parameter]:
+    def parameter_info(self) -> dict[str, ParameterInfo]:
         """Every parameter's unit, null, bounds and scale, by name."""
         info = dict(self.rig.parameters())
         for effect in self.effects:

@@ -19,7 +19,7 @@ HELD = {"q": "m", "y": "N", "effort": "N"}
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ParameterInfo:
     """What is known of a parameter beside its value.
 
     Attributes
@@ -53,7 +53,7 @@ class Parameter:
     optional: bool = False
     rigs: tuple[str, ...] = ()
 
-    def in_units(self, units: Mapping[str, str]) -> Parameter:
+    def in_units(self, units: Mapping[str, str]) -> ParameterInfo:
         """The same with the unit that it has on a rig.
 
         Parameters
@@ -77,16 +77,16 @@ def parameter(
     optional: bool = False,
     rigs: tuple[str, ...] = (),
 ) -> Any:
-    """A dataclass field that is a parameter; see `Parameter`."""
-    info = Parameter(unit, null, lower, upper, scale, grid, fitted, optional, rigs)
+    """A dataclass field that is a parameter; see `ParameterInfo`."""
+    info = ParameterInfo(unit, null, lower, upper, scale, grid, fitted, optional, rigs)
     return dataclasses.field(default=default, metadata={_KEY: info})
 
 
-def parameters_of(thing: Any) -> dict[str, Parameter]:
+def parameters_of(thing: Any) -> dict[str, ParameterInfo]:
     """Name and description of every parameter of a dataclass or an instance of one, in order."""
     return dict(_parameters_of(thing if isinstance(thing, type) else type(thing)))
 
 
 @cache
-def _parameters_of(kind: type) -> dict[str, Parameter]:
+def _parameters_of(kind: type) -> dict[str, ParameterInfo]:
     return {f.name: f.metadata[_KEY] for f in dataclasses.fields(kind) if _KEY in f.metadata}

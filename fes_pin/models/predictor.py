@@ -10,7 +10,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile.layout import WIDTH, doubt_constants
-from fes_pin.models.compile.program import program
+from fes_pin.models.compile.program import compiled_program
 from fes_pin.models.disturbance import disturbed
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import is_delayed, lane_inputs, lane_values, max_step, substeps, timing, total_delay
@@ -56,7 +56,7 @@ class Doubt:
 
 
 @dataclass(frozen=True)
-class Innovations:
+class ForetoldTrial:
     """One trial as it was foretold, sample by sample.
 
     Attributes
@@ -137,7 +137,7 @@ class Predictor:
 
     def run(
         self, values: Mapping[str, float], doubt: Doubt | Sequence[Doubt], unknowns: Sequence[Mapping[str, float]]
-    ) -> list[Innovations]:
+    ) -> list[ForetoldTrial]:
         """Foretell every trial.
 
         Parameters
@@ -149,7 +149,7 @@ class Predictor:
         unknowns
             For each trial its start, and what effects have of each trial's own.
         """
-        out: dict[int, Innovations] = {}
+        out: dict[int, ForetoldTrial] = {}
         for block in self._blocks:
             y, s = block.run(values, self._doubts(doubt), unknowns, self._delay(values))
             out.update(zip(block.lanes, block.innovations(y, s, len(self.columns)), strict=True))
@@ -198,7 +198,7 @@ class _Block:
         model = disturbed(model.acting(first.kind, rig.input_columns(first)), first.kind, processes)
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         chosen = tuple(c for c in columns if c in available)
-        self.program = program(model, first.kind, self.inputs, chosen, self.outputs)
+        self.program = compiled_program(model, first.kind, self.inputs, chosen, self.outputs)
         self.layout = self.program.layout
         self.places = [columns.index(n) for n in self.layout.columns]
         self.substeps = substeps(model, first.dt, max_step_s)
@@ -251,7 +251,7 @@ class _Block:
         constants[self.layout.constants.index("shift"), : len(shift)] = shift
         return self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
 
-    def innovations(self, y: np.ndarray, s: np.ndarray, width: int) -> Iterator[Innovations]:
+    def innovations(self, y: np.ndarray, s: np.ndarray, width: int) -> Iterator[ForetoldTrial]:
         """The innovations of each lane, with sensitivities to `width` columns."""
         k = len(self.outputs)
         for lane, trial in enumerate(self.trials):
@@ -263,7 +263,9 @@ class _Block:
             else:
                 sensitivities = np.zeros((n, k, width))
                 sensitivities[..., self.places] = own
-            yield Innovations(self.outputs, np.where(seen, y[:n, :k, lane], 0.0), y[:n, k:, lane], seen, sensitivities)
+            yield ForetoldTrial(
+                self.outputs, np.where(seen, y[:n, :k, lane], 0.0), y[:n, k:, lane], seen, sensitivities
+            )
 
     def foretold(self, y: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         """What is foretold in each lane, by output: what was given as measured less the innovation."""

@@ -12,7 +12,7 @@ import numpy as np
 from fes_pin.data.imposed import MOTION, driving_values
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile.layout import WIDTH, Layout
-from fes_pin.models.compile.program import Program, program
+from fes_pin.models.compile.program import Program, compiled_program
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
@@ -223,7 +223,9 @@ class _Block:
         model = model.acting(first.kind, rig.input_columns(first))
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
         available = set(model.parameters()) | set(model.unknowns(first.kind))
-        self.program: Program = program(model, first.kind, self.inputs, tuple(c for c in columns if c in available))
+        self.program: Program = compiled_program(
+            model, first.kind, self.inputs, tuple(c for c in columns if c in available)
+        )
         self.layout = self.program.layout
         self.places = tuple(columns.index(n) for n in self.layout.columns)
         self.substeps = substeps(model, first.dt, max_step_s)

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from fes_pin.models.maths import sqrt, where
-from fes_pin.models.parameters import Parameter, parameters_of
+from fes_pin.models.parameters import ParameterInfo, parameters_of
 
 
 class Stage(StrEnum):
@@ -103,7 +103,7 @@ class Effect:
         return {}
 
     @classmethod
-    def parameters(cls) -> dict[str, Parameter]:
+    def parameters(cls) -> dict[str, ParameterInfo]:
         """Name and description of every parameter, in order."""
         return parameters_of(cls)
 

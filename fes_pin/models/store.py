@@ -11,7 +11,7 @@ import tomli_w
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
-from fes_pin.data.schema import Number, RigSchema, one_of
+from fes_pin.data.schema import NumberKey, RigSchema, one_of
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
@@ -160,4 +160,4 @@ def _numbers(
             raise document.error(f"{key}.{name}", f"unknown; expected one of {', '.join(sorted(known))}")
     if known is not None and (missing := known - set(values)):
         raise document.error(key, f"expected {', '.join(sorted(missing))} as well")
-    return document.numbers(key, values, dict.fromkeys(values, Number("")))
+    return document.numbers(key, values, dict.fromkeys(values, NumberKey("")))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fes_pin.body.build import Body
-from fes_pin.body.controllability import Controllability
-from fes_pin.body.controllability import controllability as _controllability
+from fes_pin.body.controllability import ModalControllability
+from fes_pin.body.controllability import modal_controllability as _controllability
 from fes_pin.body.joints import JOINT_NAMES, SIDES
 from fes_pin.body.linearize import LinearBody
 from fes_pin.muscles.nerves import SUBJECT_HEIGHT, Nerves
@@ -40,8 +40,8 @@ def subject_nerves(body: Body, names: Iterable[str] = (), strength: float | None
     return Nerves.of_subject(body.mass_kg, height, tuple(dict.fromkeys(wanted)), strength, **options)
 
 
-def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> Controllability:
-    """`fes_pin.body.controllability.controllability`, which also understands names of nerves.
+def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> ModalControllability:
+    """`fes_pin.body.controllability.modal_controllability`, which also understands names of nerves.
 
     Parameters
     ----------

@@ -82,7 +82,9 @@ class Identifiability:
         return "\n".join(lines)
 
 
-def identifiability(model: Model, trials: Sequence[Trial], names: Sequence[str] = tuple(SYMBOLS)) -> Identifiability:
+def ankle_identifiability(
+    model: Model, trials: Sequence[Trial], names: Sequence[str] = tuple(SYMBOLS)
+) -> Identifiability:
     """Which constants and parameters of an ankle its trials can determine, near the model's values.
 
     Parameters

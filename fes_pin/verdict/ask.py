@@ -22,7 +22,7 @@ def diagnose(
     limit: float | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> Diagnosis | WalkDiagnosis:
-    """Find out what the model of a study gets wrong: `diagnose.diagnosis.diagnose`, for a body `diagnose_walk`.
+    """Find out what the model of a study gets wrong: `diagnose.diagnosis.diagnose_joint`, for a body `diagnose_walk`.
 
     Both answers have `verdict`, `causes`, `remainder`, `absorbed`, `nominal_error`, `extended_error`,
     `ceiling_percent`, `next_experiment`, `warnings`, `wall_s`, and the extended `model`: a body's is a `Body`.
@@ -52,6 +52,6 @@ def diagnose(
         if library is not None and library != []:
             raise InputError("a library brings causes of rigs; walking has none but its own", file=study.folder)
         return diagnose_walk(study, seed=seed, limit=limit, progress=progress)
-    from fes_pin.diagnose.diagnosis import diagnose as of_a_rig  # noqa: PLC0415
+    from fes_pin.diagnose.diagnosis import diagnose_joint as of_a_rig  # noqa: PLC0415
 
     return of_a_rig(study, library=library, seed=seed, limit=limit, progress=progress)

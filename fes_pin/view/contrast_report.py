@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from fes_pin.contrast.result import Change, Contrast, headline, notes
+from fes_pin.contrast.result import Change, Contrast, contrast_headline, contrast_notes
 from fes_pin.diagnose.cause import ParameterEstimate
 from fes_pin.diagnose.text import probability
 from fes_pin.identify.fit import CONFIDENCE_95
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
-from fes_pin.view.page import Content, Markup, element, figure, joined, page, rounded, section, table, unit_text
+from fes_pin.view.page import Content, Markup, element, figure, html_table, joined, page, section, unit_text, value_text
 
 NAMES, WIDE, ROW = 176.0, 420.0, 24.0
 """Room for names, width of a figure, height of a row."""
@@ -31,7 +31,7 @@ def contrast_html(found: Contrast) -> str:
 
 def _head(found: Contrast) -> Markup:
     counts = ", ".join(f"{g}: {sum(t.group == g for t in found.study.trials)} trials" for g in found.groups)
-    words = headline(found)
+    words = contrast_headline(found)
     style = {"nothing_changed": "adequate", "changed": "causes_found", "unexplained": "unexplained"}[found.verdict]
     return element(
         "header",
@@ -64,7 +64,7 @@ def _change(change: Change, groups: tuple[str, ...]) -> Markup:
             "div",
             element("h3", element("code", change.name)),
             element("p", change.words[0].upper() + change.words[1:] + "."),
-            table(("parameter", "unit", *groups), rows, range(2, 2 + len(groups))),
+            html_table(("parameter", "unit", *groups), rows, range(2, 2 + len(groups))),
             figure(_drawing(change, groups), f"{first} in each group, with its 95 % interval.", "narrow", change.name),
             element("p", f"{told} Over the whole library {probability(change.p_value)}."),
         ),
@@ -79,8 +79,8 @@ def _value(by_group: Mapping[str, ParameterEstimate], group: str) -> str:
     if not one.std:
         return "none"
     half = CONFIDENCE_95 * one.std
-    low, high = rounded(one.value - half, one.std), rounded(one.value + half, one.std)
-    return f"{rounded(one.value, one.std)} [{low}, {high}]"
+    low, high = value_text(one.value - half, one.std), value_text(one.value + half, one.std)
+    return f"{value_text(one.value, one.std)} [{low}, {high}]"
 
 
 def _drawing(change: Change, groups: tuple[str, ...]) -> Drawing:
@@ -110,11 +110,11 @@ def _unchanged(found: Contrast) -> list[Markup]:
     if found.unchanged:
         rows: list[list[Content]] = [[element("code", n), f"{100.0 * v:.2g} %"] for n, v in found.unchanged.items()]
         out.append(element("p", "A change of these beyond the size stated would have been seen in 95 of 100 studies:"))
-        out.append(table(("parameter of the model", "at most, of its value"), rows, (1,)))
+        out.append(html_table(("parameter of the model", "at most, of its value"), rows, (1,)))
     if found.excluded:
         rows = [[element("code", n), f"{p.value:.2g}", unit_text(p.unit)] for n, p in found.excluded.items()]
         out.append(element("p", "These causes did not come in any group, beyond the size stated:"))
-        out.append(table(("cause", "at most", "unit"), rows, (1,)))
+        out.append(html_table(("cause", "at most", "unit"), rows, (1,)))
     if found.untestable:
         names = ", ".join(found.untestable)
         out.append(element("p", f"Could have changed unseen, which is not the same as unchanged: {names}."))
@@ -135,4 +135,4 @@ def _judged(found: Contrast) -> list[Markup]:
 
 
 def _said(found: Contrast) -> list[str]:
-    return [n for n in notes(found) if n.startswith(("in all groups", "something is left", "nothing left"))]
+    return [n for n in contrast_notes(found) if n.startswith(("in all groups", "something is left", "nothing left"))]

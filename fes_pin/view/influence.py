@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fes_pin.body.controllability import Controllability
+from fes_pin.body.controllability import ModalControllability
 from fes_pin.data.errors import InputError
 
 ON = ("joints", "modes")
 
 
-def _matrix(result: Controllability, on: str) -> tuple[np.ndarray, list[str]]:
+def _matrix(result: ModalControllability, on: str) -> tuple[np.ndarray, list[str]]:
     if on == "joints":
         return np.degrees(result.joint_influence), list(result.linear.joint_names)
     if on == "modes":
@@ -20,7 +20,7 @@ def _matrix(result: Controllability, on: str) -> tuple[np.ndarray, list[str]]:
     raise InputError(f"influence is on 'joints' or 'modes', not {on!r}")
 
 
-def influence_table(result: Controllability, on: str = "joints") -> str:
+def influence_table(result: ModalControllability, on: str = "joints") -> str:
     """Acceleration per full input, deg/s2, one row a joint or mode, one column an input.
 
     Parameters
@@ -43,7 +43,7 @@ def influence_table(result: Controllability, on: str = "joints") -> str:
     return "\n".join(lines)
 
 
-def plot_influence(result: Controllability, path: str | Path, on: str = "joints") -> Path:
+def plot_influence(result: ModalControllability, path: str | Path, on: str = "joints") -> Path:
     """Draw the table as a heat map (logarithmic, red positive, blue negative) into an image file.
 
     Raises

@@ -9,7 +9,7 @@ import time
 from uuid import uuid4
 
 from fes_pin.data.errors import InputError
-from fes_pin.view.viewer import Scene, import_meshcat
+from fes_pin.view.viewer import BodyScene, import_meshcat
 
 LOOPBACK = "127.0.0.1"
 FIRST_PORT, PORTS = 7000, 100
@@ -69,7 +69,7 @@ class LiveViewer:
         self._loop.run_until_complete(server.http.close_all_connections())
         self._loop.close()
 
-    def show(self, scene: Scene) -> None:
+    def show(self, scene: BodyScene) -> None:
         """Show a scene instead of what was there before."""
         from meshcat.commands import Delete  # noqa: PLC0415
         from meshcat.path import Path  # noqa: PLC0415

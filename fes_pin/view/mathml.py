@@ -45,7 +45,7 @@ class _Unreadable(ValueError):
     """What is no equation in this notation."""
 
 
-def equations(text: str) -> Markup:
+def equations_mathml(text: str) -> Markup:
     """Lines of equations as one block of mathematics each; as they are written where one of them cannot be parsed."""
     lines = [line for line in text.split("\n") if line.strip()]
     try:

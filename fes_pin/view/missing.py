@@ -24,7 +24,7 @@ import scipy.linalg
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import low_pass, thin
+from fes_pin.identify.noise import first_order_low_pass, thin
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Signals
@@ -131,7 +131,7 @@ def activation(rig: Rig, trial: Trial) -> dict[str, np.ndarray]:
     s = _signals(rig, trial, {n: trial[n] for n in rig.input_columns(trial)})
     recruited = np.asarray(rig.sample(s)["r"], dtype=float) * np.ones(len(trial))
     pole = math.exp(-trial.dt / float(getattr(rig, "time_constant_s")))  # noqa: B009
-    return {"activation": low_pass(np.r_[0.0, recruited[:-1]], pole)}
+    return {"activation": first_order_low_pass(np.r_[0.0, recruited[:-1]], pole)}
 
 
 def nominal_torque(

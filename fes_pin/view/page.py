@@ -47,7 +47,7 @@ def joined(parts: Sequence[Markup], between: str = "\n") -> Markup:
     return Markup(between.join(p.text for p in parts))
 
 
-def table(
+def html_table(
     head: Sequence[str], rows: Sequence[Sequence[Content]], numbers: Sequence[int] = (), prose: bool = False
 ) -> Markup:
     """A table; on a narrow screen each row becomes a list of its cells with their titles.
@@ -118,7 +118,7 @@ def page(title: str, body: Markup) -> str:
     )
 
 
-def rounded(value: float, std: float) -> str:
+def value_text(value: float, std: float) -> str:
     """A value with the digits that its standard deviation leaves it: two of the uncertain ones."""
     if not math.isfinite(std) or std <= 0.0:
         return f"{value:.4g}"

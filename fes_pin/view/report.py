@@ -8,7 +8,7 @@ from pathlib import Path
 from fes_pin.data.files import write_text
 from fes_pin.diagnose.errors_ahead import Ahead
 from fes_pin.diagnose.record import NEXT_FILE
-from fes_pin.diagnose.replay import replay
+from fes_pin.diagnose.replay import replayed_trials
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.text import left_out_text, percent, probability
 from fes_pin.models.describe import sentence
@@ -19,10 +19,10 @@ from fes_pin.view.page import (
     element,
     figure,
     folded,
+    html_table,
     joined,
     page,
     section,
-    table,
     unit_text,
 )
 from fes_pin.view.plots import stimulus_drawing
@@ -51,7 +51,7 @@ def report(diagnosis: Diagnosis | WalkDiagnosis, path: str | Path) -> None:
 
 def report_html(diagnosis: Diagnosis) -> str:
     """The report of a diagnosis as one HTML page that needs nothing else: no network."""
-    replays = replay(diagnosis)
+    replays = replayed_trials(diagnosis)
     parts = [
         _head(diagnosis),
         section("Errors", *_errors(diagnosis)),
@@ -92,7 +92,7 @@ def _errors(diagnosis: Diagnosis) -> list[Markup]:
     """Errors of both models, in sample and held out; of a driven rig over three spans of time."""
     both, rows = bool(diagnosis.causes), _error_rows(diagnosis)
     head = ["trials", "prediction", "E nominal"] + ["E extended"] * both
-    out = [element("p", E_WORDS), table(head, [r[: len(head)] for r in rows], (2, 3))]
+    out = [element("p", E_WORDS), html_table(head, [r[: len(head)] for r in rows], (2, 3))]
     floor = f"The noise of the readings alone is {percent(diagnosis.ceiling_percent)} of E: no model can be better."
     notes = [floor, f"Held out: {diagnosis.held_out_by}."]
     ahead = diagnosis.ahead
@@ -163,7 +163,7 @@ def _left(diagnosis: Diagnosis) -> list[Markup]:
         out.append(element("p", f"Not testable here, which is not the same as absent: {why}"))
         unseen = [diagnosis.catalogue.effect(n) for n in diagnosis.absorbed]
         rows: list[list[Content]] = [[element("code", e.name), stage_mark(str(e.stage)), sentence(e)] for e in unseen]
-        out.append(table(("cause", "stage", "what it is"), rows, prose=True))
+        out.append(html_table(("cause", "stage", "what it is"), rows, prose=True))
     else:
         out.append(element("p", "Every other cause in the library could have been seen by these data.", class_="soft"))
     return out
@@ -203,8 +203,8 @@ def _parameters(diagnosis: Diagnosis) -> list[Markup]:
         for n, m in diagnosis.extended.noise.items()
     ]
     return [
-        table(head[: 3 + 2 * len(fits)], rows, range(2, 7)),
-        table(("noise of", "standard deviation", "unit", "autoregressive order"), noise, (1,)),
+        html_table(head[: 3 + 2 * len(fits)], rows, range(2, 7)),
+        html_table(("noise of", "standard deviation", "unit", "autoregressive order"), noise, (1,)),
     ]
 
 
@@ -240,8 +240,8 @@ def _provenance(diagnosis: Diagnosis) -> list[Markup]:
         rows.append(["command", element("code", made.command)])
     rows.append(["versions", ", ".join(f"{n} {v}" for n, v in made.versions.items())])
     files: list[list[Content]] = [[element("code", n), element("code", digest)] for n, digest in made.inputs.items()]
-    out = [element("div", table(("what", "value"), rows, prose=True), class_="provenance")]
+    out = [element("div", html_table(("what", "value"), rows, prose=True), class_="provenance")]
     if files:
-        hashes = element("div", table(("file of the study", "SHA-256"), files, prose=True), class_="provenance")
+        hashes = element("div", html_table(("file of the study", "SHA-256"), files, prose=True), class_="provenance")
         out.append(folded(f"Hashes of the {len(files)} files that were read", hashes))
     return out

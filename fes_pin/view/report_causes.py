@@ -7,8 +7,8 @@ from fes_pin.diagnose.result import EACH_TRIAL, Diagnosis
 from fes_pin.diagnose.text import probability
 from fes_pin.identify.fit import CONFIDENCE_95, Fit
 from fes_pin.models.describe import equation, remark, sentence
-from fes_pin.view.mathml import equations
-from fes_pin.view.page import Content, Markup, element, figure, rounded, table, unit_text
+from fes_pin.view.mathml import equations_mathml
+from fes_pin.view.page import Content, Markup, element, figure, html_table, unit_text, value_text
 from fes_pin.view.ranking import gain_drawing, rivals_drawing, shown_rivals
 
 
@@ -35,7 +35,7 @@ def causes_section(diagnosis: Diagnosis) -> list[Markup]:
         "Gain on held-out trials with its 95 % interval: percent of the nominal model's squared error above noise."
     )
     return [
-        table(("cause", "stage", "held-out gain [95 %]", "p", "cannot be told from"), rows, (2, 3)),
+        html_table(("cause", "stage", "held-out gain [95 %]", "p", "cannot be told from"), rows, (2, 3)),
         figure(gain_drawing(diagnosis.causes), caption, "narrow", "gains"),
         *(_cause(diagnosis, c) for c in diagnosis.causes),
     ]
@@ -91,7 +91,7 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
             "div",
             element("h3", element("code", cause.name), " ", stage_mark(cause.stage)),
             element("p", sentence(kind)),
-            equations(equation(kind)),
+            equations_mathml(equation(kind)),
             _estimates(diagnosis.extended, cause),
             element("p", gain, " ", told, *_own_note(diagnosis, cause)),
             element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}", class_="soft"),
@@ -115,9 +115,12 @@ def _estimates(fitted: Fit, cause: Cause) -> Markup:
             shown, interval = value_and_interval(fitted, key, one.value)
         else:  # a mean over trials
             low, high = one.value - CONFIDENCE_95 * one.std, one.value + CONFIDENCE_95 * one.std
-            shown, interval = rounded(one.value, one.std), f"[{rounded(low, one.std)}, {rounded(high, one.std)}]"
+            shown, interval = (
+                value_text(one.value, one.std),
+                f"[{value_text(low, one.std)}, {value_text(high, one.std)}]",
+            )
         rows.append([element("code", name), shown, unit_text(one.unit), interval])
-    return table(("parameter", "value", "unit", "95 % interval"), rows, (1, 3))
+    return html_table(("parameter", "value", "unit", "95 % interval"), rows, (1, 3))
 
 
 def value_and_interval(fitted: Fit, name: str, value: float) -> tuple[str, str]:
@@ -129,4 +132,4 @@ def value_and_interval(fitted: Fit, name: str, value: float) -> tuple[str, str]:
         return f"{value:.3g}", "not identified"
     low, high = fitted.interval(name)
     at = " at its bound" if name in fitted.at_bound else ""
-    return rounded(value, std), f"[{rounded(low, std)}, {rounded(high, std)}]{at}"
+    return value_text(value, std), f"[{value_text(low, std)}, {value_text(high, std)}]{at}"

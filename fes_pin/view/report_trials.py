@@ -12,7 +12,7 @@ from fes_pin.diagnose.text import percent
 from fes_pin.models.model import Model
 from fes_pin.models.tracking import can_track
 from fes_pin.view.missing import Missing, missing_along, missing_input
-from fes_pin.view.page import Content, Markup, element, figure, folded, joined, key, table
+from fes_pin.view.page import Content, Markup, element, figure, folded, html_table, joined, key
 from fes_pin.view.plots import by_kind, missing_drawing, points_of, share, trial_drawing
 
 OPEN = 4
@@ -148,4 +148,4 @@ def _trial_table(replays: Sequence[Replay], extended: bool) -> Markup:
             shown = element("span", percent(r.extended_error), " ")
             row.append(shown + (_flag() if got_worse(r) else Markup("")))
         rows.append(row)
-    return table(head, rows, (2, 3, 4))
+    return html_table(head, rows, (2, 3, 4))

@@ -32,7 +32,7 @@ _UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 @dataclass
-class Scene:
+class BodyScene:
     """A body in a pose or in motion.
 
     Parameters
@@ -56,12 +56,12 @@ class Scene:
     balls: list[tuple[np.ndarray, float, int]] = field(default_factory=list)
     arrows: list[Arrow] = field(default_factory=list)
 
-    def pose(self, posture) -> Scene:
+    def pose(self, posture) -> BodyScene:
         """Show one posture (as `Body.angles` takes it)."""
         self.frames = [self.body.angles(posture, check=False)]
         return self
 
-    def play(self, postures: np.ndarray) -> Scene:
+    def play(self, postures: np.ndarray) -> BodyScene:
         """Show postures one after the other: (T, 19) rad in the order of `body.joint_names`.
 
         Raises
@@ -75,7 +75,7 @@ class Scene:
         self.frames = list(postures)
         return self
 
-    def carry(self, roots: Sequence[pin.SE3]) -> Scene:
+    def carry(self, roots: Sequence[pin.SE3]) -> BodyScene:
         """Move the whole body, frame by frame, as a walk does that takes the foot off the ground.
 
         Raises
@@ -156,7 +156,7 @@ class Scene:
         return path
 
 
-def show_mode(linear: LinearBody, mode: Mode) -> Scene:
+def show_mode(linear: LinearBody, mode: Mode) -> BodyScene:
     """A mode in motion about its posture; a fall is shown to and fro, too, for it can go either way."""
     body = linear.body
     q = np.array([linear.whole_posture.get(name, 0.0) for name in body.joint_names])
@@ -165,7 +165,7 @@ def show_mode(linear: LinearBody, mode: Mode) -> Scene:
         shape[body.joint_names.index(name)] = MODE_SWING_DEG * value
     count = int(MODE_PERIOD_S * FRAMES_A_SECOND)
     phases = np.sin(2.0 * np.pi * np.arange(count + 1) / count)
-    return Scene(body, caption=mode.name).play(q + phases[:, None] * shape)
+    return BodyScene(body, caption=mode.name).play(q + phases[:, None] * shape)
 
 
 def show_walk(
@@ -174,7 +174,7 @@ def show_walk(
     fps: int = FRAMES_A_SECOND,
     caption: str = "Walking",
     pelvis: np.ndarray | None = None,
-) -> Scene:
+) -> BodyScene:
     """Gait playback.
 
     Parameters
@@ -197,7 +197,7 @@ def show_walk(
     InputError
         Shapes that do not fit.
     """
-    scene = Scene(body, caption=caption, fps=fps).play(postures)
+    scene = BodyScene(body, caption=caption, fps=fps).play(postures)
     if pelvis is None:
         return scene
     if np.shape(pelvis) != (len(scene.frames), 3, 3):
@@ -225,7 +225,7 @@ def _put_down(body: Body, shapes: pin.GeometryModel, q: np.ndarray, turn: np.nda
     return pin.SE3(rotation, np.array([-middle[0], -middle[1], -lowest if np.isfinite(lowest) else 0.0]))
 
 
-def show_influence(linear: LinearBody, inputs, names: str | Sequence[str]) -> Scene:
+def show_influence(linear: LinearBody, inputs, names: str | Sequence[str]) -> BodyScene:
     """What nerves turn: a ball at each joint, larger and redder the more of the nerves' torque acts there.
 
     Raises
@@ -238,7 +238,7 @@ def show_influence(linear: LinearBody, inputs, names: str | Sequence[str]) -> Sc
     strength = {j.name: float(np.linalg.norm([torque.get(r, 0.0) for r in j.revolutes])) for j in JOINTS}
     greatest = max(strength.values())
     posture = linear.whole_posture
-    scene = Scene(linear.body).pose(posture)
+    scene = BodyScene(linear.body).pose(posture)
     said = []
     for joint in JOINTS:
         share = strength[joint.name] / greatest if greatest > 0.0 else 0.0

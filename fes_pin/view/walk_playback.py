@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 
 from fes_pin.view.arrows import Arrow
-from fes_pin.view.viewer import FRAMES_A_SECOND, Scene
+from fes_pin.view.viewer import FRAMES_A_SECOND, BodyScene
 from fes_pin.walk.dynamics import centre_of_mass, required
 from fes_pin.walk.motion import Motion
-from fes_pin.walk.plates import LOADED_N, Plates, centre_of_pressure
+from fes_pin.walk.plates import LOADED_N, Plates, pressure_and_free_moment
 
 METRES_A_NEWTON = 2e-3
 """An arrow of 1 m is a force of 500 N."""
@@ -19,7 +19,7 @@ READ, REQUIRED = 0x17191C, 0xD55E00
 LONGEST_S = 4.0
 
 
-def show_reactions(motion: Motion, plates: Plates, caption: str = "") -> Scene:
+def show_reactions(motion: Motion, plates: Plates, caption: str = "") -> BodyScene:
     """The walk with the ground reaction of both feet together as read (black) and as the motion requires (orange).
 
     Arrows start where the reactions pierce the ground. The body walks on the spot: its centre of mass's mean way is
@@ -39,7 +39,7 @@ def show_reactions(motion: Motion, plates: Plates, caption: str = "") -> Scene:
     read = Arrow(*_arrow(plates.total[rows], way), READ)
     needed = Arrow(*_arrow(required(part), way), REQUIRED)
     words = "ground reaction of both feet: read (black), required by the motion (orange); 1 m is 500 N"
-    scene = Scene(motion.body, f"{caption}: {words}" if caption else words, fps=round(1.0 / (every * motion.dt)))
+    scene = BodyScene(motion.body, f"{caption}: {words}" if caption else words, fps=round(1.0 / (every * motion.dt)))
     scene.opacity = SEEN_THROUGH
     scene.play(part.q[:, 7:])
     scene.carry([pin.SE3(turn, place) for turn, place in _roots(part, way)])
@@ -64,6 +64,6 @@ def _roots(part: Motion, way: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]
 def _arrow(wrench: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Foot and vector of a reaction; nothing where the feet carry nothing."""
     up = wrench[:, 2] > LOADED_N
-    pressure = np.where(up[:, None], centre_of_pressure(wrench)[0], 0.0)
+    pressure = np.where(up[:, None], pressure_and_free_moment(wrench)[0], 0.0)
     foot = np.column_stack([pressure, np.zeros(len(wrench))]) - np.where(up[:, None], way, 0.0)
     return foot, METRES_A_NEWTON * wrench[:, :3] * up[:, None]

@@ -9,13 +9,13 @@ from matplotlib.figure import Figure
 
 from fes_pin.diagnose.text import percent, probability
 from fes_pin.models.describe import sentence
-from fes_pin.view.page import Content, Markup, element, figure, joined, key, page, section, table
+from fes_pin.view.page import Content, Markup, element, figure, html_table, joined, key, page, section
 from fes_pin.view.style import EXTENDED, FAINT, MEASURED, NOMINAL
 from fes_pin.view.svg import WIDTH, inline_svg, styled
 from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.record import BODY_FILE
-from fes_pin.walk.result import WalkDiagnosis, cause_row
+from fes_pin.walk.result import WalkDiagnosis, walk_cause_row
 
 PLAYBACK_FILE = "playback.html"
 
@@ -67,10 +67,10 @@ def _causes(diagnosis: WalkDiagnosis) -> list[Markup]:
         return []
     rows: list[list[Content]] = []
     for cause in diagnosis.causes:
-        name, site, values, held, others = cause_row(cause)
+        name, site, values, held, others = walk_cause_row(cause)
         rows.append([element("code", name), site, values, held, others, probability(cause.p_value)])
     head = ("cause", "site", "parameters", "held-out gain", "cannot be told from", "by chance")
-    return [table(head, rows)]
+    return [html_table(head, rows)]
 
 
 def _absorbed(diagnosis: WalkDiagnosis) -> list[Markup]:
@@ -81,7 +81,7 @@ def _absorbed(diagnosis: WalkDiagnosis) -> list[Markup]:
     rows: list[list[Content]] = [[element("code", n), said[n]] for n in diagnosis.absorbed]
     return [
         element("p", "Not testable is not the same as absent: soft tissue and noise hide these at their usual size."),
-        table(("cause", "what it is"), rows, prose=True),
+        html_table(("cause", "what it is"), rows, prose=True),
     ]
 
 

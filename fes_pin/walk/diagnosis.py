@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,13 +11,22 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
-from fes_pin.walk.experiment import NextExperiment, next_experiment
-from fes_pin.walk.judge import Gain, error_percent, evidence, floor_percent, gain, other_leg, remainder, unseen
+from fes_pin.walk.experiment import NextWalk, next_walk
+from fes_pin.walk.judge import (
+    WalkGain,
+    floor_percent,
+    other_leg,
+    unseen,
+    walk_error_percent,
+    walk_evidence,
+    walk_gain,
+    walk_remainder,
+)
 from fes_pin.walk.likelihood import white_level
 from fes_pin.walk.recording import recordings_of
-from fes_pin.walk.result import Estimate, Remainder, WalkCause, WalkDiagnosis
-from fes_pin.walk.search import LEVEL, SEPARABLE, Nulls, Search, Set
-from fes_pin.workers import one_thread_each, time_limit
+from fes_pin.walk.result import Estimate, WalkCause, WalkDiagnosis, WalkRemainder
+from fes_pin.walk.search import LEVEL, SEPARABLE, Nulls, Set, WalkSearch
+from fes_pin.workers import Progress, one_thread_each, time_limit
 
 LEFT_LEVEL = 0.01
 """Level at which what is left counts as something."""
@@ -26,8 +34,6 @@ ORDINARY_MM = 2.0
 """Marker noise up to this is no cause: cameras' and fixations' own (L. Chiari et al., Gait Posture 21:197, 2005)."""
 SURE = 3.0
 """Standard deviations by which marker noise must exceed that."""
-
-Progress = Callable[[float, str], None]
 
 
 def diagnose_walk(
@@ -67,7 +73,7 @@ def diagnose_walk(
     with one_thread_each():
         tell(0.02, "inverse dynamics")
         _, recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
-        search = Search(recordings, cutoff_hz, seed)
+        search = WalkSearch(recordings, cutoff_hz, seed)
         tell(0.3, "sets of causes")
         with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
             sizes = search.run()
@@ -91,7 +97,7 @@ def _chosen(sizes: list[Set], critical: float) -> Set:
     return best
 
 
-def _judged(study: Study, search: Search, best: Set, nulls: Nulls, seed: int) -> WalkDiagnosis:
+def _judged(study: Study, search: WalkSearch, best: Set, nulls: Nulls, seed: int) -> WalkDiagnosis:
     many = search.strides.count > 1
     refused = False
     causes = _causes(search, best, nulls, seed)
@@ -103,7 +109,7 @@ def _judged(study: Study, search: Search, best: Set, nulls: Nulls, seed: int) ->
     named = [c for _, c in causes]
     if (noise := _marker_noise(search)) is not None and all(c.name != noise.name for c in named):
         named.append(noise)
-    p_value, where = remainder(search, best)
+    p_value, where = walk_remainder(search, best)
     left = refused or p_value < LEFT_LEVEL
     order = sorted(named, key=lambda c: -(c.gain_held_out.percent if c.gain_held_out else c.gain_fit))
     none = search.fit(())
@@ -112,10 +118,16 @@ def _judged(study: Study, search: Search, best: Set, nulls: Nulls, seed: int) ->
         study=study,
         verdict="causes_found" if named else ("unexplained" if left else "adequate"),
         causes=tuple(order),
-        remainder=Remainder(left, p_value, where if left else None),
+        remainder=WalkRemainder(left, p_value, where if left else None),
         absorbed=tuple(n for n in unseen(search, best) if n not in in_a_set),
-        nominal_error=(error_percent(search, none, False), error_percent(search, none, True) if many else None),
-        extended_error=(error_percent(search, best, False), error_percent(search, best, True) if many else None),
+        nominal_error=(
+            walk_error_percent(search, none, False),
+            walk_error_percent(search, none, True) if many else None,
+        ),
+        extended_error=(
+            walk_error_percent(search, best, False),
+            walk_error_percent(search, best, True) if many else None,
+        ),
         ceiling_percent=floor_percent(search),
         next_experiment=_experiment(search, best, order),
         search=search,
@@ -123,7 +135,7 @@ def _judged(study: Study, search: Search, best: Set, nulls: Nulls, seed: int) ->
     )
 
 
-def _causes(search: Search, best: Set, nulls: Nulls, seed: int) -> list[tuple[int, WalkCause]]:
+def _causes(search: WalkSearch, best: Set, nulls: Nulls, seed: int) -> list[tuple[int, WalkCause]]:
     sizes = search.sizes(best)
     spread = np.sqrt(np.diag(best.fitted.covariance))
     owners = [i for i in best.forms for _ in search.forms[i].parameters]
@@ -152,9 +164,9 @@ def _causes(search: Search, best: Set, nulls: Nulls, seed: int) -> list[tuple[in
                     equivalents=others,
                     elsewhere=sites,
                     p_value=nulls.p_value(without.price - best.price),
-                    gain_fit=gain(search, without, best, False, seed).percent,
-                    gain_held_out=gain(search, without, best, True, seed) if search.strides.count > 1 else None,
-                    evidence=evidence(search, without, best, seed) if search.strides.count > 1 else None,
+                    gain_fit=walk_gain(search, without, best, False, seed).percent,
+                    gain_held_out=walk_gain(search, without, best, True, seed) if search.strides.count > 1 else None,
+                    evidence=walk_evidence(search, without, best, seed) if search.strides.count > 1 else None,
                     other_leg_percent=other_leg(search, search.fit((i,))) if either else None,
                 ),
             )
@@ -162,7 +174,7 @@ def _causes(search: Search, best: Set, nulls: Nulls, seed: int) -> list[tuple[in
     return out
 
 
-def white_noise(search: Search) -> tuple[float, float, float] | None:
+def white_noise(search: WalkSearch) -> tuple[float, float, float] | None:
     """White noise of markers, mm, its standard deviation, and the deviance that it saves; None for a single stride."""
     if search.strides.count < 2:
         return None
@@ -177,7 +189,7 @@ def white_noise(search: Search) -> tuple[float, float, float] | None:
     return level, std * np.sqrt(len(y) / (len(y) - 1.0)), saved
 
 
-def _marker_noise(search: Search) -> WalkCause | None:
+def _marker_noise(search: WalkSearch) -> WalkCause | None:
     """White noise on the coordinates that is more than cameras' own, from what differs from stride to stride."""
     level, std, saved = white_noise(search) or (0.0, 0.0, 0.0)
     if level - SURE * std < ORDINARY_MM or saved < SEPARABLE:
@@ -185,11 +197,13 @@ def _marker_noise(search: Search) -> WalkCause | None:
     from scipy.stats import chi2  # noqa: PLC0415
 
     parameters = {"markers_m": Estimate(1e-3 * level, 1e-3 * std, "m")}
-    return WalkCause("marker_noise", "white", parameters, (), (), float(chi2.sf(saved, 1)), 0.0, Gain(0.0, 0.0, 0.0))
+    return WalkCause(
+        "marker_noise", "white", parameters, (), (), float(chi2.sf(saved, 1)), 0.0, WalkGain(0.0, 0.0, 0.0)
+    )
 
 
-def _experiment(search: Search, best: Set, causes: list[WalkCause]) -> NextExperiment | None:
+def _experiment(search: WalkSearch, best: Set, causes: list[WalkCause]) -> NextWalk | None:
     for cause in causes:
         if cause.equivalents:
-            return next_experiment(search, best, cause.name, SEPARABLE)
+            return next_walk(search, best, cause.name, SEPARABLE)
     return None

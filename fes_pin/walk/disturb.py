@@ -9,7 +9,7 @@ import numpy as np
 from fes_pin.data.motion import TRANSLATIONS
 from fes_pin.walk.dynamics import about, centre_of_mass, required
 from fes_pin.walk.motion import motion_of
-from fes_pin.walk.recording import Recording
+from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.strides import Strides
 
 PAD_S = 0.3
@@ -27,7 +27,7 @@ LANDMARK_M, LANDMARK_RAD = 0.005, 0.026
 segment's frame is the mean of several (U. Della Croce et al., Gait Posture 21:226, 2005)."""
 
 Disturbance = Callable[[np.ndarray, np.ndarray, bool, np.random.Generator], np.ndarray]
-Errors = dict[str, np.ndarray]
+CoordinateErrors = dict[str, np.ndarray]
 
 
 def tissue(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.Generator) -> np.ndarray:
@@ -44,21 +44,21 @@ def white(time: np.ndarray, phase: np.ndarray, angle: bool, random: np.random.Ge
     return 1e-3 * random.normal(size=len(time)) / (CLUSTER_M if angle else 1.0)
 
 
-def disturbed(recording: Recording, strides: Strides, kind: Disturbance, draws: int, seed: int) -> np.ndarray:
+def disturbed_waves(recording: WalkRecording, strides: Strides, kind: Disturbance, draws: int, seed: int) -> np.ndarray:
     """Changes of the residual's waves in the first stride by random errors of all coordinates: (draws, 6, k)."""
     random = np.random.default_rng(seed)
 
-    def errors(names: list[str], clock: np.ndarray, turn: np.ndarray) -> Iterator[Errors]:
+    def errors(names: list[str], clock: np.ndarray, turn: np.ndarray) -> Iterator[CoordinateErrors]:
         for _ in range(draws):
             yield {n: kind(clock, turn, _is_angle(n), random) for n in names}
 
     return _responses(recording, strides, errors)
 
 
-def misplaced(recording: Recording, strides: Strides) -> np.ndarray:
+def misplaced(recording: WalkRecording, strides: Strides) -> np.ndarray:
     """Changes of the residual's waves by the ordinary error of each coordinate's zero: (coordinates, 6, k)."""
 
-    def errors(names: list[str], clock: np.ndarray, _turn: np.ndarray) -> Iterator[Errors]:
+    def errors(names: list[str], clock: np.ndarray, _turn: np.ndarray) -> Iterator[CoordinateErrors]:
         for n in names:
             yield {n: np.full(len(clock), LANDMARK_RAD if _is_angle(n) else LANDMARK_M)}
 
@@ -70,9 +70,9 @@ def _is_angle(name: str) -> bool:
 
 
 def _responses(
-    recording: Recording,
+    recording: WalkRecording,
     strides: Strides,
-    errors: Callable[[list[str], np.ndarray, np.ndarray], Iterator[Errors]],
+    errors: Callable[[list[str], np.ndarray, np.ndarray], Iterator[CoordinateErrors]],
 ) -> np.ndarray:
     """Changes of the residual's waves in the first stride by errors of the coordinates, by name: (errors, 6, k)."""
     _, rows, phase = strides.windows[0]

@@ -15,7 +15,7 @@ STAGE = "body"
 """Where the contract files these causes."""
 AXES = ("forward", "left", "up")
 
-Columns = Callable[[Scene], np.ndarray]
+EffectColumns = Callable[[Scene], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Form:
     parameters: tuple[str, ...]
     units: tuple[str, ...]
     plausible: tuple[float, ...]
-    columns: Columns = field(repr=False, compare=False)
+    columns: EffectColumns = field(repr=False, compare=False)
     shifts: bool = False
     positive: bool = False
     ordinary: float = 0.0

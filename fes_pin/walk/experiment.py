@@ -11,7 +11,7 @@ from fes_pin.walk.dynamics import about, centre_of_mass, required
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import Plates
 from fes_pin.walk.scene import Scene
-from fes_pin.walk.search import Search, Set
+from fes_pin.walk.search import Set, WalkSearch
 
 CARRIED_KG = 10.0
 SLOWER = 0.6
@@ -20,7 +20,7 @@ ENOUGH = 6.0
 
 
 @dataclass(frozen=True)
-class NextExperiment:
+class NextWalk:
     """A trial to do next.
 
     Attributes
@@ -41,7 +41,7 @@ class NextExperiment:
     coordinates: dict[str, np.ndarray] | None
 
 
-def next_experiment(search: Search, best: Set, cause: str, within: float) -> NextExperiment | None:
+def next_walk(search: WalkSearch, best: Set, cause: str, within: float) -> NextWalk | None:
     """The trial that separates a cause from its nearest rival of another name; None if it has none."""
     rivals = []
     for gone, other in search.swaps(best):
@@ -65,12 +65,12 @@ def next_experiment(search: Search, best: Set, cause: str, within: float) -> Nex
             f"{pair[0]} and {pair[1]} look alike in standing, in slower walking and under a known weight: "
             "weigh the plates with known masses, or measure the body by other means"
         )
-        return NextExperiment(why, pair, None, None)
+        return NextWalk(why, pair, None, None)
     first = search.recordings[0]
     time, columns = first.coordinates_time, {n: c for n, c in first.coordinates.items() if n.startswith("q_")}
     time, columns, conditions = _program(name, time - time[0], columns, first.belt_speed_mps)
     why = f"{_WORDS[name]} (it separates {pair[0]} from {pair[1]} by {np.sqrt(scores[name]):.1f} standard deviations)"
-    return NextExperiment(why, pair, conditions, {"time_s": time, **columns})
+    return NextWalk(why, pair, conditions, {"time_s": time, **columns})
 
 
 def _program(
@@ -130,7 +130,7 @@ _WORDS = {
 }
 
 
-def _separation(search: Search, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: Set) -> float:
+def _separation(search: WalkSearch, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: Set) -> float:
     """Squared distance of a signal (n, 6) from what a rival (n, 6, p) can make of it, in the noise that was found."""
     root = 1.0 / np.sqrt(best.fitted.variance)
     scenes = [np.concatenate([signal[:, :, None], rival], axis=2)]

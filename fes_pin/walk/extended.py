@@ -10,10 +10,10 @@ from defusedxml.ElementTree import fromstring
 from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
 from fes_pin.walk.effect import central
-from fes_pin.walk.search import Search, Set
+from fes_pin.walk.search import Set, WalkSearch
 
 
-def extended_body(search: Search, best: Set) -> Body:
+def extended_body(search: WalkSearch, best: Set) -> Body:
     """The body with the segments' masses, centres and inertias of a set of causes; the same where it has none.
 
     Raises

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from fes_pin.walk.likelihood import FLOOR_N, fit
-from fes_pin.walk.search import Chosen, Search, Set
+from fes_pin.walk.likelihood import FLOOR_N, fit_walk
+from fes_pin.walk.search import Chosen, Set, WalkSearch
 
 ARM = 0.1
 """Moments count as forces at this arm, in standing heights (or 0.18 m): about a foot's half length and more."""
@@ -21,7 +21,7 @@ CHANNELS = ("forward force", "leftward force", "vertical force", "moment about f
 
 
 @dataclass(frozen=True)
-class Gain:
+class WalkGain:
     """Percent of the squared error above the noise that a cause removes, with a 95 % interval."""
 
     percent: float
@@ -29,13 +29,13 @@ class Gain:
     high: float
 
 
-def weights(search: Search) -> np.ndarray:
+def weights(search: WalkSearch) -> np.ndarray:
     """Scale of the six channels for errors: (6,); forces 1 / N, moments by `ARM`."""
     height = search.recordings[0].motion.body.height_m or 1.8
     return np.r_[np.ones(3), np.full(3, 1.0 / (ARM * height))]
 
 
-def per_stride(search: Search, chosen: Chosen) -> tuple[np.ndarray, np.ndarray]:
+def per_stride(search: WalkSearch, chosen: Chosen) -> tuple[np.ndarray, np.ndarray]:
     """Residual (n, 6, k) and columns (n, 6, k, p) of a set, stride by stride."""
     bank = search.bank(chosen)
     y = search.strides.coefficients([s.residual[:, :, None] for s in bank.scenes])[..., 0]
@@ -45,7 +45,7 @@ def per_stride(search: Search, chosen: Chosen) -> tuple[np.ndarray, np.ndarray]:
     return y, search.strides.coefficients(columns)
 
 
-def left_by(search: Search, one: Set, held_out: bool) -> np.ndarray:
+def left_by(search: WalkSearch, one: Set, held_out: bool) -> np.ndarray:
     """What a set leaves in every stride, its sizes fitted to all strides or to the others: (n, 6, k)."""
     y, x = per_stride(search, one.forms)
     if not one.forms:
@@ -57,11 +57,11 @@ def left_by(search: Search, one: Set, held_out: bool) -> np.ndarray:
     for k in range(len(y)):
         others = np.arange(len(y)) != k
         mean_y, mean_x = (search.noise.rotated(v[others].mean(axis=0, keepdims=True)) for v in (y, x))
-        out.append(y[k] - x[k] @ fit(mean_y, mean_x, prior, search.noise).values)
+        out.append(y[k] - x[k] @ fit_walk(mean_y, mean_x, prior, search.noise).values)
     return np.array(out)
 
 
-def gain(search: Search, without: Set, with_it: Set, held_out: bool, seed: int) -> Gain:
+def walk_gain(search: WalkSearch, without: Set, with_it: Set, held_out: bool, seed: int) -> WalkGain:
     """What the second set removes of the first one's squared error, above what differs from stride to stride."""
     scale = weights(search)[:, None]
     before, after = (np.sum((scale * left_by(search, s, held_out)) ** 2, axis=1) for s in (without, with_it))
@@ -76,10 +76,10 @@ def gain(search: Search, without: Set, with_it: Set, held_out: bool, seed: int) 
     drawn = np.stack([part[:, strides[:, h]].sum(axis=2) for h, part in enumerate(parts)]).sum(axis=0).T
     ratio = lambda s: 100.0 * (s[..., 0] - s[..., 1]) / np.maximum(s[..., 0] - s[..., 2], 0.05 * s[..., 0])  # noqa: E731
     low, high = np.quantile(ratio(drawn), [0.025, 0.975])
-    return Gain(float(ratio(parts.sum(axis=(0, 2)))), float(low), float(high))
+    return WalkGain(float(ratio(parts.sum(axis=(0, 2)))), float(low), float(high))
 
 
-def evidence(search: Search, without: Set, with_it: Set, seed: int) -> Gain:
+def walk_evidence(search: WalkSearch, without: Set, with_it: Set, seed: int) -> WalkGain:
     """By how much held-out strides are likelier with the second set's sizes than with the first's, in the same noise.
 
     Twice the log-likelihood a stride: what the nuisance may take, of landmarks and plates, counts for neither. In
@@ -99,10 +99,10 @@ def evidence(search: Search, without: Set, with_it: Set, seed: int) -> Gain:
     drawn = np.random.default_rng(seed).integers(0, len(before), size=(BOOTSTRAP, len(before)))
     shares = 100.0 * (before - after)[drawn].sum(axis=1) / before[drawn].sum(axis=1)
     low, high = np.quantile(shares, [0.025, 0.975])
-    return Gain(float(100.0 * np.sum(before - after) / np.sum(before)), float(low), float(high))
+    return WalkGain(float(100.0 * np.sum(before - after) / np.sum(before)), float(low), float(high))
 
 
-def error_percent(search: Search, one: Set, held_out: bool) -> float:
+def walk_error_percent(search: WalkSearch, one: Set, held_out: bool) -> float:
     """E: squared error over the measured reaction's spread about its mean, all channels together."""
     scale = weights(search)[:, None]
     measured = search.strides.coefficients([s.measured[:, :, None] for s in search.banks[False].scenes])[..., 0]
@@ -110,7 +110,7 @@ def error_percent(search: Search, one: Set, held_out: bool) -> float:
     return float(100.0 * np.sum((scale * left_by(search, one, held_out)) ** 2) / spread)
 
 
-def floor_percent(search: Search) -> float:
+def floor_percent(search: WalkSearch) -> float:
     """E of what differs from stride to stride, which no model of the mean stride takes away; 0 for one stride."""
     y, scale = per_stride(search, ())[0], weights(search)[:, None]
     measured = search.strides.coefficients([s.measured[:, :, None] for s in search.banks[False].scenes])[..., 0]
@@ -119,7 +119,7 @@ def floor_percent(search: Search) -> float:
     return float(100.0 * share * np.sum((scale * (y - y.mean(axis=0))) ** 2) / spread)
 
 
-def other_leg(search: Search, one: Set) -> float | None:
+def other_leg(search: WalkSearch, one: Set) -> float | None:
     """Gain in percent on one leg's single supports of sizes fitted to the other's; None where a leg has none.
 
     Channels count in units of what the set leaves in them.
@@ -147,7 +147,7 @@ def other_leg(search: Search, one: Set) -> float | None:
     return 100.0 * (before - after) / before
 
 
-def remainder(search: Search, one: Set) -> tuple[float, str | None]:
+def walk_remainder(search: WalkSearch, one: Set) -> tuple[float, str | None]:
     """Whether what is left comes again in every stride: p-value, and the channel and wave where it is largest.
 
     For one stride there is nothing to compare with; what a millimetre of marker noise and the plates make is taken.
@@ -172,7 +172,7 @@ def remainder(search: Search, one: Set) -> tuple[float, str | None]:
     return p_value, f"{CHANNELS[channel]}, {word}"
 
 
-def unseen(search: Search, one: Set) -> list[str]:
+def unseen(search: WalkSearch, one: Set) -> list[str]:
     """Causes whose every form, at its plausible size, stands out of noise and nuisance by less than `SEEN`."""
     noise, variance = search.noise, one.fitted.variance
     root = 1.0 / np.sqrt(variance).ravel()

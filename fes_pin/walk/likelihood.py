@@ -39,7 +39,7 @@ moment about the vertical has no weight in it: the plates' free moment is what i
 
 
 @dataclass(frozen=True)
-class Noise:
+class WalkNoise:
     """What is common to all fits of a diagnosis.
 
     Attributes
@@ -108,7 +108,7 @@ def rotation(left: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
     return vectors.T * scale
 
 
-def fit(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: Noise) -> Fitted:
+def fit_walk(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise) -> Fitted:
     """Effects and noise, most likely together.
 
     Parameters
@@ -130,7 +130,7 @@ def fitted_of(many: tuple[np.ndarray, ...], number: int) -> Fitted:
 
 
 def fit_many(
-    y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: Noise, rounds: int = ROUNDS
+    y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, rounds: int = ROUNDS
 ) -> tuple[np.ndarray, ...]:
     """`fit` of many at once: values, covariances, deviances, left, variances, taken, believed.
 
@@ -171,7 +171,7 @@ def fit_many(
     return likely[:, :, 0] * scale, covariance, deviance, left, variance, values[:, p:], values[:, :p] * scale
 
 
-def white_level(y: np.ndarray, noise: Noise, jitter: np.ndarray) -> tuple[float, float, float]:
+def white_level(y: np.ndarray, noise: WalkNoise, jitter: np.ndarray) -> tuple[float, float, float]:
     """White noise on the coordinates in what differs from stride to stride.
 
     What else differs dies out with frequency; noise of differentiated coordinates grows.
@@ -216,7 +216,7 @@ class _Spectra:
     is the variance of white noise on the coordinates, in units of the noise's jitter.
     """
 
-    def __init__(self, y: np.ndarray, noise: Noise, falling: bool = False, white: np.ndarray | None = None) -> None:
+    def __init__(self, y: np.ndarray, noise: WalkNoise, falling: bool = False, white: np.ndarray | None = None) -> None:
         self.waves = noise.harmonics > 0
         count, h = len(y), noise.harmonics[self.waves]
         self.kinds, self.kind = np.unique(h, return_inverse=True)

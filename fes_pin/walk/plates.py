@@ -132,7 +132,7 @@ def _held(point: np.ndarray, loaded: np.ndarray) -> np.ndarray:
     return point[nearest]
 
 
-def centre_of_pressure(wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def pressure_and_free_moment(wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where a reaction pierces the ground z = 0, and its free moment about the vertical there.
 
     Parameters

@@ -67,7 +67,7 @@ def _check_sides(motion: Motion, plates: Plates) -> None:
         raise InputError("the right plate's centre of pressure lies under the left foot: the feet are exchanged")
 
 
-def carried(motion: Motion, plates: Plates) -> slice:
+def carried_along(motion: Motion, plates: Plates) -> slice:
     """The longest stretch in which the plates carry the whole body; all of the record, if it is most of it.
 
     Over ground a walk begins and ends beside the plates, and with one plate each other step is not measured.

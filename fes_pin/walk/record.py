@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import Any
 
 import numpy as np
 import tomli_w
 
+from fes_pin.data.numbers import printed
 from fes_pin.data.table import format_csv
 from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.result import WalkCause, WalkDiagnosis
@@ -18,9 +18,9 @@ NEXT_FILE = "next_trial.csv"
 BODY_FILE = "body.urdf"
 
 
-def shown(value: float | None) -> float | None:
+def _shown(value: float | None) -> float | None:
     """A number as printed; None for what is not finite."""
-    return None if value is None or not math.isfinite(value) else float(f"{value:.{DIGITS}g}")
+    return printed(value, DIGITS)
 
 
 def walk_record(diagnosis: WalkDiagnosis) -> dict[str, Any]:
@@ -30,25 +30,25 @@ def walk_record(diagnosis: WalkDiagnosis) -> dict[str, Any]:
     if plan and plan.conditions is not None:
         trial = {"coordinates": NEXT_FILE, "file": NEXT_FILE, "kind": "motion", **plan.conditions}
     parameters = {
-        f"{c.name}.{n}": {"value": shown(v), "std": shown(s)}
+        f"{c.name}.{n}": {"value": _shown(v), "std": _shown(s)}
         for c in diagnosis.causes
         for n, (v, s, _) in c.parameters.items()
     }
-    errors = ({"fit": shown(f), "held_out": shown(h)} for f, h in (diagnosis.nominal_error, diagnosis.extended_error))
+    errors = ({"fit": _shown(f), "held_out": _shown(h)} for f, h in (diagnosis.nominal_error, diagnosis.extended_error))
     return {
         "study": diagnosis.study.name,
         "verdict": diagnosis.verdict,
         "causes": [_cause(c) for c in diagnosis.causes],
         "remainder": {
             "unexplained": diagnosis.remainder.unexplained,
-            "p_value": shown(diagnosis.remainder.p_value),
+            "p_value": _shown(diagnosis.remainder.p_value),
             "where": diagnosis.remainder.where,
         },
         "absorbed": list(diagnosis.absorbed),
         "nominal": {"parameters": {}, "error_percent": next(errors)},
         "extended": {"parameters": parameters, "error_percent": next(errors)},
         "noise": _noise(diagnosis),
-        "ceiling_percent": shown(diagnosis.ceiling_percent),
+        "ceiling_percent": _shown(diagnosis.ceiling_percent),
         "next_experiment": {"why": plan.why, "separates": list(plan.separates), "trial": trial} if plan else None,
         "cutoff_hz": diagnosis.cutoff_hz,
         "warnings": list(diagnosis.warnings),
@@ -62,14 +62,16 @@ def _cause(cause: WalkCause) -> dict[str, Any]:
         "name": cause.name,
         "stage": cause.stage,
         "site": cause.site,
-        "parameters": {n: {"value": shown(v), "std": shown(s), "unit": u} for n, (v, s, u) in cause.parameters.items()},
+        "parameters": {
+            n: {"value": _shown(v), "std": _shown(s), "unit": u} for n, (v, s, u) in cause.parameters.items()
+        },
         "equivalents": list(cause.equivalents),
-        "p_value": shown(cause.p_value),
+        "p_value": _shown(cause.p_value),
         "gain_percent": {
-            "fit": shown(cause.gain_fit),
-            "held_out": shown(held.percent) if held else None,
-            "ci95": [shown(held.low), shown(held.high)] if held else None,
-            "other_leg": shown(cause.other_leg_percent),
+            "fit": _shown(cause.gain_fit),
+            "held_out": _shown(held.percent) if held else None,
+            "ci95": [_shown(held.low), _shown(held.high)] if held else None,
+            "other_leg": _shown(cause.other_leg_percent),
         },
     }
 
@@ -82,7 +84,7 @@ def _noise(diagnosis: WalkDiagnosis) -> dict[str, Any]:
         columns = np.concatenate([search.bank(best.forms).x[i] for i in best.forms], axis=3)
         left = left - columns @ best.fitted.values
     size = np.sqrt(np.sum(left[0] ** 2, axis=1))
-    return {name.replace(" ", "_"): {"std": shown(float(s)), "ar": []} for name, s in zip(CHANNELS, size, strict=True)}
+    return {name.replace(" ", "_"): {"std": _shown(float(s)), "ar": []} for name, s in zip(CHANNELS, size, strict=True)}
 
 
 def walk_files(diagnosis: WalkDiagnosis) -> dict[str, str | bytes]:

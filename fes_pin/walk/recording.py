@@ -15,11 +15,11 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.walk.motion import Motion, motion_of, pelvis_to_hip
 from fes_pin.walk.plates import Plates, plates_of
-from fes_pin.walk.plausible import carried, check_together
+from fes_pin.walk.plausible import carried_along, check_together
 
 
 @dataclass(frozen=True)
-class Recording:
+class WalkRecording:
     """One walking trial.
 
     Attributes
@@ -99,7 +99,7 @@ def _as_heavy(body: Body, study: Study) -> Body:
 
 def recordings_of(
     study: Study, *, cutoff_hz: float | None = CUTOFF_HZ, stance: str = "right", body: Body | None = None
-) -> tuple[Body, list[Recording]]:
+) -> tuple[Body, list[WalkRecording]]:
     """Every trial of a walking study, each file at its own sample rate; by the body that is given, else the study's.
 
     Raises
@@ -112,7 +112,7 @@ def recordings_of(
     return body, [_recording(study, trial, body, hip, cutoff_hz) for trial in study.trials]
 
 
-def _recording(study: Study, trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float | None) -> Recording:
+def _recording(study: Study, trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float | None) -> WalkRecording:
     if f"{trial.name}.coordinates" in study.files:
         source = study.files[f"{trial.name}.coordinates"]
         time, columns = read_coordinates(source)
@@ -135,11 +135,11 @@ def _recording(study: Study, trial: Trial, body: Body, hip: np.ndarray, cutoff_h
         raise InputError(error.message, file=source, column=error.column) from None
     try:
         check_together(motion, plates)
-        rows = carried(motion, plates)
+        rows = carried_along(motion, plates)
     except InputError as error:
         read = study.files.get(f"{trial.name}.ground_reaction", source)
         raise InputError(error.message, file=read, column=error.column) from None
     motion, plates = motion.part(rows), plates.part(rows)
-    return Recording(
+    return WalkRecording(
         trial.name, motion, plates, raw_time, raw, time, columns, hip, cutoff_hz, belt, float(time[0]), trial.role
     )

@@ -9,10 +9,10 @@ from fes_pin.body.build import Body
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.walk.effect import STAGE
-from fes_pin.walk.experiment import NextExperiment
+from fes_pin.walk.experiment import NextWalk
 from fes_pin.walk.extended import extended_body
-from fes_pin.walk.judge import Gain
-from fes_pin.walk.search import LEVEL, Search, Set
+from fes_pin.walk.judge import WalkGain
+from fes_pin.walk.search import LEVEL, Set, WalkSearch
 
 CERTAIN = 1e-6
 """Level of a cause in a single stride."""
@@ -61,8 +61,8 @@ class WalkCause:
     elsewhere: tuple[str, ...]
     p_value: float
     gain_fit: float
-    gain_held_out: Gain | None
-    evidence: Gain | None = None
+    gain_held_out: WalkGain | None
+    evidence: WalkGain | None = None
     other_leg_percent: float | None = None
     stage: str = STAGE
 
@@ -85,7 +85,7 @@ class WalkCause:
 
 
 @dataclass(frozen=True)
-class Remainder:
+class WalkRemainder:
     """Whether what is left comes again in every stride, its p-value, and where it is largest."""
 
     unexplained: bool
@@ -93,7 +93,7 @@ class Remainder:
     where: str | None
 
 
-def cause_row(cause: WalkCause) -> tuple[str, str, str, str, str]:
+def walk_cause_row(cause: WalkCause) -> tuple[str, str, str, str, str]:
     """Cause, site, parameters, held-out gain, what it cannot be told from."""
     values = ", ".join(f"{n} {v:.3g} +- {s:.1g} {u}".strip() for n, (v, s, u) in cause.parameters.items())
     held = cause.gain_held_out
@@ -126,13 +126,13 @@ class WalkDiagnosis:
     study: Study
     verdict: str
     causes: tuple[WalkCause, ...]
-    remainder: Remainder
+    remainder: WalkRemainder
     absorbed: tuple[str, ...]
     nominal_error: tuple[float, float | None]
     extended_error: tuple[float, float | None]
     ceiling_percent: float
-    next_experiment: NextExperiment | None
-    search: Search = field(repr=False, compare=False)
+    next_experiment: NextWalk | None
+    search: WalkSearch = field(repr=False, compare=False)
     best: Set = field(repr=False, compare=False)
     cutoff_hz: float = CUTOFF_HZ
     wall_s: float = field(default=0.0, compare=False)
@@ -181,7 +181,7 @@ class WalkDiagnosis:
     def __str__(self) -> str:
         lines = [f"{self.study.name}: {self.headline()}"]
         rows = [("cause", "site", "parameters", "held-out gain", "cannot be told from")]
-        rows += [cause_row(c) for c in self.causes]
+        rows += [walk_cause_row(c) for c in self.causes]
         if len(rows) > 1:
             widths = [max(len(r[k]) for r in rows) for k in range(5)]
             lines += [" " + "  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows]

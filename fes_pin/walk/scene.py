@@ -11,7 +11,7 @@ from fes_pin.walk.dynamics import about, centre_of_mass, required, segment_param
 from fes_pin.walk.misfit import segment_poses
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import Plates, plates_of
-from fes_pin.walk.recording import Recording
+from fes_pin.walk.recording import WalkRecording
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Scene:
         return np.hstack([along, np.cross(point - self.centre, along)])
 
 
-def scene_of(recording: Recording, cutoff_hz: float | None, later_s: float = 0.0) -> Scene:
+def scene_of(recording: WalkRecording, cutoff_hz: float | None, later_s: float = 0.0) -> Scene:
     """A trial as a scene; `later_s` reads the plates that much later than their clock says."""
     plates = recording.plates
     if later_s:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fes_pin.body.build import GRAVITY
-from fes_pin.walk.disturb import disturbed, misplaced, tissue, white
+from fes_pin.walk.disturb import disturbed_waves, misplaced, tissue, white
 from fes_pin.walk.effect import Form
 from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.likelihood import (
@@ -17,16 +17,16 @@ from fes_pin.walk.likelihood import (
     MEAN_FORCE,
     MEAN_TWIST_NM,
     Fitted,
-    Noise,
-    fit,
+    WalkNoise,
     fit_many,
+    fit_walk,
     fitted_of,
     rotation,
 )
-from fes_pin.walk.recording import Recording
+from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.scene import Scene, scene_of
 from fes_pin.walk.strides import Strides, strides_of
-from fes_pin.workers import OutOfTime, check_time
+from fes_pin.workers import OutOfTime, check_limit
 
 BEAM = 4
 """Sets of one size that are carried on."""
@@ -109,17 +109,17 @@ class Nulls:
         return float(max(-np.expm1(-np.exp(-(gain - place) / scale)), 1e-300))
 
 
-def library() -> tuple[Form, ...]:
+def walk_library() -> tuple[Form, ...]:
     """Every form of every cause."""
     return tuple(form for effect in EFFECTS for form in effect.forms())
 
 
-class Search:
+class WalkSearch:
     """One diagnosis's fits."""
 
-    def __init__(self, recordings: Sequence[Recording], cutoff_hz: float, seed: int = 0) -> None:
+    def __init__(self, recordings: Sequence[WalkRecording], cutoff_hz: float, seed: int = 0) -> None:
         self.recordings, self.cutoff_hz, self.seed = list(recordings), cutoff_hz, seed
-        self.forms = library()
+        self.forms = walk_library()
         scenes = [scene_of(r, cutoff_hz) for r in self.recordings]
         self.strides: Strides = strides_of(scenes, cutoff_hz)
         self.banks = {False: self._bank(scenes, 0.0)}
@@ -150,13 +150,13 @@ class Search:
     def tissue(self) -> np.ndarray:
         """Residuals that soft tissue leaves: (draws, 6, k)."""
         first = self.recordings[self.strides.windows[0][0]]
-        return disturbed(first, self.strides, tissue, TISSUE_DRAWS, self.seed)
+        return disturbed_waves(first, self.strides, tissue, TISSUE_DRAWS, self.seed)
 
     @cached_property
     def jitter(self) -> np.ndarray:
         """Second moment of what white noise of one unit leaves, wave by wave: (6, 6, k)."""
         first = self.recordings[self.strides.windows[0][0]]
-        draws = disturbed(first, self.strides, white, WHITE_DRAWS, self.seed)
+        draws = disturbed_waves(first, self.strides, white, WHITE_DRAWS, self.seed)
         moment = np.einsum("dik,djk->ijk", draws, draws) / len(draws)
         h = self.strides.harmonics
         for wave in np.unique(h):
@@ -170,7 +170,7 @@ class Search:
         means = np.r_[np.full(3, MEAN_FORCE * weight), np.full(2, MEAN_ARM_M * weight), MEAN_TWIST_NM] ** 2
         if not self.strides.whole:  # soft tissue does not come back to what it was
             means = means + np.mean(self.tissue[..., 0] ** 2, axis=0)
-        bare = Noise(self.strides.harmonics, turn, means, self._none())
+        bare = WalkNoise(self.strides.harmonics, turn, means, self._none())
         self.ordinary = bare.rotated(_compressed(self._in_every_session()))
         self.noise = replace(bare, nuisance=np.concatenate([bare.rotated(self._nuisance()), self.ordinary], axis=3))
         self.fits = {}
@@ -200,7 +200,7 @@ class Search:
         later, bank = 0.0, self.banks[False]
         for _ in range(SHIFT_ROUNDS):
             prior = np.array(self.forms[self.shift].plausible)
-            found = fit(self.noise.rotated(bank.y), self.noise.rotated(bank.x[self.shift]), prior, self.noise)
+            found = fit_walk(self.noise.rotated(bank.y), self.noise.rotated(bank.x[self.shift]), prior, self.noise)
             step = float(np.clip(found.values[0], -0.05, 0.05))
             later = float(np.clip(later + step, -0.2, 0.2))
             scenes = [scene_of(r, self.cutoff_hz, later) for r in self.recordings]
@@ -240,7 +240,7 @@ class Search:
         for (count, _), group in groups.items():
             for at in range(0, len(group), TOGETHER):
                 if self.kept:
-                    check_time()
+                    check_limit()
                 self._fit_alike(group[at : at + TOGETHER], count)
         return [self.fits[chosen] for chosen in sets]
 

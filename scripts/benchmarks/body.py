@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.body.attainable import attainable
 from fes_pin.body.build import Body
-from fes_pin.body.controllability import controllability
+from fes_pin.body.controllability import modal_controllability
 from fes_pin.body.gait import posture_angles, posture_names
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES
@@ -51,7 +51,7 @@ def run() -> list[tuple[str, float, float, str]]:
 
     def one_posture() -> None:
         linear = linearize(body, "mid_stance")
-        result = controllability(linear, nerves)
+        result = modal_controllability(linear, nerves)
         _ = result.fall_energy
         observability(linear, JOINT_NAMES)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from confusion_matrix.generator import Made
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.per_trial import predictions
 
@@ -17,7 +17,7 @@ from fes_pin.identify.per_trial import predictions
 def judge(made: Made) -> dict[str, Any]:
     """Diagnose a study and compare."""
     began, used = time.perf_counter(), time.process_time()
-    diagnosis = diagnose(made.study)
+    diagnosis = diagnose_joint(made.study)
     wall, cpu = time.perf_counter() - began, time.process_time() - used
     item = made.item
     named = {c.name for c in diagnosis.causes}

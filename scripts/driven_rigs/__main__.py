@@ -14,7 +14,7 @@ import typer
 
 from driven_rigs.draw import CAUSES, OUTSIDE, draw
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.fit import CONFIDENCE_95
 
@@ -40,7 +40,7 @@ def judged(causes: tuple[str, ...], size: float, seed: int) -> dict[str, Any]:
         drawn = draw(causes, size, seed, Path(folder))
         began = time.perf_counter()
         try:
-            found = diagnose(read_study(drawn.study))
+            found = diagnose_joint(read_study(drawn.study))
         except Exception as error:
             return {"seed": seed, "causes": causes, "error": f"{type(error).__name__}: {error}"}
         seconds = time.perf_counter() - began

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose
-from fes_pin.diagnose.replay import replay
+from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnose.replay import replayed_trials
 from fes_pin.view.plots import trial_drawing
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
@@ -13,9 +13,9 @@ TRIAL = "stairs"
 
 def main() -> None:
     """Diagnose, and draw what is found."""
-    diagnosis = diagnose(read_study(ANALYSIS / "studies" / "ankle_demo"))
+    diagnosis = diagnose_joint(read_study(ANALYSIS / "studies" / "ankle_demo"))
     print(diagnosis)
-    (one,) = (r for r in replay(diagnosis) if r.measured.name == TRIAL)
+    (one,) = (r for r in replayed_trials(diagnosis) if r.measured.name == TRIAL)
     drawing = trial_drawing(one, diagnosis.extended.noise, alone=True)
     path = ANALYSIS / "figures" / "verdict.svg"
     path.parent.mkdir(exist_ok=True)

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from imposed_rigs import ankle, joint, muscle
 
 RIGS = {"joint": joint, "muscle": muscle, "ankle": ankle}
@@ -31,7 +31,7 @@ def judged(rig: str, cause: str, size: float, seed: int) -> dict[str, Any]:
     began = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
         made = RIGS[rig].study((cause,) if cause else (), size, np.random.default_rng(seed), Path(folder) / "study")
-        found = diagnose(made)
+        found = diagnose_joint(made)
     named = [[c.name, *c.equivalents] for c in found.causes]
     row = {"rig": rig, "cause": cause, "seed": seed, "verdict": found.verdict, "named": named}
     return {**row, "seconds": round(time.process_time() - began, 1)}

@@ -15,7 +15,7 @@ from fes_pin.data.study import read_study
 from fes_pin.walk.diagnosis import diagnose_walk, white_noise
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.result import WalkDiagnosis
-from fes_pin.walk.search import Search
+from fes_pin.walk.search import WalkSearch
 from walking_matrix.plan import KINDS, drawn
 from walking_matrix.synthetic import Gait, Wrong, gait_of, make
 
@@ -50,7 +50,7 @@ def strength(gait: Gait, wrong: Wrong, seed: int, found: WalkDiagnosis) -> float
         return float((white_noise(found.search) or (0.0, 0.0, 0.0))[2])
     with tempfile.TemporaryDirectory() as folder:
         make(gait, Path(folder), replace(wrong, cause="none"), seed)
-        twin = Search(recordings_of(read_study(folder), cutoff_hz=found.cutoff_hz)[1], found.cutoff_hz)
+        twin = WalkSearch(recordings_of(read_study(folder), cutoff_hz=found.cutoff_hz)[1], found.cutoff_hz)
     waves = min(len(twin.strides.harmonics), len(found.search.strides.harmonics))
     y = [s.banks[False].y[:, :, :waves] for s in (found.search, twin)]
     noise, variance = twin.noise, twin.fit(()).fitted.variance[:, :, :waves]

@@ -7,7 +7,7 @@ import pytest
 
 from fes_pin.allocate.allocate import Allocator, allocate
 from fes_pin.allocate.bounded import solve_once
-from fes_pin.allocate.off_or_enough import best_choice, cost_of, rounded
+from fes_pin.allocate.off_or_enough import best_choice, cost_of, rounded_to_least
 from fes_pin.muscles.nerves import Nerves
 
 
@@ -46,7 +46,7 @@ def test_the_best_of_all_choices_is_found_and_proven():
 def test_rounding_is_allowed_never_better_and_its_gap_is_true():
     worse = 0
     for H, f, upper, least in problems(300, 1):
-        cheap, best = rounded(H, f, np.zeros(len(f)), upper, least), every_choice(H, f, upper, least)
+        cheap, best = rounded_to_least(H, f, np.zeros(len(f)), upper, least), every_choice(H, f, upper, least)
         assert (((cheap.r == 0.0) | (cheap.r >= least - 1e-15)) & (cheap.r <= upper)).all() or (least > upper).any()
         assert best - 1e-10 <= cheap.cost <= best + cheap.gap + 1e-10
         worse += cheap.cost > best + 1e-9

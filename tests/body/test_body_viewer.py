@@ -11,13 +11,13 @@ from urllib.request import urlopen
 import numpy as np
 import pytest
 
-from fes_pin.body.controllability import controllability
+from fes_pin.body.controllability import modal_controllability
 from fes_pin.body.linearize import linearize
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.nerves import Nerves
 from fes_pin.view.influence import influence_table, plot_influence
 from fes_pin.view.live import LiveViewer
-from fes_pin.view.viewer import Scene, show_influence, show_mode, show_walk
+from fes_pin.view.viewer import BodyScene, show_influence, show_mode, show_walk
 
 
 @pytest.fixture(scope="session")
@@ -83,9 +83,9 @@ def test_a_mode_shows_a_body_that_moves(body, screenshot, tmp_path):
 def test_a_live_viewer_shows_one_scene_after_the_other_and_moves(body, screenshot):
     linear = linearize(body, "mid_stance")
     with LiveViewer() as viewer:
-        viewer.show(Scene(body).pose({"right_ankle_dorsiflexion": 0.3}))
+        viewer.show(BodyScene(body).pose({"right_ankle_dorsiflexion": 0.3}))
         forward = screenshot(viewer.url)
-        viewer.show(Scene(body).pose({"right_ankle_dorsiflexion": -0.3}))
+        viewer.show(BodyScene(body).pose({"right_ankle_dorsiflexion": -0.3}))
         back = screenshot(viewer.url)
         assert skin(forward).sum() > 500
         left, right = (np.flatnonzero(skin(p).any(axis=0)).mean() for p in (forward, back))
@@ -165,12 +165,12 @@ def test_the_live_viewer_listens_to_this_machine_alone_and_dies_with_the_command
 def test_two_live_viewers_have_a_port_each(body):
     with LiveViewer() as one, LiveViewer() as other:
         assert one.url != other.url
-        other.show(Scene(body))
+        other.show(BodyScene(body))
 
 
 def test_a_nerve_paints_the_joints_that_it_turns(body, screenshot, tmp_path):
     linear = linearize(body, "mid_stance")
-    plain = screenshot(Scene(body).pose("mid_stance").write(tmp_path / "plain.html"))
+    plain = screenshot(BodyScene(body).pose("mid_stance").write(tmp_path / "plain.html"))
     scene = show_influence(linear, Nerves(), "right_femoral")
     painted = screenshot(scene.write(tmp_path / "nerve.html"))
     assert red(painted) > 100 > red(plain)
@@ -179,7 +179,7 @@ def test_a_nerve_paints_the_joints_that_it_turns(body, screenshot, tmp_path):
 
 
 def test_a_page_needs_no_network(body, tmp_path):
-    text = Scene(body, caption="<b>&").pose("neutral").write(tmp_path / "page.html").read_text()
+    text = BodyScene(body, caption="<b>&").pose("neutral").write(tmp_path / "page.html").read_text()
     assert "src=" not in text.split("<script>")[0]
     assert "&lt;b&gt;&amp;" in text
     assert len(text) < 4_000_000
@@ -214,7 +214,7 @@ def test_heat_map_and_table(body, tmp_path):
     from matplotlib import image
 
     linear = linearize(body, "mid_stance")
-    result = controllability(linear, Nerves(("right_femoral", "right_tibial")))
+    result = modal_controllability(linear, Nerves(("right_femoral", "right_tibial")))
     for on in ("joints", "modes"):
         picture = image.imread(plot_influence(result, tmp_path / f"{on}.png", on))
         assert picture[..., :3].std() > 0.05

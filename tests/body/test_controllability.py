@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import integrate, linalg
 
 from fes_pin.body.build import Body
-from fes_pin.body.controllability import controllability, gramian, mode_price, pbh, stabilizing_price
+from fes_pin.body.controllability import gramian, modal_controllability, mode_price, pbh, stabilizing_price
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linearize import linearize, linearize_batch
 from fes_pin.body.modes import NEUTRAL_RATE
@@ -37,7 +37,7 @@ def test_pbh_is_the_rank_test(seed):
     Q = rng.normal(size=(19, 3))
     missed = rng.choice(19, size=3, replace=False)
     Q = Q - linear.A @ found.shapes[:, missed] @ (found.shapes[:, missed].T @ Q)
-    result = controllability(linear, Inputs.pulling(["a", "b", "c"], Q, linear.joint_names))
+    result = modal_controllability(linear, Inputs.pulling(["a", "b", "c"], Q, linear.joint_names))
     G = linear.R @ Q
     scale = np.diag(np.concatenate([np.ones(19), np.full(19, 1.0 / 30.0)]))  # balances angles and rates
     for i, value in enumerate(found.values):
@@ -56,9 +56,9 @@ def test_equal_poles_need_as_many_inputs():
         [n for n in body.joint_names if n not in ("left_knee_flexion", "left_hip_flexion")]
     )
     twins = replace(knees, A=np.diag([1.0, 1.0]), B=np.diag([-4.0, -4.0]), C=np.zeros(2))
-    one = controllability(twins, Inputs.pulling(["a"], [[1.0], [2.0]], twins.joint_names))
+    one = modal_controllability(twins, Inputs.pulling(["a"], [[1.0], [2.0]], twins.joint_names))
     assert not one.controllable.any()
-    two = controllability(twins, Inputs.pulling(["a", "b"], [[1.0, 0.0], [2.0, 1.0]], twins.joint_names))
+    two = modal_controllability(twins, Inputs.pulling(["a", "b"], [[1.0, 0.0], [2.0, 1.0]], twins.joint_names))
     assert two.controllable.all()
 
 
@@ -107,7 +107,7 @@ def test_stabilizing_price_is_the_riccati_solution(standing):
     """min integral u'u that brings X to rest over all time is x' P x, P the stabilizing Riccati solution without state
     cost."""
     inputs = Inputs.of(Nerves(), standing)
-    result = controllability(standing, inputs)
+    result = modal_controllability(standing, inputs)
     rows = result.falling
     values, gains = result.modes.values[rows], result.gains[rows]
     scale = np.array([np.radians(1.0) / np.abs(m.shape).max() for m in result.modes.falling])
@@ -123,7 +123,7 @@ def test_stabilizing_price_is_the_riccati_solution(standing):
 
 def test_influence_is_acceleration_per_input(standing):
     inputs = Inputs.of(Nerves(), standing)
-    result = controllability(standing, inputs)
+    result = modal_controllability(standing, inputs)
     assert np.allclose(standing.A @ result.joint_influence, inputs.on(standing), atol=1e-9)
     back = result.modes.shapes @ result.gains  # A^-1 = sum of shape shape'
     assert np.abs(back - result.joint_influence).max() < 1e-7 * np.abs(back).max()
@@ -134,7 +134,7 @@ def test_muscles_that_only_pull_need_pulls_both_ways(body):
     plantar = Inputs.pulling(["tibial"], [[-100.0]], whole.joint_names)
     both = Inputs.pulling(["tibial", "peroneal"], [[-100.0, 40.0]], whole.joint_names)
     motor = Inputs.torques(["right_ankle_dorsiflexion"])
-    one, two, three = (controllability(whole, i) for i in (plantar, both, motor))
+    one, two, three = (modal_controllability(whole, i) for i in (plantar, both, motor))
     assert one.controllable.all()
     assert not one.controls_falls
     assert two.controls_falls
@@ -143,10 +143,10 @@ def test_muscles_that_only_pull_need_pulls_both_ways(body):
 
 
 def test_all_nerves_reach_every_fall_of_the_stance(standing):
-    result = controllability(standing, Nerves())
+    result = modal_controllability(standing, Nerves())
     assert result.controls_falls
     assert "right_tibial" in str(result)
-    without = controllability(standing, Nerves(("left_deep_peroneal",)))
+    without = modal_controllability(standing, Nerves(("left_deep_peroneal",)))
     assert not without.controls_falls
 
 
@@ -212,7 +212,7 @@ def test_more_goniometers_leave_less_in_doubt(standing):
 def test_observability_is_controllability_of_the_transpose(body, standing):
     """An angle sensor sees a mode as a torque at its joint moves it."""
     seen = observability(standing, ["right_ankle_inversion", "left_hip_flexion"])
-    moved = controllability(standing, ["right_ankle_inversion", "left_hip_flexion"])
+    moved = modal_controllability(standing, ["right_ankle_inversion", "left_hip_flexion"])
     assert np.array_equal(seen.observable, moved.controllable)
     apart = linearize(body, "neutral")
     apart = apart.brace([n for n in apart.joint_names if n not in ("left_knee_flexion", "lumbar_rotation")])
@@ -224,10 +224,10 @@ def test_observability_is_controllability_of_the_transpose(body, standing):
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda s: controllability(s, ["knee"]), "unknown joint"),
-        (lambda s: controllability(s, 3), "inputs must be"),
-        (lambda s: controllability(s, Nerves(), horizon=0.0), "horizon"),
-        (lambda s: controllability(s, Nerves(), horizon="x"), "horizon"),
+        (lambda s: modal_controllability(s, ["knee"]), "unknown joint"),
+        (lambda s: modal_controllability(s, 3), "inputs must be"),
+        (lambda s: modal_controllability(s, Nerves(), horizon=0.0), "horizon"),
+        (lambda s: modal_controllability(s, Nerves(), horizon="x"), "horizon"),
         (lambda s: linearize(s.body, ["a"] * 19), "joint values"),
         (lambda s: linearize(s.body, "neutral", gravity="x"), "gravity"),
         (lambda s: linearize_batch(s.body, [["a"] * 19]), "must be numbers"),

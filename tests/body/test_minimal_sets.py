@@ -7,7 +7,7 @@ import pytest
 
 from fes_pin.body.attainable import attainable, demands
 from fes_pin.body.catchable import catchable
-from fes_pin.body.controllability import controllability
+from fes_pin.body.controllability import modal_controllability
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linearize import linearize
 from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto
@@ -64,7 +64,7 @@ def test_no_smaller_set_pulls_both_ways_in_turn(braced):
     size = len(found[0].inputs)
     assert not any(pulls(n) for n in itertools.combinations(RIGHT, size - 1))
     assert {s.inputs for s in found} == {n for n in itertools.combinations(RIGHT, size) if pulls(n)}
-    assert all(controllability(braced, nerves.select(s.inputs)).controls_falls for s in found)
+    assert all(modal_controllability(braced, nerves.select(s.inputs)).controls_falls for s in found)
 
 
 def test_pulling_inputs_need_one_more_than_falls(braced):

@@ -15,7 +15,7 @@ from diagnose.hidden import study_of
 from fes_pin.cli import main
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import read_trial, write_trial
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files, diagnosis_record
 from fes_pin.identify.noise import estimate_noise
 from fes_pin.identify.stored import load_random
@@ -57,7 +57,7 @@ def made(tmp_path_factory):
 @pytest.fixture(scope="module")
 def diagnosis(made):
     """The same by the library."""
-    return diagnose(read_study(made / "study"))
+    return diagnose_joint(read_study(made / "study"))
 
 
 def by_command(folder, out, threads):
@@ -91,7 +91,7 @@ def test_the_library_says_the_same(made, diagnosis):
 
 
 def test_the_seed_changes_only_what_is_simulated(made):
-    found = diagnosis_record(diagnose(read_study(made / "study"), seed=7))
+    found = diagnosis_record(diagnose_joint(read_study(made / "study"), seed=7))
     usual = record(made / "one")
     for key in ("study", "verdict", "absorbed", "nominal", "extended", "noise", "ceiling_percent"):
         assert json.loads(json.dumps(found[key])) == usual[key], key
@@ -207,7 +207,7 @@ def test_a_failed_write_leaves_the_old_answer(made, diagnosis, monkeypatch, caps
     old = {name: f"old {name}" for name in FILES}
     for name, text in old.items():
         (out / name).write_text(text)
-    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose", lambda *_, **__: diagnosis)
+    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose_joint", lambda *_, **__: diagnosis)
     usual, count = os.replace, []
 
     def replace(source, target):
@@ -225,14 +225,14 @@ def test_a_failed_write_leaves_the_old_answer(made, diagnosis, monkeypatch, caps
 def test_what_an_earlier_diagnosis_proposed_does_not_stay(made, diagnosis, monkeypatch, tmp_path):
     (tmp_path / NEXT_FILE).write_text("of another study")
     decided = replace(diagnosis, next_experiment=None)
-    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose", lambda *_, **__: decided)
+    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose_joint", lambda *_, **__: decided)
     run(monkeypatch, "diagnose", made / "study", "--out", tmp_path)
     assert (tmp_path / "diagnosis.json").exists() and not (tmp_path / NEXT_FILE).exists()
 
 
 def test_a_killed_report_leaves_no_folder(made, diagnosis, monkeypatch, tmp_path):
     """What ends the work before the files are complete leaves nothing."""
-    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose", lambda *_, **__: diagnosis)
+    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose_joint", lambda *_, **__: diagnosis)
     monkeypatch.setattr("fes_pin.view.report.report_html", _killed)
     monkeypatch.setattr(sys, "argv", ["fes-pin", "diagnose", str(made / "study"), "--out", str(tmp_path / "out")])
     with pytest.raises((KeyboardInterrupt, SystemExit)):

@@ -11,7 +11,7 @@ from data import studies
 
 import fes_pin as fp
 from fes_pin.cli import main
-from fes_pin.compare.literature import LITERATURE, published
+from fes_pin.compare.literature import LITERATURE, published_model
 from fes_pin.compare.own_part import own_part
 from fes_pin.compare.result import apart_from
 from fes_pin.data.errors import InputError
@@ -20,7 +20,7 @@ from fes_pin.data.errors import InputError
 def test_ding_is_the_published_equations():
     """Against the sums over pulses written out, by another integrator."""
     study = twins.study("ding", 1, noise=0.0, scatter=0.0)
-    model = published("ding2003").model(fp.nominal_model(study), study.trials)
+    model = published_model("ding2003").model(fp.nominal_model(study), study.trials)
     values = {"gain": 1500.0 * 0.050957, "ding2003.half_saturation": 0.3}
     model = model.with_parameters({**values, "ding2003.tau_1_s": 0.04, "ding2003.tau_2_s": 0.08})
     for trial in study.trials[:4]:

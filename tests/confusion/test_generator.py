@@ -9,7 +9,7 @@ from confusion_matrix import drafts, generator, noise, plan, stimuli
 from confusion_matrix.plan import Item
 
 from fes_pin.identify.problem import Problem, whitened_sse
-from fes_pin.models.effects import EFFECTS, effect
+from fes_pin.models.effects import EFFECTS, effect_named
 from fes_pin.models.nominal import nominal_model
 
 AGREE = (
@@ -45,7 +45,7 @@ def test_causes_in_the_engines_form_agree_with_it(cause, short, tmp_path):
     (readings,) = drafts.run_trials([one], [one.sizes], (form,), 10)
     study = drafts.study_of(one, readings)
     shape = {n: v for n, v in {"side": one.shapes[0].get("side")}.items() if v is not None}
-    model = nominal_model(study) + dataclasses.replace(effect(cause)(), **shape)
+    model = nominal_model(study) + dataclasses.replace(effect_named(cause)(), **shape)
     truth = generator.true_values(one, (form,)) | one.plant.true
     if cause in ("recruitment_hysteresis", "passive_relaxation"):
         assert set(truth) > set(one.plant.true)
@@ -68,7 +68,7 @@ def test_causes_of_joints_alone_agree_with_the_engine(cause, short, tmp_path):
     one.shapes, one.sizes = [form.draw(item.rng(10), np.concatenate(bare))], [form.unit]
     (readings,) = drafts.run_trials([one], [one.sizes], (form,), 10)
     study = drafts.study_of(one, readings)
-    extended = nominal_model(study) + effect(cause)()
+    extended = nominal_model(study) + effect_named(cause)()
     left = generator.nominal_fit(study, generator.true_values(one, (form,)), extended)
     assert np.sqrt(left.sse) < 0.5 < 0.05 * generator.noncentrality(one, readings)
 

@@ -4,7 +4,7 @@ import pytest
 from confusion_matrix import generator
 from confusion_matrix.plan import Item
 
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 
 
 @pytest.mark.parametrize(
@@ -24,5 +24,5 @@ from fes_pin.diagnose.diagnosis import diagnose
 )
 def test_the_cause_alone_is_named(name, tmp_path):
     item = Item.parse(name)
-    diagnosis = diagnose(generator.make([item], tmp_path)[0].study)
+    diagnosis = diagnose_joint(generator.make([item], tmp_path)[0].study)
     assert [{c.name, *c.equivalents} for c in diagnosis.causes] == [set(item.causes)], str(diagnosis)

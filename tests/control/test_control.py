@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
-from fes_pin.control.endurance import RESERVE, budget, least_rest, scheduled
+from fes_pin.control.endurance import RESERVE, least_rest, muscle_budget, scheduled
 from fes_pin.control.faults import Status
 from fes_pin.control.loop import sine, steps, track
 from fes_pin.control.pulse import PulseWidth
@@ -211,7 +211,7 @@ def test_play_as_wide_as_the_threshold_is_refused(half):
 def test_five_minutes_with_fatigue_to_sixty_percent():
     model, joint = ankle_of(TIRING) + Fatigue(**FATIGUE), RunningTwin(TIRING)
     reference = sine(LOW, 15.0, 0.5, 300.0)
-    spending = budget(model, LOAD, reference)
+    spending = muscle_budget(model, LOAD, reference)
     assert spending.respected and 0.58 < spending.capacity[-1] < 0.62
     controller = PositionController(model, LOAD)
     run = track(controller, joint, reference)
@@ -223,7 +223,7 @@ def test_five_minutes_with_fatigue_to_sixty_percent():
 def test_warning_comes_before_the_joint_falls_short():
     model = ankle_of(TIRING) + Fatigue(**FATIGUE)
     reference = sine(LOW, 20.0, 0.5, 90.0)
-    spending = budget(model, LOAD, reference)
+    spending = muscle_budget(model, LOAD, reference)
     assert 5.0 < spending.short_at_s < 60.0
     controller, joint = PositionController(model, LOAD), RunningTwin(TIRING)
     warned, short = math.inf, math.inf
@@ -243,9 +243,9 @@ def test_rests_bring_a_schedule_within_the_budget():
     rest = least_rest(model, LOAD, bout, 4)
     assert 0.0 < rest < 120.0
     low = AnkleDynamics.of(model, LOAD).rest_angle()
-    kept = budget(model, LOAD, scheduled(bout, 4, rest, low))
+    kept = muscle_budget(model, LOAD, scheduled(bout, 4, rest, low))
     assert kept.respected and (kept.needed <= (1.0 - RESERVE) * kept.capacity).all()
-    assert not budget(model, LOAD, scheduled(bout, 4, rest - 0.5, low)).respected
+    assert not muscle_budget(model, LOAD, scheduled(bout, 4, rest - 0.5, low)).respected
 
 
 def test_bad_input_is_one_line():
@@ -254,8 +254,8 @@ def test_bad_input_is_one_line():
     with pytest.raises(InputError, match="load"):
         PositionController(ankle_of(TWIN), math.nan)
     with pytest.raises(InputError, match="effect fatigue"):
-        budget(ankle_of(TWIN), LOAD, np.full(3, 1.8))
+        muscle_budget(ankle_of(TWIN), LOAD, np.full(3, 1.8))
     with pytest.raises(InputError, match="finite angles"):
-        budget(ankle_of(TIRING) + Fatigue(), LOAD, np.array([1.8, math.nan]))
+        muscle_budget(ankle_of(TIRING) + Fatigue(), LOAD, np.array([1.8, math.nan]))
     with pytest.raises(InputError, match="no rest"):
         least_rest(ankle_of(TIRING) + Fatigue(**FATIGUE), LOAD, sine(LOW, 60.0, 0.5, 4.0), 3)

@@ -9,7 +9,7 @@ from fes_pin.allocate.allocator import Allocator
 from fes_pin.allocate.horizon import Horizon, StrengthFatigue
 from fes_pin.control.limits import StimulationLimits
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import as_number, between, number, positive, whole
+from fes_pin.data.numbers import as_number, between, number, positive_number, whole
 from fes_pin.muscles.nerves import Nerves
 
 NONE = ["5", b"5", True, None, [1.0], np.array([1.0]), 1j, np.bool_(True)]
@@ -20,7 +20,7 @@ NONE = ["5", b"5", True, None, [1.0], np.array([1.0]), 1j, np.bool_(True)]
     "ask",
     [
         lambda v: number(v, "x"),
-        lambda v: positive(v, "x"),
+        lambda v: positive_number(v, "x"),
         lambda v: whole(v, "x"),
         lambda v: between(v, 0.0, 9.0, "x"),
         lambda v: Allocator(np.eye(2), change=v),

@@ -4,7 +4,7 @@ import hashlib
 import shutil
 from pathlib import Path
 
-from fes_pin.data.provenance import provenance
+from fes_pin.data.provenance import provenance_now
 from fes_pin.data.study import Study, read_study
 
 DEMO = Path(__file__).parents[2] / "analysis/studies/ankle_demo"
@@ -14,17 +14,17 @@ def test_every_file_of_the_study_is_hashed(tmp_path):
     folder = shutil.copytree(DEMO, tmp_path / "study")
     (folder / "other.csv").write_text("no part of it\n")
     study = read_study(folder)
-    made = provenance(study, 3)
+    made = provenance_now(study, 3)
     assert set(made.inputs) == {"study.toml", *(f"trials/{t.name}.csv" for t in study.trials)}
     assert made.inputs["study.toml"] == hashlib.sha256((folder / "study.toml").read_bytes()).hexdigest()
     assert made.seed == 3 and made.versions["numpy"] and "command" not in made.record()
     first = next(iter(folder.glob("trials/*.csv")))
     first.write_text(first.read_text() + "\n")
-    changed = provenance(study, 3).inputs
+    changed = provenance_now(study, 3).inputs
     assert {n for n in changed if changed[n] != made.inputs[n]} == {f"trials/{first.name}"}
 
 
 def test_a_study_in_memory_has_no_files(tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
-    made = provenance(Study("s", "muscle", {}, {}, (), tmp_path), 0)
+    made = provenance_now(Study("s", "muscle", {}, {}, (), tmp_path), 0)
     assert made.inputs == {} and made.date == "1970-01-01T00:00:00Z"

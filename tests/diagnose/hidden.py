@@ -11,7 +11,7 @@ from oracle.studies import stimulus
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 
 SHORT = {"n_motion": 4, "n_isometric": 2, "duration_s": 5.0}
 
@@ -26,7 +26,7 @@ def study_of(rig, names=(), noise="white", seed=0, **how):
 @functools.cache
 def diagnosed(rig, names=(), noise="white", seed=0, driven=True):
     """The diagnosis of such a study."""
-    return diagnose(study_of(rig, names, noise, seed, driven=driven))
+    return diagnose_joint(study_of(rig, names, noise, seed, driven=driven))
 
 
 def slide(seed, causes, driven=True, trials=5, seconds=4.0):

@@ -7,7 +7,7 @@ from diagnose.hidden import study_of
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.decide.doubts import with_error
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.record import diagnosis_files, diagnosis_record
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.search.simulation_search import Searched
@@ -19,7 +19,7 @@ from fes_pin.view.report import report_html
 
 def test_a_model_that_cannot_be_simulated_is_unexplained_with_the_reason():
     study = study_of("ankle", n_motion=1, n_isometric=0, duration_s=1.0)
-    diagnosis = diagnose(replace(study, start={**study.start, "inertia_kgm2": 1e-9, "damping_nms": 1e2}))
+    diagnosis = diagnose_joint(replace(study, start={**study.start, "inertia_kgm2": 1e-9, "damping_nms": 1e2}))
     assert diagnosis.verdict == "unexplained" and diagnosis.remainder.unexplained
     assert "leaves the floating-point numbers" in diagnosis.reason
     assert diagnosis.reason in str(diagnosis).splitlines()[0]
@@ -41,7 +41,7 @@ def test_a_missing_input_does_not_end_as_noise():
 
 def test_the_headline_says_how_much_is_explained():
     study = study_of("joint", ("coulomb_friction",), seed=1)
-    diagnosis = diagnose(study)
+    diagnosis = diagnose_joint(study)
     assert "one cause explains 100 % of what the model gets wrong, 0 % stays" in str(diagnosis).splitlines()[0]
     assert any("rest on 4 trials" in w for w in diagnosis.warnings)
 
@@ -49,7 +49,7 @@ def test_the_headline_says_how_much_is_explained():
 def test_two_real_trials_end_near_the_least_error(shared):
     """The biceps' force is smooth: its noise from sample to sample is nothing, and the likelihood led elsewhere."""
     study = read_study(shared / "data/biceps_fes")
-    diagnosis = diagnose(replace(study, trials=study.trials[:2]))
+    diagnosis = diagnose_joint(replace(study, trials=study.trials[:2]))
     assert diagnosis.nominal_error[0] < 20.0
     assert diagnosis.verdict == "unexplained"
 

@@ -11,7 +11,7 @@ from oracle.studies import joint_rig, pendulum_urdf
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 
 DT = 5e-3
 
@@ -38,13 +38,13 @@ def test_a_joint_driven_over_the_top(cause, tmp_path):
     size = {"quadratic_damping": {"coefficient": 0.003}}.get(cause, TYPICAL.get(cause))
     study = far_driven(71, {cause: dict(size)} if cause else {}, tmp_path)
     assert max(np.ptp(t["position"]) for t in study.trials) > 3.0
-    assert named(diagnose(study)) == ([{cause}] if cause else [])
+    assert named(diagnose_joint(study)) == ([{cause}] if cause else [])
 
 
 def test_a_twin_is_found_where_a_fit_from_far_off_does_not_arrive(tmp_path):
     """On a joint that tumbles an offset of the sensor is a tilt of the base: the same motion, read the same."""
     study = far_driven(86, {"sensor_offset": TYPICAL["sensor_offset"]}, tmp_path)
-    assert named(diagnose(study)) == [{"sensor_offset", "base_tilt"}]
+    assert named(diagnose_joint(study)) == [{"sensor_offset", "base_tilt"}]
 
 
 def trains(seed, late=0, dt=1e-3, seconds=4.0):
@@ -66,6 +66,6 @@ def trains(seed, late=0, dt=1e-3, seconds=4.0):
 @pytest.mark.parametrize("late", [0, 12])
 def test_trains_of_other_rates_are_one_muscle(late):
     """On the muscle a delay is told from lags by its edge."""
-    diagnosis = diagnose(trains(72, late))
+    diagnosis = diagnose_joint(trains(72, late))
     assert named(diagnosis) == ([{"electromechanical_delay"}] if late else []), str(diagnosis)
     assert not diagnosis.remainder.unexplained

@@ -5,7 +5,7 @@ import pytest
 from diagnose.hidden import diagnosed, named, slide, study_of
 from oracle import TYPICAL
 
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 
 HIDDEN = [  # rig, cause, noise, driven; the seed is the row
     ("ankle", "coulomb_friction", "white", True),
@@ -65,14 +65,14 @@ def test_intervals_hold_the_truth():
 
 @pytest.mark.parametrize("driven", [True, False])
 def test_friction_of_a_slide(driven):
-    diagnosis = diagnose(slide(0, {"coulomb_friction": {"torque_nm": 0.15}}, driven))
+    diagnosis = diagnose_joint(slide(0, {"coulomb_friction": {"torque_nm": 0.15}}, driven))
     assert [s for s in named(diagnosis) if "coulomb_friction" in s], str(diagnosis)
 
 
 def test_a_reading_that_is_shifted_in_time():
     """A clock that is late is a form of `sensor_lag`: nothing is left of it, where a low pass would leave a trace."""
     study = study_of("joint", lambda _: {"sensor_lag": {"form": "shift", "lag_s": 0.025}}, seed=9)
-    diagnosis = diagnose(study)
+    diagnosis = diagnose_joint(study)
     assert named(diagnosis) == [{"sensor_lag"}], str(diagnosis)
     found = diagnosis.causes[0].parameters
     assert found["shift"].value == 1.0
@@ -83,7 +83,7 @@ def test_a_reading_that_is_shifted_in_time():
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_cause_that_has_dragged_the_nominal_fit_far_away(seed):
     """A reading 80 ms late looks like three times the damping; from there its own fit ends in another hollow."""
-    diagnosis = diagnose(study_of("ankle", lambda _: {"sensor_lag": {"lag_s": 0.08}}, seed=seed))
+    diagnosis = diagnose_joint(study_of("ankle", lambda _: {"sensor_lag": {"lag_s": 0.08}}, seed=seed))
     assert named(diagnosis) == [{"sensor_lag"}], str(diagnosis)
     assert not diagnosis.remainder.unexplained
 

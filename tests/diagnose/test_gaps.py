@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from diagnose.hidden import named, slide, study_of
 
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.record import diagnosis_record
 from fes_pin.view.report import report
 
@@ -40,7 +40,7 @@ def spiked(study, seed, share=0.01):
 def test_spikes_change_no_verdict(rig, names, seed, tmp_path):
     study = study_of(rig, names, "white", seed)
     bad, count = spiked(study, seed)
-    sound, diagnosis = diagnose(study), diagnose(bad)
+    sound, diagnosis = diagnose_joint(study), diagnose_joint(bad)
     assert sound.left_out == {} and "left_out_samples" not in diagnosis_record(sound)
     assert named(diagnosis) == named(sound) == [{n} for n in names], str(diagnosis)
     assert diagnosis.verdict == sound.verdict
@@ -62,7 +62,7 @@ def test_spikes_change_no_verdict(rig, names, seed, tmp_path):
 def test_a_velocity_that_some_trials_lack(driven, without, tmp_path):
     whole = slide(0, {"coulomb_friction": {"torque_nm": 0.15}}, driven)
     trials = tuple(t.without("velocity") if k in without else t for k, t in enumerate(whole.trials))
-    diagnosis = diagnose(replace(whole, trials=trials))
+    diagnosis = diagnose_joint(replace(whole, trials=trials))
     assert [s for s in named(diagnosis) if "coulomb_friction" in s], str(diagnosis)
     assert set(diagnosis.extended.noise) == {"position", "velocity"}
     assert diagnosis.extended.noise["velocity"].std == pytest.approx(1e-2, rel=0.3)
@@ -75,5 +75,5 @@ def test_a_velocity_that_some_trials_lack(driven, without, tmp_path):
 def test_trials_with_and_without_an_effort():
     pushed, free = slide(3, {}, True), slide(3, {}, False)
     mixed = tuple(replace(t, name=f"free {t.name}") for t in free.trials[:2]) + pushed.trials[2:]
-    diagnosis = diagnose(replace(pushed, trials=mixed))
+    diagnosis = diagnose_joint(replace(pushed, trials=mixed))
     assert diagnosis.verdict == "adequate", str(diagnosis)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from diagnose.hidden import study_of
 
-from fes_pin.diagnose.decide.held_out import RUNAWAY, cross_validate, errors_of, gain, separate
+from fes_pin.diagnose.decide.held_out import RUNAWAY, cross_validate, errors_of, held_out_gain, separate
 from fes_pin.identify.fit import fit
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 
 
@@ -15,7 +15,7 @@ def test_a_prediction_that_runs_away_counts_as_a_large_error():
     """A spring that pushes: the joint leaves the floating-point numbers, and the errors stay numbers."""
     study = study_of("joint", driven=False)
     base = fit(nominal_model(study), study.trials)
-    falling = effect("parallel_stiffness")(stiffness_nm_per_rad=-500.0, rest_angle_rad=0.0)
+    falling = effect_named("parallel_stiffness")(stiffness_nm_per_rad=-500.0, rest_angle_rad=0.0)
     errors = errors_of(base.model + falling, study.trials, base.noise)
     most = RUNAWAY * max(np.abs(t["position"]).max() for t in study.trials)
     assert np.isfinite(errors.squares).all()
@@ -26,7 +26,7 @@ def test_a_prediction_that_runs_away_counts_as_a_large_error():
 def test_evidence_against_a_model_that_runs_away_is_a_number():
     study = study_of("joint", driven=False)
     base = fit(nominal_model(study), study.trials)
-    falling = base.model + effect("parallel_stiffness")(stiffness_nm_per_rad=-500.0, rest_angle_rad=0.0)
+    falling = base.model + effect_named("parallel_stiffness")(stiffness_nm_per_rad=-500.0, rest_angle_rad=0.0)
     fallen = replace(base, model=falling)
     with_it, without_it = (
         separate(base, one, {"cause": other}, study.trials, base.noise)
@@ -41,11 +41,11 @@ def test_a_causes_gain_is_not_that_of_another_set_which_the_folds_prefer():
     study = study_of("joint", ("coulomb_friction",))
     nominal = fit(nominal_model(study), study.trials)
     offset, friction = (
-        fit(nominal.model + effect(name)(), study.trials, nominal.noise)
+        fit(nominal.model + effect_named(name)(), study.trials, nominal.noise)
         for name in ("effort_offset", "coulomb_friction")
     )
     alone = cross_validate(nominal, offset, {"effort_offset": nominal}, [], nominal.noise)
     beside = cross_validate(nominal, offset, {"effort_offset": nominal}, [friction], nominal.noise)
-    own, found = (gain(h.nominal, h.without["effort_offset"], h.extended, 0) for h in (alone, beside))
-    assert own.high < 50.0 < gain(beside.nominal, beside.nominal, beside.chosen, 0).low
+    own, found = (held_out_gain(h.nominal, h.without["effort_offset"], h.extended, 0) for h in (alone, beside))
+    assert own.high < 50.0 < held_out_gain(beside.nominal, beside.nominal, beside.chosen, 0).low
     assert found == own

@@ -17,7 +17,7 @@ from fes_pin.data.trial import read_trial, trial_csv
 from fes_pin.diagnose.experiment import ROOM, candidates, discriminations, next_experiment
 from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import measured_columns
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
 
@@ -69,8 +69,8 @@ def test_a_set_of_two_is_resolved_by_the_trial_that_the_command_writes(monkeypat
 def rivals():
     study = study_of("ankle", ("coulomb_friction",), seed=5, n_motion=3, n_isometric=1, duration_s=3.0)
     model = nominal_model(study)
-    best = fit(model + effect("coulomb_friction")(), study.trials, WHITE)
-    return study, best, fit(model + effect("quadratic_damping")(0.01), study.trials, WHITE)
+    best = fit(model + effect_named("coulomb_friction")(), study.trials, WHITE)
+    return study, best, fit(model + effect_named("quadratic_damping")(0.01), study.trials, WHITE)
 
 
 def test_what_is_expected_is_what_a_refit_cannot_take_up(rivals):
@@ -103,8 +103,8 @@ def test_a_proposed_trial_stays_near_what_was_measured(rivals):
 def test_the_next_experiment_can_be_read_back_and_predicted(tmp_path):
     study = shortened(study_of("ankle", ("coulomb_friction",), seed=5, duration_s=3.0), ("motion",))
     model = nominal_model(study)
-    best = fit(model + effect("coulomb_friction")(), study.trials, WHITE)
-    rival = fit(model + effect("quadratic_damping")(0.01), study.trials, WHITE)
+    best = fit(model + effect_named("coulomb_friction")(), study.trials, WHITE)
+    rival = fit(model + effect_named("quadratic_damping")(0.01), study.trials, WHITE)
     plan = next_experiment(best, {"quadratic_damping": rival}, "coulomb_friction", study)
     assert plan.trial is not None and plan.separates == ("coulomb_friction", "quadratic_damping")
     assert "squared noise units" in plan.why

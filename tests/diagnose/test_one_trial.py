@@ -8,7 +8,7 @@ import scipy.integrate
 
 from fes_pin.data.study import Study, read_study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 
 INERTIA, WEIGHT, DAMPING, DT = 0.02, 1.0, 0.002, 0.004
 URDF = """<robot name="swing">
@@ -46,7 +46,7 @@ def study(folder, seed: int, friction: float) -> Study:
 
 
 def test_friction_is_found_beneath_a_random_torque(tmp_path):
-    found = diagnose(study(tmp_path, 0, 0.02))
+    found = diagnose_joint(study(tmp_path, 0, 0.02))
     (cause,) = found.causes
     assert cause.name == "coulomb_friction"
     assert len(cause.equivalents) <= 1, cause.equivalents
@@ -55,7 +55,7 @@ def test_friction_is_found_beneath_a_random_torque(tmp_path):
 
 
 def test_a_random_torque_alone_has_no_name(tmp_path):
-    assert not diagnose(study(tmp_path, 2, 0.0)).causes
+    assert not diagnose_joint(study(tmp_path, 2, 0.0)).causes
 
 
 @pytest.mark.shared
@@ -64,6 +64,6 @@ def test_a_real_swing_of_under_three_seconds_names_friction(shared):
     first = next(t for t in whole.trials if t.name == "fit_1")
     rows = slice(0, 2700)
     cut = Trial("swing", "motion", {"position": first["position"][rows]}, first.time[rows])
-    found = diagnose(replace(whole, trials=(cut,)))
+    found = diagnose_joint(replace(whole, trials=(cut,)))
     assert "coulomb_friction" in {c.name for c in found.causes}
     assert max(len(c.equivalents) for c in found.causes) <= 3

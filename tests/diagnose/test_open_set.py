@@ -14,7 +14,7 @@ from fes_pin.diagnose.remainder import open_set
 from fes_pin.diagnose.remainder.bursts import burst_p_value
 from fes_pin.diagnose.remainder.heteroscedastic import heteroscedastic_p_value
 from fes_pin.diagnose.remainder.innovations import channels, under_own_noise
-from fes_pin.diagnose.remainder.open_set import FULL_NOISE, REMAINDER_LEVEL, remainder
+from fes_pin.diagnose.remainder.open_set import FULL_NOISE, REMAINDER_LEVEL, unexplained_remainder
 from fes_pin.diagnose.remainder.play import play_p_value
 from fes_pin.diagnose.remainder.repeated import repeated_p_value
 from fes_pin.diagnose.remainder.slips import slip_p_value
@@ -31,7 +31,7 @@ TREMBLING = Noise(1.0, (1.6, -0.64), 5.0)
 
 
 def left_in(study):
-    return remainder(fit(nominal_model(study), study.trials))
+    return unexplained_remainder(fit(nominal_model(study), study.trials))
 
 
 def forces(rng, bend=lambda t, force: force, colour=0.0):
@@ -57,7 +57,7 @@ def test_nothing_is_left_of_noise(rig, noise):
 def test_nothing_is_left_of_a_muscles_noise(colour):
     """At a level of 2 %, 2 of 6 have a probability of 6e-3."""
     rng = np.random.default_rng(41)
-    assert sum(remainder(forces(rng, colour=colour)).unexplained for _ in range(6)) <= 1
+    assert sum(unexplained_remainder(forces(rng, colour=colour)).unexplained for _ in range(6)) <= 1
 
 
 def test_eight_tests_together_keep_the_level(monkeypatch):
@@ -77,7 +77,7 @@ def test_eight_tests_together_keep_the_level(monkeypatch):
         return open_set.Remainder(p_value < open_set.SMOOTH_LEVEL, p_value, "phase")
 
     monkeypatch.setattr(open_set, "smooth_remainder", smooth)
-    share = np.mean([remainder(None).unexplained for _ in range(20_000)])
+    share = np.mean([unexplained_remainder(None).unexplained for _ in range(20_000)])
     assert share == pytest.approx(REMAINDER_LEVEL, abs=0.003)
 
 
@@ -127,7 +127,9 @@ def test_what_comes_again_in_every_trial_is_told_by_how_trials_differ():
 def test_a_strength_that_wanders_is_larger_while_the_muscle_is_active():
     """Of each trial's own phase, so that no feature is coherent."""
     rng = np.random.default_rng(53)
-    left = remainder(forces(rng, lambda t, f: f * (1.0 + 0.03 * np.sin(2.5 * t + rng.uniform(0.0, 7.0))), colour=0.6))
+    left = unexplained_remainder(
+        forces(rng, lambda t, f: f * (1.0 + 0.03 * np.sin(2.5 * t + rng.uniform(0.0, 7.0))), colour=0.6)
+    )
     assert left.unexplained, left
 
 
@@ -155,19 +157,23 @@ def test_humps_at_random_times_are_bursts(noise):
 def test_ripple_of_the_force_goes_with_the_stimulus(hz):
     """0.06 N on a noise of 0.2 N: d = 15."""
     rng = np.random.default_rng(45)
-    left = remainder(forces(rng, lambda t, f: f + 0.06 * f / np.abs(f).mean() * np.sin(2.0 * math.pi * hz * t)))
+    left = unexplained_remainder(
+        forces(rng, lambda t, f: f + 0.06 * f / np.abs(f).mean() * np.sin(2.0 * math.pi * hz * t))
+    )
     assert left.unexplained and left.where == "stimulus", left
 
 
 def test_a_line_of_any_phase_is_a_matter_of_time():
     rng = np.random.default_rng(46)
-    left = remainder(forces(rng, lambda t, f: f + 0.08 * np.sin(2.0 * math.pi * 31.0 * t + rng.uniform(0.0, 7.0))))
+    left = unexplained_remainder(
+        forces(rng, lambda t, f: f + 0.08 * np.sin(2.0 * math.pi * 31.0 * t + rng.uniform(0.0, 7.0)))
+    )
     assert left.unexplained and left.where == "time", left
 
 
 def test_a_sensor_that_slips_is_seen():
     rng = np.random.default_rng(47)
-    left = remainder(forces(rng, lambda t, f: f + 0.5 * (t - t[0] > rng.uniform(1.0, 4.0))))
+    left = unexplained_remainder(forces(rng, lambda t, f: f + 0.5 * (t - t[0] > rng.uniform(1.0, 4.0))))
     assert left.unexplained, left
 
 

@@ -6,7 +6,7 @@ import oracle.rigs
 import pytest
 from diagnose.hidden import study_of
 
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +19,7 @@ def diagnosis():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(oracle.rigs, "joint_torque", torque)
-        return diagnose(study_of("ankle", seed=30))
+        return diagnose_joint(study_of("ankle", seed=30))
 
 
 def test_a_detent_leaves_a_remainder(diagnosis):

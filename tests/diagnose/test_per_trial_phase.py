@@ -8,7 +8,7 @@ from diagnose.hidden import SHORT, diagnosed, named, study_of
 
 from fes_pin.diagnose.record import diagnosis_record
 from fes_pin.identify.problem import limits_of
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
 from fes_pin.models.store import model_toml
@@ -83,7 +83,7 @@ def test_a_common_phase_is_kept(rig, name):
 
 def test_what_a_trial_holds_no_period_of_is_not_periodic():
     study = study_of("ankle", duration_s=4.0)
-    limits = limits_of(nominal_model(study) + effect("periodic_torque")(), study.trials)
+    limits = limits_of(nominal_model(study) + effect_named("periodic_torque")(), study.trials)
     assert limits["periodic_torque.frequency_hz"] == pytest.approx((0.25, 0.8), rel=0.01)
-    assert effect("periodic_torque").grids({"time": study.trials[0].time})["frequency_hz"][0] == 0.3
-    assert effect("periodic_torque").grids({"time": np.arange(0.0, 1.0, 0.1)})["frequency_hz"] == (0.8,)
+    assert effect_named("periodic_torque").grids({"time": study.trials[0].time})["frequency_hz"][0] == 0.3
+    assert effect_named("periodic_torque").grids({"time": np.arange(0.0, 1.0, 0.1)})["frequency_hz"] == (0.8,)

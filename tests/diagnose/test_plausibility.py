@@ -10,7 +10,7 @@ from diagnose.hidden import slide
 from diagnose.hidden import study_of as made
 
 from fes_pin.data.errors import InputError
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.record import diagnosis_record
 from fes_pin.models.nominal import nominal_model
@@ -79,7 +79,7 @@ REFUSED = {  # rig, what was done, words
 def test_no_verdict_could_follow_from_it(case):
     rig, change, words = REFUSED[case]
     with pytest.raises(InputError, match=words) as caught:
-        diagnose(change(study_of(rig)))
+        diagnose_joint(change(study_of(rig)))
     assert len(str(caught.value).splitlines()) == 1
 
 
@@ -138,7 +138,7 @@ def test_nothing_is_said_of_what_is_right(rig):
 
 def test_a_warning_stands_in_all_that_is_written():
     study = changed(study_of("muscle"), INPUTS, np.zeros_like, 2)
-    diagnosis = diagnose(study)
+    diagnosis = diagnose_joint(study)
     (words,) = diagnosis.warnings
     assert words == "pulse_width_us is never above the threshold of 180 us in trial 02"
     assert diagnosis_record(diagnosis)["warnings"] == [words]

@@ -10,7 +10,7 @@ from identify.rigs import WHITE, trials_of
 
 from fes_pin.diagnose.decide.held_out import folds_of
 from fes_pin.diagnose.decide.significance import Family, coherence_p_value
-from fes_pin.diagnose.remainder.open_set import remainder
+from fes_pin.diagnose.remainder.open_set import unexplained_remainder
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import Linearized
@@ -79,7 +79,7 @@ def test_the_remainder_keeps_its_level():
             t.with_columns(force_n=c["force_n"] + 0.2 * rng.standard_normal(len(t)))
             for t, c in zip(trials, clean, strict=True)
         ]
-        found += remainder(fit(model, noisy, WHITE)).unexplained
+        found += unexplained_remainder(fit(model, noisy, WHITE)).unexplained
     assert found <= 5
 
 
@@ -87,10 +87,10 @@ def test_a_smooth_remainder_is_located():
     rng = np.random.default_rng(4)
     model, trials = trials_of("muscle", rng, count=5, n=300)
     bent = [t.with_columns(force_n=t["force_n"] + 0.4 * (t.time / t.time[-1]) ** 2) for t in trials]
-    left = remainder(fit(model, bent, WHITE))
+    left = unexplained_remainder(fit(model, bent, WHITE))
     assert left.unexplained and left.p_value < 1e-6
     assert left.where in {"time", "history", "offset"}
-    assert remainder(fit(model, bent, WHITE), seed=9).where == left.where
+    assert unexplained_remainder(fit(model, bent, WHITE), seed=9).where == left.where
 
 
 def test_folds_leave_out_whole_trials_of_every_kind():

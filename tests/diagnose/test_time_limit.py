@@ -5,11 +5,11 @@ import time
 import pytest
 from diagnose.hidden import study_of
 
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.record import diagnosis_files
 from fes_pin.diagnose.search.simulation_search import SimulationSearch
 from fes_pin.view.report import report_html
-from fes_pin.workers import OutOfTime, check_time, in_parallel, time_limit
+from fes_pin.workers import OutOfTime, check_limit, in_parallel, time_limit
 
 
 @pytest.fixture(scope="module")
@@ -22,14 +22,14 @@ def test_work_ends_at_its_limit_in_every_thread(monkeypatch):
     with time_limit(0.0):
         time.sleep(0.01)
         with pytest.raises(OutOfTime):
-            in_parallel(lambda _: check_time(), range(4))
+            in_parallel(lambda _: check_limit(), range(4))
         with time_limit(60.0):
-            in_parallel(lambda _: check_time(), range(4))
-    check_time()
+            in_parallel(lambda _: check_limit(), range(4))
+    check_limit()
 
 
 def test_without_time_nothing_is_claimed(study):
-    stopped = diagnose(study, limit=0.0)
+    stopped = diagnose_joint(study, limit=0.0)
     assert stopped.verdict == "unexplained" and "stopped before a cause" in stopped.reason
     assert any("limit of 0 s" in w for w in stopped.warnings)
     assert report_html(stopped) and diagnosis_files(stopped)
@@ -42,7 +42,7 @@ def test_what_has_earned_its_place_is_told(study, monkeypatch):
         raise OutOfTime
 
     monkeypatch.setattr(SimulationSearch, "_extend_beam", out_of_time)
-    stopped = diagnose(study, limit=1e3)
+    stopped = diagnose_joint(study, limit=1e3)
     assert [c.name for c in stopped.causes] == ["coulomb_friction"]
     assert stopped.nominal_error[1] is None and any("limit of 1000 s" in w for w in stopped.warnings)
     assert report_html(stopped) and diagnosis_files(stopped)

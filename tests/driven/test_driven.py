@@ -7,13 +7,13 @@ import pytest
 from driven_rigs.draw import BASES, draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.record import diagnosis_record
 
 
 def found_in(causes, seed, folder, size=0.3):
     drawn = draw(causes, size, seed, folder)
-    return drawn, diagnose(read_study(drawn.study))
+    return drawn, diagnose_joint(read_study(drawn.study))
 
 
 @pytest.mark.parametrize("seed", [11, 12])
@@ -57,7 +57,7 @@ def test_what_no_cause_explains_is_said(tmp_path):
     study = read_study(drawn.study)
     rng = np.random.default_rng(0)
     trials = tuple(t.with_columns(effort=rng.permutation(t["effort"])) for t in study.trials)
-    found = diagnose(replace(study, trials=trials))
+    found = diagnose_joint(replace(study, trials=trials))
     assert found.verdict == "unexplained" and not found.causes
     assert found.remainder.unexplained
 

@@ -14,7 +14,7 @@ from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.fit import GROSS, fit, fit_multistart, fit_problem, noise_of
 from fes_pin.identify.noise import Noise, thinning
 from fes_pin.identify.problem import Problem, normal_equations
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Joint
 
@@ -131,7 +131,7 @@ def test_nothing_is_identified_without_a_stimulus():
 def test_a_shape_is_not_identified_where_its_effect_is_absent():
     """A muscle that gains force with use: fatigue stays at its bound, so its recovery is nowhere in the data."""
     rng = np.random.default_rng(6)
-    model = Model(RIGS["muscle"]) + effect("fatigue")(rate_per_s=-0.05, recovery_s=30.0)
+    model = Model(RIGS["muscle"]) + effect_named("fatigue")(rate_per_s=-0.05, recovery_s=30.0)
     trials = [measured(model, trial("muscle", "isometric", rng, 400), rng) for _ in range(3)]
     fitted = fit(model.with_parameters({"fatigue.rate_per_s": 0.02}), trials, WHITE)
     assert "fatigue.rate_per_s" in fitted.at_bound
@@ -140,7 +140,7 @@ def test_a_shape_is_not_identified_where_its_effect_is_absent():
 
 def test_a_start_that_cannot_be_simulated_is_infinitely_bad():
     model, trials = trials_of("joint", np.random.default_rng(7))
-    broken = model + effect("parallel_stiffness")(stiffness_nm_per_rad=-500.0)
+    broken = model + effect_named("parallel_stiffness")(stiffness_nm_per_rad=-500.0)
     fitted = fit_problem(Problem(broken, trials, WHITE, ("damping",)), broken.parameters())
     assert not fitted.converged and not fitted.is_optimal()
     assert math.isinf(fitted.sse) and math.isinf(fitted.std("damping"))

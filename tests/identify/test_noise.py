@@ -7,7 +7,16 @@ import pytest
 import scipy.signal
 import scipy.stats
 
-from fes_pin.identify.noise import ORDERS, WHITE_SHARE, Noise, estimate_noise, low_pass, noise_step, thin, thinning
+from fes_pin.identify.noise import (
+    ORDERS,
+    WHITE_SHARE,
+    Noise,
+    estimate_noise,
+    first_order_low_pass,
+    noise_step,
+    thin,
+    thinning,
+)
 
 TRUE = {0: (), 1: (0.6,), 2: (1.2, -0.5), 3: (0.5, -0.3, 0.4)}
 
@@ -131,7 +140,9 @@ def test_whitening_is_the_filter_of_the_coefficients(length, order):
 
 def test_a_low_pass_is_the_recursion():
     values = np.random.default_rng(0).standard_normal(100)
-    np.testing.assert_allclose(low_pass(values, 0.9), scipy.signal.lfilter([0.1], [1.0, -0.9], values), rtol=1e-12)
+    np.testing.assert_allclose(
+        first_order_low_pass(values, 0.9), scipy.signal.lfilter([0.1], [1.0, -0.9], values), rtol=1e-12
+    )
 
 
 def test_noise_of_what_is_too_short_exact_or_not_finite():

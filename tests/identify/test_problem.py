@@ -7,7 +7,7 @@ from models.cases import RIGS, trial
 
 from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Problem
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 
 NOISE = {"position": Noise(2e-3, (0.5, 0.2), 3e-3, 4e-3), "velocity": Noise(2e-2, (0.3,), 3e-2, 4e-3)}
@@ -32,7 +32,7 @@ def mixed(rng):
 @pytest.mark.parametrize("name", ["coulomb_friction", "sensor_lag"])
 def test_each_is_as_if_it_were_alone(name):
     model, trials = mixed(np.random.default_rng(0))
-    model = model + effect(name)()
+    model = model + effect_named(name)()
     problem = Problem(model, trials, NOISE)
     unknowns = problem.start_unknowns()
     together = problem.linearize(model.parameters(), unknowns)

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from fes_pin.cli import main
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.model import Model
@@ -94,7 +94,7 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
     """Through files: study, diagnosis, model, and a trial from its inputs alone."""
     write_study(made(tmp_path, cause, seed=7), tmp_path / "study")
     study = read_study(tmp_path / "study")
-    found = diagnose(study)
+    found = diagnose_joint(study)
     assert cause in (found.causes[0].name, *found.causes[0].equivalents)
     assert found.extended_error[1] < 0.2 * found.nominal_error[1]
     save_model(found.model, tmp_path / "model.toml")
@@ -106,7 +106,7 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
 
 @pytest.mark.parametrize("seed", [7, 8])
 def test_nothing_hidden_is_adequate(tmp_path, seed):
-    assert diagnose(made(tmp_path, seed=seed)).verdict == "adequate"
+    assert diagnose_joint(made(tmp_path, seed=seed)).verdict == "adequate"
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from imposed_rigs.motion import drawn
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.models.effects import CoulombFriction, EffortGain, EffortOffset, PassiveRelaxation
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -79,7 +79,7 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
     """Through files: study, diagnosis, model, and a held-out trial from its inputs alone."""
     write_study(joint.study((cause,), 0.3, np.random.default_rng(7), tmp_path / "made"), tmp_path / "study")
     study = read_study(tmp_path / "study")
-    found = diagnose(study)
+    found = diagnose_joint(study)
     assert [c.name for c in found.causes][:1] == [cause] or cause in found.causes[0].equivalents
     assert found.extended_error[1] < 0.2 * found.nominal_error[1]
     save_model(found.model, tmp_path / "model.toml")
@@ -92,7 +92,7 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
 
 def test_nothing_hidden_is_adequate(tmp_path):
     made = joint.study((), 0.0, np.random.default_rng(11), tmp_path)
-    assert diagnose(made).verdict == "adequate"
+    assert diagnose_joint(made).verdict == "adequate"
 
 
 def test_a_spring_and_damper_in_series_begin_relaxed(tmp_path):

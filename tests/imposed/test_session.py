@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study, read_study, write_study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.models.effects import Fatigue, Potentiation
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.session import PAST, past_of, session_of
@@ -75,7 +75,7 @@ def test_a_cause_that_runs_through_the_session_is_named(tmp_path, cause, kind):
     """And the model foretells a trial from its inputs and its start, read again from the file that it was saved in."""
     write_study(session(cause, kind), tmp_path / "study")
     study = read_study(tmp_path / "study")
-    found = diagnose(study)
+    found = diagnose_joint(study)
     assert cause in (found.causes[0].name, *found.causes[0].equivalents)
     assert found.extended_error[1] < 0.5 * found.nominal_error[1]
     save_model(found.model, tmp_path / "model.toml")
@@ -86,7 +86,7 @@ def test_a_cause_that_runs_through_the_session_is_named(tmp_path, cause, kind):
 
 @pytest.mark.parametrize("kind", ["isometric", "imposed"])
 def test_where_nothing_runs_through_the_session_nothing_is_named(kind):
-    assert diagnose(session("", kind, seed=1)).verdict == "adequate"
+    assert diagnose_joint(session("", kind, seed=1)).verdict == "adequate"
 
 
 @pytest.mark.parametrize("one", [Fatigue(rate_per_s=0.08, recovery_s=20.0), Potentiation(gain=0.4, decay_s=6.0)])

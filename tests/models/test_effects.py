@@ -17,7 +17,7 @@ from fes_pin.models import effects
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import make_layout
 from fes_pin.models.compile.virtual import VirtualProgram
-from fes_pin.models.effects import EFFECTS, effect, effects_for
+from fes_pin.models.effects import EFFECTS, effect_named, effects_for
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import Simulator, max_step, simulate
@@ -102,9 +102,9 @@ def test_a_cause_is_one_file(tmp_path, monkeypatch):
 
 
 def test_effects_are_found_by_name_and_rig():
-    assert effect("fatigue").name == "fatigue"
+    assert effect_named("fatigue").name == "fatigue"
     with pytest.raises(KeyError, match="no effect 'tiredness'"):
-        effect("tiredness")
+        effect_named("tiredness")
     assert {e.name for e in effects_for("muscle")} == {e.name for e, rig in EFFECTS_OF_RIGS if rig == "muscle"}
 
 

@@ -9,7 +9,7 @@ from models.cases import ANKLE, CASES, JOINT, MUSCLE, RIGS, name_of, trial
 
 from fes_pin.data.study import read_study, write_study
 from fes_pin.identify.fit import fit
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import Simulator
@@ -106,8 +106,8 @@ def test_a_short_lag_is_told_from_a_delay(second_s):
     some, causes = trials("muscle", "isometric"), {"second_order_activation": {"second_s": second_s}}
     wanted = [oracle.simulate(MUSCLE, nominal("muscle"), causes, t)["force_n"] for t in some]
     made = [dataclasses.replace(t, columns={**t.columns, "force_n": y}) for t, y in zip(some, wanted, strict=True)]
-    as_lag = fit(Model(RIGS["muscle"]) + effect("second_order_activation")(second_s=second_s), made)
-    as_delay = fit(Model(RIGS["muscle"]) + effect("electromechanical_delay")(delay_s=second_s), made)
+    as_lag = fit(Model(RIGS["muscle"]) + effect_named("second_order_activation")(second_s=second_s), made)
+    as_delay = fit(Model(RIGS["muscle"]) + effect_named("electromechanical_delay")(delay_s=second_s), made)
     assert as_lag.noise["force_n"].std < 0.5 * as_delay.noise["force_n"].std
     assert as_lag.values["second_order_activation.second_s"] == pytest.approx(second_s, rel=0.02)
 
@@ -122,15 +122,15 @@ REFINED = [
 @pytest.mark.parametrize(("name", "rig", "parameters"), REFINED)
 def test_refined_forms_mean_what_the_oracle_means(name, rig, parameters):
     some = trials(rig, "motion")
-    error, _ = worst(Model(RIGS[rig]) + effect(name)(**parameters), {name: parameters}, rig, some)
+    error, _ = worst(Model(RIGS[rig]) + effect_named(name)(**parameters), {name: parameters}, rig, some)
     plain = {n: v for n, v in parameters.items() if n not in ("asymmetry", "second", "phase_rad")}
-    unrefined, _ = worst(Model(RIGS[rig]) + effect(name)(**plain), {name: parameters}, rig, some)
+    unrefined, _ = worst(Model(RIGS[rig]) + effect_named(name)(**plain), {name: parameters}, rig, some)
     assert error <= ANGLE_RAD * LOOSER.get(name, 1.0) < 0.1 * unrefined
 
 
 def test_friction_converges_to_its_law():
     one = oracle.TYPICAL["coulomb_friction"]
-    model, some = Model(RIGS["ankle"]) + effect("coulomb_friction")(**one), trials("ankle", "motion")
+    model, some = Model(RIGS["ankle"]) + effect_named("coulomb_friction")(**one), trials("ankle", "motion")
     coarse, _ = worst(model, {"coulomb_friction": one}, "ankle", some)
     fine, _ = worst(model, {"coulomb_friction": one}, "ankle", some, max_step_s=6.25e-5)
     assert fine <= 0.25 * coarse

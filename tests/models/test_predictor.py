@@ -5,7 +5,7 @@ import pytest
 import scipy.linalg
 
 from fes_pin.data.trial import Trial
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import STEP_S, Doubt, Predictor, repeated
 from fes_pin.models.rigs import Joint
@@ -97,7 +97,7 @@ def test_without_randomness_it_is_the_free_simulation():
 def test_machine_code_and_virtual_machine_agree(names, monkeypatch):
     model = Model(PENDULUM)
     for name in names:
-        model = model + effect(name)()
+        model = model + effect_named(name)()
     trials, columns = [driven(1, 60), driven(2, 80)], model.fitted_parameters()
     fast = foretold(model, trials, columns=columns)
     monkeypatch.setenv("FES_PIN_ENGINE", "casadi")
@@ -111,7 +111,7 @@ def test_machine_code_and_virtual_machine_agree(names, monkeypatch):
 
 def test_sensitivities_are_derivatives_where_the_gains_do_not_move():
     """On a slide neither the offset of its effort nor of its sensor moves the gains: differences are the truth."""
-    model = Model(SLIDE) + effect("effort_offset")(offset=0.2) + effect("sensor_offset")(offset=0.01)
+    model = Model(SLIDE) + effect_named("effort_offset")(offset=0.2) + effect_named("sensor_offset")(offset=0.01)
     columns = ("effort_offset.offset", "sensor_offset.offset")
     trial, values, step = driven(4), model.parameters(), 1e-4
     (found,) = foretold(model, [trial], columns=columns)
@@ -122,7 +122,7 @@ def test_sensitivities_are_derivatives_where_the_gains_do_not_move():
 
 
 def test_lags_shorter_than_a_step_do_not_blow_up():
-    model = Model(PENDULUM) + effect("sensor_lag")(lag_s=0.0)
+    model = Model(PENDULUM) + effect_named("sensor_lag")(lag_s=0.0)
     (found,) = foretold(model, [driven(5, 2000)], columns=model.fitted_parameters())
     (without,) = foretold(Model(PENDULUM), [driven(5, 2000)])
     assert np.isfinite(found.sensitivities).all()
@@ -210,7 +210,7 @@ def test_through_a_play_it_is_near_the_exact_likelihood(seed):
     trial, widths = with_play(0.03, seed), (0.015, 0.03, 0.045)
     model = Model(SLIDE)
     without = through_play(model, trial)
-    found = [without - through_play(model + effect("backlash")(half_width=w), trial) for w in widths]
+    found = [without - through_play(model + effect_named("backlash")(half_width=w), trial) for w in widths]
     exact = without - by_particles(trial, 0.03, seed)
     assert int(np.argmax(found)) == 1
     assert 0.75 * exact < found[1] < 1.05 * exact
@@ -218,7 +218,7 @@ def test_through_a_play_it_is_near_the_exact_likelihood(seed):
 
 def test_a_play_without_width_is_none():
     trial = driven(6)
-    (one,) = foretold(Model(SLIDE) + effect("backlash")(half_width=0.0), [trial])
+    (one,) = foretold(Model(SLIDE) + effect_named("backlash")(half_width=0.0), [trial])
     (none,) = foretold(Model(SLIDE), [trial])
     assert one.values == pytest.approx(none.values, abs=1e-9)
     assert one.variances == pytest.approx(none.variances, rel=1e-6)

@@ -11,15 +11,15 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import make_layout
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle, Muscle
 from fes_pin.models.rigs.joint import joint_model
 from fes_pin.models.rigs.rigid import (
     configuration,
     gravity_coefficients,
-    is_revolute,
     joint_inertia,
+    joint_is_revolute,
     load_urdf,
     point_foot,
     urdf_path,
@@ -145,7 +145,7 @@ def test_any_joint_is_pinocchio_to_1e_12(tmp_path, kind, axis, base):
     path = robot(tmp_path, kind, axis, base)
     body = load_urdf(path)
     data = body.createData()
-    assert (body.nv, is_revolute(body)) == (1, kind != "prismatic")
+    assert (body.nv, joint_is_revolute(body)) == (1, kind != "prismatic")
     scales = {"inertia_scale": 1.0, "damping": 0.3, "gravity_scale": 1.0}
     rig = joint_model(path, {}, scales)
     engine = acceleration(Model(rig), "motion", ("effort",), {**rig.constants, "idle": 0.0}, ("q", "v"))
@@ -247,10 +247,10 @@ def test_a_joint_idles_where_it_hangs(tmp_path, base):
 )
 def test_units_are_those_of_the_rig(tmp_path, kind, units):
     rig = joint_model(robot(tmp_path, kind), {}, {"inertia_scale": 1.0, "damping": 0.0})
-    info = (Model(rig) + effect("parallel_stiffness")() + effect("sensor_drift")()).parameter_info()
+    info = (Model(rig) + effect_named("parallel_stiffness")() + effect_named("sensor_drift")()).parameter_info()
     names = ("parallel_stiffness.stiffness_nm_per_rad", "parallel_stiffness.rest_angle_rad", "sensor_drift.rate_per_s")
     assert tuple(info[n].unit for n in (*names, "damping")) == units
 
 
 def test_a_force_sensor_is_off_by_newtons():
-    assert (Model(Muscle()) + effect("sensor_offset")()).parameter_info()["sensor_offset.offset"].unit == "N"
+    assert (Model(Muscle()) + effect_named("sensor_offset")()).parameter_info()["sensor_offset.offset"].unit == "N"

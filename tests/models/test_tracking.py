@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from view.reported import joint_study
 
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
@@ -24,7 +24,7 @@ def pendulum(tmp_path):
 def test_the_effort_that_was_hidden_is_found(pendulum, gravity):
     model, trial = pendulum
     model = model.with_parameters({"gravity_scale": gravity})
-    hidden = model + effect("effort_offset")(offset=0.004)
+    hidden = model + effect_named("effort_offset")(offset=0.004)
     measured = simulate(hidden, trial)
     motion = measured_motion(measured, "position")
     inside = slice(40, -40)  # the servo has settled
@@ -34,7 +34,7 @@ def test_the_effort_that_was_hidden_is_found(pendulum, gravity):
 
 def test_a_sensor_that_is_part_of_the_model_is_no_effort(pendulum):
     model, trial = pendulum
-    skewed = model + effect("sensor_offset")(offset=0.05)
+    skewed = model + effect_named("sensor_offset")(offset=0.05)
     measured = simulate(skewed, trial)
     left = tracking_effort(skewed, measured, *measured_motion(measured, "position"))
     assert np.abs(left[40:-40]).max() < 3e-4

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from models.cases import RIGS, trial
 
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
 
@@ -45,7 +45,7 @@ def test_a_gain_of_the_effort_is_a_lighter_body():
     smaller = replace(rig, **{n: getattr(rig, n) / 1.25 for n in rig.parameters()})
     ((stronger,), (lighter,)) = (
         [s.readings for s in Simulator(model, made).run(model.parameters())]
-        for model in (Model(rig) + effect("effort_gain")(error=0.25), Model(smaller))
+        for model in (Model(rig) + effect_named("effort_gain")(error=0.25), Model(smaller))
     )
     np.testing.assert_allclose(stronger, lighter, atol=1e-9)
 
@@ -67,7 +67,7 @@ def readings(rig, trials, *causes, zero=None):
     """From the same first reading of a joint, whatever its zero."""
     model = Model(RIGS[rig])
     for name, values in causes:
-        model = model + effect(name)(**values)
+        model = model + effect_named(name)(**values)
     zero = sum(values.get("offset", 0.0) for _, values in causes) if zero is None else zero
     begun = [replace(t, conditions={n: v - zero * (n == "position0") for n, v in t.conditions.items()}) for t in trials]
     return [s.readings for s in Simulator(model, begun).run(model.parameters())]

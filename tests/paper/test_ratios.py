@@ -7,7 +7,7 @@ import pytest
 import scipy.optimize
 
 from fes_pin.data.errors import InputError
-from fes_pin.diagnose.diagnosis import diagnose
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -16,7 +16,7 @@ from fes_pin.models.simulate import simulate
 from fes_pin.paper.antagonist import carried_covariance, fit_antagonist, with_antagonist
 from fes_pin.paper.constants import ANGLE_NOISE_RAD, PRINTED, paper_study, paper_trial, paper_twin
 from fes_pin.paper.error_region import ellipsoid_floor, error_domain, error_holding, follow, profile_intervals
-from fes_pin.paper.identifiability import identifiability
+from fes_pin.paper.identifiability import ankle_identifiability
 from fes_pin.paper.ratios import RATIOS, RatioProblem, ankle_of, error_percent, least_error
 from fes_pin.paper.twin import AnkleTwin, record, staircase
 
@@ -204,13 +204,13 @@ def test_antagonist_needs_four_loads():
 
 def test_the_tool_says_what_cannot_be_told():
     study = paper_study("3-23")
-    motion = identifiability(nominal_model(study), [t for t in study.trials if t.kind == "motion"][:2])
+    motion = ankle_identifiability(nominal_model(study), [t for t in study.trials if t.kind == "motion"][:2])
     assert not any(motion.determines({n: 1.0}) for n in ("inertia_kgm2", "moment_arm_m", "com_distance_m", "gain"))
     assert motion.determines({"com_distance_m": 1, "inertia_kgm2": -1})
     assert motion.determines({"damping_nms": 1, "inertia_kgm2": -1})
     assert not motion.determines({"moment_arm_m": 1, "inertia_kgm2": -1})  # k1 apart from K
     assert "K F_ref a / J" in str(motion) and "not determined singly" in str(motion)
-    both = identifiability(nominal_model(study), [study.trials[0], study.trials[-1]])
+    both = ankle_identifiability(nominal_model(study), [study.trials[0], study.trials[-1]])
     assert both.determines({"moment_arm_m": 1, "inertia_kgm2": -1}) and both.determines({"time_constant_s": 1})
     with pytest.raises(KeyError, match="no constant lever"):
         both.determines({"lever": 1.0})
@@ -221,7 +221,7 @@ def test_trial_3_23_on_its_frame_is_the_papers_and_the_frame_is_named():
     study = paper_study("3-23", frame=True)
     optimum = least_error(problem_of("3-23", frame=True))
     assert optimum.error_percent == pytest.approx(PRINTED["3-23"].error_percent, abs=0.05)
-    diagnosis = diagnose(study)
+    diagnosis = diagnose_joint(study)
     assert [c.name for c in diagnosis.causes] == ["frame_vibration"]
     trial, hidden = study.trials[0], paper_twin("3-23", frame=True)
     after = error_percent([trial["angle_rad"]], [simulate(diagnosis.model, trial)["angle_rad"]])

@@ -13,7 +13,7 @@ from fes_pin.diagnose.experiment import NextExperiment
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.fit import fit
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 
@@ -72,7 +72,7 @@ def measured(study: Study, names: tuple[str, ...], noise: float = 1e-3) -> Study
 def _extended(study: Study, names: tuple[str, ...]):
     model = nominal_model(study)
     for name in names:
-        model = model + effect(name)()
+        model = model + effect_named(name)()
     return model
 
 
@@ -109,7 +109,7 @@ def diagnosed(
 
 
 def _cause(extended, name: str, rivals: tuple[str, ...]) -> Cause:
-    kind = effect(name)
+    kind = effect_named(name)
     info, values = extended.model.parameter_info(), extended.values
     estimates = {
         n: ParameterEstimate(values[f"{name}.{n}"], 0.1, info[f"{name}.{n}"].unit)

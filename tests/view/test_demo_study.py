@@ -6,7 +6,7 @@ import pytest
 
 from fes_pin.data.study import read_study
 from fes_pin.identify.fit import fit
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 
 FOLDER = Path(__file__).parents[2] / "analysis" / "studies" / "ankle_demo"
@@ -25,7 +25,7 @@ def test_the_demo_study_holds_what_its_readme_says():
         if len(cells := line.split("|")) == 5 and "`" in cells[1]
     )
     assert set(truth) == set(study.start)
-    found = fit(nominal_model(study) + effect("recruitment_hysteresis")(), study.trials)
+    found = fit(nominal_model(study) + effect_named("recruitment_hysteresis")(), study.trials)
     assert found.values["recruitment_hysteresis.half_width_us"] == pytest.approx(35.0, abs=0.5)
     for name, value in truth.items():
         assert found.values[name] == pytest.approx(value, rel=0.03)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from view.reported import ankle_diagnosis, ankle_study, joint_study
 
-from fes_pin.diagnose.replay import replay
-from fes_pin.models.effects import effect
+from fes_pin.diagnose.replay import replayed_trials
+from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 from fes_pin.view.missing import binned, explained, missing_input, smooth
@@ -17,7 +17,9 @@ def missing_of(study, added, index=0):
 
 
 def test_missing_torque_of_a_spring_is_its_torque():
-    missing = missing_of(ankle_study(), effect("parallel_stiffness")(stiffness_nm_per_rad=0.1, rest_angle_rad=1.8))
+    missing = missing_of(
+        ankle_study(), effect_named("parallel_stiffness")(stiffness_nm_per_rad=0.1, rest_angle_rad=1.8)
+    )
     expected = -0.1 * (missing.against["angle"] - 1.8)
     moving = slice(20, -20)
     assert missing.unit == "N m"
@@ -25,19 +27,19 @@ def test_missing_torque_of_a_spring_is_its_torque():
 
 
 def test_missing_torque_of_drag_opposes_the_rate(tmp_path):
-    missing = missing_of(joint_study(tmp_path), effect("quadratic_damping")())
+    missing = missing_of(joint_study(tmp_path), effect_named("quadratic_damping")())
     rate = missing.against["rate"]
-    expected = -effect("quadratic_damping")().coefficient * rate * np.abs(rate)
+    expected = -effect_named("quadratic_damping")().coefficient * rate * np.abs(rate)
     assert np.corrcoef(missing.value[20:-20], expected[20:-20])[0, 1] > 0.98
 
 
 def test_missing_input_of_a_prismatic_joint_is_a_force(tmp_path):
-    missing = missing_of(joint_study(tmp_path, "prismatic"), effect("effort_offset")())
+    missing = missing_of(joint_study(tmp_path, "prismatic"), effect_named("effort_offset")())
     assert (missing.kind, missing.unit) == ("force", "N")
 
 
 def test_missing_force_of_an_isometric_trial_is_the_residual():
-    missing = missing_of(ankle_study(), effect("fatigue")(rate_per_s=0.3), index=1)
+    missing = missing_of(ankle_study(), effect_named("fatigue")(rate_per_s=0.3), index=1)
     assert missing.unit == "N"
     assert missing.value.min() < -1.0
     assert "angle" not in missing.against
@@ -67,6 +69,6 @@ def test_the_share_explained_is_one_of_a_function_and_small_of_noise():
 
 def test_a_replay_has_every_trial_in_order():
     diagnosis = ankle_diagnosis()
-    replays = replay(diagnosis)
+    replays = replayed_trials(diagnosis)
     assert [r.measured.name for r in replays] == [t.name for t in diagnosis.study.trials]
     assert all(r.extended_error < r.nominal_error for r in replays[:1])

@@ -21,9 +21,9 @@ import fes_pin as fp
 from fes_pin.diagnose.errors_ahead import Ahead, AheadErrors, RandomPart
 from fes_pin.diagnose.record import diagnosis_record
 from fes_pin.models.describe import equation
-from fes_pin.models.effects import effect
+from fes_pin.models.effects import effect_named
 from fes_pin.models.predictor import Doubt
-from fes_pin.view.mathml import equations
+from fes_pin.view.mathml import equations_mathml
 from fes_pin.view.report import report_html
 from fes_pin.view.report_trials import got_worse
 
@@ -100,7 +100,7 @@ def test_a_report_says_what_the_diagnosis_found():
         "sensor_offset",
     ):
         assert words in text
-    assert equations(equation(effect("coulomb_friction"))).text in ankle_page()
+    assert equations_mathml(equation(effect_named("coulomb_friction"))).text in ankle_page()
     assert "--set load_kg" in text
     assert "next_trial.csv" in text
 

@@ -7,7 +7,7 @@ from fes_pin.data.study import read_study
 from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.scene import scene_of
-from fes_pin.walk.search import library
+from fes_pin.walk.search import walk_library
 
 pytestmark = pytest.mark.shared
 HIDDEN = [  # cause, site as it is hidden, size, more of it, form that must take it away, size of its parameter
@@ -58,7 +58,7 @@ def test_the_columns_of_a_cause_take_it_away(gait, clean, tmp_path, cause, site,
 
     wrong = Wrong(cause, site, amount, tissue=0.0, markers_m=0.0, placed=0.0, strides=2, extra=extra)
     hidden = scene(gait, tmp_path, wrong)
-    (one,) = (f for f in library() if f.cause == cause and f.site == form)
+    (one,) = (f for f in walk_library() if f.cause == cause and f.site == form)
     inside = slice(10, -10)
     made = (one.columns(hidden) @ np.array([value]))[inside]
     before, after = size(hidden.residual[inside]), size(hidden.residual[inside] - made)
@@ -87,6 +87,6 @@ def test_the_catalogue_is_the_contracts(shared):
 
 
 def test_forms_are_told_apart_by_cause_and_site():
-    labels = [(f.cause, f.site) for f in library()]
+    labels = [(f.cause, f.site) for f in walk_library()]
     assert len(set(labels)) == len(labels)
-    assert all(len(f.parameters) == len(f.units) == len(f.plausible) > 0 for f in library())
+    assert all(len(f.parameters) == len(f.units) == len(f.plausible) > 0 for f in walk_library())

@@ -12,7 +12,7 @@ from fes_pin.data.study import read_study
 from fes_pin.walk.diagnosis import diagnose_walk
 from fes_pin.walk.dynamics import required, segment_parameters
 from fes_pin.walk.extended import extended_body, with_segments
-from fes_pin.walk.likelihood import Noise, fit, white_level
+from fes_pin.walk.likelihood import WalkNoise, fit_walk, white_level
 from fes_pin.walk.motion import motion_of
 from fes_pin.walk.record import walk_files
 
@@ -160,7 +160,7 @@ def test_the_extended_body_is_the_diagnosiss(heavy):
 
 def noise_of(harmonics, rows=1):
     none = np.zeros((rows, 6, len(harmonics), 0))
-    return Noise(harmonics, np.eye(6), np.full(6, 4.0), none)
+    return WalkNoise(harmonics, np.eye(6), np.full(6, 4.0), none)
 
 
 def test_the_fit_is_generalized_least_squares_with_the_noises_own_spectrum():
@@ -172,7 +172,7 @@ def test_the_fit_is_generalized_least_squares_with_the_noises_own_spectrum():
     z = []
     for _ in range(300):
         y = 2.0 * x[..., 0] + sd * random.normal(size=x.shape[:3])
-        found = fit(y, x, np.array([100.0]), noise)
+        found = fit_walk(y, x, np.array([100.0]), noise)
         z.append((found.values[0] - 2.0) / np.sqrt(found.covariance[0, 0]))
     assert abs(np.mean(z)) < 0.2
     assert 0.88 < np.mean(np.abs(z) < 1.96) < 0.98
@@ -185,7 +185,7 @@ def test_an_effect_that_is_not_there_costs_evidence():
     gains = []
     for _ in range(50):
         y, x = random.normal(size=(1, 6, len(harmonics))), random.normal(size=(1, 6, len(harmonics), 1))
-        gains.append(fit(y, none, np.zeros(0), noise).deviance - fit(y, x, np.array([1.0]), noise).deviance)
+        gains.append(fit_walk(y, none, np.zeros(0), noise).deviance - fit_walk(y, x, np.array([1.0]), noise).deviance)
     assert np.mean(gains) < -2.0
 
 

@@ -18,7 +18,7 @@ from fes_pin.walk.dynamics import (
 )
 from fes_pin.walk.misfit import marker_misfit, segment_poses
 from fes_pin.walk.motion import PELVIS_TO_HIP, TO_WORLD, motion_of, rooted_motion
-from fes_pin.walk.plates import centre_of_pressure, plates_of
+from fes_pin.walk.plates import plates_of, pressure_and_free_moment
 
 pytestmark = pytest.mark.shared
 CARRIERS = {"trunk": "torso", "pelvis": "pelvis", "right_thigh": "femur_r", "left_thigh": "femur_l"}
@@ -156,8 +156,8 @@ def test_required_reaction_in_single_support_is_near_the_plates(with_plates):
     assert np.allclose(ends, [(0.174, 0.606), (0.798, 1.230), (1.422, 1.838), (2.030, 2.446)], atol=0.02)
     for side, rows in supports:
         assert (rms(needed[rows, :3] - plates.total[rows, :3]) < [20.0, 20.0, 25.0]).all()
-        where, _ = centre_of_pressure(needed[rows])
-        measured_at, free = centre_of_pressure(plates.feet[side][rows])
+        where, _ = pressure_and_free_moment(needed[rows])
+        measured_at, free = pressure_and_free_moment(plates.feet[side][rows])
         assert (rms(where - measured_at) < [0.035, 0.045]).all()  # measured: up to 30 and 37 mm
         assert np.abs(free).max() < 15.0
 

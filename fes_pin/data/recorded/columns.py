@@ -24,7 +24,7 @@ INTERPOLATE = "interpolate"
 
 
 @dataclass(frozen=True)
-class Source:
+class ColumnSource:
     """Where a rig's column comes from: `value = scale * factor * (recorded - zero)`.
 
     Parameters
@@ -76,7 +76,7 @@ class Columns:
         Whether missing samples are filled in.
     """
 
-    sources: Mapping[str, Source]
+    sources: Mapping[str, ColumnSource]
     ignored: tuple[str, ...] = ()
     form: TextForm = field(default_factory=TextForm)
     resample_hz: float | None = None
@@ -101,7 +101,7 @@ class Columns:
         called = {column: source.name or column for column, source in taken.items()}
         columns = {c: s(recording.columns[s.name]) for c, s in taken.items() if c != "time_s"}
         time = self._time(recording, taken.get("time_s"))
-        half = taken["time_s"] if "time_s" in taken else Source("")
+        half = taken["time_s"] if "time_s" in taken else ColumnSource("")
         half_digit = abs(half.scale * half.factor) * recording.half_digit(half.name) if half.name else 0.0
         time, columns, rows, said = self._regular(recording, time, columns, schema.stimuli(kind), called)
         table = Table(
@@ -117,7 +117,7 @@ class Columns:
         )
         return table, said
 
-    def _taken(self, recording: Recording, schema: RigSchema, kind: str, inputs_only: bool) -> dict[str, Source]:
+    def _taken(self, recording: Recording, schema: RigSchema, kind: str, inputs_only: bool) -> dict[str, ColumnSource]:
         """Sources of this file's columns; refuses what nobody has spoken for."""
         measured = () if inputs_only else (schema.outputs[kind],)
         needed = {"time_s", *schema.stimuli(kind), *schema.motion(kind)[:1], *measured}
@@ -139,10 +139,10 @@ class Columns:
             if name not in known or name in taken:
                 expected = f"this rig reads {', '.join(known)}"
                 raise recording.error(f"expected it in [columns], or there among `ignored`; {expected}", name)
-            taken[name] = Source(name)
+            taken[name] = ColumnSource(name)
         return {c: taken[c] for c in ("time_s", *(n for n in taken if n != "time_s")) if c in taken}
 
-    def _time(self, recording: Recording, source: Source | None) -> np.ndarray:
+    def _time(self, recording: Recording, source: ColumnSource | None) -> np.ndarray:
         if source is None:
             raise recording.error("missing; expected [columns] to say which column it is, or its rate_hz", "time_s")
         if not source.name:
@@ -225,7 +225,7 @@ def columns_of(
     return _with_file(Columns(sources, ignored), about, error)
 
 
-def _source(column: str, value: Any, revolute: bool | None, error: Callable[[str, str], Exception]) -> Source:
+def _source(column: str, value: Any, revolute: bool | None, error: Callable[[str, str], Exception]) -> ColumnSource:
     given = {"name": value} if isinstance(value, str) else value
     if not isinstance(given, dict):
         raise error(column, 'expected the name of a column, or a table like { name = "Angle", unit = "deg" }')
@@ -249,7 +249,7 @@ def _source(column: str, value: Any, revolute: bool | None, error: Callable[[str
         factor = factor_of(unit, column, revolute) if unit else 1.0
     except ValueError as problem:
         raise error(f"{column}.unit", str(problem)) from None
-    return Source(name, factor, **numbers)
+    return ColumnSource(name, factor, **numbers)
 
 
 def _number(key: str, value: Any, error: Callable[[str, str], Exception]) -> float:

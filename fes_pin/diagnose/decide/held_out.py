@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import Missed, default_horizon, missed, own_noise
+from fes_pin.identify.ahead import SquaredErrors, default_horizon, forecast_errors, own_noise
 from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem, go_on
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
@@ -88,7 +88,7 @@ def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Error
     return Errors(np.array(squares), np.array(spread), np.array(counts, dtype=float))
 
 
-def gain(nominal: Errors, without: Errors, extended: Errors, seed: int) -> Gain:
+def held_out_gain(nominal: Errors, without: Errors, extended: Errors, seed: int) -> Gain:
     """What the step from `without` to `extended` removes of the nominal model's error above the noise.
 
     The interval is a bootstrap over the units of evidence.
@@ -154,7 +154,7 @@ class HeldOut:
     without: dict[str, Errors]
     evidence: dict[str, Evidence]
     chosen: Errors
-    ahead: tuple[Missed, Missed] | None = None
+    ahead: tuple[SquaredErrors, SquaredErrors] | None = None
 
 
 def cross_validate(
@@ -188,7 +188,7 @@ def cross_validate(
         {n: _joined([r.without[n] for r in results]) for n in without},
         {n: sum((r.evidence[n] for r in results), Evidence(0.0, 0.0)) for n in without},
         _joined([r.chosen for r in results]),
-        tuple(sum((r.ahead[k] for r in results if r.ahead), Missed()) for k in (0, 1)),  # type: ignore[arg-type]
+        tuple(sum((r.ahead[k] for r in results if r.ahead), SquaredErrors()) for k in (0, 1)),  # type: ignore[arg-type]
     )
 
 
@@ -236,8 +236,8 @@ def separate(
     )
 
 
-def _missed(fitted: Fit, trials: Sequence[Trial], floor: NoiseModel, horizon_s: float) -> Missed:
-    return missed(fitted.model, trials, own_noise(fitted), floor, horizon_s)
+def _missed(fitted: Fit, trials: Sequence[Trial], floor: NoiseModel, horizon_s: float) -> SquaredErrors:
+    return forecast_errors(fitted.model, trials, own_noise(fitted), floor, horizon_s)
 
 
 def _whitened(fitted: Fit, test: Sequence[Trial]) -> np.ndarray:

@@ -11,7 +11,7 @@ import scipy.special
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, noise_of
-from fes_pin.identify.noise import ORDERS, Noise, low_pass, thin, thinning
+from fes_pin.identify.noise import ORDERS, Noise, first_order_low_pass, thin, thinning
 from fes_pin.identify.problem import Problem
 
 CLIP = 4.0
@@ -98,7 +98,7 @@ def driven(one: Innovations) -> np.ndarray:
     trial, count = one.trial, max(1, round(one.dt / one.trial.dt))
     drive = trial[one.inputs[0]] if one.inputs else np.zeros(len(trial))
     pole = float(np.exp(-trial.dt / ACTIVATION_S))
-    act = thin(low_pass(drive / max(float(np.abs(drive).max()), 1e-300), pole), count)
+    act = thin(first_order_low_pass(drive / max(float(np.abs(drive).max()), 1e-300), pole), count)
     return act[len(act) - len(one.values) :]
 
 

@@ -25,7 +25,7 @@ from fes_pin.diagnose.remainder.slips import slip_p_value
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import Noise, NoiseModel, low_pass
+from fes_pin.identify.noise import Noise, NoiseModel, first_order_low_pass
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel
@@ -50,7 +50,7 @@ SIGN_DRAWS = 400
 
 
 @dataclass(frozen=True)
-class Features:
+class MotionFeatures:
     """Smooth functions of the simulated motion, as whitened columns.
 
     Attributes
@@ -76,7 +76,7 @@ class Remainder:
     """By how much the statistic exceeds its 97.5 % quantile."""
 
 
-def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Features:
+def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> MotionFeatures:
     """About 40 smooth functions of angle, rate, acceleration, stimulus, activation and time of the simulated trials.
 
     Each is also taken through a second-order low pass, as a torque would be by the joint.
@@ -93,7 +93,7 @@ def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Featur
     rows = [np.zeros((len(columns), len(keys))) for _, columns in blocks]
     for row, (names, columns) in zip(rows, blocks, strict=True):
         row[:, [keys.index(n) for n in names]] = columns
-    return Features(tuple(n.split()[1].split(":")[0] for n in keys), np.concatenate(rows))
+    return MotionFeatures(tuple(n.split()[1].split(":")[0] for n in keys), np.concatenate(rows))
 
 
 def _whitened(
@@ -159,10 +159,10 @@ def _of_trial(trial: Trial, inputs: Sequence[str], reading: np.ndarray, output: 
 
 
 def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
-    return low_pass(x, float(np.exp(-dt / time_constant)))
+    return first_order_low_pass(x, float(np.exp(-dt / time_constant)))
 
 
-def remainder(fitted: Fit, seed: int = 0) -> Remainder:
+def unexplained_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     """Test whether a fit leaves anything but noise.
 
     The p-value is that of the most significant of the eight tests, over its share of the level.

@@ -9,7 +9,6 @@ effort, so that what stands beside a cause must earn its place against that.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from fes_pin.data.schema import IMPOSED
@@ -19,7 +18,7 @@ from fes_pin.diagnose.search.score import Scored, best_pairs
 from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
-from fes_pin.workers import OutOfTime, time_limit
+from fes_pin.workers import OutOfTime, Progress, time_limit
 
 CLAIM_LEVEL = 0.01
 """Family-wise error of each round of claims; with the remainder's 0.02 a diagnosis stays below 5 %."""
@@ -37,8 +36,6 @@ JOINT_FITS = 8
 """Causes that are fitted beside a set, those of largest score; beside nothing all are."""
 SEEDS = 4
 """Pairs that the linear screen proposes by itself, for causes that do nothing alone."""
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
@@ -15,7 +15,7 @@ from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
-from fes_pin.workers import OutOfTime, time_limit
+from fes_pin.workers import OutOfTime, Progress, time_limit
 
 MOST_CAUSES = 3
 """Causes that are named at most: every further one multiplies the sets."""
@@ -33,8 +33,6 @@ POOL = 6
 MISSPECIFIED = 1e3
 """Reduced chi-square, in the noise from sample to sample, of a nominal model so wrong that nothing follows from it:
 every cause is then fitted from afar."""
-
-Progress = Callable[[float, str], None]
 
 
 class NominalFitError(Exception):

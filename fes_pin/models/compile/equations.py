@@ -226,15 +226,15 @@ def derive(model: Model, layout: Layout) -> Equations:
     rates = ca.vertcat(d.rates, nonzeros(d.through(d.rates, *inner), s_pattern))
     return Equations(
         layout=layout,
-        rest=function("rest", [d.z, d.p, d.c], [d.g, d.g_z]),
-        start=function("start", [d.z, d.p, d.c], [x0, m0]),
-        sample=function("sample", [state, memory, d.u, d.t, d.p, d.c], [after]),
-        rates=function("rates", [state, memory, d.u, d.t, d.since, d.into, d.p, d.c], [rates]),
-        output=function("output", [state, memory, d.u, d.t, d.p, d.c], [y]),
+        rest=dense_function("rest", [d.z, d.p, d.c], [d.g, d.g_z]),
+        start=dense_function("start", [d.z, d.p, d.c], [x0, m0]),
+        sample=dense_function("sample", [state, memory, d.u, d.t, d.p, d.c], [after]),
+        rates=dense_function("rates", [state, memory, d.u, d.t, d.since, d.into, d.p, d.c], [rates]),
+        output=dense_function("output", [state, memory, d.u, d.t, d.p, d.c], [y]),
     )
 
 
-def function(name: str, ins: list[Any], outs: list[Any]) -> ca.Function:
+def dense_function(name: str, ins: list[Any], outs: list[Any]) -> ca.Function:
     """A function whose outputs are dense and share their common terms."""
     return ca.Function(name, ins, ca.cse([ca.densify(o) for o in outs]))
 

@@ -30,7 +30,7 @@ from typing import Any
 
 import casadi as ca
 
-from fes_pin.models.compile.equations import Equations, Tangents, column, function, nonzeros
+from fes_pin.models.compile.equations import Equations, Tangents, column, dense_function, nonzeros
 from fes_pin.models.compile.layout import Layout
 from fes_pin.models.model import Model
 
@@ -158,13 +158,13 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
     given = [state, memory, d.u, d.t, d.p, d.c]
     return Equations(
         layout=layout,
-        rest=function("rest", [d.z, d.p, d.c], [d.g, d.g_z]),
-        start=function("start", [d.z, d.p, d.c], [x0, m0]),
-        sample=function("sample", given, [after]),
-        rates=function("rates", [state, memory, d.u, d.t, d.since, d.into, d.p, d.c], [rates]),
-        output=function("output", given, [d.readings]),
-        correct=function("correct", given, _corrected(d, doubt, s, inner, packed)),
-        settle=function("settle", [state, d.p, d.c], [packed(d.x, s, _ahead(d, doubt))]),
+        rest=dense_function("rest", [d.z, d.p, d.c], [d.g, d.g_z]),
+        start=dense_function("start", [d.z, d.p, d.c], [x0, m0]),
+        sample=dense_function("sample", given, [after]),
+        rates=dense_function("rates", [state, memory, d.u, d.t, d.since, d.into, d.p, d.c], [rates]),
+        output=dense_function("output", given, [d.readings]),
+        correct=dense_function("correct", given, _corrected(d, doubt, s, inner, packed)),
+        settle=dense_function("settle", [state, d.p, d.c], [packed(d.x, s, _ahead(d, doubt))]),
     )
 
 

@@ -56,7 +56,7 @@ _LOCK = threading.Lock()  # CasADi's expressions are not made for two threads
 _PROGRAMS: dict[tuple[str, str, tuple[type, ...], Layout], Program] = {}
 
 
-def program(
+def compiled_program(
     model: Model, kind: str, inputs: tuple[str, ...], columns: tuple[str, ...], measured: tuple[str, ...] = ()
 ) -> Program:
     """The program of a model, compiled if it was not before.

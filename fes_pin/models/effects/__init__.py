@@ -42,7 +42,7 @@ def __dir__() -> list[str]:
     return sorted((*globals(), *(one.__name__ for one in EFFECTS)))
 
 
-def effect(name: str) -> type[Effect]:
+def effect_named(name: str) -> type[Effect]:
     """The effect of that name.
 
     Raises

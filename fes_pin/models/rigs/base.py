@@ -12,7 +12,7 @@ from fes_pin.data.imposed import MOTION, imposed_motion
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.models.parameters import ROTARY, Parameter, parameters_of
+from fes_pin.models.parameters import ROTARY, ParameterInfo, parameters_of
 from fes_pin.models.rigs.stimuli import both_signs
 from fes_pin.models.session import Session, past_of
 from fes_pin.models.stage import Effect, Signals
@@ -127,7 +127,7 @@ class Rig:
         yield {}
 
     @classmethod
-    def parameters(cls) -> dict[str, Parameter]:
+    def parameters(cls) -> dict[str, ParameterInfo]:
         """Name and description of what the nominal model can fit."""
         return parameters_of(cls)
 

@@ -18,7 +18,7 @@ from fes_pin.data.urdf import check_one_joint
 from fes_pin.models.maths import cos, sin, sqrt, where
 from fes_pin.models.parameters import ROTARY, SLIDING, parameter
 from fes_pin.models.rigs.base import IMPOSED_STOPPING, RUN_OUT, Rig, first_rate, imposed_now, undone
-from fes_pin.models.rigs.rigid import gravity_coefficients, is_revolute, joint_inertia, load_urdf
+from fes_pin.models.rigs.rigid import gravity_coefficients, joint_inertia, joint_is_revolute, load_urdf
 from fes_pin.models.stage import Signals
 
 WEIGHTLESS = 1e-6
@@ -253,7 +253,7 @@ def joint_model(urdf: Path, constants: Mapping[str, Any], start: Mapping[str, An
     cosine, sine = gravity_coefficients(body)
     known = {n: constants[n] for n in Joint.parameters() if n in constants}
     read = {"inertia": joint_inertia(body), "gravity_cos": cosine, "gravity_sin": sine}
-    read["revolute"] = float(is_revolute(body))
+    read["revolute"] = float(joint_is_revolute(body))
     fitted = tuple(n for n in Joint.parameters() if n in start)
     if not driven and "gravity_scale" in fitted:  # free motion shows only ratios: the URDF's inertia holds
         fitted = tuple(n for n in fitted if n != "inertia_scale")

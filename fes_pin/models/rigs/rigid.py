@@ -83,7 +83,7 @@ def gravity_coefficients(model: pin.Model) -> tuple[float, float]:
     """
     data = model.createData()
     along = _gravity(model, data, 0.0)
-    if is_revolute(model):
+    if joint_is_revolute(model):
         return along, _gravity(model, data, math.pi / 2)
     weight = joint_inertia(model) * float(np.linalg.norm(model.gravity.linear))
     return along, math.sqrt(max(weight * weight - along * along, 0.0))
@@ -94,6 +94,6 @@ def joint_inertia(model: pin.Model) -> float:
     return float(pin.crba(model, model.createData(), configuration(model, 0.0))[0, 0])
 
 
-def is_revolute(model: pin.Model) -> bool:
+def joint_is_revolute(model: pin.Model) -> bool:
     """True for a revolute or continuous joint, False for a prismatic one."""
     return "P" not in model.joints[1].shortname().removeprefix("JointModel")[:2]

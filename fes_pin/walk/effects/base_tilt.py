@@ -17,7 +17,7 @@ about what a spirit level and a calibration frame tell (a round figure)."""
 _WORDS = {"forward": 0, "left": 1}
 
 
-class BaseTilt(WalkEffect):
+class LaboratoryTilt(WalkEffect):
     """The treadmill or the laboratory's frame slopes: gravity acts at another angle than believed.
 
         g -> g + g0 tilt, along the frame's level axes; positive: downhill that way
