@@ -19,8 +19,9 @@ from fes_pin.data.files import write_files
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from fes_pin.data.new_study import NewStudy, Wanted
+    from fes_pin.data.new_study import NewStudy
     from fes_pin.data.study import Study
+    from fes_pin.data.wanted import Wanted
     from fes_pin.models.catalogue import Catalogue
 
 FAR = 0.3
@@ -226,9 +227,10 @@ def _wanted(
     given: Mapping[str, object],
 ) -> Wanted:
     from fes_pin.data.errors import InputError
-    from fes_pin.data.new_study import Wanted, common_folder
+    from fes_pin.data.new_study import common_folder
     from fes_pin.data.schema import known_rigs, one_of
     from fes_pin.data.urdf import is_revolute
+    from fes_pin.data.wanted import Wanted
 
     rigs = known_rigs(catalogue.schemas())
     try:

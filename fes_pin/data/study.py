@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Mapping
@@ -14,31 +13,25 @@ from typing import TYPE_CHECKING, Any
 import tomli_w
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_bytes, read_text, write_files
+from fes_pin.data.files import read_bytes, write_files
 from fes_pin.data.motion import GROUND_REACTION
-from fes_pin.data.recorded.columns import Columns, columns_of
+from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.schema import (
     ROLES,
-    NumberKey,
     Rigs,
     RigSchema,
     check_conditions,
     known_rigs,
     one_of,
     schema_of,
-    unknown,
 )
 from fes_pin.data.show import frame, table_html
+from fes_pin.data.study_tables import HORIZON, StudyTables
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.data.trial import Trial, checked_kind, read_body_trial, read_trial, trial_csv
-from fes_pin.data.urdf import is_revolute, moving_joints
 
 if TYPE_CHECKING:
     import pandas
-
-NOTES = ("description", "subject", "source", "licence", "license", "date", "notes")
-HORIZON = "horizon_s"
-"""Key of `[study]`: how far ahead errors over a horizon look."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -181,124 +174,28 @@ def read_columns(path: str | Path, *, rigs: Rigs | None = None) -> Columns | Non
         As `read_study`, of everything but the trials.
     """
     path = Path(path)
-    return _Reader(read_toml(path / "study.toml" if path.is_dir() else path), known_rigs(rigs)).columns()
+    tables = StudyTables(read_toml(path / "study.toml" if path.is_dir() else path), known_rigs(rigs))
+    return tables.columns_table(tables.rig_table()[1])
 
 
-class _Reader:
-    """One reading of a study.toml; every error that it raises names the line and the key."""
+class _Reader(StudyTables):
+    """One reading of a study.toml with its trials."""
 
     def __init__(self, document: Document, rigs: Rigs) -> None:
-        self.document, self.rigs = document, rigs
-        self.folder = document.path.parent
-        self.error = document.error
-        for key in document.data:
-            if key not in (known := ("study", "rig", "start", "columns", "trial")):
-                raise self.error(key, unknown(key, known))
-        self.name, self.rig = self._study_table()
-        self.schema = rigs[self.rig]
+        super().__init__(document, rigs)
         self.own: Columns | None = None
 
-    def columns(self) -> Columns | None:
-        return self._columns_table(self._rig_table()[1])
-
     def study(self) -> Study:
-        constants, files = self._rig_table()
-        start = self._start_table(constants)
-        self.own = self._columns_table(files)
+        constants, files = self.rig_table()
+        start = self.start_table(constants)
+        self.own = self.columns_table(files)
         names = self._trial_names()
         trials = []
         for index, table in enumerate(self._trial_tables()):
             trials.append(self._trial(f"trial[{index}]", table, names[index], files))
         self._check_together(trials, constants)
-        horizon = self._horizon()
+        horizon = self.horizon()
         return Study(self.name, self.rig, constants, start, tuple(trials), self.folder, files, self.schema, horizon)
-
-    def _horizon(self) -> float | None:
-        table = self.document.table("study")
-        given = {HORIZON: table[HORIZON]} if HORIZON in table else {}
-        return self.document.numbers("study", given, {HORIZON: NumberKey("s", 0.0, required=False)}).get(HORIZON)
-
-    def _study_table(self) -> tuple[str, str]:
-        if "study" not in self.document.data:
-            raise self.error("study", "missing; expected a table [study] with name and rig")
-        table = self.document.table("study")
-        for key in table:
-            if key not in ("name", "rig", HORIZON, *NOTES):
-                raise self.error(f"study.{key}", unknown(key, ("name", "rig", HORIZON, *NOTES)))
-        for key in ("name", "rig"):
-            if key not in table:
-                raise self.error(f"study.{key}", "missing")
-        name = table["name"]
-        if not isinstance(name, str) or not name.strip() or not name.isprintable():
-            raise self.error("study.name", "expected a name, one line of text")
-        try:
-            return name, one_of(table["rig"], tuple(self.rigs))
-        except ValueError as problem:
-            raise self.error("study.rig", str(problem)) from None
-
-    def _rig_table(self) -> tuple[dict[str, float], dict[str, Path]]:
-        table = dict(self.document.table("rig"))
-        passive = self.document.table("rig.passive", table) if self.schema.passive else {}
-        if self.schema.passive:
-            table.pop("passive", None)
-        paths = {key: table.pop(key) for key in self.schema.files if key in table}
-        known = dict(self.schema.constants)
-        if self.schema.start_may_be_known:
-            known |= {key: NumberKey(n.unit, n.lower, n.strict, False) for key, n in self.schema.start.items()}
-        constants = self.document.numbers("rig", table, known, also=(*self.schema.files,))
-        constants |= self.document.numbers("rig.passive", passive, self.schema.passive)
-        for key, required in self.schema.files.items():
-            if required and key not in paths:
-                raise self.error(f"rig.{key}", "missing; expected the path of a file inside the study")
-        self._check_constants(constants, paths)
-        files = {key: self.document.path_of(f"rig.{key}", value) for key, value in paths.items()}
-        self._check_files(files)
-        return constants, files
-
-    def _check_constants(self, constants: Mapping[str, float], paths: Mapping[str, object]) -> None:
-        threshold, saturation = constants.get("threshold_us"), constants.get("saturation_us")
-        if (threshold is None) != (saturation is None):
-            key = "threshold_us" if threshold is None else "saturation_us"
-            raise self.error(f"rig.{key}", "missing; threshold_us and saturation_us go together")
-        if threshold is not None and saturation is not None and saturation <= threshold:
-            message = f"expected a saturation above the threshold of {threshold:g} us, found {saturation:g}"
-            raise self.error("rig.saturation_us", message)
-        either = self.schema.either
-        if absent := [key for key in either if key not in constants and not paths]:
-            expected = ", or ".join((" and ".join(either), *self.schema.files))
-            raise self.error(f"rig.{absent[0]}", f"missing; expected {expected}")
-
-    def _check_files(self, files: Mapping[str, Path]) -> None:
-        if self.schema.check_files is not None:
-            self.schema.check_files(files)
-        elif "urdf" in files:
-            moving_joints(files["urdf"])
-        if "segments" in files:
-            try:
-                json.loads(read_text(files["segments"]))
-            except (ValueError, RecursionError) as error:
-                if isinstance(error, InputError):
-                    raise
-                row = getattr(error, "lineno", None)
-                raise InputError("expected JSON", file=files["segments"], row=row) from None
-
-    def _start_table(self, constants: Mapping[str, float]) -> dict[str, float]:
-        table = self.document.table("start")
-        known = dict(self.schema.start)
-        for key in set(known) & set(constants):
-            if key in table:
-                raise self.error(f"start.{key}", "is also in [rig]; expected it in one of them")
-            del known[key]
-        return self.document.numbers("start", table, known)
-
-    def _columns_table(self, files: Mapping[str, Path]) -> Columns | None:
-        if "columns" not in self.document.data:
-            return None
-
-        def error(key: str, message: str) -> InputError:
-            return self.error(f"columns.{key}".rstrip("."), message)
-
-        return columns_of(self.document.table("columns"), self.schema, is_revolute(files.get("urdf")), error)
 
     def _trial_tables(self) -> list[dict[str, Any]]:
         tables = self.document.data.get("trial", [])

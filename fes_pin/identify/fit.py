@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.trial import Trial
-from fes_pin.identify.descent import UNIDENTIFIED, Descent
+from fes_pin.identify.covariance import covariance_of, promised_gain
+from fes_pin.identify.descent import Descent
 from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
@@ -247,14 +248,14 @@ def _run(search: Descent, max_iterations: int) -> Fit:
     with np.errstate(all="ignore"):
         system = normal_equations(search.parts)
         free = search.free_now(system.gradient)
-        decrement = _decrement(system.hessian, system.gradient, free)
+        decrement = promised_gain(system.hessian, system.gradient, free)
     model = problem.model.with_parameters(search.values(search.x))
     return Fit(
         model=model,
         trials=problem.trials,
         noise=problem.noise,
         free=problem.free,
-        covariance=_covariance(system.hessian, free),
+        covariance=covariance_of(system.hessian, free),
         sse=search.sse,
         samples=sum(len(p.residual) for p in search.parts),
         converged=bool(done and np.isfinite(search.sse)),
@@ -332,29 +333,3 @@ def noise_of(fitted: Fit, longest: int = ORDERS[-1], least: int = 0) -> dict[str
         name: estimate_noise(pieces, fitted.degrees, math.sqrt(float(np.mean(squares[name]))), step, longest, least)
         for name, pieces in columns.items()
     }
-
-
-def _covariance(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Inverse information of the free parameters; infinite variance along what is not identified, 0 at a bound."""
-    if not np.isfinite(hessian).all():
-        return np.full_like(hessian, np.inf)
-    out = np.zeros_like(hessian)
-    inner = hessian[np.ix_(free, free)]
-    diagonal = np.diag(inner).copy()
-    seen = diagonal > np.finfo(float).tiny  # the variance of what is felt less is no number
-    scale = np.sqrt(np.where(seen, diagonal, 1.0))
-    values, vectors = np.linalg.eigh(inner / np.outer(scale, scale) + np.diag(np.where(seen, 0.0, 1.0)))
-    weak = values <= UNIDENTIFIED * max(values.max(initial=0.0), 1e-300)
-    inverse = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, values))
-    covariance = (vectors * inverse) @ vectors.T / np.outer(scale, scale)
-    lost = ~seen | (np.abs(vectors[:, weak]) > 1e-3).any(axis=1)
-    covariance[np.diag_indices_from(covariance)] = np.where(lost, np.inf, np.diag(covariance))
-    out[np.ix_(free, free)] = covariance
-    return out
-
-
-def _decrement(hessian: np.ndarray, gradient: np.ndarray, free: np.ndarray) -> float:
-    """Largest gain in twice the log-likelihood that a step of one free parameter alone still promises."""
-    diagonal = np.diag(hessian)
-    good = free & (diagonal > 0) & np.isfinite(gradient)
-    return float(np.max(gradient[good] ** 2 / diagonal[good], initial=0.0))

@@ -23,9 +23,10 @@ from fes_pin.walk.judge import (
     walk_remainder,
 )
 from fes_pin.walk.likelihood import white_level
+from fes_pin.walk.nulls import Nulls
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.result import Estimate, WalkCause, WalkDiagnosis, WalkRemainder
-from fes_pin.walk.search import LEVEL, SEPARABLE, Nulls, Set, WalkSearch
+from fes_pin.walk.search import LEVEL, SEPARABLE, Set, WalkSearch
 from fes_pin.workers import Progress, one_thread_each, time_limit
 
 LEFT_LEVEL = 0.01

@@ -25,6 +25,8 @@ CLUSTER_M = 0.15
 LANDMARK_M, LANDMARK_RAD = 0.005, 0.026
 """Ordinary errors of where a coordinate's zero is, as standard deviations: landmarks are found to 6 to 21 mm, and a
 segment's frame is the mean of several (U. Della Croce et al., Gait Posture 21:226, 2005)."""
+SMALL_N = 1.0
+"""N, or N m: what ordinary errors make together in all waves, and is smaller, is left out."""
 
 Disturbance = Callable[[np.ndarray, np.ndarray, bool, np.random.Generator], np.ndarray]
 CoordinateErrors = dict[str, np.ndarray]
@@ -100,3 +102,11 @@ def _responses(
         moved = {**columns, **{n: columns[n] + error for n, error in one.items()}}
         out.append((residual(moved) - base)[:, :, None])
     return strides.first(np.concatenate(out, axis=2))
+
+
+def compressed(columns: np.ndarray) -> np.ndarray:
+    """Fewer columns of nearly the same covariance."""
+    flat = columns.reshape(-1, columns.shape[-1])
+    vectors, sizes, _ = np.linalg.svd(flat, full_matrices=False)
+    kept = sizes > SMALL_N
+    return (vectors[:, kept] * sizes[kept]).reshape(*columns.shape[:-1], -1)

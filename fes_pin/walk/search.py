@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fes_pin.body.build import GRAVITY
-from fes_pin.walk.disturb import disturbed_waves, misplaced, tissue, white
+from fes_pin.walk.disturb import compressed, disturbed_waves, misplaced, tissue, white
 from fes_pin.walk.effect import Form
 from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.likelihood import (
@@ -23,6 +23,7 @@ from fes_pin.walk.likelihood import (
     fitted_of,
     rotation,
 )
+from fes_pin.walk.nulls import Nulls
 from fes_pin.walk.recording import WalkRecording
 from fes_pin.walk.scene import Scene, scene_of
 from fes_pin.walk.strides import Strides, strides_of
@@ -40,8 +41,6 @@ is one law among many, and the channels' rotation has seen the data: what is cou
 SEPARABLE = 6.0
 """Twice the log-likelihood by which a rival must fall short: odds of 20 to 1."""
 SIMULATED_ROUNDS = 4
-SMALL_N = 1.0
-"""N, or N m: what ordinary errors make together in all waves, and is smaller, is left out."""
 TOGETHER = 64
 """Fits that are made at once: as many as a processor's cache holds."""
 TISSUE_DRAWS, WHITE_DRAWS = 40, 24
@@ -75,38 +74,6 @@ class Set:
     forms: Chosen
     fitted: Fitted = field(repr=False)
     price: float
-
-
-@dataclass(frozen=True)
-class Nulls:
-    """What simulated residuals without a cause show.
-
-    Attributes
-    ----------
-    gains
-        (SIMULATED,) of the best form, price paid.
-    spread
-        By form, (p,) root mean square of value over standard deviation: 1 where the likelihood's intervals are right.
-    """
-
-    gains: np.ndarray = field(repr=False)
-    spread: tuple[np.ndarray, ...] = field(repr=False)
-
-    @property
-    def _gumbel(self) -> tuple[float, float]:
-        """Place and scale of the maxima's Gumbel distribution, by moments."""
-        scale = max(float(np.std(self.gains)) * np.sqrt(6.0) / np.pi, 1e-6)
-        return float(np.mean(self.gains)) - float(np.euler_gamma) * scale, scale
-
-    def critical(self, level: float) -> float:
-        """A gain that is exceeded with this chance; no less than 0."""
-        place, scale = self._gumbel
-        return max(place - scale * float(np.log(-np.log1p(-level))), 0.0)
-
-    def p_value(self, gain: float) -> float:
-        """Chance of at least this gain."""
-        place, scale = self._gumbel
-        return float(max(-np.expm1(-np.exp(-(gain - place) / scale)), 1e-300))
 
 
 def walk_library() -> tuple[Form, ...]:
@@ -171,7 +138,7 @@ class WalkSearch:
         if not self.strides.whole:  # soft tissue does not come back to what it was
             means = means + np.mean(self.tissue[..., 0] ** 2, axis=0)
         bare = WalkNoise(self.strides.harmonics, turn, means, self._none())
-        self.ordinary = bare.rotated(_compressed(self._in_every_session()))
+        self.ordinary = bare.rotated(compressed(self._in_every_session()))
         self.noise = replace(bare, nuisance=np.concatenate([bare.rotated(self._nuisance()), self.ordinary], axis=3))
         self.fits = {}
 
@@ -377,14 +344,6 @@ class WalkSearch:
             stds = np.sqrt(np.einsum("bpp->bp", covariance))
             spread.append(np.sqrt(np.mean((values / stds) ** 2, axis=0)))
         return Nulls(best, tuple(spread))
-
-
-def _compressed(columns: np.ndarray) -> np.ndarray:
-    """Fewer columns of nearly the same covariance."""
-    flat = columns.reshape(-1, columns.shape[-1])
-    vectors, sizes, _ = np.linalg.svd(flat, full_matrices=False)
-    kept = sizes > SMALL_N
-    return (vectors[:, kept] * sizes[kept]).reshape(*columns.shape[:-1], -1)
 
 
 def _place(form: Form) -> tuple[str, str]:

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.new_study import Wanted, new_study
+from fes_pin.data.new_study import new_study
 from fes_pin.data.recorded import formats
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
 from fes_pin.data.templates import pendulum
+from fes_pin.data.wanted import Wanted
 
 TIME = np.arange(80) * 0.005
 ANGLE = 30.0 * np.cos(4.0 * TIME)

@@ -1,0 +1,129 @@
+"""The tables of a study.toml that say what the rig is and how its recordings are written: all but the trials."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import read_text
+from fes_pin.data.recorded.columns import Columns, columns_of
+from fes_pin.data.schema import NumberKey, Rigs, one_of, unknown
+from fes_pin.data.toml import Document
+from fes_pin.data.urdf import is_revolute, moving_joints
+
+NOTES = ("description", "subject", "source", "licence", "license", "date", "notes")
+HORIZON = "horizon_s"
+"""Key of `[study]`: how far ahead errors over a horizon look."""
+
+
+class StudyTables:
+    """One reading of a study.toml; every error that it raises names the line and the key.
+
+    Parameters
+    ----------
+    document, rigs
+        The file, and the schemas of the rigs that are known, by name.
+    """
+
+    def __init__(self, document: Document, rigs: Rigs) -> None:
+        self.document, self.rigs = document, rigs
+        self.folder = document.path.parent
+        self.error = document.error
+        for key in document.data:
+            if key not in (known := ("study", "rig", "start", "columns", "trial")):
+                raise self.error(key, unknown(key, known))
+        self.name, self.rig = self._study_table()
+        self.schema = rigs[self.rig]
+
+    def horizon(self) -> float | None:
+        """How far ahead errors over a horizon look, s, where the study says so."""
+        table = self.document.table("study")
+        given = {HORIZON: table[HORIZON]} if HORIZON in table else {}
+        return self.document.numbers("study", given, {HORIZON: NumberKey("s", 0.0, required=False)}).get(HORIZON)
+
+    def _study_table(self) -> tuple[str, str]:
+        if "study" not in self.document.data:
+            raise self.error("study", "missing; expected a table [study] with name and rig")
+        table = self.document.table("study")
+        for key in table:
+            if key not in ("name", "rig", HORIZON, *NOTES):
+                raise self.error(f"study.{key}", unknown(key, ("name", "rig", HORIZON, *NOTES)))
+        for key in ("name", "rig"):
+            if key not in table:
+                raise self.error(f"study.{key}", "missing")
+        name = table["name"]
+        if not isinstance(name, str) or not name.strip() or not name.isprintable():
+            raise self.error("study.name", "expected a name, one line of text")
+        try:
+            return name, one_of(table["rig"], tuple(self.rigs))
+        except ValueError as problem:
+            raise self.error("study.rig", str(problem)) from None
+
+    def rig_table(self) -> tuple[dict[str, float], dict[str, Path]]:
+        """Constants of the rig, and its files, by key."""
+        table = dict(self.document.table("rig"))
+        passive = self.document.table("rig.passive", table) if self.schema.passive else {}
+        if self.schema.passive:
+            table.pop("passive", None)
+        paths = {key: table.pop(key) for key in self.schema.files if key in table}
+        known = dict(self.schema.constants)
+        if self.schema.start_may_be_known:
+            known |= {key: NumberKey(n.unit, n.lower, n.strict, False) for key, n in self.schema.start.items()}
+        constants = self.document.numbers("rig", table, known, also=(*self.schema.files,))
+        constants |= self.document.numbers("rig.passive", passive, self.schema.passive)
+        for key, required in self.schema.files.items():
+            if required and key not in paths:
+                raise self.error(f"rig.{key}", "missing; expected the path of a file inside the study")
+        self._check_constants(constants, paths)
+        files = {key: self.document.path_of(f"rig.{key}", value) for key, value in paths.items()}
+        self._check_files(files)
+        return constants, files
+
+    def _check_constants(self, constants: Mapping[str, float], paths: Mapping[str, object]) -> None:
+        threshold, saturation = constants.get("threshold_us"), constants.get("saturation_us")
+        if (threshold is None) != (saturation is None):
+            key = "threshold_us" if threshold is None else "saturation_us"
+            raise self.error(f"rig.{key}", "missing; threshold_us and saturation_us go together")
+        if threshold is not None and saturation is not None and saturation <= threshold:
+            message = f"expected a saturation above the threshold of {threshold:g} us, found {saturation:g}"
+            raise self.error("rig.saturation_us", message)
+        either = self.schema.either
+        if absent := [key for key in either if key not in constants and not paths]:
+            expected = ", or ".join((" and ".join(either), *self.schema.files))
+            raise self.error(f"rig.{absent[0]}", f"missing; expected {expected}")
+
+    def _check_files(self, files: Mapping[str, Path]) -> None:
+        if self.schema.check_files is not None:
+            self.schema.check_files(files)
+        elif "urdf" in files:
+            moving_joints(files["urdf"])
+        if "segments" in files:
+            try:
+                json.loads(read_text(files["segments"]))
+            except (ValueError, RecursionError) as error:
+                if isinstance(error, InputError):
+                    raise
+                row = getattr(error, "lineno", None)
+                raise InputError("expected JSON", file=files["segments"], row=row) from None
+
+    def start_table(self, constants: Mapping[str, float]) -> dict[str, float]:
+        """Start values of what the nominal model fits, by key."""
+        table = self.document.table("start")
+        known = dict(self.schema.start)
+        for key in set(known) & set(constants):
+            if key in table:
+                raise self.error(f"start.{key}", "is also in [rig]; expected it in one of them")
+            del known[key]
+        return self.document.numbers("start", table, known)
+
+    def columns_table(self, files: Mapping[str, Path]) -> Columns | None:
+        """How the recordings are written, where the study says so."""
+        if "columns" not in self.document.data:
+            return None
+
+        def error(key: str, message: str) -> InputError:
+            return self.error(f"columns.{key}".rstrip("."), message)
+
+        return columns_of(self.document.table("columns"), self.schema, is_revolute(files.get("urdf")), error)

@@ -1,0 +1,33 @@
+"""What a fit's second derivatives say: how far its parameters are known, and what a further step could gain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fes_pin.identify.descent import UNIDENTIFIED
+
+
+def covariance_of(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Inverse information of the free parameters; infinite variance along what is not identified, 0 at a bound."""
+    if not np.isfinite(hessian).all():
+        return np.full_like(hessian, np.inf)
+    out = np.zeros_like(hessian)
+    inner = hessian[np.ix_(free, free)]
+    diagonal = np.diag(inner).copy()
+    seen = diagonal > np.finfo(float).tiny  # the variance of what is felt less is no number
+    scale = np.sqrt(np.where(seen, diagonal, 1.0))
+    values, vectors = np.linalg.eigh(inner / np.outer(scale, scale) + np.diag(np.where(seen, 0.0, 1.0)))
+    weak = values <= UNIDENTIFIED * max(values.max(initial=0.0), 1e-300)
+    inverse = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, values))
+    covariance = (vectors * inverse) @ vectors.T / np.outer(scale, scale)
+    lost = ~seen | (np.abs(vectors[:, weak]) > 1e-3).any(axis=1)
+    covariance[np.diag_indices_from(covariance)] = np.where(lost, np.inf, np.diag(covariance))
+    out[np.ix_(free, free)] = covariance
+    return out
+
+
+def promised_gain(hessian: np.ndarray, gradient: np.ndarray, free: np.ndarray) -> float:
+    """Largest gain in twice the log-likelihood that a step of one free parameter alone still promises."""
+    diagonal = np.diag(hessian)
+    good = free & (diagonal > 0) & np.isfinite(gradient)
+    return float(np.max(gradient[good] ** 2 / diagonal[good], initial=0.0))
