@@ -19,6 +19,7 @@ from functools import cache
 from multiprocessing import Pool
 
 import numpy as np
+from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from fes_pin.control.control import PositionController
@@ -321,6 +322,14 @@ def show_faults(outcomes: Iterable[Outcome]) -> None:
             print(f"  {o}")
 
 
+def per_hour(stops: int, hours: float) -> tuple[float, float]:
+    """The rate that a count allows: 97.5 % at both ends, of none 95 % at one (F. Garwood, Biometrika 28:437, 1936)."""
+    if not stops:
+        return 0.0, float(chi2.ppf(0.95, 2)) / 2.0 / hours
+    low, high = chi2.ppf(0.025, 2 * stops), chi2.ppf(0.975, 2 * stops + 2)
+    return float(low) / 2.0 / hours, float(high) / 2.0 / hours
+
+
 def show_normal(bouts: Iterable[Bout], hours: float) -> None:
     """False stops, and what the tail of the innovations' test says of rarer ones."""
     every = list(bouts)
@@ -330,10 +339,14 @@ def show_normal(bouts: Iterable[Bout], hours: float) -> None:
     scale = max(math.sqrt(6.0) / math.pi * float(np.std(largest)), 1e-9)
     place = float(np.mean(largest)) - 0.5772156649 * scale
     rate = -math.expm1(-math.exp(-(1.0 - place) / scale)) * 3600.0 / BOUT_S
+    by = {status: sum(b.status == status for b in stops) for status in sorted({b.status for b in stops})}
+    low, high = per_hour(len(stops), hours)
     print(
-        f"{hours:g} hours of normal use: {len(stops)} false stops (below {3.0 / hours:.2g} an hour at 95 % if none); "
-        f"surprise in 5 minutes: median {np.median(largest):.2f}, largest {largest[-1]:.2f} of 1; by Gumbel's law of "
-        f"the largest it passes 1 {rate:.1g} times an hour; {sum(b.calm < 1.0 for b in every)} loops were calmed"
+        f"{hours:g} hours of normal use: {len(stops)} stops ({low:.2g} to {high:.2g} an hour at 95 %)"
+        + "".join(f"; {status.lower()} {n}" for status, n in by.items())
+        + f"; surprise in 5 minutes: median {np.median(largest):.2f}, largest {largest[-1]:.2f} of 1; "
+        f"by Gumbel's law of the largest it passes 1 {rate:.1g} times an hour; "
+        f"{sum(b.calm < 1.0 for b in every)} loops were calmed"
     )
     for b in stops:
         print(f"  {b.status} after {b.stopped_s:.0f} s, calm {b.calm:.2f}, surprise {b.surprise:.2f}: {b.subject}")
