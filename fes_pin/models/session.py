@@ -18,8 +18,8 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.models.maths import exp
 
+# stretches of stimulation: begin and end in s, as `start_s` counts them, and mean recruitment
 Session = tuple[tuple[float, float, float], ...]
-"""Stretches of stimulation: begin and end in s, as `start_s` counts them, and mean recruitment."""
 NEWEST_S, GROWTH, BINS = 0.2, 1.25, 45
 """The newest bin of the past in s, how much longer each older one reaches, and how many there are: they go an hour
 back, twelve times the longest recovery that is looked for. Within a bin an exponential of its own age differs from its
