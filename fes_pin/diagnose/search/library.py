@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -113,3 +113,10 @@ def near_null(effect: type[Effect], name: str) -> float:
     assert info.null is not None
     one_sided = info.null in {info.lower, info.upper}
     return info.null + (TINY * info.scale if one_sided else 0.0)
+
+
+def far_sizes(effect: Effect) -> list[Effect]:
+    """The effect at the start values that its amplitudes have of themselves."""
+    info = effect.parameters()
+    chosen: list[dict[str, Any]] = [{name: value} for name in effect.amplitudes() for value in info[name].grid]
+    return [replace(effect, **one) for one in chosen]

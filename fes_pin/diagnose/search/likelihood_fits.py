@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.search.library import Library, Probe, near_null
+from fes_pin.diagnose.search.library import Library, Probe, far_sizes, near_null
 from fes_pin.diagnose.search.score import Projection, Scored, Scores, best_by_effect
 from fes_pin.diagnose.search.simulation_fits import Names, is_identified, names_of
 from fes_pin.identify.fit import Fit, fit_problem
@@ -104,7 +104,13 @@ class LikelihoodFits:
         """A first fit of a base with one more effect, from its shapes of largest score."""
         worth = [s for s in scored[:STARTS] if s.gain >= 0.5 * scored[0].gain]
         starts = [base.model + started(s.probe.effect, s.amplitudes) for s in worth]
-        return min((*(self._first_fit(s, base) for s in starts), *self._afresh(starts[0], base)), key=lambda f: f.price)
+        others = (*self._afresh(starts[0], base), *self._elsewhere(worth[0].probe.effect, base))
+        return min((*(self._first_fit(s, base) for s in starts), *others), key=lambda f: f.price)
+
+    def _elsewhere(self, effect: Effect, base: Fit) -> list[Fit]:
+        """Fits from sizes of a cause that no line from its null leads to, beside the rig as it was believed."""
+        guess, believed = first_guess(self.model, self.trials), Model(self.model.rig, base.model.effects)
+        return [self._maximised(believed + one, guess, rounds=AFRESH_ROUNDS) for one in far_sizes(effect)]
 
     def _afresh(self, start: Model, base: Fit) -> list[Fit]:
         """A fit that begins with little that is random, where another's random effort takes what a model should."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.search.library import Library, near_null
+from fes_pin.diagnose.search.library import Library, far_sizes, near_null
 from fes_pin.diagnose.search.score import Projection, Scored, Scores
 from fes_pin.identify.fit import (
     CONFIDENCE_95,
@@ -84,9 +84,11 @@ class SimulationFits:
     def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:
         """Fit a base with one more effect, from its shapes of largest score.
 
-        Amplitudes start at their linear estimate; where that falls over (a stiffness below zero), at their nulls.
+        Amplitudes start at their linear estimate; where that falls over (a stiffness below zero), at their nulls; and
+        at sizes of their own, beside the rig as it was believed.
         """
         starts = [base.model + _with_amplitudes(s.probe.effect, s.amplitudes) for s in scored[:STARTS]]
+        starts += [Model(self.model.rig, base.model.effects) + one for one in far_sizes(scored[0].probe.effect)]
         fitted = self.fit_from(starts, base.unknowns)
         if np.isfinite(fitted.sse):
             return fitted

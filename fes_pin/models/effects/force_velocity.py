@@ -39,17 +39,17 @@ class ForceVelocity(Effect):
     bend: float = parameter(
         0.0, null=0.0, lower=-20.0, upper=20.0, scale=0.5, optional=True, grid=(0.5,), rigs=("ankle",)
     )
-    hill: float = parameter(0.0, null=0.0, lower=0.0, upper=20.0, scale=1.0, optional=True, grid=(4.0,))
-    plateau: float = parameter(PLATEAU, null=PLATEAU, lower=0.0, upper=20.0, scale=1.0, optional=True, grid=(1.0, 4.0))
+    hill: float = parameter(0.0, null=0.0, lower=0.0, upper=20.0, scale=1.0, optional=True)
+    plateau: float = parameter(PLATEAU, null=PLATEAU, lower=0.0, upper=20.0, scale=1.0, optional=True)
 
     name, stage, signal, rigs = "force_velocity", Stage.MUSCLE, "fibres", ("ankle", "muscle")
 
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
         """Hill's branches where the motion is imposed, which may be fast; else the bend."""
-        imposed = {"length_m", "torque_nm"} & set(measured)
-        other = ("bend",) if imposed else ("hill", "plateau")
-        return {**super().grids(measured), **dict.fromkeys(other, ())}
+        if not {"length_m", "torque_nm"} & set(measured):
+            return super().grids(measured)
+        return {**super().grids(measured), "bend": (), "hill": (4.0,), "plateau": (1.0, 4.0)}
 
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
         """Of a joint, down to half a radian a second; an imposed motion shows that a muscle is damped, not driven."""
