@@ -7,7 +7,7 @@ of causes is judged by the likelihood of its one-step-ahead predictions, with a 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,15 +118,21 @@ def judge_driven(
     left = _left(driven_remainder(found.best, seed), random, refused, search)
     horizon = horizon_s or default_horizon(train)
     whole = folds or [_Fold(found.nominal, found.best, found.without, tuple(train))]
+
+    def errors(chosen: Callable[[_Fold], Fit]) -> Errors:
+        return errors_over_horizon([(chosen(f), f.best, f.test) for f in whole], horizon)
+
     falling = falls(found.best.model, train)
     return Judged(
         found=found,
         left=left,
         refused=refused,
         evidence=evidence,
-        nominal=errors_over_horizon([(f.nominal, f.test) for f in whole], horizon),
-        without={n: errors_over_horizon([(f.without[n], f.test) for f in whole], horizon) for n in found.without},
-        extended=errors_over_horizon([(f.best, f.test) for f in whole], horizon),
+        nominal=errors_over_horizon([(f.nominal, f.best, f.test) for f in whole], horizon),
+        without={
+            n: errors_over_horizon([(f.without[n], f.best, f.test) for f in whole], horizon) for n in found.without
+        },
+        extended=errors_over_horizon([(f.best, f.best, f.test) for f in whole], horizon),
         ahead=tuple(errors_ahead([(f, train)], horizon, falling) for f in (found.nominal, found.best)),  # type: ignore[arg-type]
         held_out_ahead=_held_ahead(folds, horizon, falling),
         horizon_s=horizon,

@@ -107,20 +107,26 @@ def free_errors(
     return AheadErrors(horizon_s, inside[0], inside[1], outside[0], outside[1])
 
 
-def errors_over_horizon(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float) -> Errors:
-    """Squared errors over the horizon, by seconds of each trial."""
-    work = [(fitted, trial) for fitted, trials in pairs for trial in trials]
-    found = in_parallel(lambda w: _squares(w[0], w[1], horizon_s), work)
+def errors_over_horizon(pairs: Sequence[tuple[Fit, Fit, Sequence[Trial]]], horizon_s: float) -> Errors:
+    """Squared errors over the horizon, by seconds of each trial.
+
+    Parameters
+    ----------
+    pairs
+        A fit, the one whose white noise is the unit of its errors, so that models can be compared, and trials.
+    """
+    work = [(fitted, floor, trial) for fitted, floor, trials in pairs for trial in trials]
+    found = in_parallel(lambda w: _squares(*w, horizon_s), work)
     squares, spread, counts = (np.concatenate([f[k] for f in found]) for k in range(3))
     return Errors(squares, spread, counts)
 
 
-def _squares(fitted: Fit, trial: Trial, horizon_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    assert fitted.doubt is not None
+def _squares(fitted: Fit, floor: Fit, trial: Trial, horizon_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    assert fitted.doubt is not None and floor.doubt is not None
     foretold = over_horizon(fitted.model, trial, fitted.doubt, horizon_s)
     total, around = np.zeros(len(trial)), np.zeros(len(trial))
     for name, values in foretold.items():
-        variance = fitted.doubt.white[name] ** 2
+        variance = floor.doubt.white[name] ** 2
         total += np.nan_to_num(trial[name] - values, posinf=0.0, neginf=0.0) ** 2 / variance
         around += np.nan_to_num(trial[name] - np.nanmean(trial[name])) ** 2 / variance
     pieces = [np.array_split(x, max(1, round(trial.duration))) for x in (total, around)]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from diagnose.hidden import study_of
 
-from fes_pin.diagnose.decide.held_out import RUNAWAY, cross_validate, errors_of, held_out_gain, separate
+from fes_pin.diagnose.decide.held_out import RUNAWAY, Errors, cross_validate, errors_of, held_out_gain, separate
 from fes_pin.identify.fit import fit
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
@@ -49,3 +49,17 @@ def test_a_causes_gain_is_not_that_of_another_set_which_the_folds_prefer():
     own, found = (held_out_gain(h.nominal, h.without["effort_offset"], h.extended, 0) for h in (alone, beside))
     assert own.high < 50.0 < held_out_gain(beside.nominal, beside.nominal, beside.chosen, 0).low
     assert found == own
+
+
+def test_a_gain_of_units_with_next_to_no_error_is_no_large_number():
+    """One second of a trial holds all of the error; draws without it hold noise, of which nothing is a share."""
+    rng = np.random.default_rng(3)
+    counts = np.full(12, 200.0)
+    extended = rng.chisquare(200.0, size=12)
+    without = extended + rng.normal(0.0, 5.0, size=12)
+    without[4] += 3000.0
+    errors = [Errors(squares, 10.0 * counts, counts) for squares in (without, without, extended)]
+    found = held_out_gain(*errors, seed=0)
+    assert -30.0 < found.low < 100.0 and found.percent > 90.0 and found.high < 130.0
+    nothing = held_out_gain(*(Errors(x, 10.0 * counts, counts) for x in (extended, extended + 1.0, extended)), seed=0)
+    assert abs(nothing.percent) < 30.0 and max(abs(nothing.low), abs(nothing.high)) < 30.0

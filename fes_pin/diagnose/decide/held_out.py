@@ -101,8 +101,12 @@ def held_out_gain(nominal: Errors, without: Errors, extended: Errors, seed: int)
 
 
 def _share(nominal: np.ndarray, without: np.ndarray, extended: np.ndarray, count: np.ndarray) -> np.ndarray:
-    """Percent; the error above the noise is at least what the extension removes."""
-    excess = np.maximum(np.maximum(nominal - count, nominal - extended), 1e-9 * count)
+    """Percent; the error above the noise is at least what the extension removes.
+
+    It is at least its own scatter, too, the root of 2 n for n squares of noise: units of evidence in which there is
+    next to no error would else show gains of any size.
+    """
+    excess = np.maximum(np.maximum(nominal - count, nominal - extended), np.sqrt(2.0 * count))
     return 100.0 * (without - extended) / excess
 
 
