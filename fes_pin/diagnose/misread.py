@@ -24,6 +24,7 @@ from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Linearized, Problem, normal_equations
 from fes_pin.models.model import Model
+from fes_pin.models.simulate import simulate
 from fes_pin.workers import in_parallel
 
 NAME = "condition_misread"
@@ -40,6 +41,8 @@ FEWEST = 4
 """Trials that state something: the others must tell how much trials differ anyway."""
 CANDIDATES = 3
 """Trials that are left out in turn, those that the screen finds oddest."""
+UNFELT = 1e-7
+"""Share of an answer's spread that a step of a condition moves it by where only rounding does."""
 LEAST_SCORE = 10.0
 """Drop in twice the log-likelihood under white noise that a trial must promise: three deviations."""
 STEPS = 8
@@ -110,14 +113,15 @@ def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
     trials
         What was measured, with what was stated.
     """
-    rig = model.rig
-    wanted = [(i, n) for i, t in enumerate(trials) for n in rig.stated(t)]
+    sizes = _sizes(model, trials)
+    first = {(t.kind, n): t for t in reversed(trials) for n in model.rig.stated(t)}
+    felt = {key: _is_felt(model, t, key[1], sizes[key[1]]) for key, t in first.items()}
+    wanted = [(i, n) for i, t in enumerate(trials) for n in model.rig.stated(t) if felt[t.kind, n]]
     if len({i for i, _ in wanted}) < FEWEST:
         return None
     whole = fit_multistart(Problem(model, trials, rough_noise(model, trials)), model.parameters())
     if not math.isfinite(whole.sse):
         return None
-    sizes = _sizes(model, trials)
     odd = _screen(whole, trials, wanted, sizes)
     found = [one for pick in odd if (one := _left_out(whole, trials, pick, wanted, sizes)) is not None]
     return min(found, key=lambda m: m.p_value, default=None)
@@ -136,6 +140,14 @@ def _sizes(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
             moved = trial[name] if name in trial.columns else np.array([value])
             values.setdefault(name, []).extend([float(np.min(moved)), float(np.max(moved))])
     return {n: SHARE * max(float(np.ptp(v)), 0.1 * float(np.max(np.abs(v))), 1e-6) for n, v in values.items()}
+
+
+def _is_felt(model: Model, trial: Trial, name: str, size: float) -> bool:
+    """True if the model's answer to a trial depends on what it states."""
+    moved = simulate(model, model.rig.restated(trial, name, model.rig.stated(trial)[name] + size))
+    plain = simulate(model, trial)
+    names = [n for n in model.rig.outputs(trial.kind) if n in trial.columns]
+    return any(np.max(np.abs(moved[n] - plain[n])) > UNFELT * max(np.ptp(plain[n]), 1e-12) for n in names)
 
 
 def _screen(
