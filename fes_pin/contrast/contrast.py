@@ -17,6 +17,7 @@ from fes_pin.contrast.groups import BY_GROUP, grouped_study
 from fes_pin.contrast.result import Change, Contrast
 from fes_pin.contrast.search import ContrastFound, ContrastSearch
 from fes_pin.contrast.words import of_cause, of_nominal
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.diagnose.cause import ParameterEstimate
 from fes_pin.diagnose.diagnosis import despiked_study, split
@@ -84,7 +85,7 @@ def contrast(
     train, _ = split(joined)
     names = tuple(dict.fromkeys(t.group for t in joined.trials if t.group is not None))
     trials = {g: [t for t in train if t.group == g] for g in names}
-    driven = is_fed_back(nominal.rig, train)
+    driven = any(t.kind == IMPOSED for t in train) or is_fed_back(nominal.rig, train)
     if any(len(many) < 2 for many in trials.values()):
         warnings.append("a group has one trial only: how much repeats differ is judged from its parts")
     with one_thread_each():

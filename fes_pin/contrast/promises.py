@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item
+from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library, near_null
 from fes_pin.diagnose.search.score import Projection, Scores
@@ -137,24 +137,30 @@ def _differing(bench: Bench, base: Grouped) -> Iterator[Item]:
 
 def _columns(bench: Bench, effect: type[Effect], base: Grouped) -> dict[str, list[np.ndarray]]:
     """Sensitivities to an effect's amplitudes for each of its shapes, by group."""
-    out = {}
+    out: dict[str, list[np.ndarray]] = {}
     cut = GroupedProblem(base.model, bench.trials, base.weights).by_group(base.fit.unknowns)
     for group, model in base.model.models.items():
         bare, trials, weight = Model(model.rig), bench.trials[group], base.weights[group]
-        extended = bare + effect.absent()
-        names = [f"{effect.name}.{n}" for n in effect.amplitudes()]
-        if isinstance(weight, Doubt):
-            problem: Any = LikelihoodProblem(extended, trials, weight)
-            at = [problem.free.index(n) for n in names]
-        else:
-            problem = Problem(extended, trials, weight, tuple(names))
-            at = list(range(len(names)))
-        unknowns = problem.completed(cut[group])
-        out[group] = [
-            np.concatenate([p.jacobian[:, at] for p in problem.linearize((bare + one).parameters(), unknowns)])
-            for one in bench.library.grid(effect)
-        ]
+        problems: dict[tuple, tuple[Any, list[int]]] = {}
+        out[group] = []
+        for one in bench.library.grid(effect):
+            form = tuple(one.unused().items())  # compiled in, with its values
+            if form not in problems:
+                problems[form] = _problem(bare + one, trials, weight)
+            problem, at = problems[form]
+            parts = problem.linearize((bare + one).parameters(), problem.completed(cut[group]))
+            out[group].append(np.concatenate([p.jacobian[:, at] for p in parts]))
     return out
+
+
+def _problem(model: Model, trials: Sequence[Trial], weight: Weight) -> tuple[Any, list[int]]:
+    """The problem of one effect beside the nominal model, and where its amplitudes stand among what is free."""
+    (effect,) = model.effects
+    names = [f"{effect.name}.{n}" for n in effect.amplitudes()]
+    if isinstance(weight, Doubt):
+        problem = LikelihoodProblem(model, trials, weight)
+        return problem, [problem.free.index(n) for n in names]
+    return Problem(model, trials, weight, tuple(names)), list(range(len(names)))
 
 
 def _own_columns(

@@ -91,13 +91,20 @@ class ContrastSearch:
                 break
             best = self._first(tried)
             if not p_value(self.fits, self.family, best, base) < LEVEL:
-                both = self._two_at_once(best, base)
-                if both is None:
+                instead = self._two_at_once(best, base) or self._common(tried, base)
+                if instead is None:
                     break
-                best = both
+                best = instead
             base = best
             promises, _ = self.fits.promises(base)
         return base
+
+    def _common(self, tried: list[Grouped], base: Grouped) -> Grouped | None:
+        """The cheapest set with a cause of all groups more, where no change stands out: it may hide what changed."""
+        common = [f for f in tried if f.items[-1].group is None]
+        if not common or not p_value(self.fits, self.family, common[0], base) < LEVEL:
+            return None
+        return common[0]
 
     def _two_at_once(self, one: Grouped, base: Grouped) -> Grouped | None:
         """A set with two items more, each significant beside the other, where one alone is not.
@@ -115,12 +122,17 @@ class ContrastSearch:
         return both if all(p_value(self.fits, self.family, both, rest) < LEVEL for rest in rests) else None
 
     def _beside(self, base: Grouped, promises: list[Promise], leave: Item | None = None) -> list[Grouped]:
-        """Fits of a set with each of the items of most promise beside it, cheapest first."""
+        """Fits of a set with each of the items of most promise beside it, cheapest first.
+
+        That something which the set has already differs in a group is always tried: what is random in the set hides
+        how much it would gain.
+        """
         ranked: dict[Item, list[Promise]] = {}
         for one in sorted(promises, key=lambda p: PARAMETER_PRICE * p.degrees - p.gain):
             if one.item != leave and one.gain > 1.0:
                 ranked.setdefault(one.item, []).append(one)
-        chosen = list(ranked.values())[: FITTED_DRIVEN if self.fits.driven else FITTED]
+        most = FITTED_DRIVEN if self.fits.driven else FITTED
+        chosen = [many for k, many in enumerate(ranked.values()) if k < most or many[0].effect is None]
         looks = in_parallel(lambda many: self.fits.look(base, many[:STARTS]), chosen)
         looks = sorted((f for f in looks if np.isfinite(f.fit.sse)), key=lambda f: f.price)
         return sorted([*in_parallel(self.fits.go_on, looks[:3]), *looks[3:]], key=lambda f: f.price)

@@ -13,6 +13,8 @@ from data import studies
 import fes_pin as fp
 from fes_pin.contrast.record import contrast_record
 from fes_pin.data.errors import InputError
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import CONFIDENCE_95
 from fes_pin.view.contrast_report import contrast_html
 
@@ -98,6 +100,51 @@ def test_a_misread_trial_is_told_as_such(shared, changes):
     assert value.value == pytest.approx(load, abs=2.0 * CONFIDENCE_95 * value.std)
     assert contrast_record(found)["changes"]
     assert "condition_misread" in contrast_html(found)
+
+
+STAND = """<?xml version="1.0"?>
+<robot name="stand"><link name="base"/>
+  <link name="rod"><inertial><mass value="2.0"/>
+    <inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/></inertial></link>
+  <joint name="slide" type="prismatic"><parent link="base"/><child link="rod"/><axis xyz="1 0 0"/>
+    <limit lower="-9" upper="9" effort="1e5" velocity="99"/></joint>
+</robot>
+"""
+
+
+def stroke_study(folder, tensions, damping=(400.0, 400.0)):
+    """A band around a drum on a test stand: strokes of different lengths are imposed, the force is written out."""
+    rng, trials = np.random.default_rng(12), []
+    for group, tension, viscous in zip(("slack", "tight"), tensions, damping, strict=True):
+        for k, (seconds, rate) in enumerate(((4.0, 0.8), (6.0, 0.5))):
+            time = np.arange(round(250 * seconds)) / 250.0
+            sweep = 0.02 * np.sin(2 * np.pi * rate * time * (1.0 + 0.1 * time))
+            speed = np.gradient(sweep, time)
+            force = 2.4 * np.gradient(speed, time) + viscous * speed + tension * (2.0 / np.pi) * np.arctan(speed / 1e-3)
+            columns = {"position": sweep + 1e-7 * rng.standard_normal(len(time)), "effort": force}
+            columns["effort"] = force + (0.4 if group == "slack" else 0.8) * rng.standard_normal(len(time))
+            trials.append(Trial(f"{group}{k}", "imposed", columns, time, group=group))
+    (folder / "stand.urdf").write_text(STAND)
+    start = {"inertia_scale": 1.0, "damping": 300.0}
+    return Study(
+        "stand", "joint", {"gravity_scale": 0.0}, start, tuple(trials), folder, {"urdf": folder / "stand.urdf"}
+    )
+
+
+def test_a_band_that_was_tightened_on_a_test_stand(tmp_path):
+    """Imposed strokes are judged by predictions, and dry friction of both groups differs in one."""
+    found = fp.contrast(stroke_study(tmp_path, (20.0, 50.0)))
+    assert found.driven
+    assert "coulomb_friction" in {n for c in found.changes for n in (c.name, *c.equivalents)}
+    change = next(c for c in found.changes if "coulomb_friction" in (c.name, *c.equivalents))
+    if change.name == "coulomb_friction":
+        ratio = change.parameters["torque_nm"]["tight"].value / change.parameters["torque_nm"]["slack"].value
+        assert ratio == pytest.approx(2.5, rel=0.05)
+    assert "damping" not in {c.name for c in found.changes}
+
+
+def test_strokes_that_are_repeated_are_no_change(tmp_path):
+    assert fp.contrast(stroke_study(tmp_path, (30.0, 30.0))).verdict == "nothing_changed"
 
 
 def _of(study, group):
