@@ -20,14 +20,17 @@ UNFELT = 1e-4
 def p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> float:
     """Family-wise p-value of what a set has more than another: the larger of that against the noise and of that against
     the spread between trials. A repeat that differs by more than its noise is no change.
-
-    A set that is larger by causes of all groups alone claims no change, and is judged against the noise.
     """
     degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
     noise = family.p_value(smaller.fit.sse - larger.fit.sse, degrees)
-    if not noise < LEVEL or len(larger.changes) <= len(smaller.changes):
+    if not noise < LEVEL:
         return noise
     return max(noise, family.adjusted(between_trials(larger, fits.weighed_as(smaller, larger), degrees)))
+
+
+def noise_p_value(family: Family, larger: Grouped, smaller: Grouped) -> float:
+    """Family-wise p-value against the noise alone: of a cause of all groups, which claims no change."""
+    return family.p_value(smaller.fit.sse - larger.fit.sse, max(len(larger.fit.free) - len(smaller.fit.free), 1))
 
 
 def between_trials(larger: Grouped, smaller: Grouped, degrees: int) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.contrast.decide import LEVEL, p_value
+from fes_pin.contrast.decide import LEVEL, noise_p_value, p_value
 from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.grouped import Grouped, Item
 from fes_pin.contrast.promises import Promise
@@ -100,9 +100,9 @@ class ContrastSearch:
         return base
 
     def _common(self, tried: list[Grouped], base: Grouped) -> Grouped | None:
-        """The cheapest set with a cause of all groups more, where no change stands out: it may hide what changed."""
+        """The cheapest set with a cause of all groups more, as long as no change stands out: it may hide one."""
         common = [f for f in tried if f.items[-1].group is None]
-        if not common or not p_value(self.fits, self.family, common[0], base) < LEVEL:
+        if base.changes or not common or not noise_p_value(self.family, common[0], base) < LEVEL:
             return None
         return common[0]
 
@@ -160,12 +160,18 @@ class ContrastSearch:
                 break
         while best.items:
             without = {i: self.fits.without(best, i) for i in best.items}
-            values = {i: p_value(self.fits, self.family, best, w) for i, w in without.items()}
+            values = {i: self._worth(i, best, w) for i, w in without.items()}
             weakest = max(values, key=lambda i: values[i])
             if values[weakest] < LEVEL:
                 break
             best = without[weakest]
         return best
+
+    def _worth(self, item: Item, best: Grouped, without: Grouped) -> float:
+        """p-value of an item beside all others: of a common cause against the noise, of a change against both."""
+        if item.group is None:
+            return noise_p_value(self.family, best, without)
+        return p_value(self.fits, self.family, best, without)
 
     def _told(self, nominal: Grouped, best: Grouped) -> ContrastFound:
         """Every change with its p-value and its rivals; one that a common cause could replace is none."""
