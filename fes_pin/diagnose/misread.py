@@ -191,7 +191,7 @@ def _column(model: Model, trial: Trial, name: str, fitted: Fit, noise: NoiseMode
 
 
 def _residual(model: Model, trial: Trial, fitted: Fit, noise: NoiseModel) -> Linearized:
-    problem = Problem(model, [trial], noise)
+    problem = Problem(model, [trial], noise, fitted.free)
     return problem.linearize(fitted.values, problem.start_unknowns())[0]
 
 

@@ -27,6 +27,7 @@ def test_nothing_changed(tmp_path):
     assert 0.0 < found.unchanged["gain"] < 0.05
 
 
+@pytest.mark.long
 def test_trials_that_scatter_are_no_change(tmp_path):
     """Strength that differs from trial to trial by ten times what the noise lets see is no change of a group."""
     study = free_pair("muscle", (), 80.0, 4, tmp_path)
@@ -58,6 +59,7 @@ def test_two_changes_are_both_named(tmp_path):
     assert {c.name for c in found.changes} == {"gain", "sensor_offset"}
 
 
+@pytest.mark.long
 def test_a_nominal_parameter_is_told_in_plain_words(tmp_path):
     """A driven rig, judged by predictions: inertia is added, and nothing else is."""
     study = driven_pair(("inertia_scale",), 0.4, 41, tmp_path)

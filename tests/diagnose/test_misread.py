@@ -84,6 +84,7 @@ def test_a_diagnosis_names_the_trial_and_everything_else_is_told_with_its_value(
     assert "was not run as it states" in report_html(diagnosis)
 
 
+@pytest.mark.long
 def test_beside_another_cause_both_are_named():
     study, name, true = misread_study(12, 0.15, causes=("coulomb_friction",))
     diagnosis = fp.diagnose(study)

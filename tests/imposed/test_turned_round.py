@@ -15,6 +15,7 @@ def turned(study):
     return replace(study, trials=tuple(t.with_columns(effort=-t["effort"]) for t in study.trials))
 
 
+@pytest.mark.long
 def test_on_an_imposed_motion(tmp_path):
     found = diagnose_joint(turned(joint.study((), 0.0, np.random.default_rng(21), tmp_path)))
     (cause,) = found.causes
@@ -22,6 +23,7 @@ def test_on_an_imposed_motion(tmp_path):
     assert cause.parameters["error"].value == pytest.approx(-2.0, abs=0.02)
 
 
+@pytest.mark.long
 def test_on_a_rig_that_a_controller_drives(tmp_path):
     drawn = draw((), 0.3, 22, tmp_path)
     found = diagnose_joint(turned(read_study(drawn.study)))
