@@ -128,11 +128,9 @@ def judge_driven(
         left=left,
         refused=refused,
         evidence=evidence,
-        nominal=errors_over_horizon([(f.nominal, f.best, f.test) for f in whole], horizon),
-        without={
-            n: errors_over_horizon([(f.without[n], f.best, f.test) for f in whole], horizon) for n in found.without
-        },
-        extended=errors_over_horizon([(f.best, f.best, f.test) for f in whole], horizon),
+        nominal=errors(lambda f: f.nominal),
+        without={n: errors(lambda f, n=n: f.without[n]) for n in found.without},  # type: ignore[misc]
+        extended=errors(lambda f: f.best),
         ahead=tuple(errors_ahead([(f, train)], horizon, falling) for f in (found.nominal, found.best)),  # type: ignore[arg-type]
         held_out_ahead=_held_ahead(folds, horizon, falling),
         horizon_s=horizon,

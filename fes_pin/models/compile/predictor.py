@@ -107,24 +107,16 @@ class Carried(Tangents):
         self.carried = [states + k for k in range(len(places))]
         self.followed = [self.after[k] for k in places]
         self._names = [self.sym.memories[k] for k in places]
-        self.x, self.x0 = (column([*ca.vertsplit(v), *(w[k] for k in places)]) for v, w in self._pairs())
+        self.x = column([*ca.vertsplit(self.x), *(self.m[k] for k in places)])
+        self.x0 = column([*ca.vertsplit(self.x0), *(self.m0[k] for k in places)])
         self.rates = column([*ca.vertsplit(self.rates), *[0.0] * len(places)])
         self.m, self.m0, self.after = (column([v[k] for k in others]) for v in (self.m, self.m0, self.after))
 
-    def _pairs(self) -> tuple[tuple[Any, Any], ...]:
-        return (self.x, self.m), (self.x0, self.m0)
-
     def start_variances(self) -> list[tuple[int, Any]]:
         """Places among the states, and how uncertain a carried memory is there when a trial begins."""
-        out = []
-        for effect in self.sym.signals(self.sym.x, self.sym.m).effects:
-            known = effect.start_variances()
-            out += [
-                (k, known[name.rpartition(".")[2]])
-                for k, name in zip(self.carried, self._names, strict=True)
-                if name.rpartition(".")[0] == effect.name and name.rpartition(".")[2] in known
-            ]
-        return out
+        effects = self.sym.signals(self.sym.x, self.sym.m).effects
+        known = {f"{e.name}.{n}": variance for e in effects for n, variance in e.start_variances().items()}
+        return [(k, known[n]) for k, n in zip(self.carried, self._names, strict=True) if n in known]
 
 
 def derive_predictor(model: Model, layout: Layout) -> Equations:
