@@ -40,18 +40,18 @@ class Equations:
     rates: ca.Function
     output: ca.Function
     correct: ca.Function | None = None
-    settle: ca.Function | None = None
+    follow: ca.Function | None = None
 
     def functions(self) -> dict[str, ca.Function]:
         """Every function that a program is made of, by name."""
-        names = ("rest", "start", "sample", "rates", "output", "correct", "settle")
+        names = ("rest", "start", "sample", "rates", "output", "correct", "follow")
         return {n: f for n in names if (f := getattr(self, n)) is not None}
 
     @property
     def sizes(self) -> Sizes:
         """Lengths of the vectors of states, memories and readings, each with its sensitivities."""
         reading = self.output.numel_out(0) if self.correct is None else self.correct.numel_out(1)
-        return Sizes(self.start.numel_out(0), self.start.numel_out(1), reading)
+        return Sizes(self.start.numel_out(0), self.start.numel_out(1), reading, self.rates.numel_out(0))
 
 
 class _Symbols:

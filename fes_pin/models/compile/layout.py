@@ -54,11 +54,12 @@ class Layout:
 
 @dataclass(frozen=True)
 class Sizes:
-    """Lengths of the vectors that a program keeps."""
+    """Lengths of the vectors that a program keeps, and of what is integrated: the first entries of the states."""
 
     state: int
     memory: int
     reading: int
+    integrated: int
 
     @property
     def scratch(self) -> int:

@@ -149,19 +149,24 @@ class _Loop:
 
     def _step(self, j: ir.Value, u: ir.Value) -> None:
         """From one integration step to the next."""
-        self._runge_kutta(j, u)
-        if "settle" in self.parts:
-            self.b.call(self.parts["settle"], [self.state, self.p, self.c, self.stage])
-            self._copy(self.stage, self.state, self.sizes.state)
+        b = self.b
+        b.store(b.fmul(self._number(j), self.step), self.since, align=8)
+        if "follow" not in self.parts:
+            self._runge_kutta(u, self.state)
+            return
+        self._runge_kutta(u, self.total)
+        b.store(b.fmul(self.step, splat(0.5)), self.into, align=8)
+        times = [self.t, self.since, self.into]
+        b.call(self.parts["follow"], [self.state, self.total, self.memory, u, *times, self.p, self.c, self.stage])
+        self._copy(self.stage, self.state, self.sizes.state)
 
     def _copy(self, source: ir.Value, target: ir.Value, size: int) -> None:
         self._count(ir.Constant(INT64, size), lambda i: self._store(self._load(source, i), target, i))
 
-    def _runge_kutta(self, j: ir.Value, u: ir.Value) -> None:
-        """One step of the classical Runge-Kutta method of order four."""
+    def _runge_kutta(self, u: ir.Value, end: ir.Value) -> None:
+        """One step of the classical Runge-Kutta method of order four, from the state to `end`."""
         b = self.b
-        b.store(b.fmul(self._number(j), self.step), self.since, align=8)
-        size = ir.Constant(INT64, self.sizes.state)
+        size = ir.Constant(INT64, self.sizes.integrated)
         for weight, ahead, at, source in (
             (1 / 6, 0.5, 0.0, self.state),
             (1 / 3, 0.5, 0.5, self.stage),
@@ -172,16 +177,16 @@ class _Loop:
             times = [self.t, self.since, self.into]
             b.call(self.parts["rates"], [source, self.memory, u, *times, self.p, self.c, self.rate])
             share, forward = b.fmul(self.step, splat(weight)), b.fmul(self.step, splat(ahead))
-            self._count(size, partial(self._advance, at=at, share=share, forward=forward))
+            self._count(size, partial(self._advance, at=at, share=share, forward=forward, end=end))
 
-    def _advance(self, i: ir.Value, at: float, share: ir.Value, forward: ir.Value) -> None:
+    def _advance(self, i: ir.Value, at: float, share: ir.Value, forward: ir.Value, end: ir.Value) -> None:
         """Add a stage to the sum, and go to the next stage or, after the last, to the next step."""
         b = self.b
         rate, state = self._load(self.rate, i), self._load(self.state, i)
         total = state if at == 0.0 else self._load(self.total, i)
         total = b.fadd(total, b.fmul(share, rate))
         if at == 1.0:
-            self._store(total, self.state, i)
+            self._store(total, end, i)
             return
         self._store(total, self.total, i)
         self._store(b.fadd(state, b.fmul(forward, rate)), self.stage, i)

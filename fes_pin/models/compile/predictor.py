@@ -1,9 +1,13 @@
 """A model's one-step-ahead predictor, an extended Kalman filter, and the sensitivities of its innovations.
 
-Between samples, with F = df/dx and h the integration step, the transition of one step is carried with the states:
+Between samples x' = f(x, m, u, p) goes on by Runge-Kutta steps of order four and length h. What is tangent to it
+follows with A = f_x and B = f_m R + f_p as they are in the middle of each step, as if both were constant over it:
 
-    x' = f(x, m, u, p),   S' = f_x S + f_m R + f_p,   M' = F M,  M = 1 when the step begins
+    F = 1 + (h A / 2) (1 + (h A / 3) (1 + h A / 4)),   M = 1 + h F A
+    S <- S + h F (A S + B)
     P <- M P M' + h (M G M' + G) / 2,                 G the intensities of what drives states at random
+
+which is exact to the order of h^4 where f is linear and to that of h^2 where it bends.
 
 At a sample, for each measured output y_k in turn, with H = dh_k/dx where it was foretold:
 
@@ -41,16 +45,13 @@ LEAST = 1e-20
 
 
 class _Doubt:
-    """Covariance of the states, and the transition of one integration step, as symbols."""
+    """Covariance of the states as symbols, and what moves it."""
 
     def __init__(self, d: Carried, model: Model) -> None:
         self.d, self.count = d, d.x.numel()
         self.spread = self._intensities(model)
         self.lower = ca.SX.sym("P", ca.Sparsity.lower(self.count))
         self.covariance = ca.tril2symm(self.lower)
-        self.slope = ca.jacobian(d.rates, d.x)
-        self.pattern = self._reached()
-        self.transition = ca.SX.sym("M", self.pattern)
 
     def _intensities(self, model: Model) -> Any:
         """Diagonal of G: 2 std^2 / time of each first-order process that drives a state."""
@@ -60,15 +61,6 @@ class _Doubt:
             for state, process in zip(e.states, e.random, strict=False):
                 out[at[f"{e.name}.{state}"]] = 2.0 * c[f"std.{process}"] ** 2 / c[f"time.{process}"]
         return ca.diag(out)
-
-    def _reached(self) -> Any:
-        """Entries of the transition that can be other than zero."""
-        pattern = ca.Sparsity.diag(self.count)
-        while True:
-            wider = pattern.unite(ca.mtimes(self.slope, ca.SX.sym("M", pattern)).sparsity())
-            if wider.nnz() == pattern.nnz():
-                return pattern
-            pattern = wider
 
     def at_start(self, model: Model) -> Any:
         """Covariance of the first states."""
@@ -131,32 +123,30 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
     r = ca.SX.sym("R", r_pattern)
     inner = ((d.x, s), (d.m, r))
     lower = ca.Sparsity.lower(count)
-    state = ca.vertcat(d.x, nonzeros(s, whole), nonzeros(doubt.transition, doubt.pattern), nonzeros(doubt.lower, lower))
+    state = ca.vertcat(d.x, nonzeros(s, whole), nonzeros(doubt.lower, lower))
     memory = ca.vertcat(d.m, nonzeros(r, r_pattern))
-    unmoved = nonzeros(ca.SX.eye(count), doubt.pattern)
 
     def packed(x: Any, sensitivities: Any, covariance: Any) -> Any:
-        return ca.vertcat(x, nonzeros(sensitivities, whole), unmoved, nonzeros(covariance, lower))
+        return ca.vertcat(x, nonzeros(sensitivities, whole), nonzeros(covariance, lower))
 
     x0 = packed(d.x0, d.at_start(d.x0), doubt.at_start(model))
     m0 = ca.vertcat(d.m0, nonzeros(d.at_start(d.m0), r_pattern))
     after = ca.vertcat(d.after, nonzeros(d.through(d.after, *inner), r_pattern))
-    rates = ca.vertcat(
-        d.rates,
-        nonzeros(d.through(d.rates, *inner), whole),
-        nonzeros(ca.mtimes(doubt.slope, doubt.transition), doubt.pattern),
-        ca.SX.zeros(lower.nnz()),
-    )
+    reached = ca.SX.sym("x1", count)
     given = [state, memory, d.u, d.t, d.p, d.c]
     return Equations(
         layout=layout,
         rest=dense_function("rest", [d.z, d.p, d.c], [d.g, d.g_z]),
         start=dense_function("start", [d.z, d.p, d.c], [x0, m0]),
         sample=dense_function("sample", given, [after]),
-        rates=dense_function("rates", [state, memory, d.u, d.t, d.since, d.into, d.p, d.c], [rates]),
+        rates=dense_function("rates", [d.x, memory, d.u, d.t, d.since, d.into, d.p, d.c], [d.rates]),
         output=dense_function("output", given, [d.readings]),
         correct=dense_function("correct", given, _corrected(d, doubt, s, inner, packed)),
-        settle=dense_function("settle", [state, d.p, d.c], [packed(d.x, s, _ahead(d, doubt))]),
+        follow=dense_function(
+            "follow",
+            [state, reached, memory, d.u, d.t, d.since, d.into, d.p, d.c],
+            [packed(reached, *_followed(d, doubt, s, r, reached))],
+        ),
     )
 
 
@@ -169,11 +159,18 @@ def _wider(d: Carried, s: Any, pattern: Any) -> Any:
         pattern = wider
 
 
-def _ahead(d: Carried, doubt: _Doubt) -> Any:
-    """Covariance after an integration step."""
-    through, spread = doubt.transition, doubt.spread
-    grown = ca.mtimes([through, doubt.covariance, through.T])
-    return grown + 0.5 * d.sym.c["step"] * (ca.mtimes([through, spread, through.T]) + spread)
+def _followed(d: Carried, doubt: _Doubt, s: Any, r: Any, reached: Any) -> tuple[Any, Any]:
+    """Sensitivities and covariance after an integration step; see the module."""
+    middle = 0.5 * (d.x + reached)
+    slope, beside = (ca.substitute(e, d.x, middle) for e in (ca.jacobian(d.rates, d.x), d.through(d.rates, (d.m, r))))
+    h, one = d.sym.c["step"], ca.SX.eye(doubt.count)
+    grown = one
+    for k in (4.0, 3.0, 2.0):
+        grown = one + h / k * ca.mtimes(slope, grown)
+    through = one + h * ca.mtimes(grown, slope)
+    moved = s + h * ca.mtimes(grown, ca.mtimes(slope, s) + beside)
+    spread = 0.5 * h * (ca.mtimes([through, doubt.spread, through.T]) + doubt.spread)
+    return moved, ca.mtimes([through, doubt.covariance, through.T]) + spread
 
 
 def _corrected(d: Carried, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packed: Any) -> list[Any]:

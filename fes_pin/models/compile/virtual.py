@@ -67,10 +67,11 @@ class VirtualProgram:
             def rates(x: Any, at: float, since: Any = j * h) -> Any:
                 return e.rates(x, held, u, t, since, at * h, p, c)
 
-            first = rates(state, 0.0)
-            second = rates(state + 0.5 * h * first, 0.5)
-            third = rates(state + 0.5 * h * second, 0.5)
-            fourth = rates(state + h * third, 1.0)
-            state = state + h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
-            state = state if e.settle is None else e.settle(state, p, c)
+            begun = state[: e.sizes.integrated]
+            first = rates(begun, 0.0)
+            second = rates(begun + 0.5 * h * first, 0.5)
+            third = rates(begun + 0.5 * h * second, 0.5)
+            fourth = rates(begun + h * third, 1.0)
+            end = begun + h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+            state = end if e.follow is None else e.follow(state, end, held, u, t, j * h, 0.5 * h, p, c)
         return ca.Function("sample", given, [state, held, y])
