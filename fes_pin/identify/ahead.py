@@ -12,7 +12,7 @@ its autoregression (`NoiseModel`) where a rig is simulated freely:
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,8 +35,9 @@ HORIZON_S = 0.3
 """How far ahead a horizon looks by default, s, or a tenth of the shortest trial if that is less."""
 STRIDE = 0.25
 """Of the horizon: how much older than asked the newest sample that a prediction uses may be."""
-AT_ONCE = 64
-"""Predictions that are made side by side: a bound on memory."""
+SEEN_AGAIN = 3
+"""A prediction goes on from all that was measured, but for what earlier ones along the same run were not shown: between
+two of them this many times as long is seen as is not. A filter that remembers less than that loses nothing."""
 GROWTH = 100.0
 """Factor by which a free simulation may enlarge an error of its first sample before it says nothing of the model."""
 
@@ -188,21 +189,22 @@ def over_horizon(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> 
     ahead = max(1, round(horizon_s / trial.dt))
     stride = max(1, round(STRIDE * ahead))
     outputs = tuple(n for n in model.rig.outputs(trial.kind) if n in trial.columns)
+    starts = range(0, max(len(trial) - ahead, 1), stride)
+    abreast = [starts[k :: _abreast(ahead, stride)] for k in range(min(_abreast(ahead, stride), len(starts)))]
+    shown = [masked(trial, outputs, [range(s + 1, s + ahead + stride) for s in own]) for own in abreast]
+    problem = LikelihoodProblem(model, shown, doubt, (), starts=[trial] * len(shown))
     out = {n: np.array(trial[n]) for n in outputs}
-    for pieces in _chunks(range(0, max(len(trial) - ahead, 1), stride)):
-        short = [masked(trial.first(s + ahead + stride), outputs, s + 1) for s in pieces]
-        problem = LikelihoodProblem(model, short, doubt, (), starts=[trial] * len(short))
-        run = problem.foretold(model.parameters())
-        for s, foretold in zip(pieces, run, strict=True):
+    for own, foretold in zip(abreast, problem.foretold(model.parameters()), strict=True):
+        for s in own:
             rows = slice(s + ahead if s else 1, min(s + ahead + stride, len(trial)))
             for n in outputs:
                 out[n][rows] = foretold[n][rows]
     return out
 
 
-def _chunks(starts: range) -> Iterator[range]:
-    for k in range(0, len(starts), AT_ONCE):
-        yield starts[k : k + AT_ONCE]
+def _abreast(ahead: int, stride: int) -> int:
+    """Runs that share the predictions of a trial, so that each sees enough between two of them."""
+    return math.ceil((1 + SEEN_AGAIN) * (ahead + stride) / stride)
 
 
 def falls(model: Model, trials: Sequence[Trial]) -> bool:

@@ -28,6 +28,7 @@ from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.fit import Fit, fit_problem, rough_noise
 from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Linearized, Unknowns, limits_of
+from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, ForetoldTrial, Predictor
 
@@ -89,7 +90,7 @@ class LikelihoodProblem:
         self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
         self.priors = [first_doubt(model, t) for t in starts or self.trials]
         self._predictor: Predictor | None = None
-        self._side_by_side: tuple[int, Predictor] | None = None
+        self._abreast: Predictor | None = None
 
     @property
     def noise(self) -> dict[str, Noise]:
@@ -106,7 +107,7 @@ class LikelihoodProblem:
 
     def start_unknowns(self) -> Unknowns:
         """What effects have of each trial's own, as known before: at their nulls."""
-        return [{n: u[n] for n in self.unknown_names} for u in (self.model.initial_unknowns(t) for t in self.trials)]
+        return [self.model.own_nulls() for _ in self.trials]
 
     def completed(self, unknowns: Unknowns) -> Unknowns:
         """Unknowns of another model on these trials with what this one has besides, without what it has not."""
@@ -122,15 +123,24 @@ class LikelihoodProblem:
             return self.predictor.run(values, doubt or self.doubt, own)
 
     def told(self, values: Mapping[str, float], unknowns: Unknowns, doubts: Sequence[Doubt]) -> list[_Told]:
-        """Every trial as foretold by each of several doubts, side by side in the lanes of one run."""
-        count, trials = len(doubts), len(self.trials)
-        if self._side_by_side is None or self._side_by_side[0] != count:
-            made = Predictor(self.model, self.trials * count, (), self.doubt.processes, self.priors * count)
-            self._side_by_side = (count, made)
+        """Every trial as foretold by each of several doubts, as many side by side as leave no lane idle."""
+        count, trials = self.abreast, len(self.trials)
+        if self._abreast is None:
+            self._abreast = Predictor(self.model, self.trials * count, (), self.doubt.processes, self.priors * count)
         own = [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)] * count
-        with np.errstate(all="ignore"):
-            run = self._side_by_side[1].run(values, [d for d in doubts for _ in range(trials)], own)
-        return [_joined(run[k * trials : (k + 1) * trials]) for k in range(count)]
+        out: list[_Told] = []
+        for k in range(0, len(doubts), count):
+            some = list(doubts[k : k + count])
+            each = [d for d in some + some[-1:] * (count - len(some)) for _ in range(trials)]
+            with np.errstate(all="ignore"):
+                run = self._abreast.run(values, each, own)
+            out += [_joined(run[j * trials : (j + 1) * trials]) for j in range(len(some))]
+        return out
+
+    @property
+    def abreast(self) -> int:
+        """How many doubts are tried in one run."""
+        return max(1, WIDTH // len(self.trials))
 
     def foretold(self, values: Mapping[str, float]) -> list[dict[str, np.ndarray]]:
         """What is foretold of each output of each trial, shape (n,), also where nothing was measured."""
@@ -231,18 +241,21 @@ def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknown
             break
         gradient, information = _scored(now, moved)
         held = ((z <= low) & (gradient > 0)) | ((z >= high) & (gradient < 0))
-        tried = damping * 10.0 ** np.arange(1 + len(z))
-        after = np.array([np.clip(z - _damped_step(information, gradient, ~held, d), low, high) for d in tried])
-        costs = [one.cost for one in at_all(after)]
-        best = int(np.argmin(costs))
-        gained = now.cost - costs[best]
-        if not gained > 0.0:
+        dampings = damping * 10.0 ** np.arange(1 + len(z))
+        for k in range(0, len(dampings), problem.abreast):
+            tried = dampings[k : k + problem.abreast]
+            ends = np.array([np.clip(z - _damped_step(information, gradient, ~held, d), low, high) for d in tried])
+            after = at_all(ends)
+            best = int(np.argmin([one.cost for one in after]))
+            gained = now.cost - after[best].cost
+            if gained > 0.0:
+                break
+        else:
             break
-        z, damping = after[best], max(0.3 * float(tried[best]), 1e-6)
+        z, now, damping = ends[best], after[best], max(0.3 * float(tried[best]), 1e-6)
         if gained < TOLERANCE or step == steps - 1:
-            problem.doubt = at(z)
-            return float(costs[best])
-        now, *moved = at_all(z + LOG_STEP * np.eye(1 + len(z), len(z), -1))
+            break
+        moved = at_all(z + LOG_STEP * np.eye(len(z)))
     problem.doubt = at(z)
     return now.cost
 

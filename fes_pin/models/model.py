@@ -60,10 +60,13 @@ class Model:
         """Names of what each trial of a kind must estimate for itself: its initial state, and what effects say."""
         return (*self.rig.unknowns(kind), *self.own_unknowns())
 
+    def own_nulls(self) -> dict[str, float]:
+        """What is known before of those that effects bring: their nulls."""
+        return {f"{e.name}.{n}": float(getattr(e, n)) for e in self.effects for n in e.unknowns()}
+
     def initial_unknowns(self, trial: Trial) -> dict[str, float]:
-        """Unknowns of a trial as its first samples suggest; those of effects at what is known before: their nulls."""
-        own = {f"{e.name}.{n}": float(getattr(e, n)) for e in self.effects for n in e.unknowns()}
-        return {**self.rig.initial_unknowns(trial), **own}
+        """Unknowns of a trial as its first samples suggest, and what is known before of those of effects."""
+        return {**self.rig.initial_unknowns(trial), **self.own_nulls()}
 
     def fitted_parameters(self) -> tuple[str, ...]:
         """What a fit moves: the rig's fitted parameters, and of the effects' all but choices and unused forms."""

@@ -281,8 +281,10 @@ def repeated(column: np.ndarray) -> np.ndarray:
     return np.repeat(lengths, lengths).astype(float)
 
 
-def masked(trial: Trial, outputs: Sequence[str], upto: int) -> Trial:
-    """The trial with its outputs unmeasured from sample `upto` on."""
-    rows = np.arange(len(trial)) >= upto
+def masked(trial: Trial, outputs: Sequence[str], hidden: Sequence[range]) -> Trial:
+    """The trial with its outputs unmeasured in some ranges of samples."""
+    rows = np.zeros(len(trial), dtype=bool)
+    for some in hidden:
+        rows[some.start : some.stop] = True
     columns = {n: np.where(rows & (n in outputs), np.nan, v) for n, v in trial.columns.items()}
     return replace(trial, columns=columns)
