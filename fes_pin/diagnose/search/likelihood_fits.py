@@ -162,13 +162,20 @@ class LikelihoodFits:
             self._less[names, name] = whole
         return self.fits[rest]
 
-    def refined(self, names: Names) -> Fit | None:
-        """The best fit of a set with the form of one of its effects refined; None where no form is, or none is told."""
+    def refined(self, names: Names, demanded: float) -> Fit | None:
+        """The best fit of a set with the form of one of its effects refined; None where no form is, or none is told.
+
+        Parameters
+        ----------
+        demanded
+            Fall of twice the negative log-likelihood below which no refinement is adopted. What is not half way there
+            once its parameters were fitted, beside randomness as it was, is not gone on with.
+        """
         base = self.fits[names]
         starts = [s for effect in base.model.effects for s in refinements(base.model, effect, self.library.measured)]
-        looks = in_parallel(lambda s: self._first_fit(s, base), starts)
-        best = sorted(looks, key=lambda f: f.price)[:STARTS]
-        return min(filter(is_identified, in_parallel(self._go_on, best)), key=lambda f: f.price, default=None)
+        looks = sorted(in_parallel(lambda s: self._first_fit(s, base), starts), key=lambda f: f.price)
+        worth = [f for f in looks[:STARTS] if base.sse - f.sse > 0.5 * max(demanded, base.sse - looks[0].sse)]
+        return min(filter(is_identified, in_parallel(self._go_on, worth)), key=lambda f: f.price, default=None)
 
     def _first_fit(self, start: Model, base: Fit) -> Fit:
         """A few steps from a start, at what is random in another fit."""

@@ -16,7 +16,7 @@ from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names
 from fes_pin.diagnose.search.score import Scored, best_pairs
 from fes_pin.diagnose.search.simulation_search import NominalFitError
-from fes_pin.identify.distributions import chi2_tail
+from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.workers import OutOfTime, Progress, time_limit
 
@@ -145,7 +145,7 @@ class LikelihoodSearch:
 
     def _refined(self, names: Names) -> bool:
         """Adopt the refinement of a set that the data demand most; False if they demand none."""
-        base, refined = self.sets.fits[names], self.sets.refined(names)
+        base, refined = self.sets.fits[names], self.sets.refined(names, chi2_quantile(1.0 - REFINE_LEVEL, 1))
         if refined is None:
             return False
         degrees = max(refined.degrees - base.degrees, 1)
