@@ -9,7 +9,7 @@ that.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -59,6 +59,14 @@ def imposed_motion(trial: Trial, columns: tuple[str, ...]) -> ImposedMotion:
     if trial not in _KNOWN:
         _KNOWN[trial] = _smoothed(trial, columns)
     return _KNOWN[trial]
+
+
+def same_motion(trial: Trial, other: Trial, further: float = 0.0) -> Trial:
+    """A trial whose imposed motion is that of another, so far further: what is known of that is not sought again."""
+    if other in _KNOWN:
+        known = _KNOWN[other]
+        _KNOWN[trial] = replace(known, values=known.values + np.array([[further], [0.0], [0.0]]))
+    return trial
 
 
 def driving_values(trial: Trial, name: str, columns: tuple[str, ...]) -> np.ndarray:

@@ -52,6 +52,17 @@ def test_a_measured_velocity_stands_for_that_of_the_position():
     assert np.abs(imposed_motion(trial, COLUMNS).values[1] - motion.at(trial.time, 1)).max() < 1e-4
 
 
+def test_a_motion_that_is_moved_as_a_whole_has_the_same_rates(tmp_path):
+    """As smoothed anew."""
+    (_, model), (_, trial) = arm(tmp_path), moved()
+    there = float(imposed_motion(trial, COLUMNS).values[0, 0]) + 0.3
+    further = model.rig.restated(trial, "position", there)
+    anew = further.with_columns()
+    assert further["position"][0] == pytest.approx(there, abs=1e-4)
+    for one, other in zip(imposed_motion(further, COLUMNS).values, imposed_motion(anew, COLUMNS).values, strict=True):
+        assert np.abs(one - other).max() < 1e-9 * np.ptp(other)
+
+
 def test_what_acts_on_the_effort_is_undone(tmp_path):
     """The reading is the effort that was commanded: what acts is -1 times what was, and 0.3 more."""
     (_, model), (_, trial) = arm(tmp_path), moved()

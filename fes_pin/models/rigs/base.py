@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fes_pin.data.imposed import MOTION, imposed_motion
+from fes_pin.data.imposed import MOTION, imposed_motion, same_motion
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -205,9 +205,10 @@ class Rig:
 
     def restated(self, trial: Trial, name: str, value: float) -> Trial:
         """The trial with another value of something that it states; an imposed motion is moved as a whole."""
-        if name in trial.columns:
-            return trial.with_columns(**{name: trial[name] + (value - float(trial[name][0]))})
-        return dataclasses.replace(trial, conditions={**trial.conditions, name: value})
+        if name not in trial.columns:
+            return same_motion(dataclasses.replace(trial, conditions={**trial.conditions, name: value}), trial)
+        further = value - float(trial[name][0])
+        return same_motion(trial.with_columns(**{name: trial[name] + further}), trial, further)
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
         """Names of the constants of rig and trial that the equations read."""
