@@ -7,10 +7,9 @@ import sys
 import casadi as ca
 import numpy as np
 import pytest
-from llvmlite import ir
 
 from fes_pin.models.compile.layout import WIDTH
-from fes_pin.models.compile.lower import Lowering
+from fes_pin.models.compile.lower import lowered
 from fes_pin.models.compile.machine import MachineCode, compile_object
 
 EPS = np.finfo(float).eps
@@ -21,11 +20,10 @@ class Compiled:
     """One CasADi function as machine code, called on arrays of any length."""
 
     def __init__(self, function):
-        module = ir.Module()
-        made = Lowering(module).lower(function)
-        made.linkage = "external"
-        self.function, self.code = function, MachineCode(compile_object(str(module)))
-        self.call = self.code.function(made.name, *[ctypes.c_void_p] * (function.n_in() + function.n_out()))
+        text, declared = lowered(function, "external")
+        self.function = function
+        self.code = MachineCode(compile_object("\n".join([*declared.values(), text])))
+        self.call = self.code.function(function.name(), *[ctypes.c_void_p] * (function.n_in() + function.n_out()))
 
     def __call__(self, *columns):
         columns = [np.asarray(c, dtype=float) for c in np.broadcast_arrays(*columns)]

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import casadi as ca
-from llvmlite import ir
 
-from fes_pin.models.compile.lanes import CONTRACT, VECTOR, LaneFunctions, index, select_lanes, splat
+from fes_pin.models.compile.lanes import CONTRACT, LaneFunctions
+from fes_pin.models.compile.straight import Lines, Value, splat
 
-POINTER = ir.PointerType(VECTOR)
 ROUNDED = (*CONTRACT, "arcp")
 """Beside fused products: what is divided by the same number several times may be multiplied by its inverse."""
 _BINARY = {ca.OP_ADD: "fadd", ca.OP_SUB: "fsub", ca.OP_MUL: "fmul", ca.OP_DIV: "fdiv"}
@@ -43,46 +42,49 @@ _LANE_FUNCTIONS = {
 }
 
 
-class Lowering:
-    """Lowers expressions into one LLVM module."""
+def lowered(function: ca.Function, linkage: str = "internal") -> tuple[str, dict[str, str]]:
+    """An LLVM function with one pointer to lanes for each input and output of `function` (their nonzeros).
 
-    def __init__(self, module: ir.Module) -> None:
-        self.module = module
-        self.functions = LaneFunctions(module)
+    Returns
+    -------
+    text
+        Its assembly.
+    declared
+        Declarations of the functions that it calls, by name.
+    """
+    lines = Lines()
+    inputs, outputs = ([f"%{k}{i}" for i in range(n)] for k, n in (("i", function.n_in()), ("o", function.n_out())))
+    _Lowering(lines).emit(function, inputs, outputs)
+    return lines.function(function.name(), inputs, outputs, linkage), lines.declared
 
-    def lower(self, function: ca.Function) -> ir.Function:
-        """Add an LLVM function with one pointer to lanes for each input and output of `function` (their nonzeros)."""
-        count = function.n_in() + function.n_out()
-        made = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [POINTER] * count), function.name())
-        made.linkage = "internal"
-        for arg in made.args[function.n_in() :]:
-            arg.add_attribute("noalias")
-        builder = ir.IRBuilder(made.append_basic_block())
-        self._emit(builder, function, made.args)
-        builder.ret_void()
-        return made
 
-    def _emit(self, b: ir.IRBuilder, function: ca.Function, pointers: tuple[ir.Argument, ...]) -> None:
-        work: dict[int, ir.Value] = {}
-        inputs, outputs = pointers[: function.n_in()], pointers[function.n_in() :]
+class _Lowering:
+    """Lowers expressions into one function's lines."""
+
+    def __init__(self, lines: Lines) -> None:
+        self.lines, self.functions = lines, LaneFunctions(lines)
+
+    def emit(self, function: ca.Function, inputs: list[str], outputs: list[str]) -> None:
+        """Write out every instruction."""
+        b, work = self.lines, dict[int, Value]()
         for k in range(function.n_instructions()):
             op, out = function.instruction_id(k), function.instruction_output(k)
             arguments = function.instruction_input(k)
             if op == ca.OP_INPUT:
-                work[out[0]] = b.load(_element(b, inputs[arguments[0]], arguments[1]), align=8)
+                work[out[0]] = b.load(inputs[arguments[0]], arguments[1])
             elif op == ca.OP_OUTPUT:
-                b.store(work[arguments[0]], _element(b, outputs[out[0]], out[1]), align=8)
+                b.store(work[arguments[0]], outputs[out[0]], out[1])
             elif op == ca.OP_CONST:
                 work[out[0]] = splat(function.instruction_constant(k))
             else:
-                work[out[0]] = self._operation(b, op, [work[i] for i in arguments])
+                work[out[0]] = self._operation(op, [work[i] for i in arguments])
 
-    def _operation(self, b: ir.IRBuilder, op: int, a: list[ir.Value]) -> ir.Value:
-        one, zero = splat(1.0), splat(0.0)
+    def _operation(self, op: int, a: list[Value]) -> Value:
+        b, one, zero = self.lines, splat(1.0), splat(0.0)
         if op in _BINARY:
-            return getattr(b, _BINARY[op])(a[0], a[1], flags=ROUNDED)
+            return b.operation(_BINARY[op], a[0], a[1], ROUNDED)
         if op in _COMPARE:
-            compare = b.fcmp_unordered if op == ca.OP_NE else b.fcmp_ordered
+            compare = b.unordered if op == ca.OP_NE else b.ordered
             return _number(b, compare(_COMPARE[op], a[0], a[1]))
         simple = {
             ca.OP_NEG: lambda: b.fneg(a[0]),
@@ -90,10 +92,10 @@ class Lowering:
             ca.OP_TWICE: lambda: b.fadd(a[0], a[0]),
             ca.OP_INV: lambda: b.fdiv(one, a[0]),
             ca.OP_ASSIGN: lambda: a[0],
-            ca.OP_NOT: lambda: _number(b, b.fcmp_ordered("==", a[0], zero)),
-            ca.OP_AND: lambda: _number(b, b.and_(_truth(b, a[0]), _truth(b, a[1]))),
-            ca.OP_OR: lambda: _number(b, b.or_(_truth(b, a[0]), _truth(b, a[1]))),
-            ca.OP_IF_ELSE_ZERO: lambda: select_lanes(b, _truth(b, a[0]), a[1], zero),
+            ca.OP_NOT: lambda: _number(b, b.ordered("==", a[0], zero)),
+            ca.OP_AND: lambda: _number(b, b.operation("and", _truth(b, a[0]), _truth(b, a[1]))),
+            ca.OP_OR: lambda: _number(b, b.operation("or", _truth(b, a[0]), _truth(b, a[1]))),
+            ca.OP_IF_ELSE_ZERO: lambda: b.select(_truth(b, a[0]), a[1], zero),
             ca.OP_FMIN: lambda: _extreme(b, "<", a[0], a[1]),
             ca.OP_FMAX: lambda: _extreme(b, ">", a[0], a[1]),
             ca.OP_SIGN: lambda: _sign(b, a[0]),
@@ -104,31 +106,27 @@ class Lowering:
             op = ca.OP_POW
         if op not in _LANE_FUNCTIONS:
             raise NotImplementedError(f"CasADi operation {op} has no lowering")
-        return self.functions.call(b, _LANE_FUNCTIONS[op], *a)
+        return self.functions.call(_LANE_FUNCTIONS[op], *a)
 
 
-def _element(b: ir.IRBuilder, pointer: ir.Value, place: int) -> ir.Value:
-    return b.gep(pointer, [index(place)])
-
-
-def _number(b: ir.IRBuilder, mask: ir.Value) -> ir.Value:
+def _number(b: Lines, mask: Value) -> Value:
     """A mask as 1.0 and 0.0."""
     return b.select(mask, splat(1.0), splat(0.0))
 
 
-def _extreme(b: ir.IRBuilder, relation: str, one: ir.Value, other: ir.Value) -> ir.Value:
+def _extreme(b: Lines, relation: str, one: Value, other: Value) -> Value:
     """The smaller or larger number; NaN if either is (CasADi's own would hide it)."""
-    chosen = select_lanes(b, b.fcmp_unordered(relation, one, other), one, other)
-    return select_lanes(b, b.fcmp_unordered("uno", other, other), other, chosen)
+    chosen = b.select(b.unordered(relation, one, other), one, other)
+    return b.select(b.unordered("uno", other, other), other, chosen)
 
 
-def _sign(b: ir.IRBuilder, value: ir.Value) -> ir.Value:
+def _sign(b: Lines, value: Value) -> Value:
     """-1, 0 or 1; NaN for NaN."""
     zero = splat(0.0)
-    sign = b.fsub(_number(b, b.fcmp_ordered(">", value, zero)), _number(b, b.fcmp_ordered("<", value, zero)))
-    return select_lanes(b, b.fcmp_unordered("uno", value, value), value, sign)
+    sign = b.fsub(_number(b, b.ordered(">", value, zero)), _number(b, b.ordered("<", value, zero)))
+    return b.select(b.unordered("uno", value, value), value, sign)
 
 
-def _truth(b: ir.IRBuilder, value: ir.Value) -> ir.Value:
+def _truth(b: Lines, value: Value) -> Value:
     """A number as a mask: true where it is not zero."""
-    return b.fcmp_unordered("!=", value, splat(0.0))
+    return b.unordered("!=", value, splat(0.0))

@@ -12,10 +12,12 @@ import numpy as np
 from llvmlite import ir
 
 from fes_pin.models.compile.equations import Equations
-from fes_pin.models.compile.lanes import DOUBLE, INT64, VECTOR, select_lanes, splat
 from fes_pin.models.compile.layout import REST_ITERATIONS, REST_STEP, WIDTH, Layout, Sizes
-from fes_pin.models.compile.lower import Lowering
+from fes_pin.models.compile.lower import lowered
 from fes_pin.models.compile.machine import MachineCode, compile_object
+
+DOUBLE, INT64 = ir.DoubleType(), ir.IntType(64)
+VECTOR = ir.VectorType(DOUBLE, WIDTH)
 
 
 class NativeProgram:
@@ -48,20 +50,22 @@ def compile_equations(equations: Equations) -> bytes:
 
 def emit(equations: Equations) -> str:
     """LLVM assembly of a program: static equilibrium, then samples of Runge-Kutta steps."""
-    module = ir.Module(name="fes_pin")
-    lowering = Lowering(module)
-    parts = {n: lowering.lower(function) for n, function in equations.functions().items()}
-    return str(_Loop(module, equations, parts).module)
+    made = {n: lowered(function) for n, function in equations.functions().items()}
+    declared = {name: line for _, those in made.values() for name, line in those.items()}
+    return "\n".join([str(_Loop(equations).module), *declared.values(), *(text for text, _ in made.values())])
 
 
 class _Loop:
     """The time loop around a model's functions."""
 
-    def __init__(self, module: ir.Module, equations: Equations, parts: dict[str, ir.Function]) -> None:
-        self.module, self.parts, self.equations = module, parts, equations
-        self.sizes = equations.sizes
-        double = ir.PointerType(VECTOR)
-        function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INT64, INT64] + [double] * 6), "simulate")
+    def __init__(self, equations: Equations) -> None:
+        self.module, self.equations, self.sizes = ir.Module(name="fes_pin"), equations, equations.sizes
+        double, elsewhere = ir.PointerType(VECTOR), ir.Module()  # the parts are text: here they have but their names
+        self.parts = {
+            n: ir.Function(elsewhere, ir.FunctionType(ir.VoidType(), [double] * (f.n_in() + f.n_out())), n)
+            for n, f in equations.functions().items()
+        }
+        function = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [INT64, INT64] + [double] * 6), "simulate")
         self.n, self.substeps, self.u, self.p, self.c, self.z, self.y, scratch = function.args
         self.b = ir.IRBuilder(function.append_basic_block())
         self._carve(scratch)
@@ -120,8 +124,8 @@ class _Loop:
         def newton(_: ir.Value) -> None:
             b.call(self.parts["rest"], [self.z, self.p, self.c, self.g, self._at(self.g, 1)])
             step = b.fdiv(self._load(self.g), self._load(self.g, 1))
-            step = select_lanes(b, b.fcmp_ordered(">", step, splat(REST_STEP)), splat(REST_STEP), step)
-            step = select_lanes(b, b.fcmp_ordered("<", step, splat(-REST_STEP)), splat(-REST_STEP), step)
+            for beyond, most in ((">", splat(REST_STEP)), ("<", splat(-REST_STEP))):
+                step = b.select(b.fcmp_ordered(beyond, step, most), most, step)
             self._store(b.fsub(self._load(self.z), step), self.z)
 
         self._count(ir.Constant(INT64, REST_ITERATIONS), newton)
@@ -190,3 +194,8 @@ class _Loop:
             return
         self._store(total, self.total, i)
         self._store(b.fadd(state, b.fmul(forward, rate)), self.stage, i)
+
+
+def splat(value: float) -> ir.Constant:
+    """The same number in every lane."""
+    return ir.Constant(VECTOR, [value] * WIDTH)

@@ -1,0 +1,130 @@
+"""Straight-line LLVM assembly on lanes, written as text.
+
+What a model's equations are is thousands of instructions without a branch. llvmlite's builder makes several objects for
+each and formats them one by one; here an instruction is a line. The time loop, which branches, is llvmlite's.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from functools import cache
+from typing import NamedTuple
+
+from fes_pin.models.compile.layout import WIDTH
+
+VECTOR, INTEGERS, MASK = f"<{WIDTH} x double>", f"<{WIDTH} x i64>", f"<{WIDTH} x i1>"
+ORDERED = {"<": "olt", "<=": "ole", "==": "oeq", ">": "ogt"}
+UNORDERED = {"<": "ult", ">": "ugt", "!=": "une", "uno": "uno"}
+
+
+class Value(NamedTuple):
+    """A value: its type, and its name or what it is."""
+
+    type: str
+    text: str
+
+
+@cache
+def splat(value: float) -> Value:
+    """The same number in every lane."""
+    bits = struct.unpack("<Q", struct.pack("<d", value))[0]
+    return Value(VECTOR, f"<{', '.join([f'double 0x{bits:016x}'] * WIDTH)}>")
+
+
+@cache
+def splat_int(value: int) -> Value:
+    """The same integer in every lane."""
+    return Value(INTEGERS, f"<{', '.join([f'i64 {int(value)}'] * WIDTH)}>")
+
+
+class Lines:
+    """The instructions of one function, line by line."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.declared: dict[str, str] = {}
+
+    def _made(self, kind: str, text: str) -> Value:
+        name = f"%v{len(self.lines)}"
+        self.lines.append(f"  {name} = {text}")
+        return Value(kind, name)
+
+    def operation(self, name: str, one: Value, other: Value, flags: Sequence[str] = ()) -> Value:
+        """Of two values of a type: fadd, fsub, fmul, fdiv, add, sub, shl, ashr, and, or, xor."""
+        return self._made(one.type, f"{' '.join((name, *flags))} {one.type} {one.text}, {other.text}")
+
+    def fadd(self, one: Value, other: Value, flags: Sequence[str] = ()) -> Value:
+        """Sum of numbers."""
+        return self.operation("fadd", one, other, flags)
+
+    def fsub(self, one: Value, other: Value, flags: Sequence[str] = ()) -> Value:
+        """Difference of numbers."""
+        return self.operation("fsub", one, other, flags)
+
+    def fmul(self, one: Value, other: Value, flags: Sequence[str] = ()) -> Value:
+        """Product of numbers."""
+        return self.operation("fmul", one, other, flags)
+
+    def fdiv(self, one: Value, other: Value, flags: Sequence[str] = ()) -> Value:
+        """Quotient of numbers."""
+        return self.operation("fdiv", one, other, flags)
+
+    def fneg(self, one: Value) -> Value:
+        """The number with its sign turned round."""
+        return self._made(one.type, f"fneg {one.type} {one.text}")
+
+    def ordered(self, relation: str, one: Value, other: Value) -> Value:
+        """Mask: true where a relation holds, false where either is NaN."""
+        return self._made(MASK, f"fcmp {ORDERED[relation]} {one.type} {one.text}, {other.text}")
+
+    def unordered(self, relation: str, one: Value, other: Value) -> Value:
+        """Mask: true where a relation holds or either is NaN; `uno` for the latter alone."""
+        return self._made(MASK, f"fcmp {UNORDERED[relation]} {one.type} {one.text}, {other.text}")
+
+    def differs(self, one: Value, other: Value) -> Value:
+        """Mask: true where two integers differ."""
+        return self._made(MASK, f"icmp ne {one.type} {one.text}, {other.text}")
+
+    def select(self, mask: Value, yes: Value, no: Value) -> Value:
+        """`yes` where the mask holds, else `no`, lane by lane."""
+        return self._made(yes.type, f"select {MASK} {mask.text}, {yes.type} {yes.text}, {no.type} {no.text}")
+
+    def bits_as(self, one: Value, kind: str) -> Value:
+        """The same bits as another type."""
+        return self._made(kind, f"bitcast {one.type} {one.text} to {kind}")
+
+    def intrinsic(self, name: str, args: Sequence[Value]) -> Value:
+        """LLVM's own function on lanes."""
+        return self._called(VECTOR, f"llvm.{name}.v{WIDTH}f64", args)
+
+    def per_lane(self, name: str, args: Sequence[Value]) -> Value:
+        """A function of the C library, lane by lane."""
+        out = Value(VECTOR, "undef")
+        for lane in range(WIDTH):
+            each = [self._made("double", f"extractelement {a.type} {a.text}, i32 {lane}") for a in args]
+            value = self._called("double", name, each)
+            out = self._made(VECTOR, f"insertelement {VECTOR} {out.text}, double {value.text}, i32 {lane}")
+        return out
+
+    def _called(self, kind: str, name: str, args: Sequence[Value]) -> Value:
+        self.declared[name] = f'declare {kind} @"{name}"({", ".join([kind] * len(args))})'
+        return self._made(kind, f'call {kind} @"{name}"({", ".join(f"{a.type} {a.text}" for a in args)})')
+
+    def load(self, pointer: str, place: int) -> Value:
+        """A vector from an array of them."""
+        return self._made(VECTOR, f"load {VECTOR}, {VECTOR}* {self._element(pointer, place)}, align 8")
+
+    def store(self, value: Value, pointer: str, place: int) -> None:
+        """A vector into an array of them."""
+        element = self._element(pointer, place)
+        self.lines.append(f"  store {value.type} {value.text}, {VECTOR}* {element}, align 8")
+
+    def _element(self, pointer: str, place: int) -> str:
+        return self._made("", f"getelementptr {VECTOR}, {VECTOR}* {pointer}, i64 {place}").text
+
+    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], linkage: str = "internal") -> str:
+        """The lines as a function of pointers to lanes, by their names, that returns nothing."""
+        arguments = [f"{VECTOR}* {n}" for n in inputs] + [f"{VECTOR}* noalias {n}" for n in outputs]
+        head = f'define {linkage} void @"{name}"({", ".join(arguments)})'
+        return "\n".join([head, "{", *self.lines, "  ret void", "}", ""])
