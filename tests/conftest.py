@@ -20,17 +20,42 @@ ROUNDING = {
 }
 """Files and folders whose tests get the mark `rounding`, and why."""
 
+LONG = {
+    "body/test_body_viewer.py": ("test_a_live_viewer_shows",),
+    "confusion/test_matrix.py": ("test_slice_from_end",),
+    "confusion/test_named.py": ("[ankle-joint_stop", "[joint-sensor_lag"),
+    "contrast/test_contrast.py": ("test_a_misread_trial_is_told_as_such[changes1]",),
+    "control/test_tuning.py": ("test_the_delay_margin_that_is_stated",),
+    "data/test_spikes.py": ("test_a_clean_study_is_left_alone[ankle]",),
+    "diagnose/test_adequate.py": ("test_nothing_hidden[joint-white]", "test_a_slide[False]", "off[ankle"),
+    "diagnose/test_driven_far.py": ("top[sensor_gain]", "top[quadratic_damping]", "test_a_twin_is_found"),
+    "diagnose/test_found.py": (
+        *("test_intervals_hold", "-1-True", "-2-True", "-5-True", "-6-False", "-9-True", "-11-True"),
+        *("test_friction_of_a_slide[False]", "far_away[1]"),
+    ),
+    "diagnose/test_gaps.py": ("[joint-names2", "[ankle-names1", "lack[without0-False]", "lack[without1-True]"),
+    "diagnose/test_one_trial.py": ("test_a_real_swing",),
+    "diagnose/test_per_trial_phase.py": ("[ankle-breath-process]", "[ankle-hum-white]", "kept[ankle"),
+    "driven/test_driven.py": ("test_play_before", "test_what_no_cause", "adequate[12]"),
+    "imposed/test_imposed_ankle.py": ("predicted[force_velocity]", "adequate[8]"),
+    "test_shared_diagnoses.py": ("[p02", "[p06", "[p09", "[p19", "[p20", "[n00", "[n02"),
+    "test_shared_pendulum.py": ("test_",),
+}
+"""Whole diagnoses whose like is among those that always run; they get the mark `long`, by a part of their name."""
+
 
 def pytest_configure() -> None:
-    """Say where a file that must be run again was moved or renamed."""
-    if gone := [place for place in ROUNDING if not (Path(__file__).parent / place).exists()]:
-        raise pytest.UsageError(f"tests/conftest.py, ROUNDING: there is no {', '.join(gone)}")
+    """Say where a file that must be run again, or only when asked for, was moved or renamed."""
+    if gone := [place for place in (*ROUNDING, *LONG) if not (Path(__file__).parent / place).exists()]:
+        raise pytest.UsageError(f"tests/conftest.py, ROUNDING or LONG: there is no {', '.join(gone)}")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what depends on how a processor rounds, to run it once more under other kernels (see .ci/run)."""
+    """Mark what depends on how a processor rounds, to run it once more under other kernels (.ci/run); what is long."""
     for item in items:
         path = item.path.relative_to(Path(__file__).parent)
+        if any(part in item.name for part in LONG.get(path.as_posix(), ())):
+            item.add_marker(pytest.mark.long)
         if not ROUNDING.keys().isdisjoint((path.as_posix(), path.parts[0])):
             item.add_marker(pytest.mark.rounding)
 

@@ -70,7 +70,7 @@ class Misread:
     halves
         The value that the odd quarters of the trial tell, and that the even ones tell.
     whole, others
-        Fits to all trials as they are stated, and to all but this one.
+        Fits of the model to all trials as they are stated, and to all but this one.
     """
 
     trial: str
@@ -130,6 +130,15 @@ def find_misread(model: Model, trials: Sequence[Trial]) -> Misread | None:
 def restated_trials(model: Model, trials: Sequence[Trial], found: Misread) -> list[Trial]:
     """The trials, one of them with the value that it must have had."""
     return [model.rig.restated(t, found.condition, found.value) if t.name == found.trial else t for t in trials]
+
+
+def takes_most(found: Misread, trials: Sequence[Trial]) -> bool:
+    """True if restating the trial takes away more than half of what the model gets wrong, by squares beyond noise."""
+    whole = found.whole
+    restated = restated_trials(whole.model, trials, found)
+    after = fit_problem(Problem(whole.model, restated, whole.noise), whole.values)
+    wrong = max(whole.sse - whole.samples, 0.0)
+    return after.sse - after.samples < 0.5 * wrong
 
 
 def _sizes(model: Model, trials: Sequence[Trial]) -> dict[str, float]:

@@ -1,8 +1,9 @@
 """A study with one trial's condition in doubt is searched with the value that the trial must have had.
 
-Where the nominal model then leaves only noise, nothing can be simpler. Else the misreading competes with every other
-explanation by price: the causes that the restated trials still need, with its own parameter, against those that the
-trials as stated need.
+Where that takes away most of what the nominal model gets wrong it comes first, and where only noise is then left
+nothing can be simpler. Else trials are searched as stated, and one that stands out beside the causes that were found is
+restated then. A misreading competes with every other explanation by price: the causes that the restated trials still
+need, with its own parameter, against those that the trials as stated need.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from fes_pin.diagnose.cause import Cause, ParameterEstimate
 from fes_pin.diagnose.decide.held_out import Errors, cross_validate, errors_of, held_out_gain, separate
 from fes_pin.diagnose.errors_ahead import Ahead
 from fes_pin.diagnose.experiment import SEPARABLE
-from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated_trials
+from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated_trials, takes_most
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.diagnose.searches import Result, Search
@@ -65,6 +66,8 @@ def search_with_conditions(nominal: Model, trials: Sequence[Trial], run: Run) ->
         Searches trials.
     """
     misread = _found(Model(nominal.rig), trials)
+    if misread is not None and not takes_most(misread, trials):
+        misread = None  # some trial is always the worst: what else is wrong comes first
     made = None if misread is None else _restated(nominal, trials, misread, run)
     if made is not None and not made.searched.best.model.effects and _leaves_noise(made):
         return made.search, made.searched, made
