@@ -124,7 +124,7 @@ class _Loop:
         def newton(_: ir.Value) -> None:
             b.call(self.parts["rest"], [self.z, self.p, self.c, self.g, self._at(self.g, 1)])
             step = b.fdiv(self._load(self.g), self._load(self.g, 1))
-            for beyond, most in ((">", splat(REST_STEP)), ("<", splat(-REST_STEP))):
+            for beyond, most in ((">", _splat(REST_STEP)), ("<", _splat(-REST_STEP))):
                 step = b.select(b.fcmp_ordered(beyond, step, most), most, step)
             self._store(b.fsub(self._load(self.z), step), self.z)
 
@@ -159,7 +159,7 @@ class _Loop:
             self._runge_kutta(u, self.state)
             return
         self._runge_kutta(u, self.total)
-        b.store(b.fmul(self.step, splat(0.5)), self.into, align=8)
+        b.store(b.fmul(self.step, _splat(0.5)), self.into, align=8)
         times = [self.t, self.since, self.into]
         b.call(self.parts["follow"], [self.state, self.total, self.memory, u, *times, self.p, self.c, self.stage])
         self._copy(self.stage, self.state, self.sizes.state)
@@ -177,10 +177,10 @@ class _Loop:
             (1 / 3, 1.0, 0.5, self.stage),
             (1 / 6, 0.0, 1.0, self.stage),
         ):
-            b.store(b.fmul(self.step, splat(at)), self.into, align=8)
+            b.store(b.fmul(self.step, _splat(at)), self.into, align=8)
             times = [self.t, self.since, self.into]
             b.call(self.parts["rates"], [source, self.memory, u, *times, self.p, self.c, self.rate])
-            share, forward = b.fmul(self.step, splat(weight)), b.fmul(self.step, splat(ahead))
+            share, forward = b.fmul(self.step, _splat(weight)), b.fmul(self.step, _splat(ahead))
             self._count(size, partial(self._advance, at=at, share=share, forward=forward, end=end))
 
     def _advance(self, i: ir.Value, at: float, share: ir.Value, forward: ir.Value, end: ir.Value) -> None:
@@ -196,6 +196,6 @@ class _Loop:
         self._store(b.fadd(state, b.fmul(forward, rate)), self.stage, i)
 
 
-def splat(value: float) -> ir.Constant:
+def _splat(value: float) -> ir.Constant:
     """The same number in every lane."""
     return ir.Constant(VECTOR, [value] * WIDTH)
