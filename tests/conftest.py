@@ -13,40 +13,51 @@ ROUNDING = {
     "body/test_minimal_sets.py": "least sets, chosen by comparing sums",
     "body/test_modes.py": "eigen-decompositions",
     "diagnose/test_claims.py": "verdicts at their critical values",
-    "diagnose/test_found.py": "verdicts of whole diagnoses",
+    "diagnose/test_found.py::coulomb_friction": "verdicts of whole diagnoses",
     "diagnose/test_held_out.py": "verdicts at their critical values",
     "identify": "fits to the last digits",
     "paper/test_kalman.py": "factors of nearly singular covariances",
 }
-"""Files and folders whose tests get the mark `rounding`, and why."""
+"""Files and folders whose tests get the mark `rounding`, after :: by a part of their name; and why."""
 
 LONG = {
+    "allocate/test_walk.py": ("[allocate_walking-with what paralysed",),
     "body/test_body_viewer.py": ("test_a_live_viewer_shows",),
     "confusion/test_matrix.py": ("test_slice_from_end",),
-    "confusion/test_named.py": ("[ankle-joint_stop", "[joint-sensor_lag"),
-    "contrast/test_contrast.py": ("test_a_misread_trial_is_told_as_such[changes1]",),
+    "confusion/test_named.py": ("[ankle-joint_stop", "[joint-sensor_lag", "[muscle-potentiation"),
+    "contrast/test_contrast.py": ("test_a_misread_trial_is_told_as_such[changes1]", "test_a_common_cause_is_no_change"),
+    "control/test_control.py": ("test_five_minutes",),
     "control/test_tuning.py": ("test_the_delay_margin_that_is_stated",),
     "data/test_spikes.py": ("test_a_clean_study_is_left_alone[ankle]",),
-    "diagnose/test_adequate.py": ("test_nothing_hidden[joint-white]", "test_a_slide[False]", "off[ankle"),
-    "diagnose/test_driven_far.py": ("top[sensor_gain]", "top[quadratic_damping]", "test_a_twin_is_found"),
+    "diagnose/test_adequate.py": (
+        "test_nothing_hidden[joint-process]",
+        "test_a_slide[False]",
+        "off[ankle",
+        "off[joint",
+    ),
+    "diagnose/test_driven_far.py": ("_gain]", "_damping]", "_hum]", "test_a_twin_is_found", "one_muscle[12]"),
     "diagnose/test_found.py": (
-        *("test_intervals_hold", "-1-True", "-2-True", "-5-True", "-6-False", "-9-True", "-11-True"),
+        *("test_intervals_hold", "-1-True", "-2-True", "-5-True", "-6-False", "-9-True", "-10-True", "-11-True"),
         *("test_friction_of_a_slide[False]", "far_away[1]"),
     ),
-    "diagnose/test_gaps.py": ("[joint-names2", "[ankle-names1", "lack[without0-False]", "lack[without1-True]"),
-    "diagnose/test_one_trial.py": ("test_a_real_swing",),
+    "diagnose/test_gaps.py": ("[joint-names2", "[ankle-names", "lack[without0-False]", "lack[without1"),
+    "diagnose/test_one_trial.py": ("test_a_real_swing", "test_friction_is_found_beneath"),
     "diagnose/test_per_trial_phase.py": ("[ankle-breath-process]", "[ankle-hum-white]", "kept[ankle"),
     "driven/test_driven.py": ("test_play_before", "test_what_no_cause", "adequate[12]"),
     "imposed/test_imposed_ankle.py": ("predicted[force_velocity]", "adequate[8]"),
-    "test_shared_diagnoses.py": ("[p02", "[p06", "[p09", "[p19", "[p20", "[n00", "[n02"),
+    "imposed/test_imposed_joint.py": ("predicted[passive_relaxation]",),
+    "imposed/test_session.py": ("named[potentiation-imposed]",),
+    "test_shared_diagnoses.py": ("[p02", "[p04", "[p06", "[p09", "[p14", "[p19", "[p20", "[n00", "[n02"),
     "test_shared_pendulum.py": ("test_",),
+    "walk/test_diagnosis.py": ("test_late_plates",),
 }
 """Whole diagnoses whose like is among those that always run; they get the mark `long`, by a part of their name."""
 
 
 def pytest_configure() -> None:
     """Say where a file that must be run again, or only when asked for, was moved or renamed."""
-    if gone := [place for place in (*ROUNDING, *LONG) if not (Path(__file__).parent / place).exists()]:
+    places = [place.partition("::")[0] for place in (*ROUNDING, *LONG)]
+    if gone := [place for place in places if not (Path(__file__).parent / place).exists()]:
         raise pytest.UsageError(f"tests/conftest.py, ROUNDING or LONG: there is no {', '.join(gone)}")
 
 
@@ -56,8 +67,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         path = item.path.relative_to(Path(__file__).parent)
         if any(part in item.name for part in LONG.get(path.as_posix(), ())):
             item.add_marker(pytest.mark.long)
-        if not ROUNDING.keys().isdisjoint((path.as_posix(), path.parts[0])):
+        if any(_is_of(item, path, *place.split("::")) for place in ROUNDING):
             item.add_marker(pytest.mark.rounding)
+
+
+def _is_of(item: pytest.Item, path: Path, place: str, part: str = "") -> bool:
+    """True of a test in a file or folder, with a part of its name."""
+    return place in (path.as_posix(), path.parts[0]) and part in item.name
 
 
 @pytest.fixture(scope="session")
