@@ -39,3 +39,14 @@ def frame(columns: Mapping[str, Any], index: str | None = None) -> pandas.DataFr
         raise InputError("frames need pandas: pip install 'fes-pin[pandas]'") from None
     made = pandas.DataFrame(dict(columns))
     return made.set_index(index) if index is not None else made
+
+
+def explaining(count: int) -> str:
+    """ "one cause explains", "2 causes explain"."""
+    return "one cause explains" if count == 1 else f"{count} causes explain"
+
+
+def from_to(before: Sequence[float | None], after: Sequence[float | None], where: Sequence[str]) -> str:
+    """Errors before and after, in percent, of those places that have both."""
+    pairs = zip(before, after, where, strict=True)
+    return ", ".join(f"{b:.2f} -> {a:.2f} % {w}" for b, a, w in pairs if a is not None and b is not None)

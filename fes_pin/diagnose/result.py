@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fes_pin.data.provenance import Provenance
-from fes_pin.data.show import frame, table_html
+from fes_pin.data.show import explaining, frame, from_to, table_html
 from fes_pin.data.study import Study
 from fes_pin.diagnose.cause import Cause, Ranked
 from fes_pin.diagnose.errors_ahead import AheadErrors, RandomPart
@@ -132,19 +132,13 @@ class Diagnosis:
         if not count:
             return HEADLINES[self.verdict].removesuffix(".") + (f": {self.reason}." if self.reason else ".")
         share = self.explained_percent()
-        named = "one cause explains" if count == 1 else f"{count} causes explain"
         rest = ", and something is left" if self.remainder.unexplained else ""
-        return f"{named} {share:.0f} % of what the model gets wrong, {100.0 - share:.0f} % stays{rest}."
+        return f"{explaining(count)} {share:.0f} % of what the model gets wrong, {100.0 - share:.0f} % stays{rest}."
 
     def footnotes(self) -> list[str]:
         """What stands beneath the table."""
-        before, after = self.nominal_error, self.extended_error
-        shown = [
-            f"{b:.2f} -> {a:.2f} % {where}"
-            for b, a, where in zip(before, after, ("fitted", "held out"), strict=True)
-            if a is not None and b is not None
-        ]
-        lines = [f"error E {', '.join(shown)}; noise floor {percent(self.ceiling_percent)}"] if shown else []
+        shown = from_to(self.nominal_error, self.extended_error, ("fitted", "held out"))
+        lines = [f"error E {shown}; noise floor {percent(self.ceiling_percent)}"] if shown else []
         lines += ahead_notes(self.ahead, self.random, self.model.rig.units().get("effort", ""))
         left = self.remainder
         where = f", most on {left.where}" if left.where else ""

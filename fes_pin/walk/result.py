@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from fes_pin.body.build import Body
+from fes_pin.data.show import explaining, from_to
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.walk.effect import STAGE
@@ -149,19 +150,13 @@ class WalkDiagnosis:
         if not count:
             return HEADLINES[self.verdict]
         rest = ", and something is left" if self.remainder.unexplained else ""
-        named = "one cause explains" if count == 1 else f"{count} causes explain"
-        return f"{named} what the walking model gets wrong{rest}."
+        return f"{explaining(count)} what the walking model gets wrong{rest}."
 
     def footnotes(self) -> list[str]:
         """What stands beneath the table."""
-        before, after = self.nominal_error, self.extended_error
-        shown = [
-            f"{b:.2f} -> {a:.2f} % {where}"
-            for b, a, where in zip(before, after, ("fitted", "strides held out"), strict=True)
-            if a is not None and b is not None
-        ]
+        shown = from_to(self.nominal_error, self.extended_error, ("fitted", "strides held out"))
         noise = f"stride to stride {self.ceiling_percent:.2f} %; low pass {self.cutoff_hz:g} Hz"
-        lines = [f"error E {', '.join(shown)}; {noise}"]
+        lines = [f"error E {shown}; {noise}"]
         where = f", most in {self.remainder.where}" if self.remainder.where else ""
         state = "something comes" if self.remainder.unexplained else "nothing more comes"
         lines.append(f"{state} again in every stride (p = {self.remainder.p_value:.2g}{where})")

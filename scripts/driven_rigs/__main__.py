@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import tempfile
 import time
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from going_on import results_of
 
 from driven_rigs.draw import CAUSES, OUTSIDE, draw
 from fes_pin.data.study import read_study
@@ -123,15 +123,7 @@ def main(
     ] = None,
 ) -> None:
     """Hide known causes in rigs that a controller drives, and count what the diagnosis makes of them."""
-    rows = [json.loads(x) for x in results.read_text().splitlines()] if results and results.exists() else []
-    done = {r["seed"] for r in rows}
-    for k, causes in enumerate(items(count)):
-        if seed + k in done:
-            continue
-        rows.append(judged(() if nulls else causes, size, seed + k))
-        if results:
-            with results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(rows[-1]) + "\n")
+    rows = results_of(items(count), seed, lambda causes, k: judged(() if nulls else causes, size, k), results)
     typer.echo("\n".join(table(rows)))
 
 

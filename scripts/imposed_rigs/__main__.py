@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 import time
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from going_on import results_of
 
 from fes_pin.diagnose.diagnosis import diagnose_joint
 from imposed_rigs import ankle, joint, muscle
@@ -63,15 +63,7 @@ def main(
     ] = None,
 ) -> None:
     """Hide known causes in rigs that follow a motion, and count what the diagnosis makes of them."""
-    rows = [json.loads(x) for x in results.read_text().splitlines()] if results and results.exists() else []
-    done = {r["seed"] for r in rows}
-    for k, (name, cause) in enumerate(items(count, rig)):
-        if seed + k in done:
-            continue
-        rows.append(judged(name, cause, size, seed + k))
-        if results:
-            with results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(rows[-1]) + "\n")
+    rows = results_of(items(count, rig), seed, lambda piece, k: judged(*piece, size, k), results)
     typer.echo("\n".join(table(rows)))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -41,6 +42,15 @@ KNOWN = {
 }
 
 
+class Hidden(NamedTuple):
+    """What is hidden in an ankle, how large, and the rig's own parameters and forms."""
+
+    causes: tuple[str, ...]
+    size: float
+    truth: dict[str, float]
+    form: dict[str, float]
+
+
 def study(causes: tuple[str, ...], size: float, rng: np.random.Generator, folder: Path) -> Study:
     """Trials along motions of every speed, two of them nearly still; the stimulus in steps of random width."""
     truth = {
@@ -57,20 +67,12 @@ def study(causes: tuple[str, ...], size: float, rng: np.random.Generator, folder
         "share": rng.uniform(0.02, 0.06),
     }
     turned = rng.choice([-1.0, 1.0])  # no convention says which way a dynamometer counts
-    trials = tuple(_trial(k, causes, size, truth, form, turned, rng) for k in range(8))
+    trials = tuple(_trial(k, Hidden(causes, size, truth, form), turned, rng) for k in range(8))
     start = {n: float(v * rng.uniform(0.75, 1.3)) for n, v in truth.items()}
     return Study(folder.name, "ankle", KNOWN, start, trials, folder)
 
 
-def _trial(
-    k: int,
-    causes: tuple[str, ...],
-    size: float,
-    truth: dict[str, float],
-    form: dict[str, float],
-    turned: float,
-    rng: np.random.Generator,
-) -> Trial:
+def _trial(k: int, hidden: Hidden, turned: float, rng: np.random.Generator) -> Trial:
     time = np.arange(round(SECONDS / DT)) * DT
     reach, slowest = (0.01, 0.3) if k % 4 == 0 else (REACH, 0.2 + 0.1 * k)
     motion = drawn(1.75 + rng.uniform(-0.1, 0.1), reach, slowest, 4.0 * slowest, rng)
@@ -79,26 +81,19 @@ def _trial(
         lasts, rests = rng.uniform(0.2, 0.8), rng.uniform(0.1, 0.5)
         width[(time >= at) & (time < at + lasts)] = rng.uniform(300.0, 950.0)
         at += lasts + rests * rng.integers(0, 2)
-    torque = _torque(time, width, motion, causes, size, truth, form)
-    usual = truth["gain"] * KNOWN["force_scale_n"] * KNOWN["moment_arm_m"]
+    torque = _torque(time, width, motion, hidden)
+    usual = hidden.truth["gain"] * KNOWN["force_scale_n"] * KNOWN["moment_arm_m"]
     read = torque + wandering(len(time), DT, 0.003 * usual, 0.15, rng) + 0.003 * usual * rng.standard_normal(len(time))
     angle = motion.at(time) + 2e-5 * rng.standard_normal(len(time))
     columns = {"pulse_width_us": width, "angle_rad": angle, "torque_nm": turned * read}
     return Trial(f"{k:02d}", "imposed", columns, time)
 
 
-def _torque(
-    time: np.ndarray,
-    width: np.ndarray,
-    motion: Motion,
-    causes: tuple[str, ...],
-    size: float,
-    truth: dict[str, float],
-    form: dict[str, float],
-) -> np.ndarray:
+def _torque(time: np.ndarray, width: np.ndarray, motion: Motion, hidden: Hidden) -> np.ndarray:
     """Eq. (1) of the paper along the motion, with its muscle from an integrator, and what is hidden in it."""
+    causes, size, truth, form = hidden
     k, q, v, bend = KNOWN, *(motion.at(time, order) for order in range(3))
-    act, tired, ready, relaxed = _states(time, width, motion, causes, size, truth, form)
+    act, tired, ready, relaxed = _states(time, width, motion, hidden)
     usual = truth["gain"] * k["force_scale_n"]
     force, x = usual * act, (q - 0.5 * np.pi) / REACH
     if "force_length" in causes:
@@ -123,16 +118,9 @@ def _torque(
     return torque
 
 
-def _states(
-    time: np.ndarray,
-    width: np.ndarray,
-    motion: Motion,
-    causes: tuple[str, ...],
-    size: float,
-    truth: dict[str, float],
-    form: dict[str, float],
-) -> np.ndarray:
+def _states(time: np.ndarray, width: np.ndarray, motion: Motion, hidden: Hidden) -> np.ndarray:
     """Activation, what is tired, what is potentiated and where a Maxwell element rests, shape (4, n)."""
+    causes, size, truth, form = hidden
     shift = form["sign"] * 300.0 * size if "threshold_shift" in causes else 0.0
     r = np.clip((width - shift - KNOWN["threshold_us"]) / (KNOWN["saturation_us"] - KNOWN["threshold_us"]), 0.0, 1.0)
     if "recruitment_curvature" in causes:
