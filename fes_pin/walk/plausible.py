@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from fes_pin.body.joints import SIDES
 from fes_pin.data.errors import InputError
@@ -22,6 +23,9 @@ FULLY = 0.9
 """Share of what they carry in a stretch's middle that plates carry all through it; else a foot beside them carries."""
 ENOUGH_S = 0.3
 """Most of a single support, s: less is no record of walking."""
+MEAN_S = 0.15
+"""Time over which forces are averaged before they are compared, s: a foot beside a plate stands there for longer, and
+accelerations of noisy markers are as large as the weight from sample to sample."""
 
 
 def check_together(motion: Motion, plates: Plates) -> None:
@@ -77,7 +81,8 @@ def carried_along(motion: Motion, plates: Plates) -> slice:
     InputError
         No stretch is long enough.
     """
-    needed, up = required(motion)[:, 2], plates.total[:, 2]
+    size = max(1, round(MEAN_S / motion.dt))
+    needed, up = (uniform_filter1d(x[:, 2], size, mode="nearest") for x in (required(motion), plates.total))
     whole = up > np.maximum(CARRIED * needed, LOADED_N)
     whole |= needed < LOADED_N  # in the air nothing is to be carried
     if whole.mean() > 0.95:
