@@ -44,6 +44,15 @@ class ImposedMotion:
         """Position at the first sample."""
         return float(self.values[0, 0])
 
+    def known(self, time: np.ndarray) -> np.ndarray:
+        """True where velocity and acceleration are as sure as `doubt` says, shape (n,).
+
+        Within one knot of either end, half a period of the bandwidth, a spline has no neighbours on one side, and its
+        acceleration is several times as uncertain. At most a tenth of a trial is given away at each end.
+        """
+        margin = min(0.5 / self.bandwidth_hz, 0.1 * (time[-1] - time[0]))
+        return (time >= time[0] + margin) & (time <= time[-1] - margin)
+
 
 _KNOWN: WeakKeyDictionary[Trial, ImposedMotion] = WeakKeyDictionary()
 

@@ -218,9 +218,10 @@ class _Block:
         self.measured = np.zeros((self.count, len(self.outputs), WIDTH))
         self.repeated = np.ones((self.count, len(self.outputs), WIDTH))
         for lane, trial in enumerate(self.trials):
+            judged = rig.follows(trial)
             for k, name in enumerate(self.outputs):
                 column = trial[name]
-                finite = np.isfinite(column)
+                finite = np.isfinite(column) & judged
                 self.seen[: len(trial), k, lane] = finite
                 self.measured[: len(trial), k, lane] = np.where(finite, column, 0.0)
                 self.repeated[: len(trial), k, lane] = repeated(column)

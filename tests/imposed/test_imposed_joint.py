@@ -63,6 +63,19 @@ def test_a_motion_that_is_moved_as_a_whole_has_the_same_rates(tmp_path):
         assert np.abs(one - other).max() < 1e-9 * np.ptp(other)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_ends_of_an_imposed_motion_are_not_judged(seed, tmp_path):
+    """There the acceleration is more than three times as wrong as within, where it is as its doubt says."""
+    (_, model), (motion, trial) = arm(tmp_path), moved(seed)
+    noise = 1e-3 * np.random.default_rng(seed).standard_normal(len(trial))
+    trial = trial.with_columns(position=trial["position"] + noise)
+    judged, found = model.rig.follows(trial), imposed_motion(trial, COLUMNS)
+    wrong = (found.values[2] - motion.at(trial.time, 2)) / found.doubt[2]
+    within, ends = (np.sqrt(np.mean(wrong[rows] ** 2)) for rows in (judged, ~judged))
+    assert 0.8 < np.mean(judged) < 1.0
+    assert within < 2.5 and ends > 3.0 * within
+
+
 def test_what_acts_on_the_effort_is_undone(tmp_path):
     """The reading is the effort that was commanded: what acts is -1 times what was, and 0.3 more."""
     (_, model), (_, trial) = arm(tmp_path), moved()

@@ -181,6 +181,12 @@ class Rig:
         """Constants of a trial with an imposed motion: where that begins."""
         return {"imposed_start": imposed_motion(trial, self.schema.imposed).start} if trial.kind == IMPOSED else {}
 
+    def follows(self, trial: Trial) -> np.ndarray:
+        """Samples of a trial that a model can be judged by, shape (n,): where an imposed motion's rates are known."""
+        if trial.kind != IMPOSED:
+            return np.ones(len(trial), dtype=bool)
+        return imposed_motion(trial, self.schema.imposed).known(trial.time)
+
     def constants_of(self, trial: Trial) -> dict[str, float]:
         """Values of everything that is constant in a trial: of the rig, of its motion, and what was before it."""
         return {**self.trial_constants(trial), **self.motion_constants(trial), **past_of(self.session, trial)}
