@@ -113,7 +113,9 @@ def judge_driven(
             break
         weakest = min(weak, key=lambda n: evidence[n].low)
         refused[weakest] = found.p_values[weakest]
-        found = search.settle(tuple(sorted(n for n in found.without if n != weakest)))
+        found = search.told(tuple(sorted(n for n in found.without if n != weakest)))
+    if refused:
+        found = search.settle(tuple(found.without))
     random = random_parts(found.best)
     left = _left(driven_remainder(found.best, seed), random, refused, search)
     horizon = horizon_s or default_horizon(train)

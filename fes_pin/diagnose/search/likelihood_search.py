@@ -93,7 +93,7 @@ class LikelihoodSearch:
         except OutOfTime:
             self.was_stopped = True
             with time_limit(math.inf):
-                return self._told(self._fallback)
+                return self.told(self._fallback)
 
     def nominal(self) -> Fit:
         """The nominal model."""
@@ -171,10 +171,10 @@ class LikelihoodSearch:
             rest = tuple(n for n in names if n != name)
             self.sets.without(names, name)
             self.sets.extend_all(rest, None if len(names) == 1 else JOINT_FITS)
-        return self._told(names)
+        return self.told(names)
 
-    def _told(self, names: Names) -> Found:
-        """What the sets that are fitted say of one of them."""
+    def told(self, names: Names) -> Found:
+        """What the sets that are fitted say of one of them, which no further rivals are sought for."""
         sets, rivals, without = self.sets, {}, {}
         for name in names:
             rest = tuple(n for n in names if n != name)
