@@ -42,7 +42,7 @@ def frame(columns: Mapping[str, Any], index: str | None = None) -> pandas.DataFr
 
 
 def explaining(count: int) -> str:
-    """ "one cause explains", "2 causes explain"."""
+    """The words "one cause explains", or "2 causes explain"."""
     return "one cause explains" if count == 1 else f"{count} causes explain"
 
 

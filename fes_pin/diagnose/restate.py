@@ -65,15 +65,15 @@ def search_with_conditions(nominal: Model, trials: Sequence[Trial], run: Run) ->
     run
         Searches trials.
     """
-    misread = _found(Model(nominal.rig), trials)
-    if misread is not None and not takes_most(misread, trials):
-        misread = None  # some trial is always the worst: what else is wrong comes first
-    made = None if misread is None else _restated(nominal, trials, misread, run)
+    first = _found(Model(nominal.rig), trials)
+    chief = first is not None and takes_most(first, trials)  # some trial is always the worst
+    made = _restated(nominal, trials, first, run) if first is not None and chief else None
     if made is not None and not made.searched.best.model.effects and _leaves_noise(made):
         return made.search, made.searched, made
     search, searched = run(list(trials))
-    if made is None and searched.best.model.effects and not search.was_stopped:
-        misread = _found(searched.best.model, trials)
+    if made is None and not search.was_stopped:
+        best = searched.best.model
+        misread = _found(best, trials) if best.effects else first
         made = None if misread is None else _restated(nominal, trials, misread, run)
     if made is None or search.was_stopped or made.search.was_stopped:
         return search, searched, None

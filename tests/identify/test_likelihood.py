@@ -7,6 +7,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls, one_step, over_horizon
 from fes_pin.identify.likelihood import LikelihoodProblem, driving_size, first_guess, maximise
 from fes_pin.models.model import Model
+from fes_pin.models.predictor import masked
 from fes_pin.models.rigs import Joint
 
 DT, N = 0.004, 2000
@@ -92,6 +93,19 @@ def test_three_errors_of_a_rig_that_falls():
     missed = trials[0]["position"] - over_horizon(found.model, trials[0], found.doubt, 0.1)["position"]
     assert np.std(near[5:]) < 1.3 * 4e-4
     assert 2.0 * np.std(near[5:]) < np.std(missed) < 0.05
+
+
+def test_a_horizon_uses_all_that_is_older():
+    """As a run to which nothing was shown from there on; runs that share a trial's predictions hide parts of it."""
+    (trial,) = trials = [held(7, 0.03)]
+    found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)), believed().parameters())
+    shared = over_horizon(found.model, trial, found.doubt, 0.1)["position"]
+    for last in range(900, 930, 6):  # the newest that a prediction uses, every quarter of 25 samples
+        older = masked(trial, ["position"], [range(last + 1, len(trial))])
+        alone = LikelihoodProblem(found.model, [older], found.doubt, ())
+        rows = slice(last + 25, last + 31)
+        told = alone.foretold(found.model.parameters())[0]["position"][rows]
+        assert np.abs(shared[rows] - told).max() < 1e-4 * np.ptp(trial["position"])
 
 
 def test_a_horizon_uses_nothing_younger():
