@@ -181,12 +181,12 @@ def white_noise(search: WalkSearch) -> tuple[float, float, float] | None:
         return None
     y = search.strides.coefficients([s.residual[:, :, None] for s in search.banks[False].scenes])[..., 0]
     waves = search.noise.harmonics > 0
-    values, vectors = np.linalg.eigh(search.jitter[..., waves].mean(axis=2))
+    shaken = search.shaken[..., waves]
+    values, vectors = np.linalg.eigh(np.einsum("dik,djk->ij", shaken, shaken) / (len(shaken) * waves.sum()))
     turn = (vectors / np.sqrt(values)).T  # channels in which white noise of the coordinates is independent
     noise = replace(search.noise, turn=turn)
     apart = noise.rotated((y - y.mean(axis=0)) * np.sqrt(len(y) / (len(y) - 1.0)))
-    jitter = np.einsum("ai,ijk,aj->ak", turn, search.jitter, turn)
-    level, std, saved = white_level(apart, noise, jitter)
+    level, std, saved = white_level(apart, noise, noise.rotated(search.shaken))
     return level, std * np.sqrt(len(y) / (len(y) - 1.0)), saved
 
 

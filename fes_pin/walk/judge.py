@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from fes_pin.walk.likelihood import FLOOR_N, fit_walk
+from fes_pin.walk.likelihood import FLOOR_N, by_frequency, fit_walk
 from fes_pin.walk.search import Chosen, Set, WalkSearch
 
 ARM = 0.1
@@ -157,7 +157,7 @@ def walk_remainder(search: WalkSearch, one: Set) -> tuple[float, str | None]:
     n, waves = len(left), search.strides.harmonics
     mean = left.mean(axis=0)
     apart = np.sum((y - y.mean(axis=0)) ** 2, axis=0) / max(n - 1, 1) / n
-    spread = apart if n > 1 else np.einsum("iik->ik", search.jitter)
+    spread = apart if n > 1 else by_frequency(np.mean(search.shaken**2, axis=0), waves)
     smooth = spread.copy()
     for h in np.unique(waves):
         near = np.abs(waves - h) <= 1

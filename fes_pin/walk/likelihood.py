@@ -27,8 +27,6 @@ STEP_SD = 1.0
 """Standard deviation of what is believed of a step of log variance beforehand: a factor e from one wave to the next."""
 WHITE_TRIED = 0.2, 40.0, 200
 """Levels of white noise, in units: from, to, how many; a step is less than 3 %."""
-NEAR = 10.0
-"""Of the least deviance: where its curvature is taken."""
 PRIOR_LEFT = 1e-4
 """Of the prior's weight, in reported sizes: an effect that nothing shows has a hundred times its plausible size."""
 FLOOR_N = 0.3
@@ -171,10 +169,12 @@ def fit_many(
     return likely[:, :, 0] * scale, covariance, deviance, left, variance, values[:, p:], values[:, :p] * scale
 
 
-def white_level(y: np.ndarray, noise: WalkNoise, jitter: np.ndarray) -> tuple[float, float, float]:
+def white_level(y: np.ndarray, noise: WalkNoise, draws: np.ndarray) -> tuple[float, float, float]:
     """White noise on the coordinates in what differs from stride to stride.
 
-    What else differs dies out with frequency; noise of differentiated coordinates grows.
+    What else differs dies out with frequency; noise of differentiated coordinates grows. A stride is no whole period of
+    the noise, so that its waves are not independent of each other: what this does to the scatter of the level is taken
+    from the draws, as that of a score whose terms are correlated (H. White, Econometrica 50:1, 1982).
 
     Parameters
     ----------
@@ -182,14 +182,15 @@ def white_level(y: np.ndarray, noise: WalkNoise, jitter: np.ndarray) -> tuple[fl
         (n, 6, k) differences of strides, in rotated channels.
     noise
         Whose `nuisance` is not read.
-    jitter
-        (6, k) variance that noise of one unit leaves.
+    draws
+        (d, 6, k) what noise of one unit leaves in a stride, in rotated channels.
 
     Returns
     -------
     level, std, gain
         Of the noise, in units, with its standard deviation; the deviance that it saves.
     """
+    jitter = by_frequency(np.mean(draws**2, axis=0), noise.harmonics)
     tried = np.concatenate([[0.0], np.geomspace(*WHITE_TRIED)])
     many = np.broadcast_to(y, (len(tried), *y.shape))
     spectra = _Spectra(many, replace(noise, jitter=np.broadcast_to(jitter, y.shape)), True, tried**2)
@@ -199,14 +200,42 @@ def white_level(y: np.ndarray, noise: WalkNoise, jitter: np.ndarray) -> tuple[fl
     deviance = np.sum((np.log(variance) + many**2 / variance)[..., waves], axis=(1, 2, 3)) + spectra.penalty()
     best = int(np.argmin(deviance))
     saved = float(deviance[0] - deviance[best])
-    near = (deviance < deviance[best] + NEAR) & (tried > 0.0)
-    if best == 0 or near.sum() < 3:
+    if best in (0, 1, len(tried) - 1):
         return float(tried[best]), float("inf"), saved
-    curve, slope, _ = np.polyfit(np.log(tried[near]), deviance[near], 2)
-    if curve <= 0.0:
-        return float(tried[best]), float("inf"), saved
-    level = float(np.exp(-0.5 * slope / curve))
-    return level, level / float(np.sqrt(curve)), saved
+    before, least, after = deviance[best - 1 : best + 2]
+    step = 0.5 * (before - after) / max(before - 2.0 * least + after, 1e-12)
+    level = float(tried[best] * (tried[best + 1] / tried[best]) ** step)
+    return level, 0.5 * level * _spread_of_white(spectra, variance, jitter, draws, best), saved
+
+
+def _spread_of_white(
+    spectra: _Spectra, variance: np.ndarray, jitter: np.ndarray, draws: np.ndarray, number: int
+) -> float:
+    """Standard deviation of the log of white noise's variance, of one of many.
+
+    With its share s of a variance v, the score is sum s (y^2 / v - 1) / 2. Its information is less what the spectrum's
+    levels and steps explain as well. Its scatter is that of the draws in the white part, s^2 z^2 / 2.
+    """
+    assert spectra.white is not None
+    waves = spectra.waves
+    known = variance[number][..., waves]
+    share = spectra.white[number] * jitter[:, waves] / known
+    n, d = len(known), len(draws)
+    curve = spectra.curvature((1.0 - share)[None])[0]
+    both = 0.5 * (share * (1.0 - share)).sum(axis=0) @ spectra.gather
+    cross = np.r_[both.sum(axis=1), both.sum(axis=0) @ spectra.steps]
+    alone = 0.5 * np.sum(share**2)
+    white = np.var(0.5 * np.sum(share[0] ** 2 * draws[..., waves] ** 2 / jitter[:, waves], axis=(1, 2)), ddof=1)
+    scatter = 0.5 * np.sum(share**2 * (1.0 - share**2)) + n * (1.0 + n / d) * white
+    return float(np.sqrt(scatter / alone / (alone - cross @ np.linalg.solve(curve, cross))))
+
+
+def by_frequency(values: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
+    """Values (..., k) of coefficients, each the mean over those of its frequency."""
+    out = np.array(values)
+    for h in np.unique(harmonics):
+        out[..., harmonics == h] = values[..., harmonics == h].mean(axis=-1, keepdims=True)
+    return out
 
 
 class _Spectra:
@@ -243,19 +272,22 @@ class _Spectra:
 
     def _scores(self, squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Slope (b, p) and expected curvature (b, p, p) of the log-likelihood by levels and steps."""
-        variance = self._variance(squares.shape)
-        known = variance[..., self.waves]
+        known = self._variance(squares.shape)[..., self.waves]
         share = self._smooth()[:, None] / known
-        excess = 0.5 * (squares[..., self.waves] / known - 1.0)
-        gain, weight = self._by_wave(share * excess), self._by_wave(0.5 * share**2) + 1e-9
-        count, size = self.step.shape
+        gain = self._by_wave(share * 0.5 * (squares[..., self.waves] / known - 1.0))
         slope = np.concatenate([gain.sum(axis=2), gain.sum(axis=1) @ self.steps - self.step / STEP_SD**2], axis=1)
+        return slope, self.curvature(share)
+
+    def curvature(self, share: np.ndarray) -> np.ndarray:
+        """Expected curvature (b, p, p) by levels and steps, of their shares (b, n, 6, waves) in variances."""
+        weight = self._by_wave(0.5 * share**2) + 1e-9
+        count, size = self.step.shape
         curve = np.zeros((count, 6 + size, 6 + size))
         curve[:, range(6), range(6)] = weight.sum(axis=2)
         curve[:, :6, 6:] = weight @ self.steps
         curve[:, 6:, :6] = curve[:, :6, 6:].transpose(0, 2, 1)
         curve[:, 6:, 6:] = (self.steps.T * weight.sum(axis=1)[:, None]) @ self.steps + np.eye(size) / STEP_SD**2
-        return slope, curve
+        return curve
 
     def penalty(self) -> np.ndarray:
         return np.sum((self.step / STEP_SD) ** 2, axis=1)

@@ -43,7 +43,7 @@ SEPARABLE = 6.0
 SIMULATED_ROUNDS = 4
 TOGETHER = 64
 """Fits that are made at once: as many as a processor's cache holds."""
-TISSUE_DRAWS, WHITE_DRAWS = 40, 24
+TISSUE_DRAWS, WHITE_DRAWS = 40, 64
 FLOOR_SHARE = 0.3
 """Of the fitted noise beside soft tissue's, as amplitudes."""
 TAKEN = 0.3
@@ -120,15 +120,10 @@ class WalkSearch:
         return disturbed_waves(first, self.strides, tissue, TISSUE_DRAWS, self.seed)
 
     @cached_property
-    def jitter(self) -> np.ndarray:
-        """Second moment of what white noise of one unit leaves, wave by wave: (6, 6, k)."""
+    def shaken(self) -> np.ndarray:
+        """Residuals that white noise of one unit leaves in a stride: (draws, 6, k)."""
         first = self.recordings[self.strides.windows[0][0]]
-        draws = disturbed_waves(first, self.strides, white, WHITE_DRAWS, self.seed)
-        moment = np.einsum("dik,djk->ijk", draws, draws) / len(draws)
-        h = self.strides.harmonics
-        for wave in np.unique(h):
-            moment[:, :, h == wave] = moment[:, :, h == wave].mean(axis=2, keepdims=True)
-        return moment
+        return disturbed_waves(first, self.strides, white, WHITE_DRAWS, self.seed)
 
     def _turn(self, left: np.ndarray) -> None:
         turn = rotation(left, self.strides.harmonics)

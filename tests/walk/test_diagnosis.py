@@ -189,13 +189,26 @@ def test_an_effect_that_is_not_there_costs_evidence():
     assert np.mean(gains) < -2.0
 
 
-def test_white_noise_of_coordinates_is_measured_by_its_growth_with_frequency():
-    random = np.random.default_rng(2)
+def white_draws(random, count, mixed):
+    """Draws of what white noise of one unit leaves: it grows with frequency, and `mixed` waves go together."""
     harmonics = np.array([0, *(h for h in range(1, 8) for _ in range(2))])
-    jitter = np.broadcast_to((harmonics / 4.0) ** 4 + 1e-6, (6, len(harmonics)))
-    y = 3.0 * np.sqrt(jitter) * random.normal(size=(4, 6, len(harmonics))) + 0.5 * random.normal(size=(4, 6, 15))
-    level, std, saved = white_level(y, noise_of(harmonics), jitter)
-    assert abs(level - 3.0) < 3.0 * std + 0.2
-    assert saved > 20.0
-    quiet = white_level(0.5 * random.normal(size=(4, 6, 15)), noise_of(harmonics), jitter)
+    free = random.normal(size=(count, 6, len(harmonics)))
+    shared = random.normal(size=(count, 1, 1))
+    return harmonics, ((harmonics / 4.0) ** 2 + 1e-3) * (np.sqrt(1.0 - mixed) * free + np.sqrt(mixed) * shared)
+
+
+@pytest.mark.parametrize("mixed", [0.0, 0.7])
+def test_white_noise_of_coordinates_is_measured_by_its_growth_with_frequency(mixed):
+    random = np.random.default_rng(2)
+    levels, z = [], []
+    for _ in range(60):
+        harmonics, draws = white_draws(random, 64, mixed)
+        y = 3.0 * white_draws(random, 4, mixed)[1] + 0.5 * random.normal(size=(4, 6, 15))
+        level, std, saved = white_level(y, noise_of(harmonics), draws)
+        assert saved > 20.0
+        levels.append(level)
+        z.append((level - 3.0) / std)
+    assert abs(np.mean(levels) - 3.0) < 0.3
+    assert 0.7 < np.std(z) < 1.3  # 1 +- 0.09 for errors that are normal
+    quiet = white_level(0.5 * random.normal(size=(4, 6, 15)), noise_of(harmonics), draws)
     assert quiet[0] < 0.6
