@@ -70,6 +70,20 @@ def _told(error: BaseException) -> str:
     return f"{type(error).__name__}: {words}".rstrip(": ")
 
 
+def at_fault(error: Exception, classes: Iterable[type]) -> InputError | None:
+    """One line on an error in the equations of somebody's own cause or rig; None if it is not in their code."""
+    theirs = {_path(one): one for one in classes if origin(one)}
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        one = theirs.get(Path(frame.filename).resolve())
+        if one is not None:
+            return InputError(f"class {one.__name__}: {_told(error)}", file=_where(one.__module__), row=frame.lineno)
+    return None
+
+
+def _path(one: type) -> Path:
+    return Path(getattr(sys.modules[one.__module__], "__file__", None) or "").resolve()
+
+
 def _row(error: BaseException, path: Path) -> int | None:
     if isinstance(error, SyntaxError):
         return error.lineno
@@ -155,6 +169,7 @@ def _form_lacks(one: type[Effect]) -> str:
         "expected a parameter with a null, which switches it off": not one.amplitudes(),
     }
     for name, info in one.parameters().items():
+        problems[f"expected another name than {name}, which every effect has"] = hasattr(Effect, name)
         inside = info.lower <= getattr(one, name) <= info.upper
         problems[f"expected {name} from {info.lower:g} to {info.upper:g}, as its bounds are"] = not inside
     return next((told for told, is_so in problems.items() if is_so), "")

@@ -103,12 +103,14 @@ def main() -> None:
     parser.add_argument("--hidden", type=int, default=45, help="studies that hide a cause")
     parser.add_argument("--nulls", type=int, default=20, help="studies that hide none")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--kind", choices=KINDS, help="hide this cause in all")
     parser.add_argument("--out", type=Path, help="file of records, one line each")
     options = parser.parse_args()
     gait, done = gait_of(data_folder()), {}
     if options.out and options.out.exists():
         done = {r["key"]: r for r in map(json.loads, options.out.read_text().splitlines())}
-    hidden = [(KINDS[k % len(KINDS)], options.seed + k) for k in range(options.hidden)]
+    kinds = (options.kind,) if options.kind else KINDS
+    hidden = [(kinds[k % len(kinds)], options.seed + k) for k in range(options.hidden)]
     nulls = [("none", options.seed + 10000 + k) for k in range(options.nulls)]
     spread = [(k / max(len(part), 1), one) for part in (hidden, nulls) for k, one in enumerate(part)]
     plan = [one for _, one in sorted(spread)]  # a run that is broken off has some of each

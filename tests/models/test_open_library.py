@@ -189,6 +189,7 @@ BAD = {
     "out_of_bounds": (CAUSE.replace("parameter(0.01", "parameter(11.0"), "expected coefficient from 0 to 10"),
     "no_stage": (CAUSE.replace("Stage.JOINT", '"hip"'), "expected a stage, one of Stage.NERVE"),
     "taken": (CAUSE.replace('"door_closer"', '"coulomb_friction"'), "coulomb_friction is a name of fes_pin already"),
+    "shadows": (CAUSE.replace("coefficient", "rate"), "expected another name than rate, which every effect has"),
     "odd_name": (CAUSE.replace('"door_closer"', '"door closer"'), "expected a name of letters, digits and _"),
 }
 
@@ -204,6 +205,18 @@ def test_a_file_that_is_not_whole_is_one_line(text, words, tmp_path):
     assert message.startswith(str(path)) and words in message and "\n" not in message
     stays = f"fes_pin_library_{path.stem}" in {name.rsplit("_", 1)[0] for name in sys.modules}
     assert stays == (text is not None and "cannot be run" not in message)  # what did not run is no module
+
+
+def test_an_error_in_its_equations_is_one_line(own, study, tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(CAUSE.replace("s.v", "s.speed"))
+    row = 1 + next(k for k, line in enumerate(path.read_text().splitlines()) if "s.speed" in line)
+    library = fp.load_library(own / "tail.py", path)
+    measured = fp.read_study(study, rigs=library.schemas())
+    with pytest.raises(fp.InputError) as caught:
+        fp.diagnose(measured, library=library)
+    assert str(caught.value).startswith(f"{path}, row {row}: class DoorCloser: AttributeError: ")
+    assert "\n" not in str(caught.value)
 
 
 def test_a_module_is_found_by_its_name(own, monkeypatch):

@@ -18,6 +18,7 @@ from fes_pin.models.compile.layout import Layout, make_layout
 from fes_pin.models.compile.predictor import derive_predictor
 from fes_pin.models.compile.virtual import VirtualProgram
 from fes_pin.models.model import Model
+from fes_pin.models.outside import at_fault
 
 _LOG = logging.getLogger("fes_pin")
 
@@ -95,8 +96,20 @@ def forget_programs() -> None:
 
 
 def derived(model: Model, layout: Layout) -> Equations:
-    """The equations of a simulation, or of a predictor where the layout has measured outputs."""
-    return derive_predictor(model, layout) if layout.measured else derive(model, layout)
+    """The equations of a simulation, or of a predictor where the layout has measured outputs.
+
+    Raises
+    ------
+    InputError
+        With file and row, if the equations of somebody's own cause or rig cannot be run.
+    """
+    try:
+        return derive_predictor(model, layout) if layout.measured else derive(model, layout)
+    except Exception as error:
+        told = at_fault(error, _classes(model))
+        if told is None:
+            raise
+        raise told from error
 
 
 def _classes(model: Model) -> tuple[type, ...]:
