@@ -15,7 +15,7 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
-from fes_pin.diagnose.decide.held_out import Errors, Evidence, folds_of, held_out_gain
+from fes_pin.diagnose.decide.held_out import Errors, Evidence, Gain, folds_of, held_out_gain
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
 from fes_pin.diagnose.errors_ahead import (
     Ahead,
@@ -56,8 +56,8 @@ class Judged:
         Causes that were certain in the fit, but that held-out trials did not bear out, with their p-values.
     evidence
         Of each cause, from trials held out.
-    nominal, without, extended
-        Squared errors over the horizon on held-out trials; in sample where nothing could be held out.
+    gains
+        Of each cause, over the horizon on held-out trials; in sample where nothing could be held out.
     ahead
         Errors of the nominal and of the extended model on the trials that were fitted.
     held_out_ahead
@@ -68,9 +68,7 @@ class Judged:
     left: Remainder
     refused: dict[str, float]
     evidence: dict[str, Evidence]
-    nominal: Errors
-    without: dict[str, Errors]
-    extended: Errors
+    gains: dict[str, Gain]
     ahead: tuple[Ahead, Ahead]
     held_out_ahead: tuple[Ahead, Ahead] | None
     horizon_s: float
@@ -93,6 +91,10 @@ def judge_driven(
 ) -> Judged:
     """Hold out, and judge what is left.
 
+    Trials that took no part speak for a cause by their likelihood. Where other causes stand beside it, they speak for it
+    by their errors over the horizon, too: several forms together, none of them quite right, come near to anything one
+    sample ahead (`Cause.helps` asks the same of a free simulation).
+
     Parameters
     ----------
     search, found
@@ -105,40 +107,43 @@ def judge_driven(
         How far ahead errors over a horizon look; `default_horizon` by default.
     """
     refused: dict[str, float] = {}
+    horizon = horizon_s or default_horizon(train)
     while True:
         folds = _folds(found, train, test)
         evidence = {n: _evidence(folds, found, n) for n in found.without} if folds else {}
-        weak = [n for n, e in evidence.items() if not e.low > 0.0]
+        errors = _errors(folds or [_Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon)
+        gains = {n: held_out_gain(errors[""], errors[n], errors["+"], seed) for n in found.without}
+        weak = {n: e.low for n, e in evidence.items() if not e.low > 0.0}
+        if not weak and len(evidence) > 1:
+            weak = {n: gains[n].low for n in evidence if not gains[n].low > 0.0}
         if not weak:
             break
-        weakest = min(weak, key=lambda n: evidence[n].low)
+        weakest = min(weak, key=lambda n: weak[n])
         refused[weakest] = found.p_values[weakest]
         found = search.told(tuple(sorted(n for n in found.without if n != weakest)))
     if refused:
         found = search.settle(tuple(found.without))
     random = random_parts(found.best)
-    left = _left(driven_remainder(found.best, seed), random, refused, search)
-    horizon = horizon_s or default_horizon(train)
-    whole = folds or [_Fold(found.nominal, found.best, found.without, tuple(train))]
-
-    def errors(chosen: Callable[[_Fold], Fit]) -> Errors:
-        return errors_over_horizon([(chosen(f), f.best, f.test) for f in whole], horizon)
-
     falling = falls(found.best.model, train)
     return Judged(
         found=found,
-        left=left,
+        left=_left(driven_remainder(found.best, seed), random, refused, search),
         refused=refused,
         evidence=evidence,
-        nominal=errors(lambda f: f.nominal),
-        without={n: errors(lambda f, n=n: f.without[n]) for n in found.without},  # type: ignore[misc]
-        extended=errors(lambda f: f.best),
+        gains=gains,
         ahead=tuple(errors_ahead([(f, train)], horizon, falling) for f in (found.nominal, found.best)),  # type: ignore[arg-type]
         held_out_ahead=_held_ahead(folds, horizon, falling),
         horizon_s=horizon,
         random=random,
         ceiling_percent=_ceiling(found.best),
     )
+
+
+def _errors(folds: Sequence[_Fold], found: Found, horizon_s: float) -> dict[str, Errors]:
+    """Over the horizon, on the trials of each fold: of the nominal model (""), of the best ("+"), without each cause."""
+    chosen: dict[str, Callable[[_Fold], Fit]] = {"": lambda f: f.nominal, "+": lambda f: f.best}
+    chosen |= {n: lambda f, n=n: f.without[n] for n in found.without}  # type: ignore[misc]
+    return {n: errors_over_horizon([(of(f), f.best, f.test) for f in folds], horizon_s) for n, of in chosen.items()}
 
 
 def _ceiling(fitted: Fit) -> float:
@@ -273,7 +278,7 @@ def driven_diagnosis(
             equivalents=alternatives(best, found.rivals[one.name], one.name),
             p_value=found.p_values[one.name],
             gain_fit=judged.gain_fit(one.name),
-            gain_held_out=held_out_gain(judged.nominal, judged.without[one.name], judged.extended, seed),
+            gain_held_out=judged.gains[one.name],
             evidence=judged.evidence.get(one.name),
         )
         for one in best.model.effects

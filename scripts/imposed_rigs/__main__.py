@@ -34,7 +34,8 @@ def judged(rig: str, cause: str, size: float, seed: int) -> dict[str, Any]:
         found = diagnose_joint(made)
     named = [[c.name, *c.equivalents] for c in found.causes]
     row = {"rig": rig, "cause": cause, "seed": seed, "verdict": found.verdict, "named": named}
-    return {**row, "seconds": round(time.process_time() - began, 1)}
+    row["gain"] = {c.name: [c.gain_held_out.percent, c.gain_held_out.low, c.gain_held_out.high] for c in found.causes}
+    return {**row, "left": found.remainder.unexplained, "seconds": round(time.process_time() - began, 1)}
 
 
 def table(rows: list[dict[str, Any]]) -> list[str]:
@@ -43,11 +44,13 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
     first = [r for r in others if r["named"] and r["cause"] in r["named"][0]]
     anywhere = [r for r in others if any(r["cause"] in names for names in r["named"])]
     alarms = [r for r in nulls if r["verdict"] != "adequate"]
+    alone = [r for r in first if len(r["named"]) == 1]
     lines = [
-        f"hidden cause in the first set: {len(first)} of {len(others)}; in any: {len(anywhere)} of {len(others)}",
+        f"hidden cause in the first set: {len(first)} of {len(others)}; in any: {len(anywhere)} of {len(others)}; "
+        f"no further name: {len(alone)} of {len(others)}",
         f"alarms where nothing is hidden: {len(alarms)} of {len(nulls)}",
     ]
-    wrong = [r for r in others if r not in first] + alarms
+    wrong = [r for r in others if r not in alone] + alarms
     return lines + [
         f"  {r['rig']} {r['cause'] or 'nothing'} (seed {r['seed']}): {r['verdict']} {r['named']}" for r in wrong
     ]

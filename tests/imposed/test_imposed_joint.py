@@ -10,6 +10,7 @@ from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
 from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.models.catalogue import Catalogue, shipped
 from fes_pin.models.effects import CoulombFriction, EffortGain, EffortOffset, PassiveRelaxation
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -133,3 +134,13 @@ def test_the_missing_effort_of_an_imposed_motion_is_the_friction_that_hides_in_i
     assert (found.kind, found.unit) == ("effort", "N m") and set(found.against) == {"angle", "rate", "time_s"}
     fast = np.abs(found.against["rate"]) > 0.2 * np.abs(found.against["rate"]).max()
     assert np.median(found.value[fast] * np.sign(found.against["rate"][fast])) == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_further_form_that_foretells_nothing_more_is_no_cause(tmp_path):
+    """Friction of another form than the library's: a lag earns likelihood beside it, and helps no prediction."""
+    made = joint.study(("coulomb_friction",), 0.3, np.random.default_rng(992000), tmp_path)
+    known = shipped()
+    two = Catalogue((CoulombFriction, known.effect("sensor_lag")), known.rigs)
+    found = diagnose_joint(made, library=two)
+    assert [c.name for c in found.causes] == ["coulomb_friction"]
+    assert found.remainder.unexplained

@@ -76,6 +76,8 @@ class Projection:
 
         Those that can be other in each trial are scored both ways.
         """
+        if not probes:
+            return Scores([], np.zeros((0, 0)), np.zeros(0), [])
         begun = in_parallel(lambda k: self._partly(probes, k), range(len(self._trials)))
         before, shared = (np.sum([b[j] for b in begun], axis=0) for j in (1, 2))
         left = in_parallel(lambda k: self._left(begun[k][0], shared, k), range(len(self._trials)))
