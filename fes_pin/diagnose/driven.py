@@ -91,9 +91,9 @@ def judge_driven(
 ) -> Judged:
     """Hold out, and judge what is left.
 
-    Trials that took no part speak for a cause by their likelihood. Where other causes stand beside it, they speak for it
-    by their errors over the horizon, too: several forms together, none of them quite right, come near to anything one
-    sample ahead (`Cause.helps` asks the same of a free simulation).
+    Trials that took no part speak for a cause by their likelihood. Where other causes stand beside it, they speak for
+    it by their errors over the horizon, too: several forms together, none of them quite right, come near to anything
+    one sample ahead (`Cause.helps` asks the same of a free simulation).
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def judge_driven(
 
 
 def _errors(folds: Sequence[_Fold], found: Found, horizon_s: float) -> dict[str, Errors]:
-    """Over the horizon, on the trials of each fold: of the nominal model (""), of the best ("+"), without each cause."""
+    """Over the horizon, on trials of each fold: of the nominal model (""), the best ("+"), and without each cause."""
     chosen: dict[str, Callable[[_Fold], Fit]] = {"": lambda f: f.nominal, "+": lambda f: f.best}
     chosen |= {n: lambda f, n=n: f.without[n] for n in found.without}  # type: ignore[misc]
     return {n: errors_over_horizon([(of(f), f.best, f.test) for f in folds], horizon_s) for n, of in chosen.items()}
