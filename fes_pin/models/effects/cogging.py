@@ -14,8 +14,9 @@ from fes_pin.models.stage import Effect, Stage
 
 TURN = 6.283185307179586
 """2 pi, rad per turn."""
-FEWEST, MOST = 2.0, 30.0
-"""Waves within the measured range: fewer would be a spring or gravity, more about a degree on half a radian."""
+FEWEST, MOST = 1.5, 30.0
+"""Waves within the measured range: one is a spring that hardens, or gravity; of one and a half, half comes again. More
+would be about a degree on half a radian."""
 STEP = 0.75
 """Between two that are tried, waves within the range: what it resolves is one, so a fit starts within its own hill."""
 TEETH = 36
