@@ -108,6 +108,7 @@ def judge_driven(
     """
     refused: dict[str, float] = {}
     horizon = horizon_s or default_horizon(train)
+    settled = frozenset(found.without)
     while True:
         folds = _folds(found, train, test)
         evidence = {n: _evidence(folds, found, n) for n in found.without} if folds else {}
@@ -115,14 +116,16 @@ def judge_driven(
         gains = {n: held_out_gain(errors[""], errors[n], errors["+"], seed) for n in found.without}
         weak = {n: e.low for n, e in evidence.items() if not e.low > 0.0}
         if not weak and len(evidence) > 1:
-            weak = {n: gains[n].low for n in evidence if not gains[n].low > 0.0}
-        if not weak:
+            weak = {n: gains[n].low for n in evidence if not gains[n].is_material}
+        names = frozenset(found.without)
+        if weak:
+            weakest = min(weak, key=lambda n: weak[n])
+            refused[weakest] = found.p_values[weakest]
+            found = search.told(tuple(sorted(names - {weakest})))
+        elif names != settled:
+            found, settled = search.settle(tuple(sorted(names)), refused), names
+        else:
             break
-        weakest = min(weak, key=lambda n: weak[n])
-        refused[weakest] = found.p_values[weakest]
-        found = search.told(tuple(sorted(n for n in found.without if n != weakest)))
-    if refused:
-        found = search.settle(tuple(found.without))
     random = random_parts(found.best)
     falling = falls(found.best.model, train)
     return Judged(

@@ -27,6 +27,11 @@ FAR = 1e6
 """The same for whitened residuals, in standard deviations."""
 
 
+MATERIAL_PERCENT = 0.1
+"""Gain of a cause beside others below which it is no cause: an input that is held over a sample, a tendon that is damped
+over half an integration step, the form of what was found first make as much."""
+
+
 @dataclass(frozen=True)
 class Gain:
     """Share, in percent, of the nominal model's squared error above the noise that an extension removes."""
@@ -34,6 +39,11 @@ class Gain:
     percent: float
     low: float
     high: float
+
+    @property
+    def is_material(self) -> bool:
+        """Whether it is certainly more than next to nothing."""
+        return self.low > MATERIAL_PERCENT
 
 
 @dataclass(frozen=True)

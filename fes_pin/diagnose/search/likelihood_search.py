@@ -9,6 +9,7 @@ effort, so that what stands beside a cause must earn its place against that.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from fes_pin.data.schema import IMPOSED
@@ -132,7 +133,7 @@ class LikelihoodSearch:
         none, without, extended = (
             errors_over_horizon([(f, larger, trials)], horizon) for f in (nominal, smaller, larger)
         )
-        return held_out_gain(none, without, extended, self.seed).low > 0.0
+        return held_out_gain(none, without, extended, self.seed).is_material
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
         """Family-wise p-value of what a larger set adds."""
@@ -184,14 +185,31 @@ class LikelihoodSearch:
             names = tuple(n for n in names if n != weakest)
         return names
 
-    def settle(self, names: Names) -> Found:
-        """Everything that is to be said of a set of causes: its rivals, and each cause's part in it."""
+    def settle(self, names: Names, refused: Iterable[str] = ()) -> Found:
+        """Everything that is to be said of a set of causes: its rivals, and each cause's part in it.
+
+        Where a rival turns out to be the better set, it is the answer: sets were extended one cause at a time, and what
+        was best beside fewer need not be best beside all. Each exchange lowers the price, or drops a cause.
+
+        Parameters
+        ----------
+        names
+            A set that is fitted.
+        refused
+            Names that no answer may hold.
+        """
         self.progress(0.75, "rivals")
-        for name in names:
-            rest = tuple(n for n in names if n != name)
-            self.sets.without(names, name)
-            self.sets.extend_all(rest, None if len(names) == 1 else JOINT_FITS)
-        return self.told(names)
+        while True:
+            for name in names:
+                rest = tuple(n for n in names if n != name)
+                self.sets.without(names, name)
+                self.sets.extend_all(rest, None if len(names) == 1 else JOINT_FITS)
+            better = next(n for n in self.sets.ranked(len(names)) if not set(n) & set(refused))
+            if better == names:
+                return self.told(names)
+            while self._refined(better):
+                pass
+            names = self._backward(better)
 
     def told(self, names: Names) -> Found:
         """What the sets that are fitted say of one of them, which no further rivals are sought for."""
