@@ -25,11 +25,9 @@ RUNAWAY = 10.0
 """A prediction that leaves the trials counts as this many times their largest reading: where it goes says nothing."""
 FAR = 1e6
 """The same for whitened residuals, in standard deviations."""
-
-
 MATERIAL_PERCENT = 0.1
-"""Gain of a cause beside others below which it is no cause: an input that is held over a sample, a tendon that is damped
-over half an integration step, the form of what was found first make as much."""
+"""Gain of a cause beside others below which it is no cause: an input that is held over a sample, a tendon damped over
+half an integration step, the form of what was found first make as much."""
 
 
 @dataclass(frozen=True)
