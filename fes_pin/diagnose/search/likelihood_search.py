@@ -13,13 +13,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from fes_pin.data.schema import IMPOSED
-from fes_pin.diagnose.decide.held_out import held_out_gain
 from fes_pin.diagnose.decide.significance import Family
-from fes_pin.diagnose.errors_ahead import errors_over_horizon
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names
 from fes_pin.diagnose.search.score import Scored, best_pairs
 from fes_pin.diagnose.search.simulation_search import NominalFitError
-from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.workers import OutOfTime, Progress, time_limit
@@ -111,29 +108,11 @@ class LikelihoodSearch:
             if best and not self._worth_extending(best):
                 break
             self._extend(size)
-            self._refine_first(size)
-            first = next((n for n in sets.ranked(size)[:BEAM] if self._earns(sets.fits[n], sets.fits[best])), None)
-            if first is None:
+            first = self._refine_first(size)
+            if not self.p_value(sets.fits[first], sets.fits[best]) < CLAIM_LEVEL:
                 break
             best = self._fallback = first
         return self.settle(self._backward(best))
-
-    def _earns(self, larger: Fit, smaller: Fit) -> bool:
-        """Whether a set earns its place: certain, and beside other causes better over the horizon, too.
-
-        What one-step-ahead predictions alone are better for is an error of form that the others leave; held-out trials
-        would refuse it, and every set that is built on it costs as much as the last.
-        """
-        if not self.p_value(larger, smaller) < CLAIM_LEVEL:
-            return False
-        if not smaller.model.effects:
-            return True
-        trials, nominal = self.sets.trials, self.nominal()
-        horizon = default_horizon(trials)
-        none, without, extended = (
-            errors_over_horizon([(f, larger, trials)], horizon) for f in (nominal, smaller, larger)
-        )
-        return held_out_gain(none, without, extended, self.seed).is_material
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
         """Family-wise p-value of what a larger set adds."""
@@ -158,11 +137,12 @@ class LikelihoodSearch:
             missing = {k: v for k, v in pairs.items() if k not in sets.fits}
             sets.add({k: lambda v=v: sets.extend_with_both(base, v) for k, v in missing.items()})  # type: ignore[misc]
 
-    def _refine_first(self, size: int) -> None:
-        """Give the best sets of a size the form that the data demand."""
+    def _refine_first(self, size: int) -> Names:
+        """The best set of a size, once each of the best has the form that the data demand."""
         for names in self.sets.ranked(size)[:BEAM]:
             while self._refined(names):
                 pass
+        return self.sets.ranked(size)[0]
 
     def _refined(self, names: Names) -> bool:
         """Adopt the refinement of a set that the data demand most; False if they demand none."""
