@@ -1,0 +1,78 @@
+"""Sets are extended one cause at a time; a rival that turns out better beside the others takes a cause's place."""
+
+import itertools
+from types import SimpleNamespace
+
+import pytest
+
+from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
+
+PRICE = {
+    (): 0.0,
+    ("lag",): -100.0,
+    ("tendon",): -1.0,
+    ("velocity",): -2.0,
+    ("lag", "velocity"): -150.0,
+    ("lag", "tendon"): -100.5,
+    ("tendon", "velocity"): -400.0,
+}
+"""A tendon shows nothing without velocity, and a lag nearly as much as it alone."""
+
+
+class Sets:
+    """Fits by their names, of which no cause comes in but beside a set that is there."""
+
+    def __init__(self):
+        self.fits, self.trials = {(): self.fit(())}, ()
+        self.library = SimpleNamespace(silent=lambda: ())
+
+    def fit(self, names):
+        sse = PRICE[names]
+        return SimpleNamespace(names=names, sse=sse, price=sse + 5.0 * len(names), degrees=len(names))
+
+    def extend_all(self, base, most=None):
+        for name in ("lag", "tendon", "velocity"):
+            names = tuple(sorted({*base, name}))
+            self.fits.setdefault(names, self.fit(names))
+
+    def without(self, names, name):
+        rest = tuple(n for n in names if n != name)
+        return self.fits.setdefault(rest, self.fit(rest))
+
+    def ranked(self, size):
+        return sorted((n for n in self.fits if len(n) == size), key=lambda n: self.fits[n].price)
+
+    def refined(self, names, demanded):
+        return None
+
+    def scores(self, base):
+        return SimpleNamespace(scored=[])
+
+
+@pytest.fixture
+def search():
+    made = LikelihoodSearch(Sets(), 0, lambda share, words: None)
+    made.family = SimpleNamespace(p_value=lambda gain, degrees: 1e-6 if gain > 10.0 else 0.5)
+    made.sets.extend_all(())
+    made.sets.extend_all(("lag",))
+    return made
+
+
+def test_a_rival_that_is_better_beside_the_others_is_the_answer(search):
+    found = search.settle(("lag", "velocity"))
+    assert found.best.names == ("tendon", "velocity")
+    assert [f.names for f in found.rivals["tendon"]] == [("lag", "velocity")]
+    assert set(found.without) == {"tendon", "velocity"}
+
+
+def test_what_was_refused_comes_back_in_no_exchange(search):
+    found = search.settle(("lag", "velocity"), refused=("tendon",))
+    assert found.best.names == ("lag", "velocity")
+
+
+def test_an_answer_is_the_cheapest_of_its_size(search):
+    for size in (1, 2):
+        for names in itertools.combinations(("lag", "tendon", "velocity"), size):
+            search.sets.fits.setdefault(names, search.sets.fit(names))
+            best = search.settle(names).best
+            assert best.price == min(f.price for n, f in search.sets.fits.items() if len(n) == len(best.names))
