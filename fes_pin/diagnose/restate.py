@@ -21,6 +21,7 @@ from fes_pin.diagnose.decide.held_out import Errors, cross_validate, errors_of, 
 from fes_pin.diagnose.errors_ahead import Ahead
 from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated_trials, takes_most
+from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.diagnose.searches import Result, Search
@@ -75,6 +76,8 @@ def search_with_conditions(nominal: Model, trials: Sequence[Trial], run: Run) ->
         best = searched.best.model
         misread = _found(best, trials) if best.effects else first
         made = None if misread is None else _restated(nominal, trials, misread, run)
+        if made is not None and not _leaves_nothing(made):
+            made = None  # beside a model that is not right itself, a trial is odd by the model's error
     if made is None or search.was_stopped or made.search.was_stopped:
         return search, searched, None
     price = PARAMETER_PRICE + 2.0 * math.log(sum(len(nominal.rig.stated(t)) for t in trials))
@@ -101,6 +104,13 @@ def _restated(nominal: Model, trials: Sequence[Trial], misread: Misread, run: Ru
             misread, other = again, restated_trials(nominal, trials, again)
             search, searched = run(other)
     return Restated(misread, other, search, searched)
+
+
+def _leaves_nothing(made: Restated) -> bool:
+    """Whether the restated trials are explained: nothing that was looked for stands out of what is left."""
+    if isinstance(made.searched, Searched):
+        return made.searched.complete
+    return not driven_remainder(made.searched.best).unexplained
 
 
 def _leaves_noise(made: Restated) -> bool:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from imposed_rigs import muscle
 from imposed_rigs.motion import wandering
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -10,7 +11,9 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.plausibility import implausible
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.identify.likelihood import LikelihoodProblem, first_guess, maximise
+from fes_pin.models.catalogue import Catalogue, shipped
 from fes_pin.models.effects import ForceLength, ForceVelocity, ParallelStiffness, PulseSummation, SeriesElasticity
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Muscle
@@ -158,3 +161,12 @@ def test_a_random_force_acts_on_a_muscle_on_a_lever():
 def test_no_motion_is_proposed():
     """What separates causes on a lever would be a motion, and none is made up."""
     assert Muscle.conditions_to_try(study_of()) == set()
+
+
+def test_beside_a_form_that_is_not_right_no_trial_was_misread(tmp_path):
+    """Of a muscle whose force falls with its length otherwise than the library's, one trial is always the oddest."""
+    made = muscle.study(("force_length",), 0.3, np.random.default_rng(995013), tmp_path)
+    known = shipped()
+    found = diagnose_joint(made, library=Catalogue((known.effect("force_length"),), known.rigs))
+    assert [c.name for c in found.causes] == ["force_length"]
+    assert found.remainder.unexplained
