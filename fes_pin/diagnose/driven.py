@@ -109,8 +109,9 @@ def judge_driven(
     refused: dict[str, float] = {}
     horizon = horizon_s or default_horizon(train)
     settled = frozenset(found.without)
+    again = _Again()
     while True:
-        folds = _folds(found, train, test)
+        folds = _folds(found, train, test, again)
         evidence = {n: _evidence(folds, found, n) for n in found.without} if folds else {}
         errors = _errors(folds or [_Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon)
         gains = {n: held_out_gain(errors[""], errors[n], errors["+"], seed) for n in found.without}
@@ -187,7 +188,21 @@ class _Fold:
     """False if the trials were held out by the study itself, and are in no fit."""
 
 
-def _folds(found: Found, train: Sequence[Trial], test: Sequence[Trial]) -> list[_Fold]:
+class _Again:
+    """Fits made again without some trials, each once: a set less a cause that is refused is the next set."""
+
+    def __init__(self) -> None:
+        self._kept: dict[tuple[int, tuple[int, ...]], tuple[Fit, Fit]] = {}
+
+    def __call__(self, wanted: Sequence[tuple[Fit, Sequence[int]]]) -> list[Fit]:
+        keys = [(id(fitted), tuple(held)) for fitted, held in wanted]
+        missing = {k: w for k, w in zip(keys, wanted, strict=True) if k not in self._kept}
+        made = in_parallel(lambda w: _without(*w), list(missing.values()))
+        self._kept |= {k: (w[0], one) for (k, w), one in zip(missing.items(), made, strict=True)}
+        return [self._kept[k][1] for k in keys]
+
+
+def _folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refitted: _Again) -> list[_Fold]:
     """The study's own held-out trials, or every trial in its turn; none where there is but one."""
     if test:
         return [_Fold(found.nominal, found.best, found.without, tuple(test), within=False)]
@@ -196,7 +211,7 @@ def _folds(found: Found, train: Sequence[Trial], test: Sequence[Trial]) -> list[
     held = folds_of(train)
     fits = {"": found.nominal, "+": found.best, **found.without}
     wanted = [(k, n) for k in range(len(held)) for n in fits]
-    again = dict(zip(wanted, in_parallel(lambda w: _without(fits[w[1]], held[w[0]]), wanted), strict=True))
+    again = dict(zip(wanted, refitted([(fits[n], held[k]) for k, n in wanted]), strict=True))
     return [
         _Fold(again[k, ""], again[k, "+"], {n: again[k, n] for n in found.without}, tuple(train[i] for i in out))
         for k, out in enumerate(held)
