@@ -36,6 +36,7 @@ def cohort(
 ) -> None:
     """Diagnose many studies, and say what they have in common. What is there already is not done again."""
     from fes_pin.cohort.run import run_cohort
+    from fes_pin.data.provenance import this_command
 
     with _progress() as tell:
         made = run_cohort(
@@ -46,6 +47,7 @@ def cohort(
             seed=seed,
             limit=limit,
             library=tuple(library or ()),
+            command=this_command(),
             progress=tell,
         )
     good = len(made.studies) - len(made.failed)

@@ -102,8 +102,9 @@ def diagnose(
             verdict = diagnose_walking(measured, out, seed, limit, tell)
         typer.echo(f"{verdict}\nreport: {out / 'report.html'}")
         return
+    from fes_pin.data.provenance import this_command
     from fes_pin.diagnose.diagnosis import diagnose_joint as find
-    from fes_pin.diagnose.record import NEXT_FILE, by_this_command, diagnosis_files
+    from fes_pin.diagnose.record import NEXT_FILE, by_command, diagnosis_files
     from fes_pin.diagnose.trajectories import trajectories
     from fes_pin.view.report import report_html
 
@@ -115,7 +116,8 @@ def diagnose(
                 say_whose_code(to_be_said.pop())
             tell(DIAGNOSING * share, words)
 
-        diagnosis = by_this_command(find(measured, library=catalogue, seed=seed, limit=limit, progress=told))
+        found = find(measured, library=catalogue, seed=seed, limit=limit, progress=told)
+        diagnosis = by_command(found, this_command())
         tell(DIAGNOSING, "report")
         files: dict[str, str | bytes] = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
         if table is not None:

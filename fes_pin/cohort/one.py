@@ -33,6 +33,8 @@ class Work:
         As `diagnose` takes them.
     library
         Files and modules of causes and rigs.
+    command
+        The command line that asked for it; "" for a call from Python. The answer does not depend on it.
     """
 
     name: str
@@ -40,11 +42,12 @@ class Work:
     seed: int = 0
     limit: float | None = None
     library: tuple[str, ...] = ()
+    command: str = ""
 
     def key(self) -> str:
         """What the answer depends on: the study's files, the versions, seed, limit and library."""
         files = [hashlib.sha256(Path(n).read_bytes()).hexdigest() for n in self.library if Path(n).is_file()]
-        told = [asdict(self) | {"folder": ""}, hashes(Path(self.folder)), versions(), files]
+        told = [asdict(self) | {"folder": "", "command": ""}, hashes(Path(self.folder)), versions(), files]
         return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 
@@ -96,10 +99,10 @@ def _files(work: Work) -> dict[str, str | bytes]:
     if study.rig == "body":
         return _walking(study, work.seed)
     from fes_pin.diagnose.diagnosis import diagnose_joint  # noqa: PLC0415
-    from fes_pin.diagnose.record import diagnosis_files  # noqa: PLC0415
+    from fes_pin.diagnose.record import by_command, diagnosis_files  # noqa: PLC0415
     from fes_pin.view.report import report_html  # noqa: PLC0415
 
-    found = diagnose_joint(study, library=catalogue, seed=work.seed, limit=work.limit)
+    found = by_command(diagnose_joint(study, library=catalogue, seed=work.seed, limit=work.limit), work.command)
     return {**diagnosis_files(found), "report.html": report_html(found)}
 
 

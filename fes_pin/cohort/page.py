@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fes_pin.cohort.pool import pooled
-from fes_pin.data.provenance import this_command, today, versions
+from fes_pin.data.provenance import today, versions
 from fes_pin.diagnose.text import percent, probability
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
@@ -27,6 +27,7 @@ def cohort_html(
     pooled_: Sequence[PageRow],
     prevalence: Sequence[PageRow],
     seed: int,
+    command: str = "",
 ) -> str:
     """The page, which links the reports beside it and needs nothing else."""
     good = [r for r in studies if r["verdict"] != "failed"]
@@ -35,7 +36,7 @@ def cohort_html(
         section("Which causes, and in how many studies", *_prevalence(prevalence, len(good))),
         section("How large they are in the population", *_pooled(causes, pooled_)),
         section("Studies", *_studies(studies)),
-        section("Where this comes from", *_provenance(seed)),
+        section("Where this comes from", *_provenance(seed, command)),
         element("footer", "Made by fes-pin. Intervals are 95 %. SI units."),
     ]
     return page("Cohort", joined([p for p in parts if p.text]))
@@ -182,7 +183,8 @@ def _studies(rows: Sequence[PageRow]) -> list[Markup]:
     return [made] if len(rows) <= FOREST else [folded(f"All {len(rows)} studies", made)]
 
 
-def _provenance(seed: int) -> list[Markup]:
+def _provenance(seed: int, command: str) -> list[Markup]:
     told = ", ".join(f"{n} {v}" for n, v in versions().items())
-    rows: list[list[Content]] = [["made", today()], ["seed", str(seed)], ["command", element("code", this_command())]]
-    return [element("div", html_table(("what", "value"), [*rows, ["versions", told]], prose=True), class_="provenance")]
+    rows: list[list[Content]] = [["made", today()], ["seed", str(seed)], ["versions", told]]
+    rows += [["command", element("code", command)]] if command else []
+    return [element("div", html_table(("what", "value"), rows, prose=True), class_="provenance")]

@@ -73,6 +73,7 @@ def run_cohort(
     seed: int = 0,
     limit: float | None = None,
     library: Sequence[str] = (),
+    command: str = "",
     progress: Callable[[CohortProgress], None] | None = None,
     run: Callable[[Work, str], Answer] = diagnose_one,
 ) -> Cohort:
@@ -90,6 +91,8 @@ def run_cohort(
         Address of a Dask scheduler, whose workers are used instead.
     seed, limit, library
         As `diagnose` takes them.
+    command
+        The command line that this is run by, for reports and page; "" for a call from Python.
     progress
         Called after each study.
     run
@@ -106,7 +109,7 @@ def run_cohort(
     catalogue = load_library(*library)  # what cannot be read is said before any work
     check_folder(out)
     store = Store(out)
-    every = [Work(n, str(f), seed, limit, library) for n, f in found.items()]
+    every = [Work(n, str(f), seed, limit, library, command) for n, f in found.items()]
     todo: list[Task] = [(work, key) for work in every if not store.has(work, key := work.key())]
     tell, began = progress or (lambda _progress: None), time.monotonic()
     done, failed = len(every) - len(todo), 0
@@ -123,7 +126,7 @@ def run_cohort(
     studies, causes = study_rows(kept()), cause_rows(kept(), catalogue)
     good = sum(r["verdict"] != "failed" for r in studies)
     made = Cohort(studies, causes, pooled_rows(causes, nominal_rows(kept()), good), prevalence_rows(causes, good))
-    write_files(out, _files(made, seed))
+    write_files(out, _files(made, seed, command))
     if not good:
         raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {studies[0]['error']}")
     return made
@@ -137,7 +140,7 @@ def _answers(
     return on_cluster(todo, scheduler, run) if scheduler else in_processes(todo, workers, run)
 
 
-def _files(made: Cohort, seed: int) -> dict[str, str | bytes]:
+def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
     out: dict[str, str | bytes] = {}
     for name in ("studies", "causes", "pooled", "prevalence"):
         rows: list[Row] = getattr(made, name)
@@ -145,7 +148,7 @@ def _files(made: Cohort, seed: int) -> dict[str, str | bytes]:
         parquet = parquet_bytes(rows, HEADS[name])
         if parquet is not None:
             out[f"{name}.parquet"] = parquet
-    out["cohort.html"] = cohort_html(made.studies, made.causes, made.pooled, made.prevalence, seed)
+    out["cohort.html"] = cohort_html(made.studies, made.causes, made.pooled, made.prevalence, seed, command)
     return out
 
 

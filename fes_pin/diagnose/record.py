@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from fes_pin.data.numbers import printed
-from fes_pin.data.provenance import this_command
 from fes_pin.data.trial import trial_csv
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.result import Diagnosis
@@ -63,11 +62,11 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def by_this_command(diagnosis: Diagnosis) -> Diagnosis:
-    """The diagnosis with the command line of this process in its provenance."""
+def by_command(diagnosis: Diagnosis, command: str) -> Diagnosis:
+    """The diagnosis with a command line in its provenance."""
     if diagnosis.provenance is None:
         return diagnosis
-    return replace(diagnosis, provenance=replace(diagnosis.provenance, command=this_command()))
+    return replace(diagnosis, provenance=replace(diagnosis.provenance, command=command))
 
 
 def diagnosis_files(diagnosis: Diagnosis) -> dict[str, str]:

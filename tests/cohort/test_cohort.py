@@ -1,6 +1,7 @@
 """A cohort: every study once, whatever fails or is killed; nothing done twice when it goes on."""
 
 import csv
+import json
 import os
 import signal
 import subprocess
@@ -122,3 +123,6 @@ def test_the_command_diagnoses_a_study_and_says_what_failed(tmp_path):
     assert {p.name for p in (tmp_path / "out/studies/ankle_demo").iterdir()} == {
         *("diagnosis.json", "model.toml", "report.html", "state.json")
     }
+    record = json.loads((tmp_path / "out/studies/ankle_demo/diagnosis.json").read_text())
+    for told in (record["provenance"]["command"], (tmp_path / "out/cohort.html").read_text()):
+        assert "fes-pin cohort" in told and "--limit 0" in told
