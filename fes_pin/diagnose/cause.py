@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fes_pin.diagnose.decide.held_out import Evidence, Gain
+from fes_pin.diagnose.decide.held_out import Evidence, Gain, speaks_for
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,9 @@ class Cause:
     def helps(self, complete: bool, alone: bool) -> bool:
         """True if trials that took no part speak for it.
 
-        By their likelihood where the model leaves only noise, by their open-loop errors where it does not; where other
-        causes stand beside it by both, for several flexible forms together come near to anything. A cause alone may
-        have no gain: if one trial of many reaches a stop, the others do not foretell it.
+        See `decide.held_out.speaks_for`.
         """
-        known = self.evidence if complete else None
-        likely = known is None or known.low > 0.0
-        return likely and (self.gain_held_out.low > 0.0 or (known is not None and alone))
+        return speaks_for(self.evidence if complete else None, self.gain_held_out, alone)
 
 
 @dataclass(frozen=True)

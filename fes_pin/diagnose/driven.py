@@ -15,7 +15,7 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
-from fes_pin.diagnose.decide.held_out import Errors, Evidence, Gain, folds_of, held_out_gain
+from fes_pin.diagnose.decide.held_out import Errors, Evidence, Gain, folds_of, held_out_gain, speaks_for
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
 from fes_pin.diagnose.errors_ahead import (
     Ahead,
@@ -91,9 +91,9 @@ def judge_driven(
 ) -> Judged:
     """Hold out, and judge what is left.
 
-    Trials that took no part speak for a cause by their likelihood. Where other causes stand beside it, they speak for
-    it by their errors over the horizon, too: several forms together, none of them quite right, come near to anything
-    one sample ahead (`Cause.helps` asks the same of a free simulation).
+    Trials that took no part speak for a cause, or not, by the rule of rigs that are simulated freely (`speaks_for`),
+    with errors over the horizon: several forms together, none of them quite right, come near to anything one sample
+    ahead.
 
     Parameters
     ----------
@@ -115,12 +115,12 @@ def judge_driven(
         evidence = {n: _evidence(folds, found, n) for n in found.without} if folds else {}
         errors = _errors(folds or [_Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon)
         gains = {n: held_out_gain(errors[""], errors[n], errors["+"], seed) for n in found.without}
-        weak = {n: e.low for n, e in evidence.items() if not e.low > 0.0}
-        if not weak and len(evidence) > 1:
-            weak = {n: gains[n].low for n in evidence if not gains[n].is_material}
+        left = driven_remainder(found.best, seed)
+        known = {n: None if left.unexplained else e for n, e in evidence.items()}
+        weak = [n for n, e in known.items() if not speaks_for(e, gains[n], alone=len(known) == 1)]
         names = frozenset(found.without)
         if weak:
-            weakest = min(weak, key=lambda n: weak[n])
+            weakest = min(weak, key=lambda n: gains[n].low)
             refused[weakest] = found.p_values[weakest]
             found = search.told(tuple(sorted(names - {weakest})))
         elif names != settled:
@@ -131,7 +131,7 @@ def judge_driven(
     falling = falls(found.best.model, train)
     return Judged(
         found=found,
-        left=_left(driven_remainder(found.best, seed), random, refused, search),
+        left=_left(left, random, refused, search),
         refused=refused,
         evidence=evidence,
         gains=gains,

@@ -152,6 +152,26 @@ class Evidence:
         return Evidence(self.added + other.added, self.squares + other.squares)
 
 
+def speaks_for(evidence: Evidence | None, gain: Gain, alone: bool) -> bool:
+    """Whether trials that took no part speak for a cause.
+
+    By their likelihood where the model leaves only noise, by their errors over time where it does not; where other
+    causes stand beside it by both, for several flexible forms together come near to anything. A cause alone may have no
+    gain: if one trial of many reaches a stop, the others do not foretell it.
+
+    Parameters
+    ----------
+    evidence
+        By likelihood; None where the model leaves more than noise, and a likelihood says little.
+    gain
+        Of its errors over time.
+    alone
+        Whether no other cause stands beside it.
+    """
+    likely = evidence is None or evidence.low > 0.0
+    return likely and (gain.is_material or (evidence is not None and alone))
+
+
 @dataclass(frozen=True)
 class HeldOut:
     """On held-out trials: errors of the nominal model, of the extension, and of it without each of its causes.
