@@ -79,6 +79,7 @@ class LikelihoodSearch:
     def __init__(self, sets: LikelihoodFits, seed: int, progress: Progress) -> None:
         self.sets, self.seed, self.progress = sets, seed, progress
         self.was_stopped = False
+        self._formed: set[Names] = set()
 
     def run(self) -> Found:
         """Search, as long as the limit of time lets it; the nominal model is fitted and scored anyway."""
@@ -140,9 +141,14 @@ class LikelihoodSearch:
     def _refine_first(self, size: int) -> Names:
         """The best set of a size, once each of the best has the form that the data demand."""
         for names in self.sets.ranked(size)[:BEAM]:
-            while self._refined(names):
-                pass
+            self._refine(names)
         return self.sets.ranked(size)[0]
+
+    def _refine(self, names: Names) -> None:
+        """Give a set, once, the form that the data demand."""
+        while names not in self._formed and self._refined(names):
+            pass
+        self._formed.add(names)
 
     def _refined(self, names: Names) -> bool:
         """Adopt the refinement of a set that the data demand most; False if they demand none."""
@@ -179,6 +185,7 @@ class LikelihoodSearch:
             Names that no answer may hold.
         """
         self.progress(0.75, "rivals")
+        self._refine(names)
         while True:
             for name in names:
                 rest = tuple(n for n in names if n != name)
@@ -187,8 +194,7 @@ class LikelihoodSearch:
             better = next(n for n in self.sets.ranked(len(names)) if not set(n) & set(refused))
             if better == names:
                 return self.told(names)
-            while self._refined(better):
-                pass
+            self._refine(better)
             names = self._backward(better)
 
     def told(self, names: Names) -> Found:
