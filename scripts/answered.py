@@ -12,6 +12,7 @@ import typer
 from going_on import results_of
 
 import fes_pin as fp
+from fes_pin.diagnose.misread import NAME as MISREAD
 from fes_pin.models.catalogue import shipped
 
 
@@ -35,7 +36,7 @@ def judged(study: Path, number: int) -> dict[str, Any]:
 
 def table(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Counts in words, and every study that was not answered exactly."""
-    known = {e.name for e in shipped().effects}
+    known = {e.name for e in shipped().effects} | {MISREAD}
     nulls = [r for r in rows if not r["causes"]]
     outside = [r for r in rows if set(r["causes"]) - known]
     hidden = [r for r in rows if r["causes"] and r not in outside]
@@ -45,7 +46,8 @@ def table(rows: Sequence[dict[str, Any]]) -> list[str]:
         right, alone = (sum(f(r) for r in many) for f in (_in_sets, _exact))
         lines.append(f"{count} hidden: all in their sets {right} of {len(many)}, no further name {alone}")
     if outside:
-        lines.append(f"outside the library: {sum(r['left'] or not r['named'] for r in outside)} of {len(outside)} open")
+        left = sum(r["left"] for r in outside)
+        lines.append(f"outside the library: {left} of {len(outside)} with a remainder")
     seconds = sorted(r["seconds"] for r in rows)
     lines.append(f"processor time: {seconds[len(seconds) // 2]:.1f} s in the median, {seconds[-1]:.1f} s at most")
     return lines + [

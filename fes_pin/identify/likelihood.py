@@ -270,9 +270,18 @@ def _scored(now: _Told, moved: Sequence[_Told]) -> tuple[np.ndarray, np.ndarray]
 
 
 def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray, damping: float) -> np.ndarray:
+    """A step of the logarithms, no longer than `LONGEST_MOVE`.
+
+    Raises
+    ------
+    LinAlgError
+        If the likelihood has no finite slope; LAPACK would print lines of its own beside.
+    """
     step = np.zeros(len(gradient))
     if free.any():
         inner = information[np.ix_(free, free)]
+        if not (np.isfinite(inner).all() and np.isfinite(gradient[free]).all()):
+            raise np.linalg.LinAlgError("the likelihood has no finite slope by what is random")
         inner = inner + np.diag(damping * np.diag(inner) + 1e-9)
         step[free] = np.linalg.lstsq(inner, gradient[free], rcond=1e-12)[0]
     longest = float(np.abs(step).max(initial=0.0))

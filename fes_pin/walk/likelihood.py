@@ -215,6 +215,15 @@ def _spread_of_white(
 
     With its share s of a variance v, the score is sum s (y^2 / v - 1) / 2. Its information is less what the spectrum's
     levels and steps explain as well. Its scatter is that of the draws in the white part, s^2 z^2 / 2.
+
+    Parameters
+    ----------
+    spectra, variance
+        Of all levels that were tried, and their variances (b, n, 6, k).
+    jitter, draws
+        (6, k) and (d, 6, k), of noise of one unit.
+    number
+        Which of the levels.
     """
     assert spectra.white is not None
     waves = spectra.waves

@@ -26,8 +26,9 @@ RUNAWAY = 10.0
 FAR = 1e6
 """The same for whitened residuals, in standard deviations."""
 MATERIAL_PERCENT = 0.1
-"""Gain of a cause beside others below which it is no cause: an input that is held over a sample, a tendon damped over
-half an integration step, the form of what was found first make as much."""
+"""Gain of a cause beside others below which it is no cause, from experience: lags and hums that were not there made up
+to 0.04 % beside forms that are not the library's (`scripts/imposed`, seeds 991015 and 992000); of the second causes of
+nine drawn rigs the low end was 0.27 % and more."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Gain:
 
     @property
     def is_material(self) -> bool:
-        """Whether it is certainly more than next to nothing."""
+        """Whether the low end of its interval is above `MATERIAL_PERCENT`."""
         return self.low > MATERIAL_PERCENT
 
 
