@@ -20,7 +20,7 @@ from fes_pin.contrast.words import of_cause, of_nominal
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.diagnose.cause import ParameterEstimate
-from fes_pin.diagnose.diagnosis import despiked_study, split
+from fes_pin.diagnose.diagnosis import measured_study, split
 from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.driven import driven_remainder
@@ -79,9 +79,9 @@ def contrast(
     began = time.perf_counter()
     tell = progress or (lambda _share, _words: None)
     catalogue = catalogue_of(library)
-    joined, _ = despiked_study(grouped_study(study, after, by, groups))
-    nominal = nominal_model(joined)
-    warnings = list(check_study(joined, nominal))
+    measured = measured_study(grouped_study(study, after, by, groups))
+    joined, nominal = measured.study, nominal_model(measured.study)
+    warnings = [*measured.warnings, *check_study(joined, nominal)]
     train, _ = split(joined)
     names = tuple(dict.fromkeys(t.group for t in joined.trials if t.group is not None))
     trials = {g: [t for t in train if t.group == g] for g in names}

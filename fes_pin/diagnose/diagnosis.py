@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.provenance import provenance_now
 from fes_pin.data.spikes import without_spikes
+from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.driven import driven_diagnosis
@@ -66,9 +67,9 @@ def diagnose_joint(
     began = time.perf_counter()
     tell = progress or (lambda _share, _words: None)
     catalogue, made = catalogue_of(library), provenance_now(study, seed)
-    study, left_out = despiked_study(study)
-    nominal = nominal_model(study)
-    warnings = check_study(study, nominal)
+    measured = measured_study(study)
+    study, nominal = measured.study, nominal_model(measured.study)
+    warnings = [*measured.warnings, *check_study(study, nominal)]
     train, test = split(study)
     train, spared, said = searched_part(train)
     test, warnings = test or spared, warnings + said
@@ -100,23 +101,52 @@ def diagnose_joint(
     warnings += diagnosis.warnings
     if limit is not None and searches.last is not None and searches.last.was_stopped:
         warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
-    found = replace(diagnosis, left_out=left_out, warnings=tuple(warnings), catalogue=catalogue)
+    found = replace(diagnosis, left_out=measured.left_out, warnings=tuple(warnings), catalogue=catalogue)
     return replace(found, provenance=made, wall_s=time.perf_counter() - began)
 
 
-def despiked_study(study: Study) -> tuple[Study, dict[str, dict[str, tuple[int, ...]]]]:
-    """A study without the spikes of its measured columns, and which samples they were, by trial and column.
+@dataclass(frozen=True)
+class Measured:
+    """A study without what its sensors did not measure.
+
+    Attributes
+    ----------
+    study
+        Spikes replaced, stretches of stuck sensors cut out.
+    left_out
+        Which samples were spikes, by trial and column.
+    warnings
+        What was cut out, a line each.
+    """
+
+    study: Study
+    left_out: dict[str, dict[str, tuple[int, ...]]]
+    warnings: list[str]
+
+
+def measured_study(study: Study) -> Measured:
+    """A study without spikes of its measured columns and without stretches in which a sensor was stuck.
 
     A sample that its neighbours replace is no evidence of its own: intervals are too narrow by half the share of such
     samples, half a percent where one in a hundred is a spike.
+
+    Raises
+    ------
+    InputError
+        If nothing else is left.
     """
-    rig, trials, found = nominal_model(study).rig, [], {}
+    rig, trials, found, warnings = nominal_model(study).rig, [], {}, []
     for trial in study.trials:
-        clean, spikes = without_spikes(trial, rig.outputs(trial.kind))
-        trials.append(clean)
-        if spikes:
-            found[trial.name] = spikes
-    return (replace(study, trials=tuple(trials)) if found else study), found
+        pieces, said = without_stuck(trial, rig.outputs(trial.kind), bool(rig.unknowns(trial.kind)))
+        warnings += said
+        for piece in pieces:
+            clean, spikes = without_spikes(piece, rig.outputs(piece.kind))
+            trials.append(clean)
+            if spikes:
+                found[piece.name] = spikes
+    if not trials:
+        raise InputError(f"no trial has a reading that is not stuck: {warnings[0]}", file=study.folder)
+    return Measured(replace(study, trials=tuple(trials)) if found or warnings else study, found, warnings)
 
 
 def split(study: Study) -> tuple[list[Trial], list[Trial]]:

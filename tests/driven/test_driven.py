@@ -62,6 +62,22 @@ def test_what_no_cause_explains_is_said(tmp_path):
     assert found.remainder.unexplained
 
 
+@pytest.mark.parametrize(("seed", "until"), [(13, None), (14, 0.4)])
+def test_a_sensor_that_is_stuck_is_no_cause(seed, until, tmp_path):
+    """From the middle of every trial on, or for a while: it is said, left out, and nothing is named for it."""
+    study = read_study(draw((), 0.3, seed, tmp_path).study)
+    trials = tuple(t.with_columns(position=stuck_from_the_middle(t, until)) for t in study.trials)
+    found = diagnose_joint(replace(study, trials=trials))
+    assert (found.verdict, found.causes) == ("adequate", ())
+    assert sum("as a stuck sensor does" in w for w in found.warnings) == len(study.trials)
+
+
+def stuck_from_the_middle(trial, seconds):
+    position, half = np.array(trial["position"]), len(trial) // 2
+    position[half : None if seconds is None else half + round(seconds / trial.dt)] = position[half]
+    return position
+
+
 def test_the_rigs_of_the_generator_have_the_inertia_that_they_say(tmp_path):
     pin = pytest.importorskip("pinocchio")
     from driven_rigs.draw import urdf

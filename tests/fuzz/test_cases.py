@@ -9,7 +9,7 @@ from fuzz_inputs.studies import RIGS, small_study
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
-from fes_pin.diagnose.diagnosis import despiked_study
+from fes_pin.diagnose.diagnosis import measured_study
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.models.compile.disk_cache import cache_folder
 from fes_pin.models.nominal import nominal_model
@@ -23,12 +23,18 @@ def test_spoilt_files(tmp_path, number):
     assert not result.faults, str(result)
 
 
+@pytest.mark.parametrize(("number", "seed"), [(1218, 5)], ids=["a trial of milliseconds"])
+def test_what_once_broke_a_promise(tmp_path, number, seed):
+    result = run_case(number, seed, tmp_path / "case", cache_folder())
+    assert not result.faults, str(result)
+
+
 @pytest.mark.parametrize("rig", RIGS)
 def test_what_is_odd_is_refused_in_one_line_or_told(rig):
     """Every oddity before any fit: the gate itself ends with an answer."""
     study = small_study(np.random.default_rng(1), rig)
     for name, make_odd in ODDITIES.items():
-        odd, _ = despiked_study(make_odd(study, np.random.default_rng(1)))
+        odd = measured_study(make_odd(study, np.random.default_rng(1))).study
         assert isinstance(odd, Study), name
         try:
             said = check_study(odd, nominal_model(odd))

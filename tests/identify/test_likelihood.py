@@ -6,6 +6,7 @@ import pytest
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls, one_step, over_horizon
 from fes_pin.identify.likelihood import LikelihoodProblem, driving_size, first_guess, maximise
+from fes_pin.models.effects.sensor_gain import SensorGain
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import masked
 from fes_pin.models.rigs import Joint
@@ -118,3 +119,20 @@ def test_a_horizon_uses_nothing_younger():
     before, after = (over_horizon(found.model, t, found.doubt, 0.1)["position"] for t in (trials[0], changed))
     assert after[1000] == before[1000]
     assert after[1060] != before[1060]
+
+
+@pytest.mark.parametrize("error", [-0.4, 0.6])
+def test_another_scale_of_the_reading_is_another_inertia_and_nothing_more(error):
+    """Of a slide without weight: what is known of a start beforehand, however many the trials, tells them no better."""
+    trials = [held(k, 0.06, weight=0.0) for k in range(3)]
+    slide = Joint(constants={"inertia": TRUE["inertia"], "gravity_cos": 0.0, "gravity_sin": 0.0, "revolute": 0.0})
+    plain, scaled = Model(slide), Model(slide) + SensorGain(place=2.0)
+    doubt, own = first_guess(plain, trials), 1.0 + error
+    values = {**plain.parameters(), "inertia_scale": 1.3, "damping": 0.03}
+    same = {**scaled.parameters(), "sensor_gain.error": error, "inertia_scale": 1.3 * own, "damping": 0.03 * own}
+    costs = []
+    for model, at, begin in ((plain, values, 1.0), (scaled, same, own)):
+        problem = LikelihoodProblem(model, trials, doubt)
+        problem.begins = [{n: v / begin for n, v in b.items()} for b in problem.begins]
+        costs.append(problem.cost(at, problem.start_unknowns()))
+    assert costs[0] == pytest.approx(costs[1], abs=1e-3)

@@ -77,8 +77,8 @@ def _scaled(effect: Effect, fitted: Fit) -> Effect:
     rig, trials = fitted.model.rig, fitted.trials
     moved = [t[(*rig.schema.motion(t.kind), rig.output(t.kind))[0]] for t in trials]
     low, high = float(np.nanmin(np.concatenate(moved))), float(np.nanmax(np.concatenate(moved)))
-    lag = [max(1, round(0.05 / t.dt)) for t in trials]
-    rates = [np.abs(q[k:] - q[:-k]) / (k * t.dt) for q, t, k in zip(moved, trials, lag, strict=True) if len(t) > k]
+    lag = [min(max(1, round(0.05 / t.dt)), len(t) - 1) for t in trials]
+    rates = [np.abs(q[k:] - q[:-k]) / (k * t.dt) for q, t, k in zip(moved, trials, lag, strict=True)]
     drives = [np.abs(t[n]) for t in trials for n in rig.input_columns(t)]
     scales: dict[str, Any] = {
         "centre": 0.5 * (low + high),

@@ -18,7 +18,8 @@ The gains K are taken as they are when sensitivities are formed: what a paramete
 innovations alone, which are white and independent of what is foretold where the model is right (Ljung, System
 Identification, 2nd ed., section 7.4). A sample that was not seen corrects nothing. The same count n times in a
 row, as of an encoder that stands, is one reading and not n: its error is the same each time. What a trial begins with
-is known as its unknowns are: P = X diag(prior^2) X', X the sensitivities of the first states to them.
+is known as its unknowns are, and these as their readings are: P = X diag(prior / g)^2 X', X the sensitivities of the
+first states to them and g the slope of the reading: a scale of it that another inertia undoes must not be told from it.
 
 A memory that states go into, as the play of a gear does, is as uncertain as they are: it is carried as a state that
 changes at samples alone, m+ = D(x, m). Where D bends within that uncertainty its tangent says little of it: mean, slope
@@ -67,8 +68,9 @@ class _Doubt:
         d, layout, c = self.d, self.d.layout, self.d.sym.c
         unknowns = model.rig.unknowns(layout.kind)
         moved = ca.densify(d.at_start(d.x0, d.chosen(unknowns)))
-        priors = ca.vertcat(*[c[f"prior.{n}"] ** 2 for n in unknowns]) if unknowns else ca.SX(0, 1)
-        out = ca.mtimes([moved, ca.diag(priors), moved.T]) if unknowns else ca.SX(self.count, self.count)
+        slopes = self._read_slopes(moved)
+        priors = [(c[f"prior.{n}"] / g) ** 2 for n, g in zip(unknowns, slopes, strict=False)]
+        out = ca.mtimes([moved, ca.diag(ca.vertcat(*priors)), moved.T]) if unknowns else ca.SX(self.count, self.count)
         at = {n: k for k, n in enumerate(d.sym.states)}
         for e in model.effects:
             for state, process in zip(e.states, e.random, strict=False):
@@ -76,6 +78,21 @@ class _Doubt:
                 out[k, k] = out[k, k] + c[f"std.{process}"] ** 2
         for k, variance in d.start_variances():
             out[k, k] = out[k, k] + variance
+        return out
+
+
+    def _read_slopes(self, moved: Any) -> list[Any]:
+        """Slope of what is read of each unknown of the start: of its own reading, or the first one's if it has none."""
+        d, layout = self.d, self.d.layout
+        none = [(v, ca.SX.zeros(v.numel())) for v in (d.u, d.t, d.since)]
+        out = []
+        for k in range(moved.shape[1]):
+            own = k if k < len(layout.outputs) and layout.outputs[k] in layout.measured else 0
+            slope = ca.mtimes(ca.jacobian(d.readings[own], d.x), moved[:, own])
+            for symbol, value in [(d.x, d.x0), (d.m, d.m0), *none]:
+                slope = ca.substitute(slope, symbol, value)
+            size = ca.fabs(slope)
+            out.append(ca.if_else(size > LEAST, size, 1.0))
         return out
 
 
