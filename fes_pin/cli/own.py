@@ -161,16 +161,16 @@ def _say(study: Study, warnings: Sequence[str]) -> None:
 
 
 def _checked(study: Study, catalogue: Catalogue) -> list[str]:
-    from fes_pin.diagnose.diagnosis import despiked_study
+    from fes_pin.diagnose.diagnosis import measured_study
     from fes_pin.diagnose.plausibility import check_study
     from fes_pin.models.nominal import nominal_model
 
     if study.schema.owner is None:
         return []
-    clean, spikes = despiked_study(study)
-    count = sum(len(k) for columns in spikes.values() for k in columns.values())
+    clean = measured_study(study)
+    count = sum(len(k) for columns in clean.left_out.values() for k in columns.values())
     said = [f"{count} samples look like spikes, and are taken for what their neighbours say"] if count else []
-    return [*said, *check_study(clean, nominal_model(clean))]
+    return [*said, *clean.warnings, *check_study(clean.study, nominal_model(clean.study))]
 
 
 def _template(

@@ -16,7 +16,7 @@ from fes_pin.compare.result import Apart, Compared, Comparison, apart_from
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import despiked_study, split
+from fes_pin.diagnose.diagnosis import measured_study, split
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import fit_multistart
 from fes_pin.identify.noise import Noise
@@ -73,7 +73,7 @@ def compare(
     tell = progress or (lambda _share, _words: None)
     if study.rig not in RIGS:
         raise InputError(f"expected a study of a rig {' or '.join(RIGS)}, found {study.rig}", file=study.folder)
-    joined, _ = despiked_study(study)
+    joined = measured_study(study).study
     nominal = nominal_model(joined)
     fitted, held = split(joined)
     if len(fitted) + len(held) < 2:

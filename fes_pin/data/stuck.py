@@ -10,6 +10,7 @@ What is coarse, or comes to rest as a rig does, stays as it was measured.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -38,7 +39,7 @@ def stuck(values: np.ndarray) -> list[slice]:
     """Stretches in which a reading, shape (n,), is its sensor's own; see the module."""
     ends = np.r_[0, np.flatnonzero(np.diff(values)) + 1, len(values)]
     runs = np.diff(ends)
-    long = [slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True) if b - a >= RUN]
+    long = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends) if b - a >= RUN]
     if not long or len(long) == len(runs):
         return []
     moving = _stretches(len(values), long)

@@ -80,7 +80,6 @@ class _Doubt:
             out[k, k] = out[k, k] + variance
         return out
 
-
     def _read_slopes(self, moved: Any) -> list[Any]:
         """Slope of what is read of each unknown of the start: of its own reading, or the first one's if it has none."""
         d, layout = self.d, self.d.layout
