@@ -205,7 +205,8 @@ def explained(value: np.ndarray, against: np.ndarray, bins: int = 16) -> float:
     bins
         Bins of equal width, within which the function is taken as constant.
     """
-    groups = [g for _, g in binned(value, against, bins)]
+    size = float(np.abs(value).max(initial=0.0)) or 1.0  # a share has no unit, and squares of 1e200 no number
+    groups = [g / size for _, g in binned(value, against, bins)]
     seen = np.concatenate(groups)
     total = float(np.sum((seen - seen.mean()) ** 2))
     between = sum(len(g) * float(g.mean() - seen.mean()) ** 2 for g in groups)

@@ -62,6 +62,7 @@ def test_the_share_explained_is_one_of_a_function_and_small_of_noise():
     rng = np.random.default_rng(0)
     x = rng.uniform(-1.0, 1.0, 4000)
     assert explained(np.sign(x), x) > 0.95
+    assert explained(1e200 * np.sign(x), x) == explained(np.sign(x), x)
     assert explained(rng.standard_normal(4000), x) < 0.02
     assert explained(np.ones(10), np.zeros(10)) == 0.0
     assert sum(len(values) for _, values in binned(x, x)) == 4000
