@@ -2,8 +2,9 @@
 
 A reading of one value for a while is the sensor's own, and not a rig's that stands still,
 
-- where its noise stops: white noise above the step of its digits is in a reading whether the rig moves or stands; or
-- where it stops at once: a rig has inertia and comes to rest first, a sensor holds its value in full motion.
+- where it stops at once or goes on with a leap: a rig has inertia and comes to rest first, a sensor holds its value in
+  full motion; or
+- where its noise stops: white noise above the step of its digits is in a reading whether the rig moves or stands.
 
 What is coarse, or comes to rest as a rig does, stays as it was measured.
 """
@@ -21,7 +22,7 @@ from fes_pin.data.trial import Trial
 RUN = 20
 """Equal samples in a row that noise does not make: with a deviation of one digit the chance of two is 0.3."""
 AT_ONCE = 3.0
-"""Times that a reading's change of step must exceed what it is elsewhere but for one sample in a hundred."""
+"""Times that a reading's step, or change of step, must exceed what it is elsewhere but for one sample in a hundred."""
 WHITE = -0.5
 """Correlation of neighbouring fourth differences below which they are noise's: of white noise it is -0.8, of a motion
 that sampling follows about 1."""
@@ -44,13 +45,21 @@ def stuck(values: np.ndarray) -> list[slice]:
         return []
     moving = _stretches(len(values), long)
     noisy = _come_by_chance(runs[runs < RUN]) and _is_noisy(values, moving)
-    turns = np.concatenate([np.abs(np.diff(values[s], 2)) for s in moving])
-    usual = float(np.quantile(turns, 0.99)) if len(turns) else np.inf
-    return [s for s in long if noisy or (s.start > 0 and _step_into(values, s) > AT_ONCE * usual)]
+    usual = [_usual(values, moving, order) for order in (1, 2)]
+    return [s for s in long if noisy or _at_once(values, s, *usual)]
 
 
-def _step_into(values: np.ndarray, stretch: slice) -> float:
-    return float(abs(values[stretch.start] - values[stretch.start - 1]))
+def _usual(values: np.ndarray, moving: Sequence[slice], order: int) -> float:
+    """What differences of an order are at most, but for one in a hundred."""
+    found = np.abs(np.concatenate([np.diff(values[s], order) for s in moving]))
+    return float(np.quantile(found, 0.99)) if len(found) else np.inf
+
+
+def _at_once(values: np.ndarray, stretch: slice, steps: float, turns: float) -> bool:
+    """True if a reading stops in full motion, or goes on with a leap."""
+    into = abs(values[stretch.start] - values[stretch.start - 1]) if stretch.start else 0.0
+    leap = abs(values[stretch.stop] - values[stretch.stop - 1]) if stretch.stop < len(values) else 0.0
+    return bool(into > AT_ONCE * turns or leap > AT_ONCE * steps)
 
 
 def _stretches(count: int, without: Sequence[slice]) -> list[slice]:
