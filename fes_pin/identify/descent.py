@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,8 +11,24 @@ from fes_pin.identify.problem import Linearized, NormalEquations, Problem, Unkno
 
 TOLERANCE = 0.01
 """A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
+TRIES = 12
+"""Steps that are tried, each ten times as damped as the last, before a point counts as the lowest there is."""
 UNIDENTIFIED = 1e-10
 """Eigenvalue of the scaled information matrix, relative to the largest, below which a direction is not identified."""
+
+
+@dataclass(frozen=True)
+class _Proposal:
+    """A step that a damping leads to, and what it promises of twice the log-likelihood."""
+
+    damping: float
+    x: np.ndarray
+    unknowns: Unknowns
+    promised: float
+
+    @property
+    def promises_little(self) -> bool:
+        return 0.0 <= self.promised < TOLERANCE
 
 
 class Descent:
@@ -42,7 +59,7 @@ class Descent:
         self.fixed = dict(start)
         self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
         self.unknowns = problem.start_unknowns() if unknowns is None else problem.completed(unknowns)
-        self.damping = 1e-4
+        self.damping, self._gained = 1e-4, 0.0
         known = parts is not None and all(start[n] == v for n, v in zip(self.names, self.x, strict=True))
         self.parts = list(parts) if parts and known else self._linearize(self.x, self.unknowns)
         self.sse = whitened_sse(self.parts)
@@ -60,33 +77,61 @@ class Descent:
         return ~held
 
     def step(self) -> bool:
-        """Go down once; True when there is nothing left to gain."""
+        """Go down once; True when there is nothing left to gain.
+
+        A step that gains nothing is tried again shorter, and what is shorter is first asked for its cost alone.
+        """
         if not np.isfinite(self.sse):
             return True
-        for _ in range(12):
-            system = normal_equations(self.parts, self.damping)
-            move = self._bounded_move(system)
-            new_x = self.x + move
-            promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
-            locals_ = self._moved(system.local_steps(move))
-            if 0.0 <= promised < TOLERANCE:
+        first = self._proposed(self.damping)
+        if first.promises_little or self._takes(first):
+            return first.promises_little or self._gained < TOLERANCE
+        left = TRIES - 1
+        while left > 0:
+            shorter = self._shorter(min(left, self.problem.abreast))
+            left -= len(shorter)
+            worth = [one for one in shorter if not one.promises_little]
+            bounds = self.problem.bounds([(self.values(one.x), one.unknowns) for one in worth])
+            for one, bound in zip(worth, bounds, strict=True):
+                self.damping = one.damping
+                if bound <= self.sse and self._takes(one):
+                    return self._gained < TOLERANCE
+            if len(worth) < len(shorter):
                 return True
-            parts = self._linearize(new_x, locals_)
-            sse = whitened_sse(parts)
-            if promised > 0.0 and np.isfinite(sse) and sse <= self.sse:
-                gained = self.sse - sse
-                self.x, self.unknowns, self.parts, self.sse = new_x, locals_, parts, sse
-                self.damping = max(self.damping * _relief(gained / promised), 1e-9)
-                return gained < TOLERANCE
-            self.damping = max(self.damping * 10.0, 1e-4)
         return True
 
-    def _bounded_move(self, system: NormalEquations) -> np.ndarray:
+    def _proposed(self, damping: float) -> _Proposal:
+        system = normal_equations(self.parts, damping)
+        move = self._bounded_move(system, damping)
+        promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
+        return _Proposal(damping, self.x + move, self._moved(system.local_steps(move)), float(promised))
+
+    def _shorter(self, count: int) -> list[_Proposal]:
+        """Proposals of growing damping, so many at most, to the first that promises little."""
+        out: list[_Proposal] = []
+        damping = self.damping
+        while len(out) < count and not (out and out[-1].promises_little):
+            damping = max(damping * 10.0, 1e-4)
+            out.append(self._proposed(damping))
+        return out
+
+    def _takes(self, one: _Proposal) -> bool:
+        """Go where a proposal leads, if that is down."""
+        parts = self._linearize(one.x, one.unknowns)
+        sse = whitened_sse(parts)
+        if not (one.promised > 0.0 and np.isfinite(sse) and sse <= self.sse):
+            return False
+        self._gained = self.sse - sse
+        self.x, self.unknowns, self.parts, self.sse = one.x, one.unknowns, parts, sse
+        self.damping = max(one.damping * _relief(self._gained / one.promised), 1e-9)
+        return True
+
+    def _bounded_move(self, system: NormalEquations, damping: float) -> np.ndarray:
         """Marquardt's step inside the bounds: what would leave them first stops there, and the others step anew."""
         free, move = self.free_now(system.gradient), np.zeros(len(self.x))
         while free.any():
             gradient = system.gradient - system.hessian[:, ~free] @ move[~free]
-            move[free] = _damped(system.hessian[np.ix_(free, free)], gradient[free], self.damping)
+            move[free] = _damped(system.hessian[np.ix_(free, free)], gradient[free], damping)
             room = np.where(move > 0, self.upper, self.lower) - self.x
             with np.errstate(divide="ignore", invalid="ignore"):
                 share = np.where(free & (move != 0.0), room / move, np.inf)

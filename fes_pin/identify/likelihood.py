@@ -123,23 +123,32 @@ class LikelihoodProblem:
             return self.predictor.run(values, doubt or self.doubt, own)
 
     def told(self, values: Mapping[str, float], unknowns: Unknowns, doubts: Sequence[Doubt]) -> list[_Told]:
-        """Every trial as foretold by each of several doubts, as many side by side as leave no lane idle."""
+        """Every trial as foretold by each of several doubts."""
+        return self._told([(values, unknowns, d) for d in doubts])
+
+    def bounds(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
+        """The cost at several parameter values, without sensitivities: less work than linearizing at one of them."""
+        return [one.cost for one in self._told([(*point, self.doubt) for point in points])]
+
+    def _told(self, points: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[_Told]:
+        """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
         count, trials = self.abreast, len(self.trials)
         if self._abreast is None:
             self._abreast = Predictor(self.model, self.trials * count, (), self.doubt.processes, self.priors * count)
-        own = [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)] * count
         out: list[_Told] = []
-        for k in range(0, len(doubts), count):
-            some = list(doubts[k : k + count])
-            each = [d for d in some + some[-1:] * (count - len(some)) for _ in range(trials)]
+        for k in range(0, len(points), count):
+            some = list(points[k : k + count])
+            filled = some + some[-1:] * (count - len(some))
+            values, doubts = ([one[j] for one in filled for _ in range(trials)] for j in (0, 2))
+            own = [{**begin, **u} for one in filled for begin, u in zip(self.begins, one[1], strict=True)]
             with np.errstate(all="ignore"):
-                run = self._abreast.run(values, each, own)
+                run = self._abreast.run(values, doubts, own)  # type: ignore[arg-type]
             out += [_joined(run[j * trials : (j + 1) * trials]) for j in range(len(some))]
         return out
 
     @property
     def abreast(self) -> int:
-        """How many doubts are tried in one run."""
+        """How many points are tried in one run."""
         return max(1, WIDTH // len(self.trials))
 
     def foretold(self, values: Mapping[str, float]) -> list[dict[str, np.ndarray]]:

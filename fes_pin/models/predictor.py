@@ -136,22 +136,26 @@ class Predictor:
                 yield members[start : start + WIDTH]
 
     def run(
-        self, values: Mapping[str, float], doubt: Doubt | Sequence[Doubt], unknowns: Sequence[Mapping[str, float]]
+        self,
+        values: Mapping[str, float] | Sequence[Mapping[str, float]],
+        doubt: Doubt | Sequence[Doubt],
+        unknowns: Sequence[Mapping[str, float]],
     ) -> list[ForetoldTrial]:
         """Foretell every trial.
 
         Parameters
         ----------
         values
-            Every parameter of the model, by name.
+            Every parameter of the model, by name; one for all trials, or one for each.
         doubt
             Of every output that a trial has; one for all trials, or one for each.
         unknowns
             For each trial its start, and what effects have of each trial's own.
         """
         out: dict[int, ForetoldTrial] = {}
+        each = [values] * len(self.trials) if isinstance(values, Mapping) else values
         for block in self._blocks:
-            y, s = block.run(values, self._doubts(doubt), unknowns, self._delay(values))
+            y, s = block.run(each, self._doubts(doubt), unknowns, self._delays(each))
             out.update(zip(block.lanes, block.innovations(y, s, len(self.columns)), strict=True))
         return [out[i] for i in range(len(self.trials))]
 
@@ -160,8 +164,9 @@ class Predictor:
     ) -> list[dict[str, np.ndarray]]:
         """What is foretold of every output of every trial, shape (n,) by name, measured or not; see `run`."""
         out: dict[int, dict[str, np.ndarray]] = {}
+        each = [values] * len(self.trials)
         for block in self._blocks:
-            y, _ = block.run(values, self._doubts(doubt), unknowns, self._delay(values))
+            y, _ = block.run(each, self._doubts(doubt), unknowns, self._delays(each))
             out.update(zip(block.lanes, block.foretold(y), strict=True))
         return [out[i] for i in range(len(self.trials))]
 
@@ -170,8 +175,8 @@ class Predictor:
             return [doubt.values()] * len(self.trials)
         return [one.values() for one in doubt]
 
-    def _delay(self, values: Mapping[str, float]) -> float:
-        return total_delay(self.model, values) if self._delayed else 0.0
+    def _delays(self, values: Sequence[Mapping[str, float]]) -> list[float]:
+        return [total_delay(self.model, v) if self._delayed else 0.0 for v in values]
 
 
 def _measured(model: Model, trial: Trial) -> tuple[str, ...]:
@@ -237,14 +242,14 @@ class _Block:
 
     def run(
         self,
-        values: Mapping[str, float],
+        values: Sequence[Mapping[str, float]],
         doubts: Sequence[Mapping[str, float]],
         unknowns: Sequence[Mapping[str, float]],
-        delay: float,
+        delays: Sequence[float],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What the program gives of all lanes; see `Program`. `doubts` are those of all trials, by name."""
-        p = lane_values(self.layout, values, [unknowns[i] for i in self.lanes])
-        shift = tuple(math.floor(delay / t.dt + 1e-9) for t in self.trials)
+        """What the program gives of all lanes; see `Program`. Everything is that of all trials."""
+        p = lane_values(self.layout, [values[i] for i in self.lanes], [unknowns[i] for i in self.lanes])
+        shift = tuple(math.floor(delays[i] / t.dt + 1e-9) for i, t in zip(self.lanes, self.trials, strict=True))
         constants, known = self.constants.copy(), [doubts[i] for i in self.lanes]
         known += [known[-1]] * (WIDTH - len(known))
         for name in self.doubtful:

@@ -287,15 +287,21 @@ def lane_inputs(
     return u
 
 
-def lane_values(layout: Layout, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]]) -> np.ndarray:
-    """Values of a program's parameters side by side, shape (values, WIDTH); spare lanes are as the last trial."""
+def lane_values(
+    layout: Layout, values: Mapping[str, float] | Sequence[Mapping[str, float]], unknowns: Sequence[Mapping[str, float]]
+) -> np.ndarray:
+    """Values of a program's parameters side by side, shape (values, WIDTH); spare lanes are as the last trial.
+
+    `values` of all trials, or those of each.
+    """
     p = np.empty((len(layout.values), WIDTH))
     for k, name in enumerate(layout.values):
-        if name in layout.unknowns:
-            own = [u[name] for u in unknowns]
-            p[k] = own + [own[-1]] * (WIDTH - len(own))
+        known = unknowns if name in layout.unknowns else values
+        if isinstance(known, Mapping):
+            p[k] = known[name]
         else:
-            p[k] = values[name]
+            own = [u[name] for u in known]
+            p[k] = own + [own[-1]] * (WIDTH - len(own))
     return p
 
 

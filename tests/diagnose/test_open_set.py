@@ -10,6 +10,7 @@ import scipy.signal
 from diagnose.hidden import study_of
 from identify.rigs import trials_of
 
+from fes_pin.data.trial import Trial
 from fes_pin.diagnose.remainder import open_set
 from fes_pin.diagnose.remainder.bursts import burst_p_value
 from fes_pin.diagnose.remainder.heteroscedastic import heteroscedastic_p_value
@@ -21,8 +22,10 @@ from fes_pin.diagnose.remainder.slips import slip_p_value
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.fit import fit
 from fes_pin.identify.noise import Noise, estimate_noise
+from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
+from fes_pin.models.rigs import Joint
 
 DT = 0.005
 WHITE = Noise(1.0, (), 1.0)
@@ -249,3 +252,12 @@ def test_innovations_are_what_the_fit_was_whitened_to():
     assert {len(group) for _, group in channels(own)} == {4, 2}
     assert sum(len(e) for e in pieces) == sum(len(p.residual) for p in own.parts)
     assert np.concatenate(pieces).std() == pytest.approx(1.0, abs=0.03)
+
+
+def test_of_a_simulation_that_runs_away_features_are_those_of_the_measured_motion():
+    time = np.arange(400) * DT
+    trial = Trial("wild", "motion", {"effort": np.sin(3.0 * time), "position": np.sin(2.0 * time)}, time)
+    slide = Joint(constants={"inertia": 1.0, "gravity_cos": 0.0, "gravity_sin": 0.0, "revolute": 0.0}, damping=-1e5)
+    made = open_set.features(Model(slide), [trial], {"position": WHITE})
+    assert np.isfinite(made.columns).all()
+    assert made.columns.any(axis=0).all()

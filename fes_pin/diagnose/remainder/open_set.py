@@ -77,13 +77,14 @@ class Remainder:
 
 
 def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> MotionFeatures:
-    """About 40 smooth functions of angle, rate, acceleration, stimulus, activation and time of the simulated trials.
+    """About 40 smooth functions of angle, rate, acceleration, stimulus, activation and time of the trials.
 
-    Each is also taken through a second-order low pass, as a torque would be by the joint.
+    Of the motion as it was simulated, where that stays finite. Each is also taken through a second-order low pass, as a
+    torque would be by the joint.
     """
     simulated = Simulator(model, trials).run(model.parameters())
     seen = [
-        (trial, model.rig.input_columns(trial), one.readings[:, k], output)
+        (trial, model.rig.input_columns(trial), _motion(one.readings[:, k], trial[output]), output)
         for trial, one in zip(trials, simulated, strict=True)
         for k, output in enumerate(model.rig.outputs(trial.kind))
         if output in trial.columns and output in noise
@@ -94,6 +95,11 @@ def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Motion
     for row, (names, columns) in zip(rows, blocks, strict=True):
         row[:, [keys.index(n) for n in names]] = columns
     return MotionFeatures(tuple(n.split()[1].split(":")[0] for n in keys), np.concatenate(rows))
+
+
+def _motion(simulated: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """As it was simulated; as it was measured where a simulation runs away."""
+    return simulated if np.isfinite(simulated).all() else measured
 
 
 def _whitened(
