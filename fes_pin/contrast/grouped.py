@@ -185,6 +185,20 @@ class GroupedProblem:
             at += len(part.trials)
         return out
 
+    @property
+    def abreast(self) -> int:
+        """How many points `bounds` takes at once."""
+        return max(p.abreast for p in self.parts.values())
+
+    def bounds(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
+        """What the cost is at least at several parameter values."""
+        cut = [self.by_group(unknowns) for _, unknowns in points]
+        each = [
+            part.bounds([(self.model.of(g, values), own[g]) for (values, _), own in zip(points, cut, strict=True)])
+            for g, part in self.parts.items()
+        ]
+        return [sum(costs) for costs in zip(*each, strict=True)]
+
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Whitened residuals and sensitivities of all trials, group after group."""
         out: list[Linearized] = []
