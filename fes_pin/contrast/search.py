@@ -81,7 +81,19 @@ class ContrastSearch:
             promises, _ = self.fits.promises(again)
             best = self._settled(self._forward(again, promises))
         self.progress(0.85, "rivals")
-        return self._told(nominal, best)
+        return self._told(nominal, self._in_one(best))
+
+    def _in_one(self, best: Grouped) -> Grouped:
+        """A nominal parameter's change in the place of several changes, where it costs no more: a scale of the effort
+        beside other damping and weight is another inertia."""
+        if len(best.changes) < 2:
+            return best
+        common = best
+        for item in best.changes:
+            common = self.fits.without(common, item)
+        single = [p for p in self.fits.promises(common)[0] if p.effect is None]
+        tried = in_parallel(lambda p: self.fits.go_on(self.fits.look(common, [p])), single)
+        return min([best, *tried], key=lambda f: f.price)
 
     def _forward(self, base: Grouped, promises: list[Promise]) -> Grouped:
         while len(base.items) < MOST_ITEMS:

@@ -78,6 +78,18 @@ def test_a_nominal_parameter_is_told_in_plain_words(tmp_path):
     assert "inertia_scale" in page
 
 
+@pytest.mark.long
+def test_one_change_stands_for_several(tmp_path):
+    """Twice the inertia of a pendulum held upright is half the effort, half the weight and half the damping."""
+    found = fp.contrast(driven_pair(("inertia_scale",), 0.4, 998066, tmp_path))
+    (change,) = found.changes
+    assert (change.name, change.group) == ("inertia_scale", "after")
+    assert not change.equivalents
+    before, after = (change.parameters["inertia_scale"][g].value for g in ("before", "after"))
+    assert before == pytest.approx(1.0, abs=0.02)
+    assert after == pytest.approx(1.94, abs=0.03)
+
+
 def test_a_common_cause_is_no_change(tmp_path, shared):
     """Both halves of a study whose sensor is turned the same way by the same amount."""
     study = practice_pair(fp.read_study(shared / "practice" / "n00_none"), ())

@@ -14,7 +14,8 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.remainder import open_set
 from fes_pin.diagnose.remainder.bursts import burst_p_value
 from fes_pin.diagnose.remainder.heteroscedastic import heteroscedastic_p_value
-from fes_pin.diagnose.remainder.innovations import channels, under_own_noise
+from fes_pin.diagnose.remainder.innovations import Innovations, channels, under_own_noise
+from fes_pin.diagnose.remainder.lines import line_p_value
 from fes_pin.diagnose.remainder.open_set import FULL_NOISE, REMAINDER_LEVEL, unexplained_remainder
 from fes_pin.diagnose.remainder.play import play_p_value
 from fes_pin.diagnose.remainder.repeated import repeated_p_value
@@ -252,6 +253,12 @@ def test_innovations_are_what_the_fit_was_whitened_to():
     assert {len(group) for _, group in channels(own)} == {4, 2}
     assert sum(len(e) for e in pieces) == sum(len(p.residual) for p in own.parts)
     assert np.concatenate(pieces).std() == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_trial_of_which_noise_of_a_long_order_leaves_nothing_has_no_lines():
+    time = np.arange(8) * DT
+    trial = Trial("short", "motion", {"effort": np.ones(8), "position": time}, time)
+    assert line_p_value([Innovations(trial, np.empty(0), DT, ("effort",))]) == (1.0, "time")
 
 
 def test_of_a_simulation_that_runs_away_features_are_those_of_the_measured_motion():

@@ -47,7 +47,7 @@ def _amplitude(one: Innovations, where: str) -> np.ndarray | None:
     if where == "time":
         return np.ones(len(one.values))
     act = driven(one)
-    return act if np.ptp(act) > 0 else None
+    return act if len(act) and np.ptp(act) > 0 else None
 
 
 def _lines(rows: Sequence[tuple[Innovations, np.ndarray | None]]) -> tuple[float, ...]:
