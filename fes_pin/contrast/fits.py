@@ -49,7 +49,7 @@ class Fits:
     ) -> None:
         self.nominal, self.trials, self.driven = Model(nominal.rig), dict(trials), driven
         self.every = [t for many in trials.values() for t in many]
-        self.alone: dict[str, Weight] = {}
+        self.begun: list[dict[str, Weight]] = []
         self.library = Library(self.nominal, self.every, effects)
         self.of_group = {g: Library(self.nominal, many, effects) for g, many in self.trials.items()}
         for one in self.of_group.values():
@@ -64,7 +64,8 @@ class Fits:
                 g: maximise(LikelihoodProblem(self.nominal, t, weights[g]), self.nominal.parameters())  # type: ignore[arg-type]
                 for g, t in self.trials.items()
             }
-            self.alone = weights = {g: f.doubt for g, f in alone.items() if f.doubt is not None}
+            self.begun = [weights, {g: f.doubt for g, f in alone.items() if f.doubt is not None}]
+            weights = self.begun[-1]
             begun = model.with_parameters(next(iter(alone.values())).values)
             return self.converged(begun, (), weights, None)
         each = {g: self._rich(g) for g in self.trials}
@@ -113,11 +114,11 @@ class Fits:
         return min(out, key=lambda f: f.price)
 
     def go_on(self, one: Grouped) -> Grouped:
-        """Let a set converge; of driven rigs also from what is random in each group fitted alone.
+        """Let a set converge; of driven rigs also from little that is random, and from what is in each group alone.
 
         A smaller set's random effort has taken what it got wrong, and might keep it: a likelihood can have two optima.
         """
-        starts = [one.weights, self.alone] if self.alone else [one.weights]
+        starts = [one.weights, *self.begun]
         return min((self.converged(one.model, one.items, w, one.fit.unknowns) for w in starts), key=lambda f: f.price)
 
     def without(self, one: Grouped, item: Item) -> Grouped:
