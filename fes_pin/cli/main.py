@@ -240,13 +240,13 @@ def _print_verdict(diagnosis: Diagnosis) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from fes_pin.diagnose.text import cause_row
+    from fes_pin.diagnose.text import cause_columns, cause_row
 
     console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=not sys.stdout.isatty(), highlight=False)
     console.print(Text(f"{diagnosis.study.name}: {diagnosis.headline()}", style="bold"))
     if diagnosis.causes:
         table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
-        for title in ("cause", "stage", "parameters", "held-out gain", "cannot be told from"):
+        for title in cause_columns(diagnosis.gain_name):
             table.add_column(title)
         for cause in diagnosis.causes:
             table.add_row(*(Text(cell) for cell in cause_row(cause)))

@@ -126,7 +126,7 @@ def prevalence_rows(causes: Sequence[Row], studies: int) -> list[Row]:
     out: list[Row] = []
     for cause, rows in named.items():
         low, high = share_interval(len(rows), studies)
-        gains = sorted(r["gain_percent"] for r in rows.values())
+        gains = sorted(g for r in rows.values() if not math.isnan(g := r["gain_percent"]))  # one trial holds none out
         out.append(
             {
                 "cause": cause,
@@ -136,7 +136,7 @@ def prevalence_rows(causes: Sequence[Row], studies: int) -> list[Row]:
                 "share_percent": 100.0 * len(rows) / max(studies, 1),
                 "share_low": low,
                 "share_high": high,
-                "median_gain_percent": gains[len(gains) // 2],
+                "median_gain_percent": gains[len(gains) // 2] if gains else math.nan,
                 "alone": sum(not r["equivalents"] for r in rows.values()),
             }
         )

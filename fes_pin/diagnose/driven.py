@@ -27,7 +27,7 @@ from fes_pin.diagnose.errors_ahead import (
 )
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.remainder.open_set import Remainder
-from fes_pin.diagnose.result import Diagnosis
+from fes_pin.diagnose.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosis
 from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
@@ -316,7 +316,7 @@ def driven_diagnosis(
         ceiling_percent=judged.ceiling_percent,
         next_experiment=experiment(searched, causes, study),
         ranking=ranking(searched),
-        held_out_by="the study's held-out trials" if trials[1] else "cross-validation over trials",
+        held_out_by=SEPARATE if trials[1] else CROSS_VALIDATED if held else NOTHING,
         left_out={},
         wall_s=0.0,
         random=judged.random,

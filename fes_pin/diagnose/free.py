@@ -14,7 +14,7 @@ from fes_pin.diagnose.decide.held_out import HeldOut, cross_validate, errors_of,
 from fes_pin.diagnose.decide.rivals import absorbed, equivalents, estimates, experiment, ranking
 from fes_pin.diagnose.errors_ahead import free_errors
 from fes_pin.diagnose.remainder.open_set import Remainder, unexplained_remainder
-from fes_pin.diagnose.result import Diagnosis
+from fes_pin.diagnose.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosis
 from fes_pin.diagnose.search.misspecified import under_one_noise
 from fes_pin.diagnose.search.simulation_search import Searched, SimulationSearch
 from fes_pin.identify.ahead import default_horizon
@@ -78,7 +78,7 @@ def judge_free(
         ceiling_percent=in_sample.ceiling_percent(),
         next_experiment=experiment(searched, causes, study),
         ranking=ranking(searched),
-        held_out_by="held-out trials" if test else "cross-validation over trials",
+        held_out_by=SEPARATE if test else CROSS_VALIDATED if held else NOTHING,
         left_out={},
         wall_s=0.0,
         warnings=tuple(doubts(searched, len(causes))),
@@ -105,7 +105,7 @@ def unfitted(study: Study, nominal: Fit, reason: str, test: Sequence[Trial]) -> 
         ceiling_percent=inside.ceiling_percent(),
         next_experiment=None,
         ranking={},
-        held_out_by="held-out trials" if test else "cross-validation over trials",
+        held_out_by=SEPARATE if test else NOTHING,
         left_out={},
         wall_s=0.0,
         reason=reason,

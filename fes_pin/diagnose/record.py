@@ -38,7 +38,7 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "study": diagnosis.study.name,
         "verdict": diagnosis.verdict,
-        "causes": [_cause(c) for c in diagnosis.causes],
+        "causes": [_cause(c, diagnosis.was_held_out or c.trial is not None) for c in diagnosis.causes],
         "remainder": {
             "unexplained": diagnosis.remainder.unexplained,
             "p_value": _p_shown(diagnosis.remainder.p_value),
@@ -80,7 +80,8 @@ def diagnosis_files(diagnosis: Diagnosis) -> dict[str, str]:
     return files
 
 
-def _cause(cause: Cause) -> dict[str, Any]:
+def _cause(cause: Cause, held_out: bool) -> dict[str, Any]:
+    """`held_out` says whether its gain is one on trials held out."""
     held = cause.gain_held_out
     return {
         "name": cause.name,
@@ -91,7 +92,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "p_value": _p_shown(cause.p_value),
         "gain_percent": {
             "fit": shown(cause.gain_fit),
-            "held_out": shown(held.percent),
+            "held_out": shown(held.percent) if held_out else None,
             "ci95": [shown(held.low), shown(held.high)],
         },
     }

@@ -16,8 +16,8 @@ from fes_pin.diagnose.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnose.experiment import NextExperiment
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.text import (
-    CAUSE_COLUMNS,
     ahead_notes,
+    cause_columns,
     cause_row,
     cause_table,
     left_out_text,
@@ -41,6 +41,11 @@ EACH_TRIAL = (
     "alone leaves the effect out"
 )
 """What is said of effects whose amplitudes are each trial's own."""
+
+CROSS_VALIDATED = "cross-validation over trials"
+SEPARATE = "the study's held-out trials"
+NOTHING = "nothing: every gain is that on what was fitted"
+"""What trials are held out by: `Diagnosis.held_out_by`."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,6 +100,16 @@ class Diagnosis:
     random: tuple[RandomPart, ...] = ()
     ahead: AheadErrors | None = None
     provenance: Provenance | None = field(default=None, compare=False)
+
+    @property
+    def was_held_out(self) -> bool:
+        """False where there was nothing to hold out: then every gain is that on the trials that were fitted."""
+        return self.held_out_by != NOTHING
+
+    @property
+    def gain_name(self) -> str:
+        """What the gains of its causes are, in two words."""
+        return "held-out gain" if self.was_held_out else "fitted gain"
 
     @property
     def is_driven(self) -> bool:
@@ -166,7 +181,7 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         title = f"{self.study.name}: {self.headline()}"
-        return table_html(title, CAUSE_COLUMNS, [cause_row(c) for c in self.causes], self.footnotes())
+        return table_html(title, cause_columns(self.gain_name), [cause_row(c) for c in self.causes], self.footnotes())
 
     def to_frame(self) -> pandas.DataFrame:
         """One row a parameter of each cause as a frame of pandas; see `data.show.frame`. No row without a cause."""
@@ -187,5 +202,5 @@ class Diagnosis:
         return frame(columns)
 
     def __str__(self) -> str:
-        lines = [f"{self.study.name}: {self.headline()}", *cause_table(self.causes)]
+        lines = [f"{self.study.name}: {self.headline()}", *cause_table(self.causes, self.gain_name)]
         return "\n".join(lines + [f" {note}" for note in self.footnotes()])

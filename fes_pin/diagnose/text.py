@@ -41,12 +41,13 @@ def quantity(value: float, std: float, unit: str) -> str:
     return f"{value:.{digits}f} +- {std:.{digits}f} {unit}".strip()
 
 
-CAUSE_COLUMNS = ("cause", "stage", "parameters", "held-out gain", "cannot be told from")
-"""What `cause_row` gives."""
+def cause_columns(gain: str) -> tuple[str, str, str, str, str]:
+    """Names of what `cause_row` gives; `gain` is that of its gain."""
+    return "cause", "stage", "parameters", gain, "cannot be told from"
 
 
 def cause_row(cause: Cause) -> tuple[str, str, str, str, str]:
-    """Cause, stage, parameters, held-out gain, what it cannot be told from."""
+    """Cause, stage, parameters, gain, what it cannot be told from."""
     values = "\n".join(f"{n} {quantity(p.value, p.std, p.unit)}" for n, p in cause.parameters.items())
     if cause.trial is not None:
         values = f"trial {cause.trial}: {values}"
@@ -55,11 +56,11 @@ def cause_row(cause: Cause) -> tuple[str, str, str, str, str]:
     return cause.name, cause.stage, values, gain, ", ".join(cause.equivalents) or "-"
 
 
-def cause_table(causes: Sequence[Cause]) -> list[str]:
-    """The causes as lines of a table; none without causes."""
+def cause_table(causes: Sequence[Cause], gain: str) -> list[str]:
+    """The causes as lines of a table, their gain by this name; none without causes."""
     if not causes:
         return []
-    rows = [CAUSE_COLUMNS]
+    rows = [cause_columns(gain)]
     for cause in causes:
         name, stage, values, gain, others = cause_row(cause)
         for k, value in enumerate(values.split("\n")):

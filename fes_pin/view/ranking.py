@@ -22,8 +22,9 @@ NAMES, WIDE, ROW = 176.0, 420.0, 24.0
 """Room for names, width of a figure, height of a row."""
 
 
-def gain_drawing(causes: Sequence[Cause]) -> Drawing:
-    """Held-out gain of each cause: a bar, and its 95 % interval."""
+def gain_drawing(diagnosis: Diagnosis) -> Drawing:
+    """Gain of each cause: a bar, and its 95 % interval."""
+    causes, on = diagnosis.causes, "held-out" if diagnosis.was_held_out else "fitted"
     low = min([0.0, *(c.gain_held_out.low for c in causes)])
     high = max([100.0, *(c.gain_held_out.high for c in causes)])
     panel = _rows([c.name for c in causes], [c.stage for c in causes], (1.03 * low, 1.03 * high))
@@ -34,9 +35,9 @@ def gain_drawing(causes: Sequence[Cause]) -> Drawing:
         panel.line([held.low, held.high], [-k, -k], colour, 2.6)
         panel.dot(held.percent, -k, colour)
         rows.append((cause.name, held.percent, held.low, held.high))
-    panel.x_axis("gain on held-out trials (%)")
+    panel.x_axis(f"gain on {on} trials (%)")
     words = "; ".join(f"{n} {p:.0f} %, interval {a:.0f} to {b:.0f}" for n, p, a, b in rows)
-    return _drawing(panel, len(causes), f"Gain of each cause on held-out trials: {words}.",
+    return _drawing(panel, len(causes), f"Gain of each cause on {on} trials: {words}.",
                     rows_csv(("cause", "gain_percent", "low", "high"), rows))  # fmt: skip
 
 

@@ -31,12 +31,11 @@ def causes_section(diagnosis: Diagnosis) -> list[Markup]:
         ]
         for c in diagnosis.causes
     ]
-    caption = (
-        "Gain on held-out trials with its 95 % interval: percent of the nominal model's squared error above noise."
-    )
+    on = "held-out trials" if diagnosis.was_held_out else "the trials that were fitted, as none could be held out,"
+    caption = f"Gain on {on} with its 95 % interval: percent of the nominal model's squared error above noise."
     return [
-        html_table(("cause", "stage", "held-out gain [95 %]", "p", "cannot be told from"), rows, (2, 3)),
-        figure(gain_drawing(diagnosis.causes), caption, "narrow", "gains"),
+        html_table(("cause", "stage", f"{diagnosis.gain_name} [95 %]", "p", "cannot be told from"), rows, (2, 3)),
+        figure(gain_drawing(diagnosis), caption, "narrow", "gains"),
         *(_cause(diagnosis, c) for c in diagnosis.causes),
     ]
 
@@ -81,10 +80,10 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
         if cause.equivalents
         else "These data tell it apart from every other cause in the library."
     )
-    gain = (
-        f"It removes {_gain_text(cause)} of the error above the noise on held-out trials "
-        f"({cause.gain_fit:.0f} % on the fitted ones)."
-    )
+    where = f"held-out trials ({cause.gain_fit:.0f} % on the fitted ones)"
+    if not diagnosis.was_held_out:
+        where = "the trials that were fitted: there was nothing to hold out"
+    gain = f"It removes {_gain_text(cause)} of the error above the noise on {where}."
     return element(
         "article",
         element(

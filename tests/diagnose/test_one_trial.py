@@ -9,6 +9,8 @@ import scipy.integrate
 from fes_pin.data.study import Study, read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnose.record import diagnosis_record
+from fes_pin.view.report import report_html
 
 INERTIA, WEIGHT, DAMPING, DT = 0.02, 1.0, 0.002, 0.004
 URDF = """<robot name="swing">
@@ -52,6 +54,12 @@ def test_friction_is_found_beneath_a_random_torque(tmp_path):
     assert len(cause.equivalents) <= 1, cause.equivalents
     estimate = cause.parameters["torque_nm"]
     assert abs(estimate.value - 0.02) < 4.0 * estimate.std < 0.02
+    assert not found.was_held_out  # and nobody is told that it was
+    assert "fitted gain" in str(found) and "held-out" not in str(found)
+    gains = diagnosis_record(found)["causes"][0]["gain_percent"]
+    assert gains["held_out"] is None and gains["ci95"][0] > 0.0
+    page = report_html(found)
+    assert "gain on held-out trials" not in page.lower() and "there was nothing to hold out" in page
 
 
 def test_a_random_torque_alone_has_no_name(tmp_path):
