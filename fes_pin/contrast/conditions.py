@@ -14,7 +14,7 @@ from fes_pin.contrast.search import ContrastFound
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import ParameterEstimate
 from fes_pin.diagnose.experiment import SEPARABLE
-from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated_trials
+from fes_pin.diagnose.misread import LEVEL, NAME, Misread, find_misread, restated_trials
 from fes_pin.identify.fit import PARAMETER_PRICE
 from fes_pin.models.model import Model
 
@@ -42,7 +42,7 @@ class ContrastSearched:
 
 def contrast_with_conditions(nominal: Model, trials: Trials, run: RunContrast) -> ContrastSearched:
     """Search groups of trials, and again with a trial restated that stands out of its own group."""
-    told = [(g, one) for g, many in trials.items() if (one := _found(nominal, many)) is not None]
+    told = [(g, one) for g, many in trials.items() if (one := _found(nominal, many, len(trials))) is not None]
     if not told:
         return ContrastSearched(*run(trials))
     group, misread = min(told, key=lambda pair: pair[1].p_value)
@@ -59,11 +59,15 @@ def contrast_with_conditions(nominal: Model, trials: Trials, run: RunContrast) -
     return after if before.price - found.best.price > price + SEPARABLE else as_stated
 
 
-def _found(nominal: Model, trials: Sequence[Trial]) -> Misread | None:
+def _found(nominal: Model, trials: Sequence[Trial], groups: int) -> Misread | None:
+    """The trial of a group that stands out of it, beside the other groups that are asked as well."""
     try:
-        return find_misread(nominal, trials)
+        found = find_misread(nominal, trials)
     except (ArithmeticError, np.linalg.LinAlgError):
         return None
+    if found is None or not groups * found.p_value < LEVEL:
+        return None
+    return replace(found, p_value=groups * found.p_value)
 
 
 def misread_change(searched: ContrastSearched) -> list[Change]:
