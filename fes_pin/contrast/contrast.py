@@ -102,6 +102,9 @@ def contrast(
     changes = [_change(found, i, names, catalogue) for i in found.best.changes] + misread_change(searched)
     changes.sort(key=lambda c: c.p_value)
     unchanged, excluded, untestable = _not_changed(found, driven)
+    if left.unexplained:  # sizes that would have been seen are those beside a model that is right
+        unchanged, excluded = {}, {}
+        said = [*said, "beside what is left unexplained it cannot be said what did not change"]
     tell(1.0, "done")
     return Contrast(
         study=joined,

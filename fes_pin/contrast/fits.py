@@ -10,8 +10,11 @@ from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item
 from fes_pin.contrast.promises import Bench, Promise, promises
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library
+from fes_pin.diagnose.search.likelihood_fits import STARTS, refinements
+from fes_pin.diagnose.search.likelihood_search import REFINE_LEVEL
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.identify.descent import TOLERANCE
+from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.likelihood import LikelihoodProblem, first_guess, maximise, score_doubt
 from fes_pin.identify.noise import as_white
@@ -20,6 +23,7 @@ from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
+from fes_pin.workers import in_parallel
 
 FIRST_LOOK = 15
 """Iterations of a first fit of a set."""
@@ -121,6 +125,30 @@ class Fits:
         starts = [one.weights, *self.begun]
         return min((self.converged(one.model, one.items, w, one.fit.unknowns) for w in starts), key=lambda f: f.price)
 
+    def refined(self, one: Grouped) -> Grouped:
+        """The set with the form of its last cause that the data of a driven rig demand; itself if they demand none."""
+        item = one.items[-1]
+        group = item.group or next(iter(self.trials))
+        model = one.model.models[group]
+        effect = next((e for e in model.effects if e.name == item.name), None)
+        if effect is None or not self.driven:
+            return one
+        demanded = chi2_quantile(1.0 - REFINE_LEVEL, 1)
+        starts = [_reformed(one.model, group, m) for m in refinements(model, effect, self.library.measured)]
+        looks = sorted(in_parallel(lambda start: self._looked(start, one), starts), key=lambda f: f.price)
+        worth = [f for f in looks[:STARTS] if one.fit.sse - f.fit.sse > 0.5 * demanded]
+        best = min(in_parallel(self.go_on, worth), key=lambda f: f.price, default=one)
+        degrees = max(len(best.fit.free) - len(one.fit.free), 1)
+        if not chi2_tail(max(one.fit.sse - best.fit.sse, 0.0), degrees) < REFINE_LEVEL:
+            return one
+        return self.refined(best)
+
+    def _looked(self, start: GroupedModel, one: Grouped) -> Grouped:
+        """A few steps from another form of a set."""
+        problem = GroupedProblem(start, self.trials, one.weights)
+        fitted = fit_problem(problem, start.parameters(), one.fit.unknowns, LOOK_DRIVEN)  # type: ignore[arg-type]
+        return Grouped(one.items, fitted, one.weights)
+
     def without(self, one: Grouped, item: Item) -> Grouped:
         """The set less one item, fitted from its own values."""
         rest = tuple(i for i in one.items if i != item)
@@ -155,3 +183,9 @@ class Fits:
     def promises(self, base: Grouped) -> tuple[list[Promise], Scores]:
         """Every item that a set does not have, scored; see `promises.promises`."""
         return promises(Bench(self.nominal, self.trials, self.library), base)
+
+
+def _reformed(model: GroupedModel, group: str, own: Model) -> GroupedModel:
+    """A grouped model with the values that differ in one group's model."""
+    known = model.models[group].parameters()
+    return model.with_parameters({model.path(n, group): v for n, v in own.parameters().items() if v != known[n]})

@@ -101,7 +101,7 @@ class ContrastSearch:
             tried = self._beside(base, promises)
             if not tried:
                 break
-            best = self._first(tried)
+            best = self.fits.refined(self._first(tried))
             if not p_value(self.fits, self.family, best, base) < LEVEL:
                 instead = self._two_at_once(best, base) or self._common(tried, base)
                 if instead is None:
