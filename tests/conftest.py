@@ -43,13 +43,13 @@ LONG = {
     "diagnose/test_gaps.py": ("[joint-names2", "[ankle-names", "lack[without0-False]", "lack[without1"),
     "diagnose/test_one_trial.py": ("test_a_real_swing", "test_friction_is_found_beneath"),
     "diagnose/test_per_trial_phase.py": ("[ankle-breath-process]", "[ankle-hum-white]", "kept[ankle"),
-    "driven/test_driven.py": ("test_play_before", "test_what_no_cause", "adequate[12]"),
+    "driven/test_driven.py": ("test_play_before", "test_what_no_cause", "adequate[12]", "no_cause[14"),
     "imposed/test_imposed_ankle.py": ("predicted[force_velocity]", "adequate[8]"),
     "imposed/test_imposed_joint.py": ("predicted[passive_relaxation]",),
     "imposed/test_session.py": ("named[potentiation-imposed]",),
-    "test_shared_diagnoses.py": ("[p02", "[p04", "[p06", "[p09", "[p14", "[p19", "[p20", "[n00", "[n02"),
+    "test_shared_diagnoses.py": ("[p02", "[p04", "[p06", "[p08", "[p09", "[p12", "[p14", "[p19", "[p20", "[n00", "[n02"),
     "test_shared_pendulum.py": ("test_",),
-    "walk/test_diagnosis.py": ("test_late_plates",),
+    "walk/test_diagnosis.py": ("test_late_plates", "growth_with_frequency[0.7]"),
 }
 """Whole diagnoses whose like is among those that always run; they get the mark `long`, by a part of their name."""
 
