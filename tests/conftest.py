@@ -47,7 +47,10 @@ LONG = {
     "imposed/test_imposed_ankle.py": ("predicted[force_velocity]", "adequate[8]"),
     "imposed/test_imposed_joint.py": ("predicted[passive_relaxation]",),
     "imposed/test_session.py": ("named[potentiation-imposed]",),
-    "test_shared_diagnoses.py": ("[p02", "[p04", "[p06", "[p08", "[p09", "[p12", "[p14", "[p19", "[p20", "[n00", "[n02"),
+    "test_shared_diagnoses.py": (
+        *("[p02", "[p04", "[p06", "[p08", "[p09", "[p12", "[p14", "[p19", "[p20"),
+        *("[n00", "[n02"),
+    ),
     "test_shared_pendulum.py": ("test_",),
     "walk/test_diagnosis.py": ("test_late_plates", "growth_with_frequency[0.7]"),
 }
