@@ -71,11 +71,12 @@ def report_html(diagnosis: Diagnosis) -> str:
 def _head(diagnosis: Diagnosis) -> Markup:
     study = diagnosis.study
     kinds = " and ".join(f"{n} {kind}" for kind, n in Counter(t.kind for t in study.trials).items())
+    trials = "trial" if len(study.trials) == 1 else "trials"
     seconds = sum(t.duration for t in study.trials)
     partly = " partly" if diagnosis.causes and diagnosis.remainder.unexplained else ""
     return element(
         "header",
-        element("p", f"{study.name} · rig {study.rig} · {kinds} trials, {seconds:.4g} s", class_="eyebrow"),
+        element("p", f"{study.name} · rig {study.rig} · {kinds} {trials}, {seconds:.4g} s", class_="eyebrow"),
         element("h1", title(diagnosis), class_=f"verdict {diagnosis.verdict}{partly}"),
         answers(diagnosis),
         *(element("p", element("strong", "Warning: "), f"{words}.") for words in diagnosis.warnings),
