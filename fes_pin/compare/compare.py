@@ -73,7 +73,8 @@ def compare(
     tell = progress or (lambda _share, _words: None)
     if study.rig not in RIGS:
         raise InputError(f"expected a study of a rig {' or '.join(RIGS)}, found {study.rig}", file=study.folder)
-    joined = measured_study(study).study
+    measured = measured_study(study)
+    joined = measured.study
     nominal = nominal_model(joined)
     fitted, held = split(joined)
     if len(fitted) + len(held) < 2:
@@ -99,7 +100,7 @@ def compare(
         by="role" if held else "folds",
         horizon_s=horizon,
         given_s=given_s,
-        warnings=tuple(_warnings(ranked, given_s)),
+        warnings=(*measured.warnings, *_warnings(ranked, given_s)),
         wall_s=time.perf_counter() - began,
     )
 

@@ -135,8 +135,9 @@ def _left(fits: Fits, best: Grouped, seed: int) -> tuple[Remainder, list[str]]:
     if len(open_) == len(each):
         words = "the model leaves something unexplained in every group; `diagnose` says what"
         return Remainder(False, p, least.where), [words]
-    said = [f"something is left unexplained in the group {g}" for g in open_]
-    return Remainder(bool(open_) and p < LEVEL, p, least.where if open_ else None), said
+    if not open_ or not p < LEVEL:
+        return Remainder(False, p, None), []
+    return Remainder(True, p, least.where), [f"something is left unexplained in the group {g}" for g in open_]
 
 
 def _in_single_trials(fits: Fits, best: Grouped, group: str, left: Remainder, seed: int) -> Remainder:

@@ -46,6 +46,11 @@ class Fits:
         The causes that are looked for.
     driven
         True for rigs whose effort answers the reading, which are judged by predictions.
+
+    Attributes
+    ----------
+    first_weights
+        What is random that fits of driven rigs begin with, too: little, and that of each group fitted alone.
     """
 
     def __init__(
@@ -53,7 +58,7 @@ class Fits:
     ) -> None:
         self.nominal, self.trials, self.driven = Model(nominal.rig), dict(trials), driven
         self.every = [t for many in trials.values() for t in many]
-        self.begun: list[dict[str, Weight]] = []
+        self.first_weights: list[dict[str, Weight]] = []
         self.library = Library(self.nominal, self.every, effects)
         self.of_group = {g: Library(self.nominal, many, effects) for g, many in self.trials.items()}
         for one in self.of_group.values():
@@ -68,8 +73,8 @@ class Fits:
                 g: maximise(LikelihoodProblem(self.nominal, t, weights[g]), self.nominal.parameters())  # type: ignore[arg-type]
                 for g, t in self.trials.items()
             }
-            self.begun = [weights, {g: f.doubt for g, f in alone.items() if f.doubt is not None}]
-            weights = self.begun[-1]
+            self.first_weights = [weights, {g: f.doubt for g, f in alone.items() if f.doubt is not None}]
+            weights = self.first_weights[-1]
             begun = model.with_parameters(next(iter(alone.values())).values)
             return self.converged(begun, (), weights, None)
         each = {g: self._rich(g) for g in self.trials}
@@ -122,7 +127,7 @@ class Fits:
 
         A smaller set's random effort has taken what it got wrong, and might keep it: a likelihood can have two optima.
         """
-        starts = [one.weights, *self.begun]
+        starts = [one.weights, *self.first_weights]
         return min((self.converged(one.model, one.items, w, one.fit.unknowns) for w in starts), key=lambda f: f.price)
 
     def refined(self, one: Grouped) -> Grouped:

@@ -84,8 +84,10 @@ class ContrastSearch:
         return self._told(nominal, self._in_one(best))
 
     def _in_one(self, best: Grouped) -> Grouped:
-        """A nominal parameter's change in the place of several changes, where it costs no more: a scale of the effort
-        beside other damping and weight is another inertia."""
+        """A nominal parameter's change in the place of several changes, where it is significant and costs no more.
+
+        A scale of the effort beside other damping and weight is another inertia.
+        """
         if len(best.changes) < 2:
             return best
         common = best
@@ -93,7 +95,8 @@ class ContrastSearch:
             common = self.fits.without(common, item)
         single = [p for p in self.fits.promises(common)[0] if p.effect is None]
         tried = in_parallel(lambda p: self.fits.go_on(self.fits.look(common, [p])), single)
-        return min([best, *tried], key=lambda f: f.price)
+        cheaper = [f for f in tried if f.price < best.price and p_value(self.fits, self.family, f, common) < LEVEL]
+        return min(cheaper, key=lambda f: f.price, default=best)
 
     def _forward(self, base: Grouped, promises: list[Promise]) -> Grouped:
         while len(base.items) < MOST_ITEMS:

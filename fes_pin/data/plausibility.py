@@ -16,6 +16,7 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED
+from fes_pin.data.stuck import RUN
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 
@@ -33,8 +34,6 @@ STRONGEST_NM = 1e3
 """Torque in N m that no joint exerts: those 3 kN at the shank, a third of a metre from the knee."""
 HEAVIEST_KG = 100.0
 """Load in kg that nobody hangs on an ankle; grams begin there."""
-RUN = 20
-"""Equal samples in a row that noise does not make: two equal neighbours are rare where a reading resolves its noise."""
 COMMON = 0.05
 """Share of equal neighbours from which a reading is coarse: equal samples in a row then say nothing."""
 CLIPPED = 0.01

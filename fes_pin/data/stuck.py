@@ -29,6 +29,8 @@ that sampling follows about 1."""
 FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 SHORTEST = 0.25
 """Share of a trial's longest piece that another must have to be worth a start of its own."""
+OF_THE_START = ("position0", "velocity0")
+"""Conditions that state where a trial begins: of its later pieces they say nothing."""
 FEW = 16
 """Samples below which a piece shows no motion."""
 BY_CHANCE = 1e-3
@@ -128,7 +130,9 @@ def without_stuck(trial: Trial, columns: Sequence[str], starts_anywhere: bool) -
 
 def _piece(trial: Trial, rows: slice, number: int) -> Trial:
     name = f"{trial.name}_part{number + 1}" if number else trial.name
-    return replace(trial, name=name, columns={n: v[rows] for n, v in trial.columns.items()}, time=trial.time[rows])
+    stated = {n: v for n, v in trial.conditions.items() if not rows.start or n not in OF_THE_START}
+    columns = {n: v[rows] for n, v in trial.columns.items()}
+    return replace(trial, name=name, columns=columns, time=trial.time[rows], conditions=stated)
 
 
 def _said(trial: Trial, name: str, stretches: Sequence[slice]) -> str:

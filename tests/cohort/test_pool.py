@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fes_pin.cohort.pool import discovery_rates, pooled, share_interval
+from fes_pin.cohort.tables import prevalence_rows
 
 # Colditz et al., Efficacy of BCG vaccine in the prevention of tuberculosis, JAMA 271 (1994): cases and others, treated
 # and not. What is expected is of statsmodels 0.14.5: combine_effects(y, v, method_re="iterated", use_t=True).
@@ -67,3 +68,10 @@ def test_rates_count_every_cause_that_was_looked_for():
 def test_shares_have_wilsons_interval():
     assert share_interval(0, 10) == pytest.approx((0.0, 27.753), abs=1e-3)
     assert share_interval(5, 10) == pytest.approx((23.659, 76.341), abs=1e-3)
+
+
+def test_a_gain_that_nothing_was_held_out_for_is_in_no_median():
+    shared = {"cause": "coulomb_friction", "stage": "joint", "false_discovery_rate": 0.0, "equivalents": ""}
+    rows = [{**shared, "study": s, "gain_percent": g} for s, g in (("a", math.nan), ("b", 40.0), ("c", 60.0))]
+    assert prevalence_rows(rows, 3)[0]["median_gain_percent"] == 60.0
+    assert math.isnan(prevalence_rows(rows[:1], 3)[0]["median_gain_percent"])

@@ -83,6 +83,13 @@ def test_a_trial_goes_on_behind_the_stretch_where_a_model_may_begin_anywhere():
     assert [len(p) for p in only] == [len(pieces[0])]
 
 
+def test_where_a_trial_began_says_nothing_of_its_later_pieces():
+    whole = Trial("one", "motion", {"position": held(noisy(2), 1500, 1600)}, TIME, {"position0": 0.0, "load_kg": 2.0})
+    first, second = without_stuck(whole, ("position",), True)[0]
+    assert dict(first.conditions) == {"position0": 0.0, "load_kg": 2.0}
+    assert dict(second.conditions) == {"load_kg": 2.0}
+
+
 def test_short_pieces_are_not_worth_a_start_and_a_trial_may_be_lost_whole():
     pieces, _ = without_stuck(trial(held(noisy(2), 500, 900)), ("position",), True)
     assert [len(p) > FEW for p in pieces] == [True]

@@ -6,6 +6,7 @@ import pytest
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls, one_step, over_horizon
 from fes_pin.identify.likelihood import LikelihoodProblem, driving_size, first_guess, maximise
+from fes_pin.identify.problem import whitened_sse
 from fes_pin.models.effects.sensor_gain import SensorGain
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import masked
@@ -136,3 +137,15 @@ def test_another_scale_of_the_reading_is_another_inertia_and_nothing_more(error)
         problem.begins = [{n: v / begin for n, v in b.items()} for b in problem.begins]
         costs.append(problem.cost(at, problem.start_unknowns()))
     assert costs[0] == pytest.approx(costs[1], abs=1e-3)
+
+
+def test_costs_of_points_side_by_side_are_those_of_each_linearized(fitted):
+    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt)
+    points = [
+        ({**fitted.values, "inertia_scale": k * fitted.values["inertia_scale"]}, fitted.unknowns)
+        for k in (1.0, 1.1, 0.8)
+    ]
+    assert problem.abreast > 1
+    costs = [whitened_sse(problem.linearize(*point)) for point in points]
+    assert problem.bounds(points) == pytest.approx(costs, rel=1e-12)
+    assert len(set(costs)) == len(points)
