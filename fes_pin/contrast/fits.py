@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight
+from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight, noise_in
 from fes_pin.contrast.promises import Bench, Promise, promises
+from fes_pin.contrast.repeats import Repeats, scatter, without_locals
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library
 from fes_pin.diagnose.search.likelihood_fits import STARTS, refinements
@@ -99,7 +100,7 @@ class Fits:
         problem = GroupedProblem(model, self.trials, weights)
         if not self.driven:
             fitted = fit_problem(problem, model.parameters(), unknowns)  # type: ignore[arg-type]
-            return Grouped(tuple(items), fitted, weights)
+            return self._scattered(Grouped(tuple(items), fitted, weights))
         fitted = fit_problem(problem, model.parameters(), unknowns, LOOK_DRIVEN)  # type: ignore[arg-type]
         for _ in range(ROUNDS):
             before = fitted.sse
@@ -110,6 +111,34 @@ class Fits:
             if not fitted.sse < before - 10.0 * TOLERANCE:
                 break
         return Grouped(tuple(items), fitted, {g: p.doubt for g, p in problem.parts.items()})
+
+    def _scattered(self, one: Grouped) -> Grouped:
+        """The set again, with the scatter of repeats that is most likely beside it."""
+        best = one
+        for _ in range(ROUNDS):
+            weights = self._repeats(best)
+            problem = GroupedProblem(best.model, self.trials, weights)
+            fitted = fit_problem(problem, best.fit.values, best.fit.unknowns)  # type: ignore[arg-type]
+            before, best = best, Grouped(one.items, fitted, weights)
+            if not best.fit.sse < before.fit.sse - 10.0 * TOLERANCE:
+                break
+        return best
+
+    def _repeats(self, one: Grouped) -> dict[str, Weight]:
+        """The noise of each group with how much repeats scatter beside a set."""
+        noise = {g: noise_in(w) for g, w in one.weights.items()}
+        problem = GroupedProblem(one.model, self.trials, noise)
+        parts = problem.linearize(one.fit.values, one.fit.unknowns)
+        names = self.nominal.fitted_parameters()
+        paths = [[one.model.path(n, g) for n in names] for g, many in self.trials.items() for _ in many]
+        columns = [p.jacobian[:, [problem.free.index(n) for n in own]] for p, own in zip(parts, paths, strict=True)]
+        deviations = scatter(parts, columns, names)
+        if not deviations:
+            return dict(noise)
+        at = [names.index(n) for n in deviations]
+        along = [without_locals(p, c[:, at] * list(deviations.values())) for p, c in zip(parts, columns, strict=True)]
+        cut = problem.by_group(along)
+        return {g: Repeats(noise[g], deviations, tuple(cut[g])) for g in noise}
 
     def look(self, base: Grouped, promises: Sequence[Promise]) -> Grouped:
         """A first fit of a set with one item more, from its most promising shapes."""
@@ -183,7 +212,7 @@ class Fits:
         if isinstance(weight, Doubt):
             problem: Any = LikelihoodProblem(model, trials, weight)
             return replace(fit_problem(problem, model.parameters(), unknowns, LOOK_DRIVEN), doubt=weight)
-        return fit_problem(Problem(model, trials, weight), model.parameters(), unknowns)
+        return fit_problem(Problem(model, trials, noise_in(weight)), model.parameters(), unknowns)
 
     def promises(self, base: Grouped) -> tuple[list[Promise], Scores]:
         """Every item that a set does not have, scored; see `promises.promises`."""

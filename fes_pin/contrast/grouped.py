@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.contrast.repeats import RepeatedProblem, Repeats
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -21,8 +22,23 @@ from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
 
-Weight = NoiseModel | Doubt
-"""What weighs the residuals of a group: the noise of simulations, or what is random about predictions."""
+Weight = NoiseModel | Repeats | Doubt
+"""What weighs the residuals of a group: the noise of simulations, perhaps beside the scatter of repeats, or what is
+random about predictions."""
+
+
+def problem_of(model: Model, trials: Sequence[Trial], weight: Weight, free: tuple[str, ...] | None = None) -> Any:
+    """A model on the trials of one group, as their weight demands."""
+    if isinstance(weight, Doubt):
+        return LikelihoodProblem(model, trials, weight)
+    kind = RepeatedProblem if isinstance(weight, Repeats) else Problem
+    return kind(model, trials, weight, free)  # type: ignore[arg-type]
+
+
+def noise_in(weight: Weight) -> NoiseModel:
+    """The noise alone."""
+    assert not isinstance(weight, Doubt)
+    return weight.noise if isinstance(weight, Repeats) else weight
 
 
 @dataclass(frozen=True)
@@ -156,8 +172,7 @@ class GroupedProblem:
     ) -> None:
         self.model, self.free = model, model.free
         self.parts: dict[str, Any] = {
-            g: LikelihoodProblem(m, trials[g], w) if isinstance(w, Doubt) else Problem(m, trials[g], w)
-            for (g, m), w in ((one, weights[one[0]]) for one in model.models.items())
+            g: problem_of(m, trials[g], weights[g]) for g, m in model.models.items()
         }
         self.trials = tuple(t for p in self.parts.values() for t in p.trials)
         self.unknown_names = tuple(dict.fromkeys(n for p in self.parts.values() for n in p.unknown_names))

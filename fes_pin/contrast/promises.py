@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight
+from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight, problem_of
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library, near_null
 from fes_pin.diagnose.search.score import Projection, Scores
-from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import Linearized, Problem
+from fes_pin.identify.problem import Linearized
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
@@ -157,10 +155,8 @@ def _problem(model: Model, trials: Sequence[Trial], weight: Weight) -> tuple[Any
     """The problem of one effect beside the nominal model, and where its amplitudes stand among what is free."""
     (effect,) = model.effects
     names = [f"{effect.name}.{n}" for n in effect.amplitudes()]
-    if isinstance(weight, Doubt):
-        problem = LikelihoodProblem(model, trials, weight)
-        return problem, [problem.free.index(n) for n in names]
-    return Problem(model, trials, weight, tuple(names)), list(range(len(names)))
+    problem = problem_of(model, trials, weight, tuple(names))
+    return problem, [problem.free.index(n) for n in names]
 
 
 def _own_columns(

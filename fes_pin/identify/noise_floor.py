@@ -35,7 +35,7 @@ def rich_noise(
     parts = problem.linearize(fitted.values, fitted.unknowns)
     residual = np.concatenate([p.residual for p in parts])
     explain = [np.concatenate([p.jacobian for p in parts]), *columns, _local_columns(parts)]
-    basis = _span(np.concatenate([c for c in explain if c.shape[1]], axis=1))
+    basis = span(np.concatenate([c for c in explain if c.shape[1]], axis=1))
     left = residual - basis @ (basis.T @ residual)
     for shapes in varying:
         left = left - _of_each_trial(left, shapes, [len(p.residual) for p in parts])
@@ -61,7 +61,7 @@ def _of_each_trial(left: np.ndarray, shapes: Sequence[np.ndarray], counts: Seque
         for end, count in zip(ends, counts, strict=True):
             rows = slice(end - count, end)
             if columns[rows].any():
-                basis = _span(columns[rows])
+                basis = span(columns[rows])
                 explained[rows] = basis @ (basis.T @ left[rows])
                 rank += basis.shape[1]
         worth = float(explained @ explained) - PARAMETER_PRICE * rank
@@ -81,8 +81,8 @@ def _local_columns(parts: Sequence) -> np.ndarray:
     return out
 
 
-def _span(columns: np.ndarray) -> np.ndarray:
-    """Orthonormal basis of a span, shape (m, rank)."""
+def span(columns: np.ndarray) -> np.ndarray:
+    """Orthonormal basis of what columns of shape (m, k) span, shape (m, rank)."""
     norms = np.linalg.norm(columns, axis=0)
     good = (norms > 0) & np.isfinite(norms)
     scaled = columns[:, good] / norms[good]
