@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight, noise_in
 from fes_pin.contrast.promises import Bench, Promise, promises
-from fes_pin.contrast.repeats import Repeats, scatter, without_locals
+from fes_pin.contrast.repeats import Repeats, scatter, without_locals, without_scatter
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library
 from fes_pin.diagnose.search.likelihood_fits import STARTS, refinements
@@ -18,9 +20,9 @@ from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.likelihood import LikelihoodProblem, first_guess, maximise, score_doubt
-from fes_pin.identify.noise import as_white
+from fes_pin.identify.noise import Noise, NoiseModel, as_white
 from fes_pin.identify.noise_floor import rich_noise
-from fes_pin.identify.problem import Problem
+from fes_pin.identify.problem import Linearized, Problem
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
@@ -32,6 +34,9 @@ LOOK_DRIVEN = 4
 """Steps of a first fit under what is random in a smaller set."""
 ROUNDS = 6
 """Turns of parameters and randomness, at most."""
+ALIKE = 0.1
+"""Share of a deviation by which its next estimate may differ without another fit: what eight trials tell of it is
+uncertain by a quarter, and the likelihood flat about its best value."""
 
 
 class Fits:
@@ -91,7 +96,7 @@ class Fits:
         )
         white = as_white(noise_of(alone))
         probes = library.probes(alone, white)
-        return alone.values, rich_noise(alone, white, [p.columns for p in probes])
+        return alone.values, rich_noise(alone, white, [p.columns for p in probes], [[_slopes(alone, white)]])
 
     def converged(
         self, model: GroupedModel, items: Sequence[Item], weights: Mapping[str, Weight], unknowns: Any
@@ -114,31 +119,37 @@ class Fits:
 
     def _scattered(self, one: Grouped) -> Grouped:
         """The set again, with the scatter of repeats that is most likely beside it."""
-        best = one
         for _ in range(ROUNDS):
-            weights = self._repeats(best)
-            problem = GroupedProblem(best.model, self.trials, weights)
-            fitted = fit_problem(problem, best.fit.values, best.fit.unknowns)  # type: ignore[arg-type]
-            before, best = best, Grouped(one.items, fitted, weights)
-            if not best.fit.sse < before.fit.sse - 10.0 * TOLERANCE:
+            weights = self._repeats(one)
+            if _alike(weights, one.weights):
                 break
-        return best
+            problem = GroupedProblem(one.model, self.trials, weights)
+            one = Grouped(one.items, fit_problem(problem, one.fit.values, one.fit.unknowns), weights)  # type: ignore[arg-type]
+        return one
 
     def _repeats(self, one: Grouped) -> dict[str, Weight]:
         """The noise of each group with how much repeats scatter beside a set."""
         noise = {g: noise_in(w) for g, w in one.weights.items()}
-        problem = GroupedProblem(one.model, self.trials, noise)
-        parts = problem.linearize(one.fit.values, one.fit.unknowns)
-        names = self.nominal.fitted_parameters()
-        paths = [[one.model.path(n, g) for n in names] for g, many in self.trials.items() for _ in many]
-        columns = [p.jacobian[:, [problem.free.index(n) for n in own]] for p, own in zip(parts, paths, strict=True)]
-        deviations = scatter(parts, columns, names)
+        parts, names, at = self._plain_parts(one), self.nominal.fitted_parameters(), 0
+        columns: dict[str, list[np.ndarray]] = {}
+        for group, many in self.trials.items():
+            own = [one.fit.free.index(one.model.path(n, group)) for n in names]
+            columns[group] = [without_locals(p, p.jacobian[:, own]) for p in parts[at : at + len(many)]]
+            at += len(many)
+        deviations = scatter(parts, [c for many in columns.values() for c in many], names)
         if not deviations:
             return dict(noise)
-        at = [names.index(n) for n in deviations]
-        along = [without_locals(p, c[:, at] * list(deviations.values())) for p, c in zip(parts, columns, strict=True)]
-        cut = problem.by_group(along)
-        return {g: Repeats(noise[g], deviations, tuple(cut[g])) for g in noise}
+        chosen, sizes = [names.index(n) for n in deviations], np.array(list(deviations.values()))
+        return {g: Repeats(noise[g], deviations, tuple(c[:, chosen] * sizes for c in columns[g])) for g in noise}
+
+    def _plain_parts(self, one: Grouped) -> list[Linearized]:
+        """The trials of a fit, whitened with their noise alone."""
+        out, at = [], 0
+        for group, many in self.trials.items():
+            parts, weight = list(one.fit.parts[at : at + len(many)]), one.weights[group]
+            out += without_scatter(parts, weight) if isinstance(weight, Repeats) else parts
+            at += len(many)
+        return out
 
     def look(self, base: Grouped, promises: Sequence[Promise]) -> Grouped:
         """A first fit of a set with one item more, from its most promising shapes."""
@@ -192,8 +203,16 @@ class Fits:
         """The set again, under the noise that it leaves in each group."""
         if self.driven:
             return one
-        weights = {g: noise_of(self.part(one, g)) for g in self.trials}
+        weights = {g: self._own_noise(self.part(one, g), one.weights[g]) for g in self.trials}
         return self.converged(one.model, one.items, weights, one.fit.unknowns)
+
+    def _own_noise(self, part: Fit, weight: Weight) -> NoiseModel:
+        """The noise that a group's part of a fit leaves; without what its repeats differ by, where they scatter."""
+        noise = noise_of(part)
+        if not isinstance(weight, Repeats):
+            return noise
+        white = as_white(noise)
+        return rich_noise(part, white, (), [[_slopes(part, white)]])
 
     def weighed_as(self, one: Grouped, other: Grouped) -> Grouped:
         """The set again, under the weights of another: only then are the residuals of both in one unit."""
@@ -223,3 +242,18 @@ def _reformed(model: GroupedModel, group: str, own: Model) -> GroupedModel:
     """A grouped model with the values that differ in one group's model."""
     known = model.models[group].parameters()
     return model.with_parameters({model.path(n, group): v for n, v in own.parameters().items() if v != known[n]})
+
+
+def _slopes(fitted: Fit, white: dict[str, Noise]) -> np.ndarray:
+    """Sensitivities to all that is free, scaled with white noise, shape (m, free), all trials end to end."""
+    problem = Problem(fitted.model, fitted.trials, white, fitted.free)
+    return np.concatenate([p.jacobian for p in problem.linearize(fitted.values, fitted.unknowns)])
+
+
+def _alike(one: Mapping[str, Weight], other: Mapping[str, Weight]) -> bool:
+    """True if repeats scatter as much by two weights, within `ALIKE`."""
+    for a, b in zip(one.values(), other.values(), strict=True):
+        here, there = (w.deviations if isinstance(w, Repeats) else {} for w in (a, b))
+        if set(here) != set(there) or any(abs(here[n] - there[n]) > ALIKE * there[n] for n in here):
+            return False
+    return True

@@ -171,9 +171,7 @@ class GroupedProblem:
         self, model: GroupedModel, trials: Mapping[str, Sequence[Trial]], weights: Mapping[str, Weight]
     ) -> None:
         self.model, self.free = model, model.free
-        self.parts: dict[str, Any] = {
-            g: problem_of(m, trials[g], weights[g]) for g, m in model.models.items()
-        }
+        self.parts: dict[str, Any] = {g: problem_of(m, trials[g], weights[g]) for g, m in model.models.items()}
         self.trials = tuple(t for p in self.parts.values() for t in p.trials)
         self.unknown_names = tuple(dict.fromkeys(n for p in self.parts.values() for n in p.unknown_names))
         self.limits = {model.path(n, g): v for g, p in self.parts.items() for n, v in p.limits.items()}

@@ -17,7 +17,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import PARAMETER_PRICE
@@ -29,10 +28,8 @@ from fes_pin.models.model import Model
 SMALLEST, LARGEST = -1.0, 12.0
 """Logarithms between which s is sought, in units of what the trials tell of a parameter: at the smallest its variance
 is an eighth of that, at the largest a trial tells nothing but its own."""
-GRID = 27
-"""Values of a deviation that are tried before the best of them is refined: half a unit of the logarithm apart."""
-SWEEPS = 2
-"""Turns in which deviations are refined beside each other."""
+COARSE, STEP, FINE = 27, 0.5, 21
+"""Points of a deviation's logarithm that are tried, half a unit apart, and as many within one of them from the best."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,36 +62,44 @@ class RepeatedProblem(Problem):
         self, model: Model, trials: Sequence[Trial], weight: Repeats, free: tuple[str, ...] | None = None
     ) -> None:
         super().__init__(model, trials, weight.noise, free)
-        self._shrinks = [_shrink(v) for v in weight.along]
+        self._shrinks = [_Shrink.of(v) for v in weight.along]
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """As a `Problem` does, times (I + V D^2 V')^(-1/2)."""
         plain = super().linearize(values, unknowns)
-        return [_shrunk(part, *shrink) for part, shrink in zip(plain, self._shrinks, strict=True)]
-
-
-def _shrink(along: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Orthonormal directions, what is taken off along each, and the log-determinant of I + `along` `along`'."""
-    powers, vectors = np.linalg.eigh(along.T @ along)
-    felt = powers > 1e-12 * max(powers.max(initial=0.0), 1e-300)
-    basis = along @ vectors[:, felt] / np.sqrt(powers[felt])
-    return basis, 1.0 - 1.0 / np.sqrt(1.0 + powers[felt]), float(np.log1p(powers[felt]).sum())
-
-
-def _shrunk(part: Linearized, basis: np.ndarray, less: np.ndarray, log_determinant: float) -> Linearized:
-    residual, jacobian, local = (x - basis @ (less * (basis.T @ x).T).T for x in (part.residual, part.jacobian, part.local))
-    return Linearized(residual, jacobian, local, part.log_determinant + log_determinant)
+        return [shrink.shrunk(part) for part, shrink in zip(plain, self._shrinks, strict=True)]
 
 
 @dataclass(frozen=True)
-class _Evidence:
-    """What a trial says: products of X (free parameters), V and r, its own unknowns taken out."""
+class _Shrink:
+    """(I + V D^2 V')^(-1/2) of one trial: orthonormal directions, and the powers of V D along them."""
 
-    xx: np.ndarray
-    xv: np.ndarray
-    xr: np.ndarray
-    vv: np.ndarray
-    vr: np.ndarray
+    basis: np.ndarray
+    powers: np.ndarray
+
+    @classmethod
+    def of(cls, along: np.ndarray) -> _Shrink:
+        powers, vectors = np.linalg.eigh(along.T @ along)
+        felt = powers > 1e-12 * max(powers.max(initial=0.0), 1e-300)
+        return cls(along @ vectors[:, felt] / np.sqrt(powers[felt]), powers[felt])
+
+    def shrunk(self, part: Linearized) -> Linearized:
+        return self._scaled(part, 1.0 / np.sqrt(1.0 + self.powers), 1.0)
+
+    def grown(self, part: Linearized) -> Linearized:
+        return self._scaled(part, np.sqrt(1.0 + self.powers), -1.0)
+
+    def _scaled(self, part: Linearized, factors: np.ndarray, sign: float) -> Linearized:
+        def scaled(x: np.ndarray) -> np.ndarray:
+            return x + (self.basis * (factors - 1.0)) @ (self.basis.T @ x)
+
+        more = sign * float(np.log1p(self.powers).sum())
+        return Linearized(scaled(part.residual), scaled(part.jacobian), scaled(part.local), part.log_determinant + more)
+
+
+def without_scatter(parts: Sequence[Linearized], weight: Repeats) -> list[Linearized]:
+    """Trials of a `RepeatedProblem` as a `Problem` would have them."""
+    return [_Shrink.of(v).grown(p) for p, v in zip(parts, weight.along, strict=True)]
 
 
 def scatter(parts: Sequence[Linearized], columns: Sequence[np.ndarray], names: Sequence[str]) -> dict[str, float]:
@@ -105,74 +110,79 @@ def scatter(parts: Sequence[Linearized], columns: Sequence[np.ndarray], names: S
     parts
         Trials linearized at a fit, whitened with their noise alone.
     columns
-        V of each trial, shape (m, names).
+        V of each trial, shape (m, names), without what its own unknowns take up.
     names
         Of the parameters that may scatter.
     """
-    told = [_evidence(p, v) for p, v in zip(parts, columns, strict=True)]
-    size = np.sqrt(np.mean([np.diag(e.vv) for e in told], axis=0))
-    found: dict[int, float] = {}
-    cost = _cost(told, np.zeros(len(names)))
-    for _ in names:
-        tried = {k: _with(told, found, k, size) for k in range(len(names)) if k not in found and size[k] > 0.0}
-        best = min(tried, key=lambda k: tried[k][0], default=None)
-        if best is None or not cost - tried[best][0] > PARAMETER_PRICE:
-            break
-        cost, found = tried[best]
-    return {names[k]: s for k, s in found.items()}
+    return _Scatter(parts, columns, names).found()
 
 
-def _with(
-    told: Sequence[_Evidence], found: Mapping[int, float], k: int, size: np.ndarray
-) -> tuple[float, dict[int, float]]:
-    """The cost with one deviation more, and all of them."""
-    now, cost = dict(found), np.inf
-    for turn in range(SWEEPS if found else 1):
-        for one in (k, *found) if turn == 0 else (*found, k):
-            cost, now[one] = _best_of_one(told, now, one, size)
-    return cost, now
+class _Scatter:
+    """The likelihood of deviations, from products of X (free parameters), V and r of each trial."""
 
+    def __init__(self, parts: Sequence[Linearized], columns: Sequence[np.ndarray], names: Sequence[str]) -> None:
+        self.names = names
+        unit = 1.0 / np.maximum(np.linalg.norm(np.concatenate([p.jacobian for p in parts]), axis=0), 1e-300)
+        x = [without_locals(p, p.jacobian * unit) for p in parts]
+        r = [without_locals(p, p.residual[:, None])[:, 0] for p in parts]
+        self.xx = np.array([a.T @ a for a in x])
+        self.xv = np.array([a.T @ v for a, v in zip(x, columns, strict=True)])
+        self.xr = np.array([a.T @ b for a, b in zip(x, r, strict=True)])
+        self.vv = np.array([v.T @ v for v in columns])
+        self.vr = np.array([v.T @ b for v, b in zip(columns, r, strict=True)])
+        self.size = np.sqrt(np.mean(np.diagonal(self.vv, axis1=1, axis2=2), axis=0))
 
-def _best_of_one(
-    told: Sequence[_Evidence], found: Mapping[int, float], k: int, size: np.ndarray
-) -> tuple[float, float]:
-    def cost(log_s: float) -> float:
-        deviations = np.zeros(len(size))
-        for one, s in found.items():
-            deviations[one] = s
-        deviations[k] = np.exp(log_s) / size[k]
-        return _cost(told, deviations)
+    def found(self) -> dict[str, float]:
+        """Deviations, one more as long as it is demanded."""
+        best = np.zeros(len(self.names))
+        cost = float(self.costs(best[None])[0])
+        while True:
+            more = [self._with(best, k) for k in np.flatnonzero((best == 0.0) & (self.size > 0.0)).tolist()]
+            least, wanted = min(more, key=lambda m: m[0], default=(np.inf, best))
+            if not cost - least > PARAMETER_PRICE:
+                return {n: float(s) for n, s in zip(self.names, best, strict=True) if s > 0.0}
+            best, cost = wanted, least
 
-    grid = np.linspace(SMALLEST, LARGEST, GRID)
-    start = grid[int(np.argmin([cost(x) for x in grid]))]
-    near = scipy.optimize.minimize_scalar(cost, bounds=(start - 0.5, start + 0.5), method="bounded")
-    return float(near.fun), float(np.exp(near.x) / size[k])
+    def _with(self, deviations: np.ndarray, k: int) -> tuple[float, np.ndarray]:
+        """The cost with one deviation more, and all of them, refined beside each other."""
+        now, cost = deviations.copy(), np.inf
+        beside: list[int] = np.flatnonzero(now).tolist()
+        for one in [k, *beside, k] if beside else [k]:
+            cost, now[one] = self._best(now, one)
+        return cost, now
 
+    def _best(self, deviations: np.ndarray, k: int) -> tuple[float, float]:
+        """The least cost along one of the deviations, and where it is."""
+        least, best = np.inf, 0.0
+        for grid in (np.linspace(SMALLEST, LARGEST, COARSE), np.linspace(-STEP, STEP, FINE)):
+            tried = np.tile(deviations, (len(grid), 1))
+            tried[:, k] = np.exp(grid) * (best or 1.0 / self.size[k])
+            costs = self.costs(tried)
+            at = int(np.argmin(costs))
+            least, best = float(costs[at]), float(tried[at, k])
+        return least, best
 
-def _evidence(part: Linearized, columns: np.ndarray) -> _Evidence:
-    x, v, r = without_locals(part, part.jacobian), without_locals(part, columns), part.residual
-    r = without_locals(part, r[:, None])[:, 0]
-    return _Evidence(x.T @ x, x.T @ v, x.T @ r, v.T @ v, v.T @ r)
+    def costs(self, deviations: np.ndarray) -> np.ndarray:
+        """Twice the negative log-likelihood but for a constant, the free parameters profiled out.
+
+        Parameters
+        ----------
+        deviations
+            Shape (points, names).
+        """
+        felt = np.flatnonzero(deviations.any(axis=0))
+        d = deviations[:, None, felt]
+        inner = np.eye(len(felt)) + d[..., None] * self.vv[:, felt[:, None], felt] * d[:, :, None, :]
+        xv, vr = self.xv[:, :, felt] * d[:, :, None, :], self.vr[:, felt] * d
+        solved = np.linalg.solve(inner, np.concatenate([xv.swapaxes(2, 3), vr[..., None]], axis=3))
+        hessian = (self.xx - xv @ solved[..., :-1]).sum(axis=1)
+        gradient = (self.xr - (xv @ solved[..., -1:])[..., 0]).sum(axis=1)
+        own = np.linalg.slogdet(inner)[1].sum(axis=1) - (vr * solved[..., -1]).sum(axis=(1, 2))
+        inverse = np.linalg.pinv(hessian, rcond=1e-12, hermitian=True)
+        return np.asarray(own - np.einsum("gp,gpq,gq->g", gradient, inverse, gradient))
 
 
 def without_locals(part: Linearized, columns: np.ndarray) -> np.ndarray:
     """Columns less what a step of the trial's own unknowns makes of them, shape as `columns`."""
     own = span(part.local)
     return columns - own @ (own.T @ columns)
-
-
-def _cost(told: Sequence[_Evidence], deviations: np.ndarray) -> float:
-    """Twice the negative log-likelihood but for a constant, the free parameters profiled out."""
-    felt = deviations > 0.0
-    hessian, gradient, total = 0.0, 0.0, 0.0
-    for one in told:
-        xx, xr = one.xx, one.xr
-        if felt.any():
-            d = deviations[felt]
-            inner = np.eye(len(d)) + d[:, None] * one.vv[np.ix_(felt, felt)] * d
-            xv, vr = one.xv[:, felt] * d, one.vr[felt] * d
-            solved = np.linalg.solve(inner, np.column_stack([xv.T, vr]))
-            xx, xr = xx - xv @ solved[:, :-1], xr - xv @ solved[:, -1]
-            total += float(np.linalg.slogdet(inner)[1] - vr @ solved[:, -1])
-        hessian, gradient = hessian + xx, gradient + xr
-    return total - float(gradient @ np.linalg.lstsq(hessian, gradient, rcond=1e-12)[0])
