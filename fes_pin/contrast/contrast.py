@@ -99,7 +99,7 @@ def contrast(
         fits, found = searched.fits, searched.found
         tell(0.95, "what is left")
         left, said = _left(fits, found.best, seed)
-    changes = [_change(found, i, names, catalogue) for i in found.best.changes] + misread_change(searched)
+    changes = [_change(fits, found, i, names, catalogue) for i in found.best.changes] + misread_change(searched)
     changes.sort(key=lambda c: c.p_value)
     unchanged, excluded, untestable = _not_changed(found, driven)
     if left.unexplained:  # sizes that would have been seen are those beside a model that is right
@@ -151,11 +151,11 @@ def _in_single_trials(fits: Fits, best: Grouped, group: str, left: Remainder, se
     return replace(left, unexplained=p < LEVEL, p_value=max(left.p_value, p))
 
 
-def _change(found: ContrastFound, item: Item, groups: tuple[str, ...], catalogue: Catalogue) -> Change:
+def _change(fits: Fits, found: ContrastFound, item: Item, groups: tuple[str, ...], catalogue: Catalogue) -> Change:
     best, model = found.best, found.best.model
     assert item.group is not None
     rest = found.without[item]
-    wider = math.sqrt(max(1.0, inflation(best, rest)[0]))
+    wider = math.sqrt(max(1.0, inflation(fits, best, rest).phi))
     nominal = item.name in found.nominal.model.free
     paths = [item.name] if nominal else [n for n in model.models[item.group].parameters() if _is_of(item.name, n)]
     parameters: dict[str, dict[str, ParameterEstimate]] = {}
@@ -219,7 +219,7 @@ def _not_changed(
     for one in found.promises:
         if one.item.group is None:
             continue
-        size = reach * one.deviation * math.sqrt(one.spread)
+        size = reach * one.deviation * math.sqrt(max(one.spread, 1.0))
         if one.effect is None:
             path = one.item.name
             if path in info and path not in changed and model.parameters()[path]:

@@ -1,11 +1,27 @@
-"""What is claimed of a change: against the noise, against the spread between trials, over the whole library."""
+"""What is claimed of a change: against the noise, against the spread between trials, over the whole library.
+
+x_i is what the larger of two sets adds to trial i, r_i what it leaves there; x_i' r_i / |x_i| has a variance phi, 1
+where repeats differ by their noise alone. Few trials tell little of phi along one x. Along every cause of the library
+they tell it again: with ln phi scattered among those no more than f degrees of freedom would have it, phi is one and
+the same for all; else so many degrees stand behind the usual phi as the scatter leaves. Both together are
+
+    phi = max(phi, (f0 phi0 + f phi) / (f0 + f)),
+
+and gain / (degrees phi) is compared with Fisher's F(degrees, f0 + f). Source: Smyth, Stat. Appl. Genet. Mol. Biol. 3
+(2004), article 3, sections 3 and 6.2.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
+from scipy import optimize, special
 
 from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.grouped import Grouped
+from fes_pin.contrast.promises import Promise
 from fes_pin.diagnose.decide.significance import Family, coherence_p_value
 from fes_pin.identify.distributions import f_tail
 
@@ -17,6 +33,19 @@ UNFELT = 1e-4
 """Share of the largest part that a trial must have in a change to say something of its spread."""
 
 
+@dataclass(frozen=True)
+class Spread:
+    """A variance between trials in units of what the noise explains, and the degrees of freedom behind it."""
+
+    phi: float
+    free: float
+
+    def beside(self, usual: Spread) -> Spread:
+        """What this and the usual spread say together; never less than this alone, which may be no usual one."""
+        total = usual.free + self.free
+        return Spread(max(self.phi, (usual.free * usual.phi + self.free * self.phi) / total), total)
+
+
 def p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> float:
     """Family-wise p-value of what a set has more than another: the larger of that against the noise and of that against
     the spread between trials. A repeat that differs by more than its noise is no change.
@@ -25,7 +54,7 @@ def p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> fl
     noise = family.p_value(smaller.fit.sse - larger.fit.sse, degrees)
     if not noise < LEVEL:
         return noise
-    return max(noise, family.adjusted(between_trials(larger, fits.weighed_as(smaller, larger), degrees)))
+    return max(noise, family.adjusted(between_trials(fits, larger, fits.weighed_as(smaller, larger), degrees)))
 
 
 def noise_p_value(family: Family, larger: Grouped, smaller: Grouped) -> float:
@@ -33,24 +62,18 @@ def noise_p_value(family: Family, larger: Grouped, smaller: Grouped) -> float:
     return family.p_value(smaller.fit.sse - larger.fit.sse, max(len(larger.fit.free) - len(smaller.fit.free), 1))
 
 
-def between_trials(larger: Grouped, smaller: Grouped, degrees: int) -> float:
-    """p-value of a gain against its spread between trials.
-
-    x_i is what the larger set adds to trial i, r_i what it leaves there; x_i' r_i / |x_i| has a variance phi, 1 where
-    repeats differ by their noise alone. gain / (degrees phi) is compared with Fisher's F(degrees, n - 2): the mean
-    over all trials and that of one group are fitted.
-    """
+def between_trials(fits: Fits, larger: Grouped, smaller: Grouped, degrees: int) -> float:
+    """p-value of a gain against its spread between trials; both sets under the same weights."""
     if len(larger.fit.parts) < FEWEST_TRIALS:
         return coherence_p_value(smaller.fit, larger.fit, degrees)
-    phi, free = inflation(larger, smaller)
-    gain = smaller.fit.sse - larger.fit.sse
-    if free < 1 or gain <= 0.0:
+    spread, gain = inflation(fits, larger, smaller), smaller.fit.sse - larger.fit.sse
+    if spread.free < 1 or gain <= 0.0:
         return 1.0
-    return float(f_tail(gain / (degrees * max(phi, 1e-12)), degrees, free))
+    return float(f_tail(gain / (degrees * max(spread.phi, 1e-12)), degrees, spread.free))
 
 
-def inflation(larger: Grouped, smaller: Grouped) -> tuple[float, int]:
-    """phi of `between_trials` and its degrees of freedom."""
+def inflation(fits: Fits, larger: Grouped, smaller: Grouped) -> Spread:
+    """phi beside what is usual in the library; the mean of all trials and that of one group are fitted."""
     pairs = [
         (few.residual - many.residual, many.residual)
         for few, many in zip(smaller.fit.parts, larger.fit.parts, strict=True)
@@ -60,5 +83,28 @@ def inflation(larger: Grouped, smaller: Grouped) -> tuple[float, int]:
     felt = sizes > UNFELT * max(float(sizes.max()), 1e-300)
     free = int(felt.sum()) - 1 - max(1, len(larger.changes))
     if free < 1:
-        return 1.0, free
-    return float(np.sum(along[felt] ** 2 / sizes[felt])) / free, free
+        return Spread(1.0, free)
+    own = Spread(float(np.sum(along[felt] ** 2 / sizes[felt])) / free, free)
+    return own.beside(usual_spread(fits.promises(larger)[0]))
+
+
+def usual_spread(promises: Sequence[Promise]) -> Spread:
+    """The spread that is usual among the causes of a library; no more degrees stand behind it than it has causes."""
+    told = np.array([(p.spread, p.spread_degrees) for p in promises if p.spread_degrees > 0 and p.spread > 0.0])
+    if len(told) < 2:
+        return Spread(1.0, 0.0)
+    phi, half = told[:, 0], 0.5 * told[:, 1]
+    logs = np.log(phi) - special.digamma(half) + np.log(half)
+    free = _degrees(float(logs.var(ddof=1) - np.mean(special.polygamma(1, half))), len({p.item.name for p in promises}))
+    shift = special.digamma(0.5 * free) - np.log(0.5 * free)
+    return Spread(float(np.exp(logs.mean() + shift)), free)
+
+
+def _degrees(variance: float, most: float) -> float:
+    """Degrees of freedom f0 of a variance whose logarithm has trigamma(f0 / 2) as its own."""
+    if variance <= special.polygamma(1, 0.5 * most):
+        return most
+    least = 1e-3
+    if variance >= special.polygamma(1, 0.5 * least):
+        return least
+    return float(optimize.brentq(lambda f: special.polygamma(1, 0.5 * f) - variance, least, most))

@@ -65,6 +65,7 @@ class Fits:
         self.nominal, self.trials, self.driven = Model(nominal.rig), dict(trials), driven
         self.every = [t for many in trials.values() for t in many]
         self.first_weights: list[dict[str, Weight]] = []
+        self._promised: dict[int, tuple[Grouped, list[Promise], Scores]] = {}
         self.library = Library(self.nominal, self.every, effects)
         self.of_group = {g: Library(self.nominal, many, effects) for g, many in self.trials.items()}
         for one in self.of_group.values():
@@ -235,7 +236,9 @@ class Fits:
 
     def promises(self, base: Grouped) -> tuple[list[Promise], Scores]:
         """Every item that a set does not have, scored; see `promises.promises`."""
-        return promises(Bench(self.nominal, self.trials, self.library), base)
+        if id(base) not in self._promised:
+            self._promised[id(base)] = (base, *promises(Bench(self.nominal, self.trials, self.library), base))
+        return self._promised[id(base)][1:]
 
 
 def _reformed(model: GroupedModel, group: str, own: Model) -> GroupedModel:

@@ -37,8 +37,8 @@ class Promise:
         Standard deviation of its first amplitude.
     start
         Value that a parameter would have.
-    spread
-        Variance of what single trials say of it, in units of what the noise explains; at least 1.
+    spread, spread_degrees
+        Variance of what single trials say of it, in units of what the noise explains, and its degrees of freedom.
     """
 
     item: Item
@@ -49,6 +49,7 @@ class Promise:
     deviation: float
     start: Mapping[str, float]
     spread: float = 1.0
+    spread_degrees: int = 0
 
 
 @dataclass(frozen=True)
@@ -82,13 +83,12 @@ def promises(bench: Bench, base: Grouped) -> tuple[list[Promise], Scores]:
     gram, along = left.T @ left, left.T @ projection.residual
     ends = np.cumsum([0, *(m[3].shape[1] for m in made)])
     blocks = [slice(a, b) for a, b in itertools.pairwise(ends)]
-    out = [
-        replace(
-            _promise(base.model, m[:3], gram[b, b], along[b], norms),
-            spread=_spread(m[3][:, 0], projection.residual, base.fit.parts),
+    out = []
+    for m, b, norms in zip(made, blocks, before, strict=True):
+        spread, free = _spread(m[3][:, 0], projection.residual, base.fit.parts)
+        out.append(
+            replace(_promise(base.model, m[:3], gram[b, b], along[b], norms), spread=spread, spread_degrees=free)
         )
-        for m, b, norms in zip(made, blocks, before, strict=True)
-    ]
     tested = [b for m, b in zip(made, blocks, strict=True) if m[0].group is not None]
     return out, Scores([], gram, along, tested)
 
@@ -224,12 +224,12 @@ def _started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
     return replace(effect, **values)  # type: ignore[arg-type]
 
 
-def _spread(column: np.ndarray, residual: np.ndarray, parts: Sequence[Linearized]) -> float:
-    """Variance of what each trial says of a parameter, in units of what the noise explains."""
+def _spread(column: np.ndarray, residual: np.ndarray, parts: Sequence[Linearized]) -> tuple[float, int]:
+    """Variance of what each trial says of a parameter, in units of what the noise explains; its degrees of freedom."""
     ends = np.cumsum([0, *(len(p.residual) for p in parts)])
     cuts = [slice(a, b) for a, b in itertools.pairwise(ends)]
     sizes = np.array([float(column[c] @ column[c]) for c in cuts])
     along = np.array([float(column[c] @ residual[c]) for c in cuts])
     felt = sizes > 1e-4 * max(float(sizes.max()), 1e-300)
     free = int(felt.sum()) - 2
-    return max(1.0, float(np.sum(along[felt] ** 2 / sizes[felt])) / free) if free > 0 else 1.0
+    return (float(np.sum(along[felt] ** 2 / sizes[felt])) / free, free) if free > 0 else (1.0, 0)
