@@ -7,8 +7,10 @@ the same for all; else so many degrees stand behind the usual phi as the scatter
 
     phi = max(phi, (f0 phi0 + f phi) / (f0 + f)),
 
-and gain / (degrees phi) is compared with Fisher's F(degrees, f0 + f). Source: Smyth, Stat. Appl. Genet. Mol. Biol. 3
-(2004), article 3, sections 3 and 6.2.
+and gain / (degrees phi) is compared with Fisher's F(degrees, f0 + f). Of the scatter of repeats few trials tell little
+as well: where a share q of the gain rests on it, the degrees are 1 / (1 / (f0 + f) + q^2 / f).
+Sources: Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004), article 3, sections 3 and 6.2; for q Satterthwaite, Biometrics
+Bulletin 2 (1946).
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from scipy import optimize, special
 from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.grouped import Grouped
 from fes_pin.contrast.promises import Promise
+from fes_pin.contrast.repeats import Repeats
 from fes_pin.diagnose.decide.significance import Family, coherence_p_value
 from fes_pin.identify.distributions import f_tail
 
@@ -85,7 +88,19 @@ def inflation(fits: Fits, larger: Grouped, smaller: Grouped) -> Spread:
     if free < 1:
         return Spread(1.0, free)
     own = Spread(float(np.sum(along[felt] ** 2 / sizes[felt])) / free, free)
-    return own.beside(usual_spread(fits.promises(larger)[0]))
+    both = own.beside(usual_spread(fits.promises(larger)[0]))
+    share = _leaning(larger, [x for x, _ in pairs]) / float(sizes.sum())
+    return Spread(both.phi, 1.0 / (1.0 / both.free + share**2 / free))
+
+
+def _leaning(one: Grouped, moved: Sequence[np.ndarray]) -> float:
+    """What of the squares that move the trials rests on how much repeats scatter."""
+    total, at = 0.0, 0
+    for weight in one.weights.values():
+        if isinstance(weight, Repeats):
+            total += weight.leaning(moved[at : at + len(weight.along)])
+            at += len(weight.along)
+    return total
 
 
 def usual_spread(promises: Sequence[Promise]) -> Spread:

@@ -50,9 +50,16 @@ class Repeats:
     deviations: Mapping[str, float]
     along: tuple[np.ndarray, ...]
 
-    def of(self, rows: slice) -> Repeats:
-        """The same for some of the trials."""
-        return Repeats(self.noise, self.deviations, self.along[rows])
+    def leaning(self, moved: Sequence[np.ndarray]) -> float:
+        """Part of the squares of what moves each trial, weighed, that is the larger the less repeats scatter.
+
+        With the logarithm of s^2 it falls as this part of it, and so is as uncertain.
+        """
+        total = 0.0
+        for one, along in zip(moved, self.along, strict=True):
+            shrink = _Shrink.of(along)
+            total += float(np.sum((shrink.basis.T @ one) ** 2 * shrink.powers / (1.0 + shrink.powers)))
+        return total
 
 
 class RepeatedProblem(Problem):
