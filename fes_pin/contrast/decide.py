@@ -1,14 +1,16 @@
 """What is claimed of a change: against the noise, against the spread between trials, over the whole library.
 
 x_i is what the larger of two sets adds to trial i, r_i what it leaves there; x_i' r_i / |x_i| has a variance phi, 1
-where repeats differ by their noise alone. Few trials tell little of phi along one x. Along every cause of the library
-they tell it again: with ln phi scattered among those no more than f degrees of freedom would have it, phi is one and
-the same for all; else so many degrees stand behind the usual phi as the scatter leaves. Both together are
+where repeats differ by their noise alone. phi is estimated with the trials' shares of the gain as weights. Few trials
+tell little of it along one x, but they tell it along every cause of the library: with ln phi scattered among those no
+more than f degrees of freedom would have it, phi is one and the same for all; else so many degrees f0 stand behind the
+usual phi0 as that scatter leaves. Both together are
 
     phi = max(phi, (f0 phi0 + f phi) / (f0 + f)),
 
-and gain / (degrees phi) is compared with Fisher's F(degrees, f0 + f). Of the scatter of repeats few trials tell little
-as well: where a share q of the gain rests on it, the degrees are 1 / (1 / (f0 + f) + q^2 / f).
+f0 less the more significantly phi is above phi0, and gain / (degrees phi) is compared with Fisher's F of f0 + f. Of
+the scatter of repeats few trials tell little as well: where a share q of the gain rests on it, the degrees are
+1 / (1 / (f0 + f) + q^2 / f).
 Sources: Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004), article 3, sections 3 and 6.2; for q Satterthwaite, Biometrics
 Bulletin 2 (1946).
 """
@@ -35,6 +37,10 @@ FEWEST_TRIALS = 6
 UNFELT = 1e-4
 """Share of the largest part that a trial must have in a change to say something of its spread."""
 
+UNUSUAL = 0.05
+"""p-value below which a spread is larger than what is usual, as repeats may differ in just this: the usual one counts
+the less, the smaller it is."""
+
 
 @dataclass(frozen=True)
 class Spread:
@@ -44,9 +50,13 @@ class Spread:
     free: float
 
     def beside(self, usual: Spread) -> Spread:
-        """What this and the usual spread say together; never less than this alone, which may be no usual one."""
-        total = usual.free + self.free
-        return Spread(max(self.phi, (usual.free * usual.phi + self.free * self.phi) / total), total)
+        """What this and the usual spread say together, as far as they agree."""
+        if not usual.free > 0.0:
+            return self
+        agree = min(1.0, f_tail(self.phi / usual.phi, self.free, usual.free) / UNUSUAL)
+        more = agree * usual.free
+        total = more + self.free
+        return Spread(max(self.phi, (more * usual.phi + self.free * self.phi) / total), total)
 
 
 def p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> float:
@@ -87,10 +97,23 @@ def inflation(fits: Fits, larger: Grouped, smaller: Grouped) -> Spread:
     free = int(felt.sum()) - 1 - max(1, len(larger.changes))
     if free < 1:
         return Spread(1.0, free)
-    own = Spread(float(np.sum(along[felt] ** 2 / sizes[felt])) / free, free)
+    own = _clustered(sizes, along)
     both = own.beside(usual_spread(fits.promises(larger)[0]))
     share = _leaning(larger, [x for x, _ in pairs]) / float(sizes.sum())
     return Spread(both.phi, 1.0 / (1.0 / both.free + share**2 / free))
+
+
+def _clustered(sizes: np.ndarray, along: np.ndarray) -> Spread:
+    """phi with each trial's share of the gain as its weight, corrected for what the trial itself has drawn the change
+    to; fewer degrees of freedom the fewer trials carry it. Source: Bell and McCaffrey, Survey Methodology 28 (2002).
+    """
+    shares = sizes / sizes.sum()
+    weights = shares / np.maximum(1.0 - shares, 1e-9)
+    beside = np.eye(len(shares)) - np.sqrt(np.outer(shares, shares))
+    form = beside * weights @ beside
+    return Spread(
+        float(np.sum(weights * along**2 / np.maximum(sizes, 1e-300))), float(np.trace(form) ** 2 / np.sum(form**2))
+    )
 
 
 def _leaning(one: Grouped, moved: Sequence[np.ndarray]) -> float:
