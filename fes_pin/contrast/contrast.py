@@ -118,6 +118,7 @@ def contrast(
         remainder=left,
         fit=found.best.fit,
         driven=driven,
+        repeats=found.best.repeats,
         warnings=tuple([*warnings, *said]),
         wall_s=time.perf_counter() - began,
     )

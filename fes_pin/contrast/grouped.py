@@ -259,3 +259,12 @@ class Grouped:
     def changes(self) -> tuple[Item, ...]:
         """The items that differ in one group."""
         return tuple(i for i in self.items if i.group is not None)
+
+    @property
+    def repeats(self) -> dict[str, float]:
+        """How much nominal parameters scatter between trials, as a share of the first group's value."""
+        weight = next(iter(self.weights.values()))
+        if not isinstance(weight, Repeats):
+            return {}
+        values = next(iter(self.model.models.values())).parameters()
+        return {n: s / abs(values[n]) for n, s in weight.deviations.items() if values[n]}

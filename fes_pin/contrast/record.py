@@ -23,6 +23,7 @@ def contrast_record(found: Contrast) -> dict[str, Any]:
         "unchanged": {n: {"at_most": shown(v)} for n, v in found.unchanged.items()},
         "excluded": {n: {"at_most": shown(p.value), "unit": p.unit} for n, p in found.excluded.items()},
         "untestable": list(found.untestable),
+        "repeats": {n: shown(v) for n, v in found.repeats.items()},
         "remainder": {"unexplained": left.unexplained, "p_value": shown(left.p_value), "where": left.where},
         "judged_by": "predictions" if found.driven else "simulations",
         "warnings": list(found.warnings),

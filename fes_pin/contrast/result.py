@@ -67,6 +67,9 @@ class Contrast:
         What could have changed unseen.
     remainder
         What is left in a group that no other group has.
+    repeats
+        Standard deviation of a nominal parameter between trials that are meant to be alike, as a share of its value: of
+        those that scatter by more than their noise.
     """
 
     study: Study
@@ -80,6 +83,7 @@ class Contrast:
     remainder: Remainder
     fit: Fit
     driven: bool
+    repeats: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     wall_s: float = field(default=0.0, compare=False)
 
@@ -113,6 +117,9 @@ def contrast_notes(found: Contrast) -> list[str]:
     lines = []
     if found.common:
         lines.append(f"in all groups alike, so no change: {', '.join(found.common)}")
+    if found.repeats:
+        sizes = ", ".join(f"{n} by {100.0 * v:.2g} %" for n, v in found.repeats.items())
+        lines.append(f"repeats scatter by themselves: {sizes} (standard deviation)")
     if found.unchanged:
         sizes = ", ".join(f"{n} by {100.0 * v:.2g} %" for n, v in found.unchanged.items())
         lines.append(f"did not change; would have been seen in 95 of 100: {sizes}")

@@ -15,6 +15,8 @@ from fes_pin.view.page import Content, Markup, element, figure, html_table, join
 
 NAMES, WIDE, ROW = 176.0, 420.0, 24.0
 """Room for names, width of a figure, height of a row."""
+SAID = ("in all groups", "repeats scatter", "something is left", "nothing left")
+"""Beginnings of the notes that stand beside how it was judged; the others have sections of their own."""
 
 
 def contrast_html(found: Contrast) -> str:
@@ -135,4 +137,4 @@ def _judged(found: Contrast) -> list[Markup]:
 
 
 def _said(found: Contrast) -> list[str]:
-    return [n for n in contrast_notes(found) if n.startswith(("in all groups", "something is left", "nothing left"))]
+    return [n for n in contrast_notes(found) if n.startswith(SAID)]
