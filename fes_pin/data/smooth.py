@@ -17,7 +17,19 @@ ORDER = 2
 DEGREE = 5
 """Of the splines of an imposed motion: their acceleration is smooth."""
 KNOT_COUNTS = 30
-"""How many numbers of knots are tried, from one to a quarter of the samples."""
+"""How many numbers of knots are tried, from one to a quarter of the samples; to half of those that are taken apart."""
+APART = (16, 12, 8, 6, 4, 3, 2)
+"""Samples that knots are counted with besides are so far apart: the farthest that sample the motion well."""
+TURNS = 4
+"""Sequences of such samples that are looked at together, at most."""
+WELL = 0.3
+"""Knots for each sample at most where samples show a motion well; cross-validation ends at twice as many."""
+FEWER = 0.6
+"""Share of knots beneath which noise is not white: with white noise their number scatters by a quarter."""
+MOTION, PLACES = 5.0, 5.0
+"""Times what many knots leave, beyond which few leave motion, as of noise that lasts many follow a part only; and
+places between knots, as many as hold all squares evenly, of which noise has more. A quick release leaves 20 to 100
+times as much, or all of it in two or three places."""
 _WINDOW = 300
 """Samples that cross-validation looks at together: its cost grows with the cube."""
 _GRID = 10.0 ** np.linspace(-4.0, 8.0, 121)
@@ -123,22 +135,67 @@ def smoothed_rates(values: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np
     if n < 2 * (DEGREE + 1):
         rate = np.gradient(values, dt)
         return np.stack([values, rate, np.gradient(rate, dt)]), np.full(3, np.nan), 0.5 / dt
-    best = (np.inf, 0.0, 0, None)
-    for inner in np.unique(np.round(np.geomspace(1, max(n // 4, 1), KNOT_COUNTS)).astype(int)):
-        ends, knots = np.full(DEGREE + 1, time[0]), np.linspace(time[0], time[-1], inner + 2)[1:-1]
-        used = inner + DEGREE + 1
-        if used >= 0.6 * n:
-            continue
-        spline = make_lsq_spline(time, values, np.r_[ends, knots, np.full(DEGREE + 1, time[-1])], k=DEGREE)
-        left = float(np.sum((values - spline(time)) ** 2))
-        score = left / (1.0 - 1.4 * used / n) ** 2
-        if score < best[0]:
-            best = (score, float(np.sqrt(left / (n - used))), inner, spline)
-    _, noise, inner, spline = best
+    inner, apart = _knots(values, time)
+    spline = make_lsq_spline(time, values, _knot_places(time, inner), k=DEGREE)
+    noise = float(np.sqrt(np.sum((values - spline(time)) ** 2) / (n - inner - DEGREE - 1)))
     bandwidth = 0.5 * (inner + 1) / float(time[-1] - time[0])
-    doubt = [2.0 * bandwidth * dt * (2.0 * np.pi * bandwidth) ** (2 * k) / (2 * k + 1) for k in range(3)]
-    assert spline is not None
+    doubt = [2.0 * bandwidth * apart * dt * (2.0 * np.pi * bandwidth) ** (2 * k) / (2 * k + 1) for k in range(3)]
     return np.stack([spline(time, k) for k in range(3)]), noise * np.sqrt(doubt), bandwidth
+
+
+def _knots(values: np.ndarray, time: np.ndarray) -> tuple[int, int]:
+    """How many inner knots a reading has, and how many samples apart its noise is taken for white.
+
+    Noise that lasts over some samples, of a log that was interpolated or of a clock that drifts between them, is
+    followed by a spline as motion is, and an acceleration is most of all noise then. Samples so far apart that they
+    just show the motion well do not share it. White noise lets them have fewer knots by the power of 1 / 13 of the
+    distance alone (Wahba 1990, Spline Models for Observational Data, section 4.4, for a quintic).
+    """
+    all_of_them = _cross_validated_knots(values, time, 1)
+    for apart in APART:
+        few = _cross_validated_knots(values, time, apart)
+        if few <= WELL * len(time) / apart:
+            usual = round(few * apart ** (1.0 / 13.0))
+            lasting = usual < FEWER * all_of_them and _leave_noise(values, time, usual, all_of_them)
+            return (usual, apart) if lasting else (all_of_them, 1)
+    return all_of_them, 1
+
+
+def _leave_noise(values: np.ndarray, time: np.ndarray, few: int, many: int) -> bool:
+    """True if what few knots leave is noise: little more than many knots leave, and not in a few places alone."""
+    left = _left(values, time, few)
+    squares = np.array([float(part @ part) for part in np.array_split(left, few + 1)])
+    places = squares.sum() ** 2 / np.sum(squares**2) if squares.any() else 0.0
+    return bool(places > PLACES and left.std() < MOTION * _left(values, time, many).std())
+
+
+def _left(values: np.ndarray, time: np.ndarray, inner: int) -> np.ndarray:
+    """What a spline with so many inner knots leaves."""
+    return np.asarray(values - make_lsq_spline(time, values, _knot_places(time, inner), k=DEGREE)(time))
+
+
+def _cross_validated_knots(values: np.ndarray, time: np.ndarray, apart: int) -> int:
+    """The number of inner knots of least generalized cross-validation, by samples so far apart, in turns."""
+    turns = [slice(k, None, apart) for k in range(0, apart, -(-apart // TURNS))]
+    best, most = (np.inf, 1), max(len(time) // (4 if apart == 1 else 2 * apart), 1)
+    for inner in np.unique(np.round(np.geomspace(1, most, KNOT_COUNTS)).astype(int)):
+        used, knots, score = inner + DEGREE + 1, _knot_places(time, inner), 0.0
+        for own in turns:
+            x, y = time[own], values[own]
+            if used >= 0.6 * len(x):
+                return best[1]
+            left = y - make_lsq_spline(x, y, knots, k=DEGREE)(x)
+            score += float(left @ left) / (1.0 - 1.4 * used / len(x)) ** 2
+        best = min(best, (score, int(inner)))
+    return best[1]
+
+
+def _knot_places(time: np.ndarray, inner: int) -> np.ndarray:
+    return np.r_[
+        np.full(DEGREE + 1, time[0]),
+        np.linspace(time[0], time[-1], inner + 2)[1:-1],
+        np.full(DEGREE + 1, time[-1]),
+    ]
 
 
 def _cross_validated(values: np.ndarray) -> float:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.smooth import low_pass, rates, smoothed_rates, smoothing_spline
@@ -65,3 +66,29 @@ def test_rates_of_a_reading_are_as_sure_as_they_say(noise):
     for value, true, std in zip(found, truth, doubt, strict=True):
         assert 0.4 < (value - true)[100:-100].std() / std < 2.5
         assert np.abs(value - true).max() < max(60.0 * std, 0.03 * np.ptp(true))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_clock_that_is_late_for_some_samples_is_no_motion(seed):
+    """A servo's counts, read 0.7 ms early or late for two or three rows of a log that is interpolated afterwards."""
+    rng = np.random.default_rng(seed)
+    logged = np.cumsum(rng.uniform(0.003, 0.007, 2000))
+    late = 0.0007 * np.sqrt(1.0 - 0.5**2) * lfilter([1.0], [1.0, -0.5], rng.standard_normal(2000))
+    time, count = np.arange(0.01, 6.0, 0.005), 2.0 * np.pi / 4096.0
+    w, phase = 2.0 * np.pi * np.array([0.4, 1.1]), rng.uniform(0.0, 6.0, 2)
+    reading = count * np.round(np.sin(np.outer(logged + late, w) + phase).sum(axis=1) / count)
+    found, doubt, bandwidth = smoothed_rates(np.interp(time, logged, reading), time)
+    true = -(w**2 * np.sin(np.outer(time, w) + phase)).sum(axis=1)
+    wrong = (found[2] - true)[60:-60]
+    assert 1.1 < bandwidth < 6.0
+    assert wrong.std() < 0.03 * true.std()
+    assert 0.4 < wrong.std() / doubt[2] < 2.5
+
+
+def test_a_step_is_motion():
+    """A quick release in noise that is white: knots for the step, whatever samples far apart would show."""
+    rng, time = np.random.default_rng(3), np.arange(2000) * 1e-3
+    step = 1e-3 / (1.0 + np.exp(-(time - 1.0) / 0.003))
+    found, _, bandwidth = smoothed_rates(step + 1e-6 * rng.standard_normal(2000), time)
+    assert bandwidth > 50.0
+    assert np.abs(found[0] - step).max() < 2e-5
