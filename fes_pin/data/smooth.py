@@ -28,8 +28,8 @@ FEWER = 0.6
 """Share of knots beneath which noise is not white: with white noise their number scatters by a quarter."""
 MOTION, PLACES = 5.0, 5.0
 """Times what many knots leave, beyond which few leave motion, as of noise that lasts many follow a part only; and
-places between knots, as many as hold all squares evenly, of which noise has more. A quick release leaves 20 to 100
-times as much, or all of it in two or three places."""
+places between knots, as many as hold all squares evenly, of which noise has more, or a quarter. A quick release leaves
+20 to 100 times as much, or all of it in two or three places."""
 _WINDOW = 300
 """Samples that cross-validation looks at together: its cost grows with the cube."""
 _GRID = 10.0 ** np.linspace(-4.0, 8.0, 121)
@@ -166,7 +166,7 @@ def _leave_noise(values: np.ndarray, time: np.ndarray, few: int, many: int) -> b
     left = _left(values, time, few)
     squares = np.array([float(part @ part) for part in np.array_split(left, few + 1)])
     places = squares.sum() ** 2 / np.sum(squares**2) if squares.any() else 0.0
-    return bool(places > PLACES and left.std() < MOTION * _left(values, time, many).std())
+    return bool(places > min(PLACES, 0.25 * len(squares)) and left.std() < MOTION * _left(values, time, many).std())
 
 
 def _left(values: np.ndarray, time: np.ndarray, inner: int) -> np.ndarray:
