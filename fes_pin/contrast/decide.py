@@ -1,10 +1,11 @@
 """What is claimed of a change: against the noise, against the spread between trials, over the whole library.
 
 x_i is what the larger of two sets adds to trial i, r_i what it leaves there; x_i' r_i / |x_i| has a variance phi, 1
-where repeats differ by their noise alone. phi is estimated with the trials' shares of the gain as weights. Few trials
-tell little of it along one x, but they tell it along every cause of the library: with ln phi scattered among those no
-more than f degrees of freedom would have it, phi is one and the same for all; else so many degrees f0 stand behind the
-usual phi0 as that scatter leaves. Both together are
+where repeats differ by their noise alone. phi is estimated with the trials' shares of the gain as weights; fewer than
+six trials are cut into pieces, which know less of how repeats differ. Few trials tell little of it along one x, but
+they tell it along every cause of the library: with ln phi scattered among those no more than f degrees of freedom would
+have it, phi is one and the same for all; else so many degrees f0 stand behind the usual phi0 as that scatter leaves.
+Both together are
 
     phi = max(phi, (f0 phi0 + f phi) / (f0 + f)),
 
@@ -25,17 +26,13 @@ from scipy import optimize, special
 
 from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.grouped import Grouped
-from fes_pin.contrast.promises import Promise
+from fes_pin.contrast.promises import UNFELT, Promise, units
 from fes_pin.contrast.repeats import Repeats
-from fes_pin.diagnose.decide.significance import Family, coherence_p_value
+from fes_pin.diagnose.decide.significance import Family
 from fes_pin.identify.distributions import f_tail
 
 LEVEL = 0.01
 """Family-wise error of each round of claims."""
-FEWEST_TRIALS = 6
-"""Trials that alone show how much repeats differ; of fewer each is cut into pieces, as a diagnosis does."""
-UNFELT = 1e-4
-"""Share of the largest part that a trial must have in a change to say something of its spread."""
 
 UNUSUAL = 0.05
 """p-value below which a spread is larger than what is usual, as repeats may differ in just this: the usual one counts
@@ -77,8 +74,6 @@ def noise_p_value(family: Family, larger: Grouped, smaller: Grouped) -> float:
 
 def between_trials(fits: Fits, larger: Grouped, smaller: Grouped, degrees: int) -> float:
     """p-value of a gain against its spread between trials; both sets under the same weights."""
-    if len(larger.fit.parts) < FEWEST_TRIALS:
-        return coherence_p_value(smaller.fit, larger.fit, degrees)
     spread, gain = inflation(fits, larger, smaller), smaller.fit.sse - larger.fit.sse
     if spread.free < 1 or gain <= 0.0:
         return 1.0
@@ -87,19 +82,18 @@ def between_trials(fits: Fits, larger: Grouped, smaller: Grouped, degrees: int) 
 
 def inflation(fits: Fits, larger: Grouped, smaller: Grouped) -> Spread:
     """phi beside what is usual in the library; the mean of all trials and that of one group are fitted."""
-    pairs = [
-        (few.residual - many.residual, many.residual)
-        for few, many in zip(smaller.fit.parts, larger.fit.parts, strict=True)
-    ]
-    sizes = np.array([float(x @ x) for x, _ in pairs])
-    along = np.array([float(x @ r) for x, r in pairs])
+    left = np.concatenate([p.residual for p in larger.fit.parts])
+    moved = np.concatenate([p.residual for p in smaller.fit.parts]) - left
+    cuts = units(larger.fit.parts)
+    sizes = np.array([float(moved[c] @ moved[c]) for c in cuts])
+    along = np.array([float(moved[c] @ left[c]) for c in cuts])
     felt = sizes > UNFELT * max(float(sizes.max()), 1e-300)
     free = int(felt.sum()) - 1 - max(1, len(larger.changes))
     if free < 1:
         return Spread(1.0, free)
     own = _clustered(sizes, along)
     both = own.beside(usual_spread(fits.promises(larger)[0]))
-    share = _leaning(larger, [x for x, _ in pairs]) / float(sizes.sum())
+    share = _leaning(larger, moved) / float(sizes.sum())
     return Spread(both.phi, 1.0 / (1.0 / both.free + share**2 / free))
 
 
@@ -116,12 +110,13 @@ def _clustered(sizes: np.ndarray, along: np.ndarray) -> Spread:
     )
 
 
-def _leaning(one: Grouped, moved: Sequence[np.ndarray]) -> float:
+def _leaning(one: Grouped, moved: np.ndarray) -> float:
     """What of the squares that move the trials rests on how much repeats scatter."""
+    pieces = np.split(moved, np.cumsum([len(p.residual) for p in one.fit.parts])[:-1])
     total, at = 0.0, 0
     for weight in one.weights.values():
         if isinstance(weight, Repeats):
-            total += weight.leaning(moved[at : at + len(weight.along)])
+            total += weight.leaning(pieces[at : at + len(weight.along)])
             at += len(weight.along)
     return total
 

@@ -126,9 +126,18 @@ class GroupedModel:
             if effect is not None and item.name not in (e.name for e in models[group].effects):
                 models[group] = models[group] + effect
         if item.group is not None:
-            paths = models[item.group].parameters()
-            own |= {(n, item.group) for n in paths if item.name in (n, n.split(".")[0])}
+            own |= {(n, item.group) for n in models[item.group].parameters() if self._differs(n, item, models)}
         return GroupedModel(models, frozenset(own))
+
+    @staticmethod
+    def _differs(path: str, item: Item, models: Mapping[str, Model]) -> bool:
+        """True of what an item gives a group of its own: of a cause that others have as well its amplitudes alone."""
+        cause, _, name = path.rpartition(".")
+        if item.name != cause:
+            return item.name == path
+        shared = any(item.name == e.name for g, m in models.items() if g != item.group for e in m.effects)
+        (effect,) = (e for e in models[str(item.group)].effects if e.name == item.name)
+        return not shared or name in effect.amplitudes()
 
     def without(self, item: Item, items: Sequence[Item]) -> GroupedModel:
         """The same without one of its items."""

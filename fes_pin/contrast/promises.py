@@ -11,12 +11,18 @@ import numpy as np
 
 from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight, problem_of
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.decide.significance import MIN_UNITS
 from fes_pin.diagnose.search.library import Library, near_null
 from fes_pin.diagnose.search.score import Projection, Scores
 from fes_pin.identify.problem import Linearized
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
+
+FEWEST_TRIALS = 6
+"""Trials that alone show how much repeats differ; of fewer each is cut into pieces, as a diagnosis does."""
+UNFELT = 1e-4
+"""Share of the largest part that a unit must have in a change to say something of its spread."""
 
 
 @dataclass(frozen=True)
@@ -224,12 +230,19 @@ def _started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
     return replace(effect, **values)  # type: ignore[arg-type]
 
 
+def units(parts: Sequence[Linearized]) -> list[slice]:
+    """Rows of each unit of evidence: a trial, or a piece of one where trials are few."""
+    pieces = 1 if len(parts) >= FEWEST_TRIALS else -(-MIN_UNITS // len(parts))
+    ends = itertools.accumulate((len(p.residual) for p in parts), initial=0)
+    cuts = [np.linspace(a, b, pieces + 1).round().astype(int) for a, b in itertools.pairwise(ends)]
+    return [slice(int(a), int(b)) for cut in cuts for a, b in itertools.pairwise(cut)]
+
+
 def _spread(column: np.ndarray, residual: np.ndarray, parts: Sequence[Linearized]) -> tuple[float, int]:
-    """Variance of what each trial says of a parameter, in units of what the noise explains; its degrees of freedom."""
-    ends = np.cumsum([0, *(len(p.residual) for p in parts)])
-    cuts = [slice(a, b) for a, b in itertools.pairwise(ends)]
+    """Variance of what each unit says of a parameter, in units of what the noise explains; its degrees of freedom."""
+    cuts = units(parts)
     sizes = np.array([float(column[c] @ column[c]) for c in cuts])
     along = np.array([float(column[c] @ residual[c]) for c in cuts])
-    felt = sizes > 1e-4 * max(float(sizes.max()), 1e-300)
+    felt = sizes > UNFELT * max(float(sizes.max()), 1e-300)
     free = int(felt.sum()) - 2
     return (float(np.sum(along[felt] ** 2 / sizes[felt])) / free, free) if free > 0 else (1.0, 0)
