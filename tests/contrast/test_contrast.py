@@ -157,6 +157,16 @@ def test_a_band_that_was_tightened_on_a_test_stand(tmp_path):
     assert "damping" not in {c.name for c in found.changes}
 
 
+@pytest.mark.long
+def test_a_measured_band_that_was_tightened(shared):
+    """One trial for each tension; the stand rings, which the model does not have."""
+    found = fp.contrast(fp.read_study(shared / "data" / "friction_damper"), groups=["20 lb", "70 lb"])
+    (change,) = found.changes
+    assert (change.name, change.equivalents) == ("coulomb_friction", ())
+    loose, tight = (change.parameters["torque_nm"][g].value for g in ("20 lb", "70 lb"))
+    assert 1.8 < tight / loose < 3.2  # 2.69 on the loops
+
+
 def test_strokes_that_are_repeated_are_no_change(tmp_path):
     assert fp.contrast(stroke_study(tmp_path, (30.0, 30.0))).verdict == "nothing_changed"
 
