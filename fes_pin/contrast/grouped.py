@@ -27,7 +27,7 @@ Weight = NoiseModel | Repeats | Doubt
 random about predictions."""
 
 
-def problem_of(model: Model, trials: Sequence[Trial], weight: Weight, free: tuple[str, ...] | None = None) -> Any:
+def group_problem(model: Model, trials: Sequence[Trial], weight: Weight, free: tuple[str, ...] | None = None) -> Any:
     """A model on the trials of one group, as their weight demands."""
     if isinstance(weight, Doubt):
         return LikelihoodProblem(model, trials, weight)
@@ -180,7 +180,7 @@ class GroupedProblem:
         self, model: GroupedModel, trials: Mapping[str, Sequence[Trial]], weights: Mapping[str, Weight]
     ) -> None:
         self.model, self.free = model, model.free
-        self.parts: dict[str, Any] = {g: problem_of(m, trials[g], weights[g]) for g, m in model.models.items()}
+        self.parts: dict[str, Any] = {g: group_problem(m, trials[g], weights[g]) for g, m in model.models.items()}
         self.trials = tuple(t for p in self.parts.values() for t in p.trials)
         self.unknown_names = tuple(dict.fromkeys(n for p in self.parts.values() for n in p.unknown_names))
         self.limits = {model.path(n, g): v for g, p in self.parts.items() for n, v in p.limits.items()}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight, problem_of
+from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight, group_problem
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.significance import MIN_UNITS
 from fes_pin.diagnose.search.library import Library, near_null
@@ -161,7 +161,7 @@ def _problem(model: Model, trials: Sequence[Trial], weight: Weight) -> tuple[Any
     """The problem of one effect beside the nominal model, and where its amplitudes stand among what is free."""
     (effect,) = model.effects
     names = [f"{effect.name}.{n}" for n in effect.amplitudes()]
-    problem = problem_of(model, trials, weight, tuple(names))
+    problem = group_problem(model, trials, weight, tuple(names))
     return problem, [problem.free.index(n) for n in names]
 
 
