@@ -189,7 +189,10 @@ class ContrastSearch:
         return p_value(self.fits, self.family, best, without)
 
     def _told(self, nominal: Grouped, best: Grouped) -> ContrastFound:
-        """Every change with its p-value and its rivals; one that a common cause could replace is none."""
+        """Every change with its p-value and its rivals; one that a common cause could replace is none.
+
+        Beside less noise than the search began with a rival may have become the better one: it takes the place.
+        """
         while True:
             p_values, without, rivals = {}, {}, {}
             for item in best.changes:
@@ -197,17 +200,26 @@ class ContrastSearch:
                 without[item] = self.fits.weighed_as(rest, best)
                 p_values[item] = p_value(self.fits, self.family, best, rest)
                 rivals[item] = self._beside(rest, self.fits.promises(rest)[0], item)
-            doubtful = [
-                (one, item)
-                for item, many in rivals.items()
-                for one in many
-                if one.items[-1].group is None and one.price < best.price + SEPARABLE
-            ]
-            if not doubtful:
+            every = [one for many in rivals.values() for one in many]
+            doubtful = [f for f in every if f.items[-1].group is None and f.price < best.price + SEPARABLE]
+            better = self._better(best, rivals, without)
+            if not doubtful and better is None:
                 break
-            best = self._dropped(min(doubtful, key=lambda d: d[0].price)[0])
+            best = self._dropped(min(doubtful, key=lambda f: f.price)) if doubtful else better or best
         promises, _ = self.fits.promises(best)
         return ContrastFound(nominal, best, p_values, without, rivals, promises, self.family)
+
+    def _better(
+        self, best: Grouped, rivals: dict[Item, list[Grouped]], without: dict[Item, Grouped]
+    ) -> Grouped | None:
+        """The cheapest set in which a rival that is as significant stands in a change's place, if it is cheaper."""
+        cheaper = [
+            one
+            for item, many in rivals.items()
+            for one in many[:1]
+            if one.price < best.price - 1.0 and p_value(self.fits, self.family, one, without[item]) < LEVEL
+        ]
+        return min(cheaper, key=lambda f: f.price, default=None)
 
     def _dropped(self, best: Grouped) -> Grouped:
         """The set less the changes that are not significant any more."""
