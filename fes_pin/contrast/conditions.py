@@ -51,7 +51,7 @@ def contrast_with_conditions(nominal: Model, trials: Trials, run: RunContrast) -
         return ContrastSearched(*run(trials))
     group, misread = min(told, key=lambda pair: pair[1].p_value)
     after = _restated(nominal, trials, group, misread, run)
-    fits, found = after.fits, after.found
+    found = after.found
     if not found.best.items:  # nothing changed, and nothing is wrong: no explanation is simpler
         return after
     as_stated = ContrastSearched(*run(trials))
