@@ -209,9 +209,7 @@ class ContrastSearch:
         promises, _ = self.fits.promises(best)
         return ContrastFound(nominal, best, p_values, without, rivals, promises, self.family)
 
-    def _better(
-        self, best: Grouped, rivals: dict[Item, list[Grouped]], without: dict[Item, Grouped]
-    ) -> Grouped | None:
+    def _better(self, best: Grouped, rivals: dict[Item, list[Grouped]], without: dict[Item, Grouped]) -> Grouped | None:
         """The cheapest set in which a rival that is as significant stands in a change's place, if it is cheaper."""
         cheaper = [
             one
