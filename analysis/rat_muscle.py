@@ -101,6 +101,24 @@ improved, traditional = (AUTHORS[f"{m}_rmse_percent_of_peak"] for m in ("IM", "T
 print(f"stretch-shortening cycles, never fitted: {told[-1][2]:.1f} % of peak")
 print(f"the authors: {improved:.1f} % by their improved method, {traditional:.1f} % by the traditional one")
 
+
+# %% What no fitted trial foretells: how strong the muscle is in each train
+def strengths(trial):
+    """Measured over foretold peak force of each train of pulses."""
+    pulses, foretold = np.flatnonzero(trial["stim"] > 0), fp.simulate(best.model, trial)["force_n"]
+    trains = np.split(pulses, np.flatnonzero(np.diff(pulses) > 50) + 1)
+    spans = [slice(t[0], t[-1] + 30) for t in trains]
+    return np.array([trial["force_n"][s].max() / foretold[s].max() for s in spans])
+
+
+of_trains = {t.name: strengths(t) for t in CYCLES}
+failed = [n for n, s in of_trains.items() if s.min() < 0.1]
+first, last = (np.median([s[k] for n, s in of_trains.items() if n not in failed]) for k in (0, -1))
+weaker = best.model.with_parameters({"gain": best.model.parameters()["gain"] * float(first)})
+print(f"a train that brings no force: {', '.join(failed)}")
+print(f"peak force over what is foretold, median: first train {first:.3f}, last {last:.3f}")
+print(f"with the strength of the first trains: {on_the_cycles(weaker)[1]:.1f} % of peak")
+
 # %% Two of the cycles, and what each cause was worth
 figure, axes = plt.subplots(1, 3, figsize=(14, 4.2), width_ratios=(2, 2, 1.4))
 for axis, name in zip(axes, ("ssc_pa07_1", "ssc_pb06_1"), strict=False):
