@@ -112,7 +112,7 @@ def judge_driven(
     again = _Again()
     while True:
         folds = _folds(found, train, test, again)
-        evidence = {n: _evidence(folds, found, n) for n in found.without} if folds else {}
+        evidence = _evidence(folds, found, again) if folds else {}
         errors = _errors(folds or [_Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon)
         gains = {n: held_out_gain(errors[""], errors[n], errors["+"], seed) for n in found.without}
         left = driven_remainder(found.best, seed)
@@ -189,15 +189,15 @@ class _Fold:
 
 
 class _Again:
-    """Fits made again without some trials, each once: a set less a cause that is refused is the next set."""
+    """Fits made again to other trials, each once: a set less a cause that is refused is the next set."""
 
     def __init__(self) -> None:
         self._kept: dict[tuple[int, tuple[int, ...]], tuple[Fit, Fit]] = {}
 
-    def __call__(self, wanted: Sequence[tuple[Fit, Sequence[int]]]) -> list[Fit]:
-        keys = [(id(fitted), tuple(held)) for fitted, held in wanted]
+    def __call__(self, wanted: Sequence[tuple[Fit, Sequence[Trial]]]) -> list[Fit]:
+        keys = [(id(fitted), tuple(map(id, trials))) for fitted, trials in wanted]
         missing = {k: w for k, w in zip(keys, wanted, strict=True) if k not in self._kept}
-        made = in_parallel(lambda w: _without(*w), list(missing.values()))
+        made = in_parallel(lambda w: _refitted(*w), list(missing.values()))
         self._kept |= {k: (w[0], one) for (k, w), one in zip(missing.items(), made, strict=True)}
         return [self._kept[k][1] for k in keys]
 
@@ -210,17 +210,13 @@ def _folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refitted
         return []
     held = folds_of(train)
     fits = {"": found.nominal, "+": found.best, **found.without}
+    others = [[t for i, t in enumerate(found.best.trials) if i not in out] for out in held]
     wanted = [(k, n) for k in range(len(held)) for n in fits]
-    again = dict(zip(wanted, refitted([(fits[n], held[k]) for k, n in wanted]), strict=True))
+    again = dict(zip(wanted, refitted([(fits[n], others[k]) for k, n in wanted]), strict=True))
     return [
         _Fold(again[k, ""], again[k, "+"], {n: again[k, n] for n in found.without}, tuple(train[i] for i in out))
         for k, out in enumerate(held)
     ]
-
-
-def _without(fitted: Fit, held: Sequence[int]) -> Fit:
-    """A fit again, without the trials that are held out."""
-    return _refitted(fitted, [t for i, t in enumerate(fitted.trials) if i not in held])
 
 
 def _refitted(fitted: Fit, trials: Sequence[Trial]) -> Fit:
@@ -232,8 +228,8 @@ def _refitted(fitted: Fit, trials: Sequence[Trial]) -> Fit:
     return maximise(problem, fitted.values, unknowns)
 
 
-def _evidence(folds: Sequence[_Fold], found: Found, name: str) -> Evidence:
-    """What a cause adds to twice the log-likelihood of held-out trials, foretold by fits to the others.
+def _evidence(folds: Sequence[_Fold], found: Found, again: _Again) -> dict[str, Evidence]:
+    """What each cause adds to twice the log-likelihood of held-out trials, foretold by fits to the others.
 
     By Bayes' rule p(held | others) = p(all) / p(others), each the integral over the parameters about its fit (Laplace):
 
@@ -242,15 +238,16 @@ def _evidence(folds: Sequence[_Fold], found: Found, name: str) -> Evidence:
     so that what the others leave in doubt of a parameter is doubt about the held trials as well. The ratio of
     likelihoods of a true cause scatters by twice the root of its mean.
     """
-    total = 0.0
+    foretold = {n: 0.0 for n in ("", *found.without)}
     for fold in folds:
-        for sign, everywhere, elsewhere in (
-            (1.0, found.without[name], fold.without[name]),
-            (-1.0, found.best, fold.best),
-        ):
-            both = everywhere if fold.within else _refitted(everywhere, (*elsewhere.trials, *fold.test))
-            total += sign * (_weight(both) - _weight(elsewhere))
-    return Evidence(total, max(total, 0.0)) if np.isfinite(total) else Evidence(0.0, 0.0)
+        whole, part = {"": found.best, **found.without}, {"": fold.best, **fold.without}
+        if not fold.within:
+            every = again([(whole[n], (*part[n].trials, *fold.test)) for n in foretold])
+            whole = dict(zip(foretold, every, strict=True))
+        for n in foretold:
+            foretold[n] += _weight(whole[n]) - _weight(part[n])
+    gains = {n: foretold[n] - foretold[""] for n in found.without}
+    return {n: Evidence(g, max(g, 0.0)) if np.isfinite(g) else Evidence(0.0, 0.0) for n, g in gains.items()}
 
 
 def _weight(fitted: Fit) -> float:
