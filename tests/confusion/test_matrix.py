@@ -81,13 +81,14 @@ def counted(label):
 
 
 def test_the_check_passes_what_the_table_holds_and_notices_what_is_worse():
+    """Each with an error of 5 % at most, as 30 studies of a sort allow: by the table 2 of 209 raise an alarm."""
     alarms, blanks = counted("false alarms")
     assert blanks > 200
-    assert binom.cdf(check.MOST_ALARMS, check.STUDIES, alarms / blanks) > 0.98
+    assert binom.cdf(check.MOST_ALARMS, check.STUDIES, alarms / blanks) > 0.95
     assert binom.sf(check.MOST_ALARMS, check.STUDIES, 0.15) > 0.95
     rows = [counted(f"true cause in the first set, d = {d}") for d in (40, 150)]
     found, hidden = map(sum, zip(*rows, strict=True))
-    assert binom.cdf(check.MOST_MISSED, check.STUDIES, 1.0 - found / hidden) > 0.98
+    assert binom.cdf(check.MOST_MISSED, check.STUDIES, 1.0 - found / hidden) > 0.95
     assert binom.sf(check.MOST_MISSED, check.STUDIES, 0.25) > 0.95
 
 
