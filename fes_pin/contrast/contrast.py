@@ -111,7 +111,7 @@ def contrast(
         groups=names,
         verdict="changed" if changes else "unexplained" if left.unexplained else "nothing_changed",
         changes=tuple(changes),
-        common=tuple(i.name for i in found.best.items if i.group is None),
+        common=_common(found.best),
         unchanged=unchanged,
         excluded=excluded,
         untestable=untestable,
@@ -122,6 +122,12 @@ def contrast(
         warnings=tuple([*warnings, *said]),
         wall_s=time.perf_counter() - began,
     )
+
+
+def _common(best: Grouped) -> tuple[str, ...]:
+    """Causes of all groups, but for those that differ in one."""
+    differ = {i.name for i in best.changes}
+    return tuple(i.name for i in best.items if i.group is None and i.name not in differ)
 
 
 def _left(fits: Fits, best: Grouped, seed: int) -> tuple[Remainder, list[str]]:

@@ -195,6 +195,16 @@ class Fits:
         fitted = fit_problem(problem, start.parameters(), one.fit.unknowns, LOOK_DRIVEN)  # type: ignore[arg-type]
         return Grouped(one.items, fitted, one.weights)
 
+    def in_common(self, one: Grouped) -> Grouped:
+        """The set with a cause that every group has of its own as one of all, different in all but the first."""
+        groups = list(self.trials)
+        for name in dict.fromkeys(i.name for i in one.items):
+            if all(Item(name, g) in one.items for g in groups) and Item(name) not in one.items:
+                items = tuple(Item(name) if i == Item(name, groups[0]) else i for i in one.items)
+                model = one.model.with_common(name, groups[1:])
+                return self.in_common(self.converged(model, items, one.weights, one.fit.unknowns))
+        return one
+
     def without(self, one: Grouped, item: Item) -> Grouped:
         """The set less one item, fitted from its own values."""
         rest = tuple(i for i in one.items if i != item)

@@ -139,6 +139,13 @@ class GroupedModel:
         (effect,) = (e for e in models[str(item.group)].effects if e.name == item.name)
         return not shared or name in effect.amplitudes()
 
+    def with_common(self, name: str, groups: Sequence[str]) -> GroupedModel:
+        """The same with a cause that every group has of its own as one of all, whose amplitudes differ in some."""
+        out = GroupedModel(self.models, frozenset((n, g) for n, g in self.own if n.rpartition(".")[0] != name))
+        for group in groups:
+            out = out.with_item(Item(name, group))
+        return _agreed(out)
+
     def without(self, item: Item, items: Sequence[Item]) -> GroupedModel:
         """The same without one of its items."""
         models, own = dict(self.models), set(self.own)

@@ -129,8 +129,10 @@ def contrast_notes(found: Contrast) -> list[str]:
     if found.untestable:
         lines.append(f"could have changed unseen: {', '.join(found.untestable)}")
     left = found.remainder
-    state = "something is" if left.unexplained else "nothing"
-    lines.append(f"{state} left unexplained in one group alone ({probability(left.p_value)})")
+    if left.unexplained:
+        lines.append(f"something is left unexplained in one group alone ({probability(left.p_value)})")
+    else:  # what every group leaves is the model's error, and is a warning
+        lines.append("nothing is left unexplained in one group alone")
     return [*lines, *(f"warning: {words}" for words in found.warnings)]
 
 

@@ -110,7 +110,7 @@ class ContrastSearch:
                 if instead is None:
                     break
                 best = instead
-            base = best
+            base = self.fits.in_common(best)
             promises, _ = self.fits.promises(base)
         return base
 
@@ -193,6 +193,7 @@ class ContrastSearch:
 
         Beside less noise than the search began with a rival may have become the better one: it takes the place.
         """
+        best = self._dropped(self.fits.in_common(best))
         while True:
             p_values, without, rivals = {}, {}, {}
             for item in best.changes:

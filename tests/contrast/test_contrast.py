@@ -99,6 +99,19 @@ def test_a_common_cause_is_no_change(tmp_path, shared):
     assert found.common
 
 
+def test_a_cause_of_all_groups_that_differs_in_one_is_one_change(tmp_path):
+    """The sensor is off by 0.5 N before, and by 1.3 N after: one change, by 0.8 N, and no common cause beside it."""
+    study = free_pair("muscle", (), 80.0, 6, tmp_path)
+    off = {"before": 0.5, "after": 1.3}
+    trials = [t.with_columns(force_n=t["force_n"] + off[t.group]) for t in study.trials]
+    found = fp.contrast(replace(study, trials=tuple(trials)))
+    (change,) = found.changes
+    assert change.name == "sensor_offset"
+    told = {g: v.value for g, v in change.parameters["offset"].items()}
+    assert told == pytest.approx(off, abs=0.05)
+    assert not found.common
+
+
 @pytest.mark.parametrize("changes", [(), ("threshold_shift",)])
 def test_a_misread_trial_is_told_as_such(shared, changes):
     """One trial of a group states another load than it had; that is no change of the rig, and hides none."""
