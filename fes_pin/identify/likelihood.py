@@ -20,9 +20,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.fit import Fit, fit_problem, rough_noise
@@ -36,6 +38,8 @@ ROUNDS = 12
 """Turns of parameters and randomness, at most."""
 LOG_STEP = 1e-3
 """Step of the differences in logarithms."""
+FOLLOWED_STEP = 0.01
+"""Step of a difference of the cost by a parameter of the reading, in its standard deviations."""
 LONGEST_MOVE = 1.5
 """Longest step of a logarithm: randomness changes by a factor of 4.5 at most before parameters move again."""
 FIRST_SHARE = 0.003
@@ -159,7 +163,33 @@ class LikelihoodProblem:
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Innovations over their deviations, and sensitivities, at a parameter value."""
-        return [self._whitened(one) for one in self.innovations(values, unknowns)]
+        parts = [self._whitened(one) for one in self.innovations(values, unknowns)]
+        return self._followed(parts, values, unknowns) if self.followed else parts
+
+    @cached_property
+    def followed(self) -> tuple[str, ...]:
+        """Free parameters that scale a reading: the filter's gains go with them."""
+        imposed = any(t.kind == IMPOSED for t in self.trials)
+        read = ("reading", "effort") if imposed else ("reading",)
+        names = [f"{e.name}.{n}" for e in self.model.effects if e.scales and e.signal in read for n in e.amplitudes()]
+        return tuple(n for n in names if n in self.free)
+
+    def _followed(self, parts: list[Linearized], values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
+        """Sensitivities to `followed` without what gains that stay as they are add along the innovations.
+
+        Where a filter takes up nearly all of what it reads, a scale of the reading seems to shrink the innovations as a
+        whole, as long as the gains do not go with it. The true slope of the cost is its difference.
+        """
+        at, squares = [self.free.index(n) for n in self.followed], sum(float(p.residual @ p.residual) for p in parts)
+        sizes = np.sqrt(sum(np.sum(p.jacobian[:, at] ** 2, axis=0) for p in parts))
+        if not (np.isfinite(squares) and squares > 0.0 and np.all(np.isfinite(sizes) & (sizes > 0.0))):
+            return parts
+        steps = FOLLOWED_STEP / sizes
+        moved = [{**values, n: values[n] + float(h)} for n, h in zip(self.followed, steps, strict=True)]
+        now = squares + sum(p.log_determinant for p in parts)
+        slopes = 0.5 * (np.array(self.bounds([(m, unknowns) for m in moved])) - now) / steps
+        factors = (-slopes - sum(p.residual @ p.jacobian[:, at] for p in parts)) / squares
+        return [_added(p, at, np.nan_to_num(factors)) for p in parts]
 
     def _whitened(self, one: ForetoldTrial) -> Linearized:
         with np.errstate(all="ignore"):
@@ -173,6 +203,13 @@ class LikelihoodProblem:
     def cost(self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None) -> float:
         """Twice the negative log-likelihood."""
         return sum(one.cost() for one in self.innovations(values, unknowns, doubt))
+
+
+def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Linearized:
+    """Some columns of the sensitivities with multiples of the residual added."""
+    jacobian = part.jacobian.copy()
+    jacobian[:, at] += np.outer(part.residual, factors)
+    return replace(part, jacobian=jacobian)
 
 
 def _joined(run: Sequence[ForetoldTrial]) -> _Told:

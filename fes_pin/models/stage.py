@@ -60,6 +60,8 @@ class Effect:
         Names of effects without which it shows little or nothing: it is screened beside them.
     remembers
         True if earlier trials of the session are in its states at the start: `rest` reads them by `session`.
+    scales
+        True if it multiplies its signal. Where that is a reading, a filter's gains go with it: see `LikelihoodProblem`.
     each_trial
         Its amplitudes are unknowns of each trial, estimated from that trial alone; the fields keep what a trial that
         was not measured is predicted with: their nulls. All other parameters stay common to all trials.
@@ -79,6 +81,7 @@ class Effect:
     varies: ClassVar[bool] = False
     beside: ClassVar[tuple[str, ...]] = ()
     remembers: ClassVar[bool] = False
+    scales: ClassVar[bool] = False
 
     each_trial: bool = dataclasses.field(default=False, kw_only=True)
 

@@ -1,5 +1,7 @@
 """A joint whose motion is imposed: the effort that it takes, its noise, and what hides in it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,8 +12,9 @@ from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
 from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.identify.likelihood import LikelihoodProblem, first_guess
 from fes_pin.models.catalogue import Catalogue, shipped
-from fes_pin.models.effects import CoulombFriction, EffortGain, EffortOffset, PassiveRelaxation
+from fes_pin.models.effects import CoulombFriction, EffortGain, EffortOffset, PassiveRelaxation, SensorGain
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict
@@ -51,6 +54,22 @@ def test_a_measured_velocity_stands_for_that_of_the_position():
     measured = trial.with_columns(velocity=motion.at(trial.time, 1) + 0.5)
     assert np.abs(imposed_motion(measured, COLUMNS).values[1] - measured["velocity"]).max() < 1e-4
     assert np.abs(imposed_motion(trial, COLUMNS).values[1] - motion.at(trial.time, 1)).max() < 1e-4
+
+
+@pytest.mark.parametrize("effect", [EffortGain(error=0.05), SensorGain(error=0.05)], ids=lambda e: e.name)
+def test_a_scale_of_the_effort_has_the_slope_of_its_cost(tmp_path, effect):
+    """Beneath a large random effort a filter takes up all that it reads, and its gains go with the scale."""
+    made, model = arm(tmp_path, coulomb_friction=0.3)
+    trials, path = made.trials[:2], f"{effect.name}.error"
+    guess = first_guess(model, trials)
+    doubt = replace(guess, std={n: 300.0 * v for n, v in guess.std.items()})
+    problem = LikelihoodProblem(model + effect, trials, doubt)
+    values, unknowns = (model + effect).parameters(), problem.start_unknowns()
+    parts, at = problem.linearize(values, unknowns), problem.free.index(path)
+    deviation = sum(float(p.jacobian[:, at] @ p.jacobian[:, at]) for p in parts) ** -0.5
+    slope = -sum(float(p.jacobian[:, at] @ p.residual) for p in parts)
+    ends = [problem.cost({**values, path: values[path] + h * deviation}, unknowns) for h in (0.05, -0.05)]
+    assert slope * deviation == pytest.approx((ends[0] - ends[1]) / 0.2, abs=0.1)
 
 
 def test_a_motion_that_is_moved_as_a_whole_has_the_same_rates(tmp_path):

@@ -95,9 +95,9 @@ class LikelihoodFits:
                 self._probing[key] = LikelihoodProblem(nominal + one, self.trials, base.doubt)
             problem = self._probing[key]
             places = [problem.free.index(f"{effect.name}.{n}") for n in effect.amplitudes()]
-            run = problem.innovations((nominal + one).parameters(), problem.start_unknowns(), base.doubt)
-            columns = [-i.sensitivities[i.seen][:, places] / np.sqrt(i.variances[i.seen])[:, None] for i in run]
-            out.append(Probe(one, np.nan_to_num(np.concatenate(columns))))
+            problem.doubt = base.doubt
+            parts = problem.linearize((nominal + one).parameters(), problem.start_unknowns())
+            out.append(Probe(one, np.nan_to_num(np.concatenate([p.jacobian[:, places] for p in parts]))))
         return out
 
     def extend(self, base: Fit, scored: Sequence[Scored]) -> Fit:

@@ -27,6 +27,7 @@ class EffortGain(Effect):
     error: float = parameter(0.1, null=0.0, lower=-11.0, upper=9.0, scale=0.05, grid=(-2.0,))
 
     name, stage, signal, rigs = "effort_gain", Stage.RIG, "effort", ("joint",)
+    scales = True
 
     def apply(self, value: Any, s: Any) -> Any:
         return (1.0 + self.error) * value

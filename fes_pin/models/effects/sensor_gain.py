@@ -31,6 +31,7 @@ class SensorGain(Effect):
     place: float = parameter(0.0, lower=0.0, upper=2.0, grid=(0.0, 1.0, 2.0), fitted=False)
 
     name, stage, signal, rigs = "sensor_gain", Stage.SENSOR, "reading", ("ankle", "joint")
+    scales = True
 
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
