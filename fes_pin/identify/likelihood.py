@@ -9,9 +9,9 @@ filter's gains as they are (`identify.descent`), what is random by Fisher scorin
 
     g_i = sum r r_i / V + (1 - r^2 / V) V_i / (2 V),    I_ij = sum r_i r_j / V + V_i V_j / (2 V^2),
 
-r_i and V_i the derivatives. A parameter that scales a reading is followed by the gains: its slope is a difference of the
-cost. Both go on by turns until neither gains. What is random begins small: begun large it takes
-all that the model gets wrong.
+r_i and V_i the derivatives. Gains go with a parameter that scales a reading: its slope is a difference of the cost.
+Both go on by turns until neither gains. What is random begins small: begun large it takes all that the model gets
+wrong.
 
 Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
