@@ -175,7 +175,8 @@ class LikelihoodFits:
         starts = [s for effect in base.model.effects for s in refinements(base.model, effect, self.library.measured)]
         looks = sorted(in_parallel(lambda s: self._first_fit(s, base), starts), key=lambda f: f.price)
         worth = [f for f in looks[:STARTS] if base.sse - f.sse > 0.5 * max(demanded, base.sse - looks[0].sse)]
-        return min(filter(is_identified, in_parallel(self._go_on, worth)), key=lambda f: f.price, default=None)
+        found = [f for f in in_parallel(self._go_on, worth) if is_identified(f, base)]
+        return min(found, key=lambda f: f.price, default=None)
 
     def _first_fit(self, start: Model, base: Fit) -> Fit:
         """A few steps from a start, at what is random in another fit."""

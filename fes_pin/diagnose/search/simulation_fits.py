@@ -297,14 +297,21 @@ def _refined(model: Model, effect: Effect) -> list[list[Model]]:
     return out
 
 
-def is_identified(fitted: Fit) -> bool:
-    """True if the data tell every parameter that has a null from it, within its bounds, in all refined effects."""
+def is_identified(fitted: Fit, before: Fit | None = None) -> bool:
+    """True if the data tell every parameter that has a null from it, within its bounds, in all refined effects.
+
+    Parameters
+    ----------
+    before
+        The fit that was refined: what stood at its bound there already speaks not against another form.
+    """
+    there = before.at_bound if before is not None else ()
     for one in fitted.model.effects:
         if not one.refined():
             continue
         for n, info in one.parameters().items():
             name = f"{one.name}.{n}"
-            if name not in fitted.free:
+            if name not in fitted.free or name in there:
                 continue
             if name in fitted.at_bound:
                 return False
