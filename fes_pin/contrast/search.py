@@ -26,6 +26,8 @@ FITTED = 10
 """Items that are fitted beside a set, those of most linear promise."""
 FITTED_DRIVEN = 6
 """The same on driven rigs, where a fit is some five times as long and the screen already holds what is random."""
+CONVERGED = 3
+"""Sets that go on until they converge, those that are cheapest after a few steps."""
 STARTS = 2
 """Shapes that a fit starts from."""
 SWAPS = 2
@@ -104,15 +106,26 @@ class ContrastSearch:
             tried = self._beside(base, promises)
             if not tried:
                 break
-            best = self.fits.refined(self._first(tried))
-            if not p_value(self.fits, self.family, best, base) < LEVEL:
-                instead = self._two_at_once(best, base) or self._common(tried, base)
-                if instead is None:
-                    break
-                best = instead
+            first = self._first(tried)
+            best = self._significant([first, *(f for f in tried[:CONVERGED] if f is not first)], base)
+            if best is None:
+                best = self._two_at_once(self.fits.refined(first), base) or self._common(tried, base)
+            if best is None:
+                break
             base = self.fits.in_common(best)
             promises, _ = self.fits.promises(base)
         return base
+
+    def _significant(self, tried: list[Grouped], base: Grouped) -> Grouped | None:
+        """The first of some sets that is significant; probabilities are those of the whole library.
+
+        What is cheapest may be what single trials differ by, which says nothing of a group, and hides what does.
+        """
+        for one in tried:
+            refined = self.fits.refined(one)
+            if p_value(self.fits, self.family, refined, base) < LEVEL:
+                return refined
+        return None
 
     def _common(self, tried: list[Grouped], base: Grouped) -> Grouped | None:
         """The cheapest set with a cause of all groups more, as long as no change stands out: it may hide one."""
@@ -150,7 +163,8 @@ class ContrastSearch:
         chosen = [many for k, many in enumerate(ranked.values()) if k < most or many[0].effect is None]
         looks = in_parallel(lambda many: self.fits.look(base, many[:STARTS]), chosen)
         looks = sorted((f for f in looks if np.isfinite(f.fit.sse)), key=lambda f: f.price)
-        return sorted([*in_parallel(self.fits.go_on, looks[:3]), *looks[3:]], key=lambda f: f.price)
+        done = in_parallel(self.fits.go_on, looks[:CONVERGED])
+        return sorted([*done, *looks[CONVERGED:]], key=lambda f: f.price)
 
     def _first(self, tried: list[Grouped]) -> Grouped:
         """The cheapest, or a common cause in its place that is as good."""
@@ -169,8 +183,8 @@ class ContrastSearch:
                     continue
                 rest = self.fits.without(best, item)
                 tried = self._beside(rest, self.fits.promises(rest)[0], item)
-                if tried and tried[0].price < best.price - 1.0:
-                    best = tried[0]
+                cheaper = (f for f in tried[:CONVERGED] if f.price < best.price - 1.0)
+                best = next((f for f in cheaper if self._worth(f.items[-1], f, rest) < LEVEL), best)
             if best is before:
                 break
         while best.items:
@@ -200,24 +214,24 @@ class ContrastSearch:
                 rest = self.fits.without(best, item)
                 without[item] = self.fits.weighed_as(rest, best)
                 p_values[item] = p_value(self.fits, self.family, best, rest)
-                rivals[item] = self._beside(rest, self.fits.promises(rest)[0], item)
+                rivals[item] = self._tenable(self._beside(rest, self.fits.promises(rest)[0], item), best, rest)
             every = [one for many in rivals.values() for one in many]
             doubtful = [f for f in every if f.items[-1].group is None and f.price < best.price + SEPARABLE]
-            better = self._better(best, rivals, without)
+            better = self._better(best, rivals)
             if not doubtful and better is None:
                 break
             best = self._dropped(min(doubtful, key=lambda f: f.price)) if doubtful else better or best
         promises, _ = self.fits.promises(best)
         return ContrastFound(nominal, best, p_values, without, rivals, promises, self.family)
 
-    def _better(self, best: Grouped, rivals: dict[Item, list[Grouped]], without: dict[Item, Grouped]) -> Grouped | None:
-        """The cheapest set in which a rival that is as significant stands in a change's place, if it is cheaper."""
-        cheaper = [
-            one
-            for item, many in rivals.items()
-            for one in many[:1]
-            if one.price < best.price - 1.0 and p_value(self.fits, self.family, one, without[item]) < LEVEL
-        ]
+    def _tenable(self, rivals: list[Grouped], best: Grouped, rest: Grouped) -> list[Grouped]:
+        """Rivals without those that cost as little and are not significant themselves: what single trials differ by."""
+        near = best.price + SEPARABLE
+        return [f for f in rivals if f.price >= near or self._worth(f.items[-1], f, rest) < LEVEL]
+
+    def _better(self, best: Grouped, rivals: dict[Item, list[Grouped]]) -> Grouped | None:
+        """The cheapest set in which a rival stands in a change's place, if it is cheaper."""
+        cheaper = [many[0] for many in rivals.values() if many and many[0].price < best.price - 1.0]
         return min(cheaper, key=lambda f: f.price, default=None)
 
     def _dropped(self, best: Grouped) -> Grouped:
