@@ -253,6 +253,7 @@ DECIDING = {
     "RUNAWAY",
     "GROWTH",
     "MOST_CAUSES",
+    "UNUSUAL",
 }
 """Those that say what is claimed, what is left and what is not testable; the others say how and how finely."""
 

@@ -18,8 +18,9 @@ from fes_pin.diagnose.search.likelihood_search import REFINE_LEVEL
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
+from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
-from fes_pin.identify.likelihood import LikelihoodProblem, first_guess, maximise, score_doubt
+from fes_pin.identify.likelihood import LikelihoodProblem, maximise, score_doubt
 from fes_pin.identify.noise import Noise, NoiseModel, as_white
 from fes_pin.identify.noise_floor import rich_noise
 from fes_pin.identify.problem import Linearized, Problem

@@ -10,8 +10,8 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import Errors
 from fes_pin.identify.ahead import SquaredErrors, forecast_errors, one_step, over_horizon, own_noise
+from fes_pin.identify.doubts import driving_size
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood import driving_size
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel

@@ -28,7 +28,8 @@ import numpy as np
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.descent import TOLERANCE
-from fes_pin.identify.fit import Fit, fit_problem, rough_noise
+from fes_pin.identify.doubts import doubt_limits, first_doubt
+from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Linearized, Unknowns, limits_of
 from fes_pin.models.compile.layout import WIDTH
@@ -43,15 +44,6 @@ FOLLOWED_STEP = 0.01
 """Step of a difference of the cost by a parameter of the reading, in its standard deviations."""
 LONGEST_MOVE = 1.5
 """Longest step of a logarithm: randomness changes by a factor of 4.5 at most before parameters move again."""
-FIRST_SHARE = 0.003
-"""Random effort that a fit begins with, as a share of what drives the rig; see the module."""
-FIRST_TIME_S = 0.1
-"""Time constant that it begins with."""
-SMALLEST = 1e-6
-"""Smallest random part, as a share of what drives the rig or of a reading's range: it counts as none."""
-SLOWEST = 0.1
-"""Longest time constant of a random process, as a share of the longest trial: what does not change some ten times in a
-trial is an offset, and would hide one."""
 
 
 @dataclass(frozen=True)
@@ -219,53 +211,6 @@ def _joined(run: Sequence[ForetoldTrial]) -> _Told:
         np.concatenate([one.values[one.seen] for one in run]),
         np.concatenate([one.variances[one.seen] for one in run]),
     )
-
-
-def first_doubt(model: Model, trial: Trial) -> dict[str, float]:
-    """How far the start of a trial may be from what its first samples say: nothing is known of it beforehand.
-
-    A position as far as it ever is from another, a rate as fast as the trial moves.
-    """
-    if not model.rig.unknowns(trial.kind):
-        return {}
-    column = trial[model.rig.output(trial.kind)]
-    reach = max(float(np.nanmax(column) - np.nanmin(column)), 1e-9)
-    lag = max(1, round(0.05 / trial.dt))
-    moved = column[lag:] - column[:-lag] if len(column) > lag else column
-    rate = max(float(np.sqrt(np.nanmean(moved**2))) / (lag * trial.dt), reach / max(trial.duration, trial.dt))
-    return {n: (rate if "velocity" in n else reach) for n in model.rig.unknowns(trial.kind)}
-
-
-def driving_size(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
-    """Root mean square of what drives the rig, by random process: the reference that random efforts are a share of.
-
-    The effort at a joint is that of the nominal equations along the measured motion, inertia's and gravity's parts
-    included, so that a rig without an input has one too.
-    """
-    return {n: value for n, value in model.rig.driving_sizes(trials).items() if value > 0.0}
-
-
-def first_guess(model: Model, trials: Sequence[Trial]) -> Doubt:
-    """Randomness that a fit begins with: reading noise from second differences, and a small random effort."""
-    white = {n: noise.std for n, noise in rough_noise(model, trials).items()}
-    sizes = driving_size(model, trials)
-    return Doubt(white, {n: FIRST_SHARE * v for n, v in sizes.items()}, dict.fromkeys(sizes, FIRST_TIME_S))
-
-
-def doubt_limits(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, float]]:
-    """Bounds of everything that is random, by name."""
-    step, longest = max(t.dt for t in trials), max(t.duration for t in trials)
-    out: dict[str, tuple[float, float]] = {}
-    for name, noise in rough_noise(model, trials).items():
-        values = np.concatenate([t[name] for t in trials if name in t.columns])
-        spread = max(float(np.nanmax(values) - np.nanmin(values)), 1e-9)
-        out[f"white.{name}"] = (min(SMALLEST * spread, noise.std), spread)
-        out["std.reading"] = (SMALLEST * spread, spread)
-    for name, size in driving_size(model, trials).items():
-        out[f"std.{name}"] = (SMALLEST * size, 10.0 * size)
-    for name in ("effort", "force", "reading"):
-        out[f"time.{name}"] = (step, max(SLOWEST * longest, 2.0 * step))
-    return out
 
 
 def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknowns: Unknowns, steps: int = 2) -> float:

@@ -5,7 +5,8 @@ import pytest
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls, one_step, over_horizon
-from fes_pin.identify.likelihood import LikelihoodProblem, driving_size, first_guess, maximise
+from fes_pin.identify.doubts import driving_size, first_guess
+from fes_pin.identify.likelihood import LikelihoodProblem, maximise
 from fes_pin.identify.problem import whitened_sse
 from fes_pin.models.effects.sensor_gain import SensorGain
 from fes_pin.models.model import Model

@@ -13,8 +13,9 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library, Probe, far_sizes, near_null
 from fes_pin.diagnose.search.score import Projection, Scored, Scores, best_by_effect
 from fes_pin.diagnose.search.simulation_fits import Names, is_identified, names_of
+from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit, fit_problem
-from fes_pin.identify.likelihood import ROUNDS, LikelihoodProblem, first_guess, maximise
+from fes_pin.identify.likelihood import ROUNDS, LikelihoodProblem, maximise
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
