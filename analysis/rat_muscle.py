@@ -26,6 +26,7 @@ from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Problem
 from fes_pin.models import effects
+from fes_pin.models.store import load_model
 
 OUT = Path("out")
 try:
@@ -100,6 +101,12 @@ AUTHORS = json.loads((FOLDER / "reference.json").read_text())["ssc"]
 improved, traditional = (AUTHORS[f"{m}_rmse_percent_of_peak"] for m in ("IM", "TM"))
 print(f"stretch-shortening cycles, never fitted: {told[-1][2]:.1f} % of peak")
 print(f"the authors: {improved:.1f} % by their improved method, {traditional:.1f} % by the traditional one")
+
+# %% The diagnosis by itself, where it was run: fes-pin diagnose FOLDER --out out/rat_diagnosed (20 minutes)
+DIAGNOSED = OUT / "rat_diagnosed" / "model.toml"
+if DIAGNOSED.exists():
+    newton, percent = on_the_cycles(load_model(DIAGNOSED))
+    print(f"by `fes-pin diagnose`, cycles held out: {newton:.3f} N, {percent:.1f} % of peak")
 
 
 # %% What no fitted trial foretells: how strong the muscle is in each train
