@@ -47,7 +47,7 @@ class Effect:
     states_of_form
         Which of its states it has only beside a refinement, with the parameter that switches that on.
     random
-        Names of processes that drive its states at random, one for each state; see `models.disturbance`.
+        Names of the constants that say how its states are driven at random; see `models.disturbance`.
     inputs
         Columns of a trial that it reads beside those that drive the rig, as `s.u.<name>`.
     dissipative
@@ -99,6 +99,14 @@ class Effect:
 
     def rest(self, s: Any) -> Mapping[str, Any]:
         """States and memories at rest that are not zero."""
+        return {}
+
+    def intensities(self, c: Any) -> Mapping[str, Any]:
+        """Intensity of the white noise that drives each state at random, from the constants `random`."""
+        return {}
+
+    def start_covariances(self, c: Any) -> Mapping[tuple[str, str], Any]:
+        """Covariances of what is random in its states when a trial begins, each pair once."""
         return {}
 
     def start_variances(self) -> Mapping[str, Any]:
@@ -205,8 +213,11 @@ def in_order(effects: Iterable[Named]) -> tuple[Named, ...]:
 class Signals(SimpleNamespace):
     """The signals of one instant, by name: what a rig's equations and the effects read.
 
-    `own` holds the states and memories of the effect that is being evaluated.
+    `own` holds the states and memories of the effect that is being evaluated; `v_std` is the standard deviation of the
+    velocity where a predictor estimates it.
     """
+
+    v_std: Any = 0.0
 
     def __init__(self, effects: Sequence[Effect], **signals: Any) -> None:
         super().__init__(effects=tuple(effects), own=SimpleNamespace(), owned={}, **signals)

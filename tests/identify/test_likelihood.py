@@ -8,6 +8,7 @@ from fes_pin.identify.ahead import falls, one_step, over_horizon
 from fes_pin.identify.doubts import driving_size, first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem, maximise
 from fes_pin.identify.problem import whitened_sse
+from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.effects.sensor_gain import SensorGain
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import masked
@@ -17,8 +18,16 @@ DT, N = 0.004, 2000
 TRUE = {"inertia": 0.05, "damping": 0.06, "weight": 0.9}
 
 
-def held(seed: int, torque: float, tau: float = 0.1, weight: float = TRUE["weight"], noise: float = 4e-4) -> Trial:
-    """A pendulum under feedback with a random torque: Euler steps of a twentieth of a sample."""
+def held(
+    seed: int,
+    torque: float,
+    tau: float = 0.1,
+    weight: float = TRUE["weight"],
+    noise: float = 4e-4,
+    friction: float = 0.0,
+    slow: float = 1.0,
+) -> Trial:
+    """A pendulum under feedback with a random torque and friction: Euler steps of a twentieth of a sample."""
     rng = np.random.default_rng(seed)
     q = v = lagged = 0.0
     e, h = torque * rng.normal(), DT / 20
@@ -28,10 +37,11 @@ def held(seed: int, torque: float, tau: float = 0.1, weight: float = TRUE["weigh
         position[k] = q + noise * rng.normal()
         lagged = 0.8 * lagged + 0.2 * (position[k] - last) / DT
         last = position[k]
-        wanted = 0.5 * np.sin(2.0 * k * DT + seed) + 0.3 * np.sin(5.1 * k * DT)
+        wanted = 0.5 * np.sin(2.0 * slow * k * DT + seed) + 0.3 * np.sin(5.1 * slow * k * DT)
         effort[k] = 6.0 * (wanted - position[k]) - 0.5 * lagged
         for _ in range(20):
-            a = (effort[k] + e - TRUE["damping"] * v - weight * np.sin(q)) / TRUE["inertia"]
+            lost = TRUE["damping"] * v + friction * np.tanh(v / 0.005)
+            a = (effort[k] + e - lost - weight * np.sin(q)) / TRUE["inertia"]
             q, v = q + h * v, v + h * a
             e += -e * h / tau + torque * np.sqrt(2.0 * h / tau) * rng.normal()
     return Trial(f"t{seed}", "motion", {"effort": effort, "position": position}, np.arange(N) * DT)
@@ -78,6 +88,37 @@ def test_innovations_are_white_at_the_maximum(fitted):
         assert np.std(r) == pytest.approx(1.0, abs=0.06)
         for lag in (1, 2, 5, 20):
             assert abs(float(np.mean(r[lag:] * r[:-lag]))) < 4.0 / np.sqrt(len(r))
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    """Slow motion with dry friction, read so coarsely that the sign of the velocity is often in doubt."""
+    return [held(k, 0.01, noise=2e-3, friction=0.2, slow=0.3) for k in range(3)]
+
+
+def test_the_likelihood_of_dry_friction_is_smooth(rubbing):
+    """A slope that steps of a thousandth find is that of steps of a hundredth: no sign of an estimate flips between."""
+    model = believed() + CoulombFriction(torque_nm=0.2)
+    found = maximise(LikelihoodProblem(model, rubbing, first_guess(model, rubbing)), model.parameters())
+    problem = LikelihoodProblem(found.model, rubbing, found.doubt)
+    name = "coulomb_friction.torque_nm"
+
+    def slope(step: float) -> float:
+        up, down = (
+            problem.cost({**found.values, name: found.values[name] + s * step}, found.unknowns) for s in (1, -1)
+        )
+        return (up - down) / (2.0 * step)
+
+    deviation = found.std(name)
+    for k in (0.01, 0.03, 0.1):
+        assert abs(slope(k * deviation) - slope(deviation)) * deviation < 0.1
+
+
+def test_friction_that_is_felt_near_standstill_is_not_underestimated(rubbing):
+    model = believed() + CoulombFriction(torque_nm=0.2)
+    found = maximise(LikelihoodProblem(model, rubbing, first_guess(model, rubbing)), model.parameters())
+    assert abs(found.values["coulomb_friction.torque_nm"] - 0.2) < 3.0 * found.std("coulomb_friction.torque_nm")
+    assert abs(found.values["damping"] - TRUE["damping"]) < 3.0 * found.std("damping")
 
 
 def test_without_a_random_torque_none_is_found():

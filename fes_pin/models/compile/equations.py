@@ -57,7 +57,7 @@ class Equations:
 class _Symbols:
     """Symbols of one model, and the signals made of them."""
 
-    def __init__(self, model: Model, layout: Layout) -> None:
+    def __init__(self, model: Model, layout: Layout, estimated: bool) -> None:
         self.model, self.layout = model, layout
         rig, kind = model.rig, layout.kind
         self.states = list(rig.states(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.kept_states()]
@@ -66,6 +66,7 @@ class _Symbols:
         self.p, self.c = _symbols("p", layout.values), _symbols("c", layout.constants)
         self.u, self.t, self.z = _symbols("u", layout.inputs), ca.SX.sym("t"), ca.SX.sym("z")
         self.since, self.into = ca.SX.sym("since"), ca.SX.sym("into")
+        self.v_std = ca.SX.sym("v_std") if estimated and "v" in self.states else 0.0
         self.is_late = any(e.signal == "delay" for e in model.effects)
 
     def vector(self, which: dict[str, Any]) -> ca.SX:
@@ -88,6 +89,7 @@ class _Symbols:
             initial=SimpleNamespace(**{n: p[n] for n in layout.unknowns if "." not in n}),
             time=self.t - self.c["t0"],
             step=self.c["step"],
+            v_std=self.v_std,
             elapsed=0.0,
             pace=1.0,
             delayed=lambda now, before: now,
@@ -169,8 +171,8 @@ class Tangents:
         Where a trial begins, next memories, rates, readings, and what is zero at rest.
     """
 
-    def __init__(self, model: Model, layout: Layout) -> None:
-        self.layout, self.sym = layout, (sym := _Symbols(model, layout))
+    def __init__(self, model: Model, layout: Layout, estimated: bool = False) -> None:
+        self.layout, self.sym = layout, (sym := _Symbols(model, layout, estimated))
         self.x, self.m, self.p, self.c, self.u = (sym.vector(v) for v in (sym.x, sym.m, sym.p, sym.c, sym.u))
         self.t, self.since, self.into, self.z = sym.t, sym.since, sym.into, sym.z
         states, memories, residual = sym.at_rest()

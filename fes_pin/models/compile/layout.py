@@ -74,11 +74,10 @@ def reading_inputs(measured: tuple[str, ...]) -> tuple[str, ...]:
 
 def doubt_constants(model: Model, kind: str, measured: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the constants of a predictor: deviations of reading noise and initial states, of random states too."""
-    random = [n for e in model.effects for n in e.random]
     return (
         *(f"white.{n}" for n in measured),
         *(f"prior.{n}" for n in model.rig.unknowns(kind)),
-        *(f"{what}.{n}" for n in random for what in ("std", "time")),
+        *(n for e in model.effects for n in e.random),
     )
 
 

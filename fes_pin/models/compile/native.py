@@ -179,7 +179,8 @@ class _Loop:
         ):
             b.store(b.fmul(self.step, _splat(at)), self.into, align=8)
             times = [self.t, self.since, self.into]
-            b.call(self.parts["rates"], [source, self.memory, u, *times, self.p, self.c, self.rate])
+            begun = [self.state] if "follow" in self.parts else []
+            b.call(self.parts["rates"], [source, *begun, self.memory, u, *times, self.p, self.c, self.rate])
             share, forward = b.fmul(self.step, _splat(weight)), b.fmul(self.step, _splat(ahead))
             self._count(size, partial(self._advance, at=at, share=share, forward=forward, end=end))
 

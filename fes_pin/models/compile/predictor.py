@@ -55,13 +55,21 @@ class _Doubt:
         self.covariance = ca.tril2symm(self.lower)
 
     def _intensities(self, model: Model) -> Any:
-        """Diagonal of G: 2 std^2 / time of each first-order process that drives a state."""
+        """G, which is diagonal."""
         at = {n: k for k, n in enumerate(self.d.sym.states)}
         out, c = ca.SX(self.count, 1), self.d.sym.c
         for e in model.effects:
-            for state, process in zip(e.states, e.random, strict=False):
-                out[at[f"{e.name}.{state}"]] = 2.0 * c[f"std.{process}"] ** 2 / c[f"time.{process}"]
+            for state, intensity in e.intensities(c).items():
+                out[at[f"{e.name}.{state}"]] = intensity
         return ca.diag(out)
+
+    def widened(self, f: Any) -> Any:
+        """An expression with the velocity's standard deviation as it is when a step begins."""
+        sym = self.d.sym
+        if not isinstance(sym.v_std, ca.SX):
+            return f
+        k = sym.states.index("v")
+        return ca.substitute(f, sym.v_std, ca.sqrt(ca.fmax(self.covariance[k, k], 0.0) + LEAST))
 
     def at_start(self, model: Model) -> Any:
         """Covariance of the first states."""
@@ -73,9 +81,10 @@ class _Doubt:
         out = ca.mtimes([moved, ca.diag(ca.vertcat(*priors)), moved.T]) if unknowns else ca.SX(self.count, self.count)
         at = {n: k for k, n in enumerate(d.sym.states)}
         for e in model.effects:
-            for state, process in zip(e.states, e.random, strict=False):
-                k = at[f"{e.name}.{state}"]
-                out[k, k] = out[k, k] + c[f"std.{process}"] ** 2
+            for pair, covariance in e.start_covariances(c).items():
+                i, k = (at[f"{e.name}.{state}"] for state in pair)
+                for place in {(i, k), (k, i)}:
+                    out[place] = out[place] + covariance
         for k, variance in d.start_variances():
             out[k, k] = out[k, k] + variance
         return out
@@ -107,7 +116,7 @@ class Carried(Tangents):
     """
 
     def __init__(self, model: Model, layout: Layout) -> None:
-        super().__init__(model, layout)
+        super().__init__(model, layout, estimated=True)
         felt = ca.jacobian(self.after, self.x)
         places = [k for k in range(self.m.numel()) if felt[k, :].nnz()]
         others = [k for k in range(self.m.numel()) if k not in places]
@@ -145,6 +154,8 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
     def packed(x: Any, sensitivities: Any, covariance: Any) -> Any:
         return ca.vertcat(x, nonzeros(sensitivities, whole), nonzeros(covariance, lower))
 
+    held = ca.vertcat(ca.SX.sym("held", count), nonzeros(s, whole), nonzeros(doubt.lower, lower))
+    d.rates = doubt.widened(d.rates)
     x0 = packed(d.x0, d.at_start(d.x0), doubt.at_start(model))
     m0 = ca.vertcat(d.m0, nonzeros(d.at_start(d.m0), r_pattern))
     after = ca.vertcat(d.after, nonzeros(d.through(d.after, *inner), r_pattern))
@@ -155,7 +166,7 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
         rest=dense_function("rest", [d.z, d.p, d.c], [d.g, d.g_z]),
         start=dense_function("start", [d.z, d.p, d.c], [x0, m0]),
         sample=dense_function("sample", given, [after]),
-        rates=dense_function("rates", [d.x, memory, d.u, d.t, d.since, d.into, d.p, d.c], [d.rates]),
+        rates=dense_function("rates", [d.x, held, memory, d.u, d.t, d.since, d.into, d.p, d.c], [d.rates]),
         output=dense_function("output", given, [d.readings]),
         correct=dense_function("correct", given, _corrected(d, doubt, s, inner, packed)),
         follow=dense_function(

@@ -64,8 +64,8 @@ class VirtualProgram:
         h = c[layout.constants.index("step")]
         for j in range(substeps):
 
-            def rates(x: Any, at: float, since: Any = j * h) -> Any:
-                return e.rates(x, held, u, t, since, at * h, p, c)
+            def rates(x: Any, at: float, since: Any = j * h, begun: Any = (state,) if e.follow else ()) -> Any:
+                return e.rates(x, *begun, held, u, t, since, at * h, p, c)
 
             begun = state[: e.sizes.integrated]
             first = rates(begun, 0.0)

@@ -42,6 +42,9 @@ class CoulombFriction(Effect):
     below T the joint still creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the
     limit of small steps x = v / creep_speed. The corners of clip are rounded over `softness` of the friction. `load` is
     the bearing's: see the rig. one_way = asymmetry sign(x), x without it.
+    Where v is an estimate with deviation v_std, friction is its mean over what v may be: the corners are rounded over
+    k v_std / S as well, so that T sign(v) becomes T v / sqrt(v^2 + v_std^2), the mean for errors of Student's
+    distribution with two degrees of freedom. Its slope at one point says nothing of friction beside v = 0.
     Where the motion is imposed, friction may build up over a way `presliding`, as of a contact or band that stretches
     before it slips: a share z of it acts, presliding z' = |v| (clip(x) - z).
     Sliding contacts lose in proportion to the load; rolling ones by elastic hysteresis, the load times the width of the
@@ -53,6 +56,7 @@ class CoulombFriction(Effect):
     European Journal of Control 4 (1998). Load: Tabor, The mechanism of rolling friction II: the elastic range, Proc. R.
     Soc. A 229 (1955); Greenwood, Minshall and Tabor, Hysteresis losses in rolling and sliding friction, 259 (1961).
     Presliding: Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1, 1968.
+    Mean over an estimate: Gelb, Applied Optimal Estimation, 1974, section 6.2, statistical linearization.
     Asymmetry: Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, whose offset holds it.
     """
 
@@ -122,7 +126,9 @@ class CoulombFriction(Effect):
         y = value / scale
         beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
         x = y / (beyond * beyond) + stopping * s.v / scale
-        return 0.5 * (_length(x + 1.0, self.softness) - _length(x - 1.0, self.softness))
+        unsure = stopping * s.v_std / scale
+        corner = self.softness * self.softness + unsure * unsure
+        return 0.5 * (_length(x + 1.0, corner) - _length(x - 1.0, corner))
 
 
 def _imposed_way(measured: Mapping[str, np.ndarray]) -> float:
@@ -143,6 +149,6 @@ def _usual_speed(measured: Mapping[str, np.ndarray]) -> float:
     return float(np.nanmedian(moved)) / (lag * dt) if len(moved) else 0.0
 
 
-def _length(x: Any, corner: Any = CORNER) -> Any:
-    """|x| with a rounded corner: sums and differences of two make max(1, |x|) and clip(x)."""
-    return sqrt(x * x + corner * corner)
+def _length(x: Any, corner: Any = CORNER * CORNER) -> Any:
+    """|x| with a rounded corner, given as its square: sums and differences of two make max(1, |x|) and clip(x)."""
+    return sqrt(x * x + corner)
