@@ -66,5 +66,4 @@ def doubt_limits(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float
         out[f"std.{name}"] = (SMALLEST * size, 10.0 * size)
     for name in ("effort", "force", "reading"):
         out[f"time.{name}"] = (step, max(SLOWEST * longest, 2.0 * step))
-        out[f"smooth.{name}"] = (0.5 * step, max(SLOWEST * longest, 2.0 * step))
     return out

@@ -99,7 +99,7 @@ class LikelihoodProblem:
         """The compiled predictor, with sensitivities to `free` and to the effects' unknowns."""
         if self._predictor is None:
             columns = (*self.free, *self.unknown_names)
-            self._predictor = Predictor(self.model, self.trials, columns, self.doubt.random, self.priors)
+            self._predictor = Predictor(self.model, self.trials, columns, self.doubt.processes, self.priors)
         return self._predictor
 
     def start_unknowns(self) -> Unknowns:
@@ -131,7 +131,7 @@ class LikelihoodProblem:
         """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
         count, trials = self.abreast, len(self.trials)
         if self._abreast is None:
-            self._abreast = Predictor(self.model, self.trials * count, (), self.doubt.random, self.priors * count)
+            self._abreast = Predictor(self.model, self.trials * count, (), self.doubt.processes, self.priors * count)
         out: list[_Told] = []
         for k in range(0, len(points), count):
             some = list(points[k : k + count])

@@ -19,9 +19,6 @@ STEP_S = 1.25e-3
 """Longest integration step of any predictor, s, as short as an effect with a fast lag needs: models that are compared
 by their likelihood are integrated alike."""
 
-PARTS = ("white", "std", "time", "smooth")
-"""What is told of randomness; see `Doubt`."""
-
 
 @dataclass(frozen=True)
 class Doubt:
@@ -32,25 +29,22 @@ class Doubt:
     white
         Standard deviation of the white noise of each output, in its unit, by column name.
     std, time
-        Stationary standard deviation and time constant (s) of each random process that acts, by its name: "effort" at
-        the joint, "force" of a held muscle, "reading" of the first output.
-    smooth
-        Second time constant (s) of those that are smooth: see `models.disturbance`.
+        Stationary standard deviation and time constant (s) of each first-order random process that acts, by its name:
+        "effort" at the joint, "force" of a held muscle, "reading" of the first output.
     """
 
     white: Mapping[str, float]
     std: Mapping[str, float] = field(default_factory=dict)
     time: Mapping[str, float] = field(default_factory=dict)
-    smooth: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def random(self) -> tuple[str, ...]:
-        """Names of the values of the random processes that act."""
-        return tuple(n for n in self.values() if not n.startswith("white."))
+    def processes(self) -> tuple[str, ...]:
+        """The random processes that act."""
+        return tuple(self.std)
 
     def with_values(self, values: Mapping[str, float]) -> Doubt:
         """The same with other values, by name as in `values`."""
-        parts = {part: dict(getattr(self, part)) for part in PARTS}
+        parts = {part: dict(getattr(self, part)) for part in ("white", "std", "time")}
         for name, value in values.items():
             part, _, which = name.partition(".")
             parts[part][which] = value
@@ -58,7 +52,7 @@ class Doubt:
 
     def values(self) -> dict[str, float]:
         """Every value by name: white.position, std.effort, time.effort."""
-        return {f"{part}.{n}": v for part in PARTS for n, v in getattr(self, part).items()}
+        return {f"{part}.{n}": v for part in ("white", "std", "time") for n, v in getattr(self, part).items()}
 
 
 @dataclass(frozen=True)
@@ -108,8 +102,8 @@ class Predictor:
         What was measured; a sample that is NaN was not.
     columns
         Parameters, and unknowns of effects, to give sensitivities for.
-    random
-        Names of the values of the random processes that act; see `Doubt`.
+    processes
+        Names of the random processes that act; see `Doubt`.
     priors
         Of each trial, standard deviation of each unknown of its start about what its first samples say.
     """
@@ -119,14 +113,14 @@ class Predictor:
         model: Model,
         trials: Sequence[Trial],
         columns: tuple[str, ...],
-        random: tuple[str, ...],
+        processes: tuple[str, ...],
         priors: Sequence[Mapping[str, float]],
     ) -> None:
         self.model, self.trials, self.columns = model, tuple(trials), columns
         self.max_step_s = min(max_step(model), STEP_S)
         self._delayed = is_delayed(model)
         self._blocks = [
-            _Block(model, self.trials, lanes, columns, random, priors, self.max_step_s) for lanes in self._groups()
+            _Block(model, self.trials, lanes, columns, processes, priors, self.max_step_s) for lanes in self._groups()
         ]
 
     def _groups(self) -> Iterator[list[int]]:
@@ -198,7 +192,7 @@ class _Block:
         trials: Sequence[Trial],
         lanes: list[int],
         columns: tuple[str, ...],
-        random: tuple[str, ...],
+        processes: tuple[str, ...],
         priors: Sequence[Mapping[str, float]],
         max_step_s: float,
     ) -> None:
@@ -206,7 +200,7 @@ class _Block:
         self.rig = rig = model.rig
         self.inputs = model.driven_by(first)
         self.outputs = _measured(model, first)
-        model = disturbed(model.acting(first.kind, rig.input_columns(first)), first.kind, random)
+        model = disturbed(model.acting(first.kind, rig.input_columns(first)), first.kind, processes)
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         chosen = tuple(c for c in columns if c in available)
         self.program = compiled_program(model, first.kind, self.inputs, chosen, self.outputs)

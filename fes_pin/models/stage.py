@@ -105,8 +105,8 @@ class Effect:
         """Intensity of the white noise that drives each state at random, from the constants `random`."""
         return {}
 
-    def start_covariances(self, c: Any) -> Mapping[tuple[str, str], Any]:
-        """Covariances of what is random in its states when a trial begins, each pair once."""
+    def stationary_variances(self, c: Any) -> Mapping[str, Any]:
+        """Variance of what is random in each state when a trial begins, from the constants `random`."""
         return {}
 
     def start_variances(self) -> Mapping[str, Any]:

@@ -57,7 +57,7 @@ def exact(trial: Trial, doubt: Doubt) -> tuple[np.ndarray, np.ndarray]:
 
 
 def foretold(model, trials, doubt=DOUBT, columns=(), velocity=0.3):
-    predictor = Predictor(model, trials, columns, doubt.random, [PRIOR] * len(trials))
+    predictor = Predictor(model, trials, columns, doubt.processes, [PRIOR] * len(trials))
     begin = [{"initial_position": float(t["position"][0]), "initial_velocity": velocity} for t in trials]
     return predictor.run(model.parameters(), doubt, begin)
 
@@ -182,7 +182,7 @@ def with_play(width: float, seed: int, n: int = 1500) -> Trial:
 
 def through_play(model: Model, trial: Trial) -> float:
     begin = {"initial_position": float(trial["position"][0]), "initial_velocity": 0.3}
-    return Predictor(model, [trial], (), ROUGH.random, [NEAR]).run(model.parameters(), ROUGH, [begin])[0].cost()
+    return Predictor(model, [trial], (), ROUGH.processes, [NEAR]).run(model.parameters(), ROUGH, [begin])[0].cost()
 
 
 def by_particles(trial: Trial, width: float, seed: int, count: int = 8000) -> float:

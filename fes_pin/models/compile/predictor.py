@@ -9,6 +9,8 @@ follows with A = f_x and B = f_m R + f_p as they are in the middle of each step,
 
 which is exact to the order of h^4 where f is linear and to that of h^2 where it bends.
 
+f may depend on the deviation of an estimated velocity, as dry friction does: sqrt(P_vv), as a step begins.
+
 At a sample, for each measured output y_k in turn, with H = dh_k/dx where it was foretold:
 
     r = y_k - h_k,   V = H P H' + n white_k^2,   K = P H' / V
@@ -81,10 +83,9 @@ class _Doubt:
         out = ca.mtimes([moved, ca.diag(ca.vertcat(*priors)), moved.T]) if unknowns else ca.SX(self.count, self.count)
         at = {n: k for k, n in enumerate(d.sym.states)}
         for e in model.effects:
-            for pair, covariance in e.start_covariances(c).items():
-                i, k = (at[f"{e.name}.{state}"] for state in pair)
-                for place in {(i, k), (k, i)}:
-                    out[place] = out[place] + covariance
+            for state, variance in e.stationary_variances(c).items():
+                k = at[f"{e.name}.{state}"]
+                out[k, k] = out[k, k] + variance
         for k, variance in d.start_variances():
             out[k, k] = out[k, k] + variance
         return out
