@@ -20,7 +20,7 @@ from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
-from fes_pin.identify.likelihood import LikelihoodProblem, maximise, score_doubt
+from fes_pin.identify.likelihood import WORTH, LikelihoodProblem, maximise, score_doubt
 from fes_pin.identify.noise import Noise, NoiseModel, as_white
 from fes_pin.identify.noise_floor import rich_noise
 from fes_pin.identify.problem import Linearized, Problem
@@ -115,7 +115,9 @@ class Fits:
                 own = problem.by_group(fitted.unknowns)[group]
                 score_doubt(part, fitted.model.of(group, fitted.values), own)  # type: ignore[attr-defined]
             fitted = fit_problem(problem, fitted.values, fitted.unknowns, LOOK_DRIVEN)  # type: ignore[arg-type]
-            if not fitted.sse < before - 10.0 * TOLERANCE:
+            if fitted.sse < before - 10.0 * TOLERANCE:
+                continue
+            if not (fitted.gradient_norm > WORTH and problem.sharpen()):
                 break
         return Grouped(tuple(items), fitted, {g: p.doubt for g, p in problem.parts.items()})
 

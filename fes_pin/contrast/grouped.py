@@ -214,6 +214,10 @@ class GroupedProblem:
             at += len(part.trials)
         return out
 
+    def sharpen(self) -> bool:
+        """Let slopes be differences of the cost; False where those of all groups are. Of driven rigs alone."""
+        return sum(p.sharpen() for p in self.parts.values()) > 0
+
     @property
     def abreast(self) -> int:
         """How many points `bounds` takes at once."""

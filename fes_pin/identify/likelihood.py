@@ -9,8 +9,10 @@ filter's gains as they are (`identify.descent`), what is random by Fisher scorin
 
     g_i = sum r r_i / V + (1 - r^2 / V) V_i / (2 V),    I_ij = sum r_i r_j / V + V_i V_j / (2 V^2),
 
-r_i and V_i the derivatives. Gains go with a parameter that scales a reading: its slope is a difference of the cost.
-Both go on by turns until neither gains. What is random begins small: begun large it takes all that the model gets
+r_i and V_i the derivatives. Both go on by turns until neither gains. Where steps by slopes for gains as they are still
+promise what none of them keeps, slopes are then differences of the cost, in which gains go with the parameters: the two
+are one only where a model is right, and it is the first that lead there from afar. A parameter that scales a reading
+always has a slope of the second kind. What is random begins small: begun large it takes all that the model gets
 wrong.
 
 Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
@@ -38,6 +40,9 @@ from fes_pin.models.predictor import Doubt, ForetoldTrial, Predictor
 
 ROUNDS = 12
 """Turns of parameters and randomness, at most."""
+WORTH = 1.0
+"""Promise of twice the log-likelihood that no step keeps, from which slopes become differences of the cost: a standard
+deviation of one parameter."""
 LOG_STEP = 1e-3
 """Step of the differences in logarithms."""
 FOLLOWED_STEP = 0.01
@@ -86,6 +91,7 @@ class LikelihoodProblem:
         self.unknown_names = model.own_unknowns()
         self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
         self.priors = [first_doubt(model, t) for t in starts or self.trials]
+        self.is_sharp = False
         self._predictor: Predictor | None = None
         self._abreast: Predictor | None = None
 
@@ -159,8 +165,23 @@ class LikelihoodProblem:
         parts = [self._whitened(one) for one in self.innovations(values, unknowns)]
         return self._followed(parts, values, unknowns) if self.followed else parts
 
-    @cached_property
+    def sharpen(self) -> bool:
+        """Let the slopes of all parameters be differences of the cost; False where they are, or effort itself is read.
+
+        There a lag would take up how smooth a random effort is, which no process of first order is.
+        """
+        if self.is_sharp or not all(self.model.rig.unknowns(t.kind) for t in self.trials):
+            return False
+        self.is_sharp = True
+        return True
+
+    @property
     def followed(self) -> tuple[str, ...]:
+        """Free parameters whose slopes are differences of the cost."""
+        return self.free if self.is_sharp else self._scales
+
+    @cached_property
+    def _scales(self) -> tuple[str, ...]:
         """Free parameters that scale a reading: the filter's gains go with them."""
         imposed = any(t.kind == IMPOSED for t in self.trials)
         read = ("reading", "effort") if imposed else ("reading",)
@@ -175,12 +196,13 @@ class LikelihoodProblem:
         """
         at, squares = [self.free.index(n) for n in self.followed], sum(float(p.residual @ p.residual) for p in parts)
         sizes = np.sqrt(sum(np.sum(p.jacobian[:, at] ** 2, axis=0) for p in parts))
-        if not (np.isfinite(squares) and squares > 0.0 and np.all(np.isfinite(sizes) & (sizes > 0.0))):
+        if not (np.isfinite(squares) and squares > 0.0 and np.isfinite(sizes).all()):
             return parts
-        steps = FOLLOWED_STEP / sizes
+        felt = sizes > 0.0
+        steps = FOLLOWED_STEP / np.where(felt, sizes, np.inf)
         moved = [{**values, n: values[n] + float(h)} for n, h in zip(self.followed, steps, strict=True)]
         now = squares + sum(p.log_determinant for p in parts)
-        slopes = 0.5 * (np.array(self.bounds([(m, unknowns) for m in moved])) - now) / steps
+        slopes = 0.5 * (np.array(self.bounds([(m, unknowns) for m in moved])) - now) / np.where(felt, steps, np.inf)
         factors = (-slopes - sum(p.residual @ p.jacobian[:, at] for p in parts)) / squares
         return [_added(p, at, np.nan_to_num(factors)) for p in parts]
 
@@ -299,6 +321,8 @@ def maximise(
         before = fitted.sse
         score_doubt(problem, fitted.values, fitted.unknowns)
         fitted = fit_problem(problem, fitted.values, fitted.unknowns, iterations)  # type: ignore[arg-type]
-        if not fitted.sse < before - 10.0 * TOLERANCE:
+        if fitted.sse < before - 10.0 * TOLERANCE:
+            continue
+        if not (fitted.gradient_norm > WORTH and problem.sharpen()):
             return replace(fitted, doubt=problem.doubt)
     return replace(fitted, doubt=problem.doubt, converged=False)

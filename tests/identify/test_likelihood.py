@@ -81,6 +81,29 @@ def test_gains_as_they_are_lead_to_the_maximum_of_the_whole_likelihood(fitted):
         assert abs(slope / bend) < 0.1 * fitted.std(name), name
 
 
+def test_the_maximum_of_a_model_that_is_wrong_is_found_from_anywhere():
+    """Friction that the model lacks: gains as they are promise steps that none keeps. Differences of the cost decide."""
+    trials = [read_in_counts(held(k, 0.02, noise=1e-6, friction=0.3, slow=0.3), 1e-5) for k in range(2)]
+    ends = []
+    for scale, damping in ((0.5, 0.03), (2.0, 0.3)):
+        problem = LikelihoodProblem(believed(), trials, first_guess(believed(), trials))
+        begun = {**believed().parameters(), "inertia_scale": scale, "damping": damping}
+        ends.append(maximise(problem, begun))
+    assert ends[0].sse == pytest.approx(ends[1].sse, abs=0.2)
+    problem = LikelihoodProblem(believed(), trials, ends[0].doubt)
+    for name in ends[0].free:
+        step = ends[0].std(name)
+        sides = [
+            problem.cost({**ends[0].values, name: ends[0].values[name] + s * step}, ends[0].unknowns) for s in (-1, 1)
+        ]
+        assert min(sides) > ends[0].sse, name
+
+
+def read_in_counts(trial: Trial, count: float) -> Trial:
+    """The trial as an encoder reads it."""
+    return trial.with_columns(position=np.round(trial["position"] / count) * count)
+
+
 def test_innovations_are_white_at_the_maximum(fitted):
     problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt)
     for part in problem.linearize(fitted.values, fitted.unknowns):
