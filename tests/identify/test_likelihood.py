@@ -82,7 +82,7 @@ def test_gains_as_they_are_lead_to_the_maximum_of_the_whole_likelihood(fitted):
 
 
 def test_the_maximum_of_a_model_that_is_wrong_is_found_from_anywhere():
-    """Friction that the model lacks: gains as they are promise steps that none keeps. Differences of the cost decide."""
+    """It lacks friction: gains as they are promise steps that none keeps, and differences of the cost decide."""
     trials = [read_in_counts(held(k, 0.02, noise=1e-6, friction=0.3, slow=0.3), 1e-5) for k in range(2)]
     ends = []
     for scale, damping in ((0.5, 0.03), (2.0, 0.3)):
