@@ -126,7 +126,7 @@ def _sizes(
     for cause in causes:
         if cause == "coulomb_friction":
             out |= {cause: torque, "friction_speed": speed * float(rng.uniform(0.02, 0.1))}
-            out["stiction"] = float(rng.choice([0.0, 0.3]))
+            out["stiction"], out["sticks"] = float(rng.choice([0.0, 0.3])), float(rng.random() < 0.5)
         elif cause == "quadratic_damping":
             out[cause] = torque / speed**2
         elif cause == "parallel_stiffness":

@@ -1,7 +1,8 @@
 """One-joint rigs under feedback in plain numpy: what hides in them, the controller, the encoder, and a random torque.
 
 Nothing here is the engine's: another integrator (Heun's, four steps a sample), other functional forms (a hyperbolic
-tangent for friction, a one-sided spring with damping for a stop, a discrete Maxwell element), noise by a recursion.
+tangent for friction or one that jumps and sticks, a one-sided spring with damping for a stop, a discrete Maxwell
+element), noise by a recursion.
 """
 
 from __future__ import annotations
@@ -109,7 +110,10 @@ class _State:
                 self.lagged = self.q + (self.lagged - self.q) * np.exp(-h / lag)
             if relax:
                 self.relaxed = self.q + (self.relaxed - self.q) * np.exp(-h / relax)
-            self.q, self.v = self.q + 0.5 * h * (self.v + v1), self.v + 0.5 * h * (a0 + a1)
+            v = self.v + 0.5 * h * (a0 + a1)
+            if p.hidden.get("sticks", 0.0):
+                v = np.where(v * self.v < 0.0, 0.0, v)
+            self.q, self.v = self.q + 0.5 * h * (self.v + v1), v
             shock = p.torque * np.sqrt(1.0 - keep**2) * self.rng.standard_normal(len(self.q))
             self.random = keep * self.random + shock
 
@@ -118,15 +122,28 @@ class _State:
     ) -> np.ndarray:
         p = self.plant
         torque = effort * (1.0 + p.hidden.get("effort_gain", 0.0)) - p.weight * np.sin(q) - p.damping * v
-        return (torque + self.random + _hidden(p.hidden, t, q, v, relaxed)) / p.inertia
+        torque = torque + self.random + _hidden(p.hidden, t, q, v, relaxed)
+        return (torque - _friction(p.hidden, torque, v)) / p.inertia
+
+
+def _friction(hidden: dict[str, float], torque: np.ndarray, v: np.ndarray) -> np.ndarray | float:
+    """A hyperbolic tangent of the velocity, or what jumps where its sign does and holds a joint that stands.
+
+    Source of the second: Karnopp, Computer simulation of stick-slip friction in mechanical dynamic systems, J. Dyn.
+    Syst. Meas. Control 107 (1985).
+    """
+    if not (size := hidden.get("coulomb_friction", 0.0)):
+        return 0.0
+    ratio = v / hidden["friction_speed"]
+    most = size * (1.0 + hidden.get("stiction", 0.0) * np.exp(-((0.2 * ratio) ** 2)))
+    if hidden.get("sticks", 0.0):
+        return np.where(v == 0.0, np.clip(torque, -most, most), most * np.sign(v))
+    return most * np.tanh(ratio)
 
 
 def _hidden(hidden: dict[str, float], t: float, q: np.ndarray, v: np.ndarray, relaxed: np.ndarray) -> np.ndarray:
-    """The torque of what is hidden."""
+    """The torque of what is hidden but for friction."""
     out = np.zeros_like(q)
-    if size := hidden.get("coulomb_friction", 0.0):
-        ratio = v / hidden["friction_speed"]
-        out -= size * np.tanh(ratio) * (1.0 + hidden.get("stiction", 0.0) * np.exp(-((0.2 * ratio) ** 2)))
     if size := hidden.get("quadratic_damping", 0.0):
         out -= size * v * np.abs(v)
     if size := hidden.get("effort_offset", 0.0):

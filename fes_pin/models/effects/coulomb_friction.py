@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fes_pin.models.maths import exp, log, sqrt
+from fes_pin.models.maths import exp, fabs, log, sqrt
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage, lag
 
@@ -36,15 +37,16 @@ class CoulombFriction(Effect):
         T = torque_nm |load|^load_exponent (1 + stiction exp(-(v / stribeck_speed)^2)) (1 + one_way)
         x = y / max(1, |y|)^2 + k v / S,   y = torque / S,   S = T + k creep_speed,   k = STIFFEST J / h
 
-    with clip(x) from -1 to 1 and h the integration step, 0 where the motion is imposed. It is T sign(v) in motion, and
-    what holds the joint at rest: there x is torque / S, and k v brings the joint there within a step. A torque beyond T
-    only turns the motion: y falls out of x then, and friction changes its sign where the velocity does. Under a torque
-    below T the joint still creeps, at most by `creep_speed`: 0.2 degrees a second, until data show another. In the
-    limit of small steps x = v / creep_speed. The corners of clip are rounded over `softness` of the friction. `load` is
+    with clip(x) from -1 to 1, its corners rounded over `softness` of the friction as ln cosh is, and h the integration
+    step, 0 where the motion is imposed. It is T sign(v) in motion, and what holds the joint at rest: there x is
+    torque / S, and k v brings the joint there within a step. A torque beyond T only turns the motion: y falls out of x
+    then, and friction changes its sign where the velocity does. Under a torque below T the joint still creeps, at most
+    by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of small steps x = v / creep_speed. Far from its corners friction is T but for what falls exponentially: a
+    slower approach would pass for damping. Wide corners make it T tanh(v / speed), the commonest smooth form. `load` is
     the bearing's: see the rig. one_way = asymmetry sign(x), x without it.
-    Where v is an estimate with deviation v_std, friction is its mean over what v may be: the corners are rounded over
-    k v_std / S as well, so that T sign(v) becomes T v / sqrt(v^2 + v_std^2), the mean for errors of Student's
-    distribution with two degrees of freedom. Its slope at one point says nothing of friction beside v = 0.
+    Where v is an estimate of deviation v_std, friction is near its mean over what v may be: corners are rounded over
+    sqrt(pi / 2) k v_std / S as well, and T sign(v) becomes T tanh(v / (sqrt(pi / 2) v_std)), which has the slope of the
+    mean for a Gaussian. The slope at one velocity says nothing of friction at those beside it.
     Where the motion is imposed, friction may build up over a way `presliding`, as of a contact or band that stretches
     before it slips: a share z of it acts, presliding z' = |v| (clip(x) - z).
     Sliding contacts lose in proportion to the load; rolling ones by elastic hysteresis, the load times the width of the
@@ -55,6 +57,8 @@ class CoulombFriction(Effect):
     Source: Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation,
     European Journal of Control 4 (1998). Load: Tabor, The mechanism of rolling friction II: the elastic range, Proc. R.
     Soc. A 229 (1955); Greenwood, Minshall and Tabor, Hysteresis losses in rolling and sliding friction, 259 (1961).
+    Smooth forms: Andersson, Soderberg and Bjorklund, Friction models for sliding dry, boundary and mixed lubricated
+    contacts, Tribology International 40 (2007).
     Presliding: Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1, 1968.
     Mean over an estimate: Gelb, Applied Optimal Estimation, 1974, section 6.2, statistical linearization.
     Asymmetry: Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, whose offset holds it.
@@ -127,8 +131,7 @@ class CoulombFriction(Effect):
         beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
         x = y / (beyond * beyond) + stopping * s.v / scale
         unsure = stopping * s.v_std / scale
-        corner = self.softness * self.softness + unsure * unsure
-        return 0.5 * (_length(x + 1.0, corner) - _length(x - 1.0, corner))
+        return _clip(x, sqrt(self.softness * self.softness + 0.5 * math.pi * unsure * unsure))
 
 
 def _imposed_way(measured: Mapping[str, np.ndarray]) -> float:
@@ -149,6 +152,13 @@ def _usual_speed(measured: Mapping[str, np.ndarray]) -> float:
     return float(np.nanmedian(moved)) / (lag * dt) if len(moved) else 0.0
 
 
-def _length(x: Any, corner: Any = CORNER * CORNER) -> Any:
-    """|x| with a rounded corner, given as its square: sums and differences of two make max(1, |x|) and clip(x)."""
-    return sqrt(x * x + corner)
+def _length(x: Any) -> Any:
+    """|x| with a rounded corner."""
+    return sqrt(x * x + CORNER * CORNER)
+
+
+def _clip(x: Any, corner: Any) -> Any:
+    """x from -1 to 1 with rounded corners: corner / 2 ln(cosh((x + 1) / corner) / cosh((x - 1) / corner))."""
+    above, below = fabs(x + 1.0), fabs(x - 1.0)
+    tails = (1.0 + exp(-2.0 * above / corner)) / (1.0 + exp(-2.0 * below / corner))
+    return 0.5 * (above - below + corner * log(tails))
