@@ -41,9 +41,10 @@ class CoulombFriction(Effect):
     step, 0 where the motion is imposed. It is T sign(v) in motion, and what holds the joint at rest: there x is
     torque / S, and k v brings the joint there within a step. A torque beyond T only turns the motion: y falls out of x
     then, and friction changes its sign where the velocity does. Under a torque below T the joint still creeps, at most
-    by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of small steps x = v / creep_speed. Far from its corners friction is T but for what falls exponentially: a
-    slower approach would pass for damping. Wide corners make it T tanh(v / speed), the commonest smooth form. `load` is
-    the bearing's: see the rig. one_way = asymmetry sign(x), x without it.
+    by `creep_speed`: 0.2 degrees a second, until data show another. In the limit of small steps x = v / creep_speed.
+    Far from its corners friction is T but for what falls exponentially: a slower approach would pass for damping. Wide
+    corners make it T tanh(v / speed), the commonest smooth form. `load` is the bearing's: see the rig.
+    one_way = asymmetry sign(x), x without it.
     Where v is an estimate of deviation v_std, friction is near its mean over what v may be: corners are rounded over
     sqrt(pi / 2) k v_std / S as well, and T sign(v) becomes T tanh(v / (sqrt(pi / 2) v_std)), which has the slope of the
     mean for a Gaussian. The slope at one velocity says nothing of friction at those beside it.
