@@ -45,6 +45,9 @@ class Sets:
     def refined(self, names, demanded):
         return None
 
+    def simplified(self, names):
+        return None
+
     def scores(self, base):
         return SimpleNamespace(scored=[])
 

@@ -179,6 +179,17 @@ class LikelihoodFits:
         found = [f for f in in_parallel(self._go_on, worth) if is_identified(f, base)]
         return min(found, key=lambda f: f.price, default=None)
 
+    def simplified(self, names: Names) -> Fit | None:
+        """The best fit of a set with one refinement of a form fewer; None where none is cheaper.
+
+        A form that was demanded beside fewer causes may have stood for one that has been found since.
+        """
+        base = self.fits[names]
+        starts = [s for effect in base.model.effects for s in _less_refined(base.model, effect)]
+        looks = sorted(in_parallel(lambda s: self._first_fit(s, base), starts), key=lambda f: f.price)
+        best = min(in_parallel(self._go_on, looks[:STARTS]), key=lambda f: f.price, default=None)
+        return best if best is not None and best.price < base.price else None
+
     def _first_fit(self, start: Model, base: Fit) -> Fit:
         """A few steps from a start, at what is random in another fit."""
         assert base.doubt is not None
@@ -201,6 +212,13 @@ def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
         nothing = abs(value - null) < 1e-6 * one.scale
         values[name] = near_null(type(effect), name) if nothing else float(np.clip(value, one.lower, one.upper))
     return replace(effect, **values)
+
+
+def _less_refined(model: Model, effect: Effect) -> list[Model]:
+    """Starts with one refinement of an effect fewer."""
+    info, refined = effect.parameters(), effect.refined()
+    nulls = {n: info[n].null for n, *_ in effect.refinements() if n in refined}
+    return [model.with_parameters({f"{effect.name}.{n}": float(null)}) for n, null in nulls.items() if null is not None]
 
 
 def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
