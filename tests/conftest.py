@@ -42,7 +42,8 @@ LONG = {
     "diagnose/test_driven_far.py": ("_gain]", "_damping]", "_hum]", "test_a_twin_is_found", "one_muscle[12]"),
     "diagnose/test_found.py": (
         *("test_intervals_hold", "-1-True", "-2-True", "-5-True", "-6-False", "-9-True", "-10-True", "-11-True"),
-        *("test_friction_of_a_slide[False]", "far_away[1]"),
+        *("test_friction_of_a_slide[False]", "far_away[1]", "('coulomb_friction',)-ar1-4-True"),
+        "test_both_of_two",
     ),
     "diagnose/test_gaps.py": ("[joint-names2", "[ankle-names", "lack[without"),
     "diagnose/test_misread.py": ("test_a_cause_that_shows_at_one_load",),
@@ -55,8 +56,12 @@ LONG = {
     ),
     "driven/test_driven.py": ("test_play_before", "test_what_no_cause", "adequate[12]", "no_cause[14"),
     "fuzz/test_cases.py": ("a trial of milliseconds",),
-    "imposed/test_imposed_ankle.py": ("predicted[force_velocity]", "adequate[8]"),
-    "imposed/test_imposed_joint.py": ("predicted[passive_relaxation]", "test_a_further_form"),
+    "imposed/test_imposed_ankle.py": ("predicted[force_velocity]", "predicted[passive_relaxation]", "adequate[8]"),
+    "imposed/test_imposed_joint.py": (
+        *("predicted[passive_relaxation]", "predicted[coulomb_friction]"),
+        "test_a_further_form",
+    ),
+    "imposed/test_imposed_muscle.py": ("test_beside_a_form",),
     "imposed/test_session.py": ("named[potentiation-imposed]",),
     "test_shared_diagnoses.py": (
         *("[p02", "[p04", "[p06", "[p08", "[p09", "[p11", "[p12", "[p14", "[p19", "[p20"),
