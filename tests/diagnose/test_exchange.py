@@ -48,6 +48,8 @@ class Sets:
     def simplified(self, names):
         return None
 
+    reformed = simplified
+
     def scores(self, base):
         return SimpleNamespace(scored=[])
 

@@ -15,7 +15,7 @@ from fes_pin.diagnose.search.score import Projection, Scored, Scores, best_by_ef
 from fes_pin.diagnose.search.simulation_fits import Names, is_identified, names_of
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit, fit_problem
-from fes_pin.identify.likelihood import ROUNDS, LikelihoodProblem, maximise
+from fes_pin.identify.likelihood import ROUNDS, WORTH, LikelihoodProblem, maximise
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
@@ -189,6 +189,26 @@ class LikelihoodFits:
         looks = sorted(in_parallel(lambda s: self._first_fit(s, base), starts), key=lambda f: f.price)
         best = min(in_parallel(self._go_on, looks[:STARTS]), key=lambda f: f.price, default=None)
         return best if best is not None and best.price < base.price else None
+
+    def reformed(self, names: Names) -> Fit | None:
+        """A set with several refinements of a form, all begun anew at once; None where that is no better.
+
+        They were adopted one after another, and the first may have bent to what a later one says.
+        """
+        base = self.fits[names]
+        starts = [s for effect in base.model.effects for s in self._begun_anew(base.model, effect)]
+        looks = in_parallel(lambda s: self._first_fit(s, base), starts)
+        best = min(in_parallel(self._go_on, looks), key=lambda f: f.price, default=None)
+        return best if best is not None and best.price < base.price - WORTH else None
+
+    def _begun_anew(self, model: Model, effect: Effect) -> list[Model]:
+        """The start of an effect with several refinements from their most likely values; none of others."""
+        adopted = [names for names in effect.refinements() if names[0] in effect.refined()]
+        if len(adopted) < 2:
+            return []
+        grids = effect.grids(self.library.measured)
+        starts = {f"{effect.name}.{n}": grids[n][0] for names in adopted for n in names if len(grids[n])}
+        return [model.with_parameters(starts)]
 
     def _first_fit(self, start: Model, base: Fit) -> Fit:
         """A few steps from a start, at what is random in another fit."""

@@ -146,16 +146,19 @@ class LikelihoodSearch:
 
     def _refine(self, names: Names) -> None:
         """Give a set, once, the form that the data demand."""
-        while names not in self._formed and (self._simplified(names) or self._refined(names)):
+        while names not in self._formed and (
+            self._replaced(names, self.sets.simplified(names))
+            or self._refined(names)
+            or self._replaced(names, self.sets.reformed(names))
+        ):
             pass
         self._formed.add(names)
 
-    def _simplified(self, names: Names) -> bool:
-        """Drop a refinement of a set that it is cheaper without; False if there is none."""
-        simpler = self.sets.simplified(names)
-        if simpler is not None:
-            self.sets.fits[names] = simpler
-        return simpler is not None
+    def _replaced(self, names: Names, better: Fit | None) -> bool:
+        """Take a better fit of a set; False if there is none."""
+        if better is not None:
+            self.sets.fits[names] = better
+        return better is not None
 
     def _refined(self, names: Names) -> bool:
         """Adopt the refinement of a set that the data demand most; False if they demand none."""

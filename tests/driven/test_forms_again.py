@@ -1,0 +1,39 @@
+"""A form that stood for another cause is dropped once that is found, and several forms are begun anew together."""
+
+from driven_rigs.draw import draw
+
+from fes_pin.data.study import read_study
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.identify.likelihood import LikelihoodProblem, maximise
+from fes_pin.models.effects import CoulombFriction, QuadraticDamping, SensorLag
+from fes_pin.models.nominal import nominal_model
+
+PAIR = ("coulomb_friction", "quadratic_damping")
+
+
+def test_friction_that_grew_with_the_load_is_plain_beside_another_damping(tmp_path):
+    study = read_study(draw(PAIR, 0.3, 1108031, tmp_path).study)
+    sets = LikelihoodFits(nominal_model(study), study.trials)
+    model = sets.nominal().model + CoulombFriction(0.1, load_exponent=1.5) + QuadraticDamping(0.05)
+    problem = LikelihoodProblem(model, study.trials, sets.fits[()].doubt)
+    sets.fits[PAIR] = stood = maximise(problem, model.parameters())
+    simpler = sets.simplified(PAIR)
+    assert simpler.price < stood.price - 100.0
+    assert simpler.values["coulomb_friction.load_exponent"] == 0.0
+    sets.fits[PAIR] = simpler
+    assert sets.simplified(PAIR) is None
+
+
+def test_forms_that_bent_one_to_the_other_are_begun_anew(tmp_path):
+    """Stiction was fitted before the friction's width was told: it is a tenth of that, and damping came out low."""
+    drawn = draw(("coulomb_friction", "sensor_lag"), 0.3, 1108016, tmp_path)
+    study, names = read_study(drawn.study), ("coulomb_friction", "sensor_lag")
+    sets = LikelihoodFits(nominal_model(study), study.trials)
+    friction = CoulombFriction(0.387, stiction=3.13, stribeck_speed=0.0747, creep_speed=0.132)
+    model = sets.nominal().model + friction + SensorLag(0.0094)
+    problem = LikelihoodProblem(model, study.trials, sets.fits[()].doubt)
+    sets.fits[names] = bent = maximise(problem, model.parameters())
+    anew = sets.reformed(names)
+    assert anew.price < bent.price - 50.0
+    damping = drawn.truth["damping"]
+    assert abs(anew.values["damping"] - damping) < 0.3 * abs(bent.values["damping"] - damping)
