@@ -73,7 +73,7 @@ class CoulombFriction(Effect):
     creep_speed: float = parameter(
         CREEP, unit="{q}/s", null=CREEP, lower=1e-5, upper=0.5, scale=0.002, optional=True, grid=(0.02,)
     )
-    softness: float = parameter(CORNER, null=CORNER, lower=1e-3, upper=2.0, scale=0.1, optional=True, grid=(0.5,))
+    softness: float = parameter(CORNER, null=CORNER, lower=1e-3, upper=50.0, scale=0.1, optional=True, grid=(0.5,))
     load_exponent: float = parameter(
         0.0, null=0.0, lower=0.0, upper=2.0, scale=1.0, optional=True, fitted=False, grid=(1.0, 4.0 / 3.0, 1.5)
     )
