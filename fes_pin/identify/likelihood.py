@@ -41,7 +41,7 @@ from fes_pin.models.predictor import Doubt, ForetoldTrial, Predictor
 ROUNDS = 12
 """Turns of parameters and randomness, at most."""
 WORTH = 1.0
-"""Promise of twice the log-likelihood that no step keeps, from which slopes become differences of the cost: a standard
+"""Change of twice the log-likelihood that is worth more work, as where it is promised and no step keeps it: a standard
 deviation of one parameter."""
 LOG_STEP = 1e-3
 """Step of the differences in logarithms."""

@@ -214,7 +214,7 @@ class Signals(SimpleNamespace):
     """The signals of one instant, by name: what a rig's equations and the effects read.
 
     `own` holds the states and memories of the effect that is being evaluated; `v_std` is the standard deviation of the
-    velocity where a predictor estimates it.
+    velocity, in its unit, where a predictor estimates it and asks for rates; else it is 0.
     """
 
     v_std: Any = 0.0

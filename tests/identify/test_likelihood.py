@@ -115,33 +115,30 @@ def test_innovations_are_white_at_the_maximum(fitted):
 
 @pytest.fixture(scope="module")
 def rubbing():
-    """Slow motion with dry friction, read so coarsely that the sign of the velocity is often in doubt."""
-    return [held(k, 0.01, noise=2e-3, friction=0.2, slow=0.3) for k in range(3)]
+    """Slow motion with dry friction, read so coarsely that the sign of the velocity is often in doubt; fitted."""
+    trials = [held(k, 0.01, noise=2e-3, friction=0.2, slow=0.3) for k in range(12)]
+    model = believed() + CoulombFriction(torque_nm=0.2)
+    return maximise(LikelihoodProblem(model, trials, first_guess(model, trials)), model.parameters())
 
 
 def test_the_likelihood_of_dry_friction_is_smooth(rubbing):
-    """A slope that steps of a thousandth find is that of steps of a hundredth: no sign of an estimate flips between."""
-    model = believed() + CoulombFriction(torque_nm=0.2)
-    found = maximise(LikelihoodProblem(model, rubbing, first_guess(model, rubbing)), model.parameters())
-    problem = LikelihoodProblem(found.model, rubbing, found.doubt)
+    """Steps of a hundredth of a deviation find the slope that a whole one does: no sign flips between."""
+    problem = LikelihoodProblem(rubbing.model, rubbing.trials, rubbing.doubt)
     name = "coulomb_friction.torque_nm"
 
     def slope(step: float) -> float:
-        up, down = (
-            problem.cost({**found.values, name: found.values[name] + s * step}, found.unknowns) for s in (1, -1)
-        )
+        moved = [{**rubbing.values, name: rubbing.values[name] + s * step} for s in (1, -1)]
+        up, down = (problem.cost(values, rubbing.unknowns) for values in moved)
         return (up - down) / (2.0 * step)
 
-    deviation = found.std(name)
+    deviation = rubbing.std(name)
     for k in (0.01, 0.03, 0.1):
         assert abs(slope(k * deviation) - slope(deviation)) * deviation < 0.1
 
 
 def test_friction_that_is_felt_near_standstill_is_not_underestimated(rubbing):
-    model = believed() + CoulombFriction(torque_nm=0.2)
-    found = maximise(LikelihoodProblem(model, rubbing, first_guess(model, rubbing)), model.parameters())
-    assert abs(found.values["coulomb_friction.torque_nm"] - 0.2) < 3.0 * found.std("coulomb_friction.torque_nm")
-    assert abs(found.values["damping"] - TRUE["damping"]) < 3.0 * found.std("damping")
+    for name, truth in (("coulomb_friction.torque_nm", 0.2), ("damping", TRUE["damping"])):
+        assert abs(rubbing.values[name] - truth) < 3.0 * rubbing.std(name), name
 
 
 def test_without_a_random_torque_none_is_found():

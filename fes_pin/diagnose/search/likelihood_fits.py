@@ -186,9 +186,7 @@ class LikelihoodFits:
         """
         base = self.fits[names]
         starts = [s for effect in base.model.effects for s in _less_refined(base.model, effect)]
-        looks = sorted(in_parallel(lambda s: self._first_fit(s, base), starts), key=lambda f: f.price)
-        best = min(in_parallel(self._go_on, looks[:STARTS]), key=lambda f: f.price, default=None)
-        return best if best is not None and best.price < base.price else None
+        return self._cheaper(starts, base, base.price)
 
     def reformed(self, names: Names) -> Fit | None:
         """A set with several refinements of a form, all begun anew at once; None where that is no better.
@@ -197,9 +195,13 @@ class LikelihoodFits:
         """
         base = self.fits[names]
         starts = [s for effect in base.model.effects for s in self._begun_anew(base.model, effect)]
-        looks = in_parallel(lambda s: self._first_fit(s, base), starts)
-        best = min(in_parallel(self._go_on, looks), key=lambda f: f.price, default=None)
-        return best if best is not None and best.price < base.price - WORTH else None
+        return self._cheaper(starts, base, base.price - WORTH)
+
+    def _cheaper(self, starts: Sequence[Model], base: Fit, price: float) -> Fit | None:
+        """The best fit from some starts, of which those that look best go on; None where none is below a price."""
+        looks = sorted(in_parallel(lambda s: self._first_fit(s, base), starts), key=lambda f: f.price)
+        best = min(in_parallel(self._go_on, looks[:STARTS]), key=lambda f: f.price, default=None)
+        return best if best is not None and best.price < price else None
 
     def _begun_anew(self, model: Model, effect: Effect) -> list[Model]:
         """The start of an effect with several refinements from their most likely values; none of others."""

@@ -89,7 +89,6 @@ class _Symbols:
             initial=SimpleNamespace(**{n: p[n] for n in layout.unknowns if "." not in n}),
             time=self.t - self.c["t0"],
             step=self.c["step"],
-            v_std=self.v_std,
             elapsed=0.0,
             pace=1.0,
             delayed=lambda now, before: now,
@@ -151,6 +150,7 @@ class _Symbols:
             for n, value in effect.update(s.of(effect)).items():
                 memories[f"{effect.name}.{n}"] = value
         s = self.within_a_sample(self.signals(self.x, self.m))
+        s.v_std = self.v_std
         rates = dict(rig.rates(s))
         for effect in s.effects:
             rates.update({f"{effect.name}.{n}": v for n, v in effect.rate(s.of(effect)).items()})
