@@ -136,7 +136,8 @@ class LikelihoodSearch:
                 tuple(sorted((a.probe.name, b.probe.name))): (a, b) for a, b in best_pairs(sets.scores(base), SEEDS)
             }
             missing = {k: v for k, v in pairs.items() if k not in sets.fits}
-            sets.add({k: lambda v=v: sets.extend_with_both(base, v) for k, v in missing.items()})  # type: ignore[misc]
+            begun = {k: lambda v=v: sets.extend_with_both(base, v) for k, v in missing.items()}
+            sets.add(base, begun)
 
     def _refine_first(self, size: int) -> Names:
         """The best set of a size, once each of the best has the form that the data demand."""
