@@ -44,8 +44,8 @@ class Effect:
         What it changes: see the rig's equations for the names.
     rigs
         The rigs it can be part of.
-    states_of_form
-        Which of its states it has only beside a refinement, with the parameter that switches that on.
+    of_form
+        Which of its states and memories it has only beside a refinement, with the parameter that switches that on.
     random
         Names of the constants that say how its states are driven at random; see `models.disturbance`.
     inputs
@@ -73,7 +73,7 @@ class Effect:
     rigs: ClassVar[tuple[str, ...]]
     states: ClassVar[tuple[str, ...]] = ()
     memories: ClassVar[tuple[str, ...]] = ()
-    states_of_form: ClassVar[Mapping[str, str]] = {}
+    of_form: ClassVar[Mapping[str, str]] = {}
     random: ClassVar[tuple[str, ...]] = ()
     inputs: ClassVar[tuple[str, ...]] = ()
     dissipative: ClassVar[bool] = False
@@ -151,8 +151,15 @@ class Effect:
 
     def kept_states(self) -> tuple[str, ...]:
         """Its states, without those of refinements that are switched off: such a state it does not have at all."""
-        refined = self.refined() if self.states_of_form else ()
-        return tuple(n for n in self.states if self.states_of_form.get(n, n) in (n, *refined))
+        return self._kept(self.states)
+
+    def kept_memories(self) -> tuple[str, ...]:
+        """Its memories, in the same way."""
+        return self._kept(self.memories)
+
+    def _kept(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        refined = self.refined() if self.of_form else ()
+        return tuple(n for n in names if self.of_form.get(n, n) in (n, *refined))
 
     def unknowns(self) -> tuple[str, ...]:
         """The parameters that each trial has a value of its own of."""

@@ -61,7 +61,7 @@ class _Symbols:
         self.model, self.layout = model, layout
         rig, kind = model.rig, layout.kind
         self.states = list(rig.states(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.kept_states()]
-        self.memories = list(rig.memories(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.memories]
+        self.memories = list(rig.memories(kind)) + [f"{e.name}.{n}" for e in model.effects for n in e.kept_memories()]
         self.x, self.m = _symbols("x", self.states), _symbols("m", self.memories)
         self.p, self.c = _symbols("p", layout.values), _symbols("c", layout.constants)
         self.u, self.t, self.z = _symbols("u", layout.inputs), ca.SX.sym("t"), ca.SX.sym("z")
@@ -95,7 +95,7 @@ class _Symbols:
         )
         s.owned = {
             e.name: {n: states[f"{e.name}.{n}"] for n in e.kept_states()}
-            | {n: memories[f"{e.name}.{n}"] for n in e.memories}
+            | {n: memories[f"{e.name}.{n}"] for n in e.kept_memories()}
             for e in self.model.effects
         }
         if self.is_late:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.models.maths import exp, fabs, log, sqrt
+from fes_pin.models.maths import exp, fabs, log, sqrt, where
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage, lag
 
@@ -23,6 +23,9 @@ SPAN_S = 0.05
 """Time over which a speed is read off measured positions, s: an encoder's counts are small beside what is moved."""
 WAYS = (0.05, 0.2)
 """Presliding that is tried, as shares of an imposed way."""
+STRETCHES = (1e-4, 1e-3)
+"""Stretches of a contact that are tried, as shares of the way of a free motion: micrometres on a slide, a milliradian on
+a joint that turns."""
 STANDING = 1e-6
 """Speed below which friction does not build up, rad/s or m/s: it keeps derivatives finite."""
 UNLOADED = 1e-3
@@ -48,8 +51,15 @@ class CoulombFriction(Effect):
     Where v is an estimate of deviation v_std, friction is near its mean over what v may be: corners are rounded over
     sqrt(pi / 2) k v_std / S as well, and T sign(v) becomes T tanh(v / (sqrt(pi / 2) v_std)), which has the slope of the
     mean for a Gaussian. The slope at one velocity says nothing of friction at those beside it.
-    Where the motion is imposed, friction may build up over a way `presliding`, as of a contact or band that stretches
-    before it slips: a share z of it acts, presliding z' = |v| (clip(x) - z).
+    A contact stretches before it slips. On a joint that is free, with `stretch` of it, what holds the joint at rest is a
+    spring to an anchor a that it drags along, and not the torque itself:
+
+        x = (q - a) / stretch + k v / S,   a+ = clip(a, q - stretch, q + stretch), once per sample
+
+    so that it comes to rest within the stretch of where it stopped, and `creep_speed` is what dampens it there; T over
+    the stretch is the spring's stiffness, no more than integration steps resolve. Where the motion is imposed, friction
+    may build up over a way `presliding` as exponentials do: a share z acts, presliding z' = |v| (clip(x) - z). The
+    velocity is known there; noise in one that is estimated would wear z away while the joint stands.
     Sliding contacts lose in proportion to the load; rolling ones by elastic hysteresis, the load times the width of the
     contact: to the power 4/3 for balls, 3/2 for rollers. Friction that differs by the direction is, moving and at rest,
     symmetric friction beside a constant torque: a joint has `effort_offset` for that, and no asymmetry.
@@ -60,7 +70,9 @@ class CoulombFriction(Effect):
     Soc. A 229 (1955); Greenwood, Minshall and Tabor, Hysteresis losses in rolling and sliding friction, 259 (1961).
     Smooth forms: Andersson, Soderberg and Bjorklund, Friction models for sliding dry, boundary and mixed lubricated
     contacts, Tribology International 40 (2007).
-    Presliding: Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1, 1968.
+    Presliding: Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1, 1968. Spring to an anchor:
+    Hayward and Armstrong, A new computational model of friction applied to haptic rendering, in Experimental Robotics
+    VI, Springer 2000; Prandtl, ZAMM 8 (1928).
     Mean over an estimate: Gelb, Applied Optimal Estimation, 1974, section 6.2, statistical linearization.
     Asymmetry: Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, whose offset holds it.
     """
@@ -81,16 +93,21 @@ class CoulombFriction(Effect):
         0.0, null=0.0, lower=-1.0, upper=1.0, scale=0.1, optional=True, grid=(0.3, -0.3), rigs=("ankle",)
     )
     presliding: float = parameter(0.0, unit="{q}", null=0.0, lower=0.0, upper=10.0, scale=0.01, optional=True)
+    stretch: float = parameter(
+        0.0, unit="{q}", null=0.0, lower=0.0, upper=10.0, scale=0.001, optional=True, rigs=("joint",)
+    )
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
-    states, states_of_form = ("share",), {"share": "presliding"}
+    states, memories = ("share",), ("anchor",)
+    of_form = {"share": "presliding", "anchor": "stretch"}
     dissipative = True
 
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
         """Of a joint, speeds in the measure of its own: those that it is at in a slow quarter of the time, and less."""
         grids, speed = super().grids(measured), _usual_speed(measured)
-        grids["presliding"] = tuple(k * _imposed_way(measured) for k in WAYS) if _imposed_way(measured) else ()
+        grids["presliding"] = tuple(k * _imposed_way(measured) for k in WAYS)
+        grids["stretch"] = tuple(k * _free_way(measured) for k in STRETCHES)
         if not speed > 0.0:
             return grids
         return {**grids, "stribeck_speed": (0.3 * speed, 0.1 * speed, speed), "creep_speed": (0.1 * speed, 0.5 * speed)}
@@ -114,6 +131,31 @@ class CoulombFriction(Effect):
         most = most * (1.0 + self.asymmetry * both_ways / _length(both_ways))
         return value - most * self._acting(most, value, s)[0]
 
+    def _held(self, y: Any, s: Any) -> Any:
+        """What holds the joint at rest, in units of the largest friction."""
+        if hasattr(s.own, "anchor"):
+            return (s.q - s.own.anchor) / self._way(s)
+        beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
+        return y / (beyond * beyond)
+
+    def update(self, s: Any) -> Mapping[str, Any]:
+        if not hasattr(s.own, "anchor"):
+            return {}
+        a, low, high = s.own.anchor, s.q - self._way(s), s.q + self._way(s)
+        return {"anchor": where(a < low, low, where(a > high, high, a))}
+
+    def rest(self, s: Any) -> Mapping[str, Any]:
+        return {"anchor": s.q} if hasattr(s.own, "anchor") else {}
+
+    def start_variances(self) -> Mapping[str, Any]:
+        """How far the contact is stretched when a trial begins nobody knows."""
+        return {"anchor": self.stretch**2 / 3.0}
+
+    def _way(self, s: Any) -> Any:
+        """Way over which the contact stretches, at least the shortest that integration steps resolve."""
+        shortest = self.torque_nm * s.step / _stopping(s)
+        return sqrt(self.stretch * self.stretch + shortest * shortest)
+
     def rate(self, s: Any) -> Mapping[str, Any]:
         return {"share": self._acting(self.torque_nm, 0.0, s)[1]} if hasattr(s.own, "share") else {}
 
@@ -126,13 +168,24 @@ class CoulombFriction(Effect):
 
     def _share(self, most: Any, value: Any, s: Any) -> Any:
         """Share of the largest friction that acts, with its sign: clip(x)."""
-        stopping = STIFFEST * getattr(s, "stopping", s.inertia / s.step)
+        stopping = _stopping(s)
         scale = most + stopping * self.creep_speed
-        y = value / scale
-        beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
-        x = y / (beyond * beyond) + stopping * s.v / scale
+        x = self._held(value / scale, s) + stopping * s.v / scale
         unsure = stopping * s.v_std / scale
         return _clip(x, sqrt(self.softness * self.softness + 0.5 * math.pi * unsure * unsure))
+
+
+def _stopping(s: Any) -> Any:
+    """Torque over velocity that stops the joint within a step: k."""
+    return STIFFEST * getattr(s, "stopping", s.inertia / s.step)
+
+
+def _free_way(measured: Mapping[str, np.ndarray]) -> float:
+    """How far a motion goes that is read as a position, rad or m; 0 of others."""
+    position = measured.get("position", np.empty(0))
+    if not len(position) or not np.array_equal(position, measured.get("reading", ())):
+        return 0.0
+    return float(np.max(position) - np.min(position))
 
 
 def _imposed_way(measured: Mapping[str, np.ndarray]) -> float:

@@ -185,6 +185,7 @@ class Joint(Rig):
         return z
 
     def sample(self, s: Signals) -> dict[str, Any]:
+        s.inertia = self.inertia_scale * s.c.inertia
         if s.kind == IMPOSED:
             s.q = s.sensed = imposed_now(s)[0]
         else:

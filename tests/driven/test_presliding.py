@@ -1,0 +1,78 @@
+"""A contact stretches before it slips: at rest dry friction is a spring to where the joint stopped."""
+
+import numpy as np
+import pytest
+from driven.bristles import DAMPING, DT, FRICTION, MASS, STIFFNESS, believed, trial
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.identify.distributions import chi2_quantile
+from fes_pin.models.effects import CoulombFriction
+from fes_pin.models.simulate import simulate
+
+NAMES = ("coulomb_friction",)
+STRETCH = 2e-3
+
+
+def pulled(force):
+    """A heavy slide without damping, from rest."""
+    model = believed().with_parameters({"inertia_scale": 1.0, "damping": 0.0})
+    time = np.arange(len(force)) * DT
+    columns = {"effort": np.asarray(force, float), "position": np.zeros(len(force))}
+    friction = CoulombFriction(FRICTION, stretch=STRETCH)
+    return simulate(model + friction, Trial("a", "motion", columns, time))["position"]
+
+
+def test_a_force_below_friction_is_held_by_a_spring_that_lets_go_back():
+    """Damped by what creep_speed makes of it: 5 kN s/m, a time constant of half a second."""
+    n = round(4.0 / DT)
+    position = pulled(np.r_[np.full(n, 0.6 * FRICTION), np.zeros(n)])
+    assert position[n - 1] == pytest.approx(0.6 * STRETCH, rel=0.01)
+    assert abs(position[-1]) < 0.01 * STRETCH
+
+
+def test_a_force_above_friction_accelerates_by_the_rest():
+    n = round(2.0 / DT)
+    position = pulled(np.full(n, 3.0 * FRICTION))
+    speed = np.gradient(position, DT)
+    late = slice(n // 2, n - 1)
+    slope = np.polyfit(np.arange(n)[late] * DT, speed[late], 1)[0]
+    assert slope == pytest.approx(2.0 * FRICTION / MASS, rel=1e-3)
+
+
+def test_a_joint_that_was_pushed_beyond_its_stretch_stays_within_it_of_where_it_stopped():
+    n = round(1.0 / DT)
+    position = pulled(np.r_[np.full(n, 3.0 * FRICTION), np.full(4 * n, 0.0)])
+    assert position[-1] > 20.0 * STRETCH
+    assert position.max() - position[-1] == pytest.approx(STRETCH, rel=0.05)
+
+
+def test_a_stretch_too_short_for_integration_steps_is_not_shorter_than_they_resolve():
+    """The stiffness of 20 N over a nanometre would ring at 15 kHz."""
+    n = round(1.0 / DT)
+    model = believed().with_parameters({"inertia_scale": 1.0}) + CoulombFriction(FRICTION, stretch=1e-9)
+    columns = {"effort": np.full(n, 0.5 * FRICTION), "position": np.zeros(n)}
+    position = simulate(model, Trial("a", "motion", columns, np.arange(n) * DT))["position"]
+    assert np.abs(position).max() < 1e-4
+
+
+def test_bristles_are_read_as_friction_with_a_stretch():
+    """LuGre's friction, which no form of the engine is: plain dry friction falls short of it, and calls it random."""
+    sets = LikelihoodFits(believed(), [trial(1), trial(2)], [CoulombFriction])
+    nominal = sets.nominal()
+    sets.extend_all(())
+    plain, demanded = sets.fits[NAMES], chi2_quantile(0.999, 1)
+    while better := sets.refined(NAMES, demanded):
+        if sets.fits[NAMES].sse - better.sse < demanded:
+            break
+        sets.fits[NAMES] = better
+    found = sets.fits[NAMES]
+    friction = found.model.effects[0]
+    assert "stretch" in friction.refined()
+    assert nominal.sse - plain.sse > 100.0
+    assert plain.sse - found.sse > nominal.sse - plain.sse
+    assert found.doubt.std["effort"] < 0.6 * plain.doubt.std["effort"]
+    assert friction.torque_nm == pytest.approx(FRICTION, rel=0.1)
+    assert found.values["damping"] == pytest.approx(DAMPING, rel=0.1)
+    assert found.values["inertia_scale"] == pytest.approx(1.0, abs=0.03)
+    assert friction.stretch == pytest.approx(FRICTION / STIFFNESS, rel=0.6)
