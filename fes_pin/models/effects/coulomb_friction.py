@@ -24,8 +24,8 @@ SPAN_S = 0.05
 WAYS = (0.05, 0.2)
 """Presliding that is tried, as shares of an imposed way."""
 STRETCHES = (1e-4, 1e-3)
-"""Stretches of a contact that are tried, as shares of the way of a free motion: micrometres on a slide, a milliradian on
-a joint that turns."""
+"""Stretches of a contact that are tried, as shares of the way of a free motion: some ten micrometres on a slide, a
+milliradian on a joint that turns."""
 STANDING = 1e-6
 """Speed below which friction does not build up, rad/s or m/s: it keeps derivatives finite."""
 UNLOADED = 1e-3
@@ -51,8 +51,8 @@ class CoulombFriction(Effect):
     Where v is an estimate of deviation v_std, friction is near its mean over what v may be: corners are rounded over
     sqrt(pi / 2) k v_std / S as well, and T sign(v) becomes T tanh(v / (sqrt(pi / 2) v_std)), which has the slope of the
     mean for a Gaussian. The slope at one velocity says nothing of friction at those beside it.
-    A contact stretches before it slips. On a joint that is free, with `stretch` of it, what holds the joint at rest is a
-    spring to an anchor a that it drags along, and not the torque itself:
+    A contact stretches before it slips. On a joint that is free, with `stretch` of it, what holds the joint at rest is
+    a spring to an anchor a that it drags along, and not the torque itself:
 
         x = (q - a) / stretch + k v / S,   a+ = clip(a, q - stretch, q + stretch), once per sample
 
@@ -98,8 +98,7 @@ class CoulombFriction(Effect):
     )
 
     name, stage, signal, rigs = "coulomb_friction", Stage.JOINT, "friction", ("ankle", "joint")
-    states, memories = ("share",), ("anchor",)
-    of_form = {"share": "presliding", "anchor": "stretch"}
+    states, memories, of_form = ("share",), ("anchor",), {"share": "presliding", "anchor": "stretch"}
     dissipative = True
 
     @classmethod
