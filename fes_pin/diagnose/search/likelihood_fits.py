@@ -33,7 +33,7 @@ one in which the model explains and one in which randomness does. Beside a fit w
 further causes begin also with the smallest."""
 AFRESH_ROUNDS = 3
 """Turns of parameters and randomness of such a fit, before the best sets converge."""
-AFRESH_SETS = 4
+AFRESH_SETS = 3
 """Sets that go on from little randomness, the lowest there of all that begin side by side: what takes over from a
 random effort explains most where there is least of it. On 14 driven rigs it was among the first two of 8 or 18."""
 
@@ -236,8 +236,19 @@ class LikelihoodFits:
         return replace(found, doubt=base.doubt)
 
     def ranked(self, size: int) -> list[Names]:
-        """Sets of a size, cheapest first."""
-        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (self.fits[n].price, n))
+        """Sets of a size, cheapest first; those that have converged to what cannot be come last."""
+        absurd = {n for n in self._converged if not is_possible(self.fits[n])}
+        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (n in absurd, self.fits[n].price, n))
+
+
+def is_possible(fitted: Fit) -> bool:
+    """False if the size of a cause ended where what it can be ends, other than at nothing: it stands for another."""
+    for effect in fitted.model.effects:
+        info = effect.parameters()
+        for n in effect.amplitudes():
+            if f"{effect.name}.{n}" in fitted.at_bound and getattr(effect, n) != info[n].null:
+                return False
+    return True
 
 
 def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnose.decide.significance import Family
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names, is_possible
 from fes_pin.diagnose.search.score import Scored, best_pairs
 from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
@@ -110,7 +110,7 @@ class LikelihoodSearch:
                 break
             self._extend(size)
             first = self._refine_first(size)
-            if not self.p_value(sets.fits[first], sets.fits[best]) < CLAIM_LEVEL:
+            if not (self.p_value(sets.fits[first], sets.fits[best]) < CLAIM_LEVEL and is_possible(sets.fits[first])):
                 break
             best = self._fallback = first
         return self.settle(self._backward(best))
@@ -215,7 +215,7 @@ class LikelihoodSearch:
             rest = tuple(n for n in names if n != name)
             without[name] = sets.without(names, name)
             others = [k for k in sets.fits if len(k) == len(names) and set(rest) <= set(k) and name not in k]
-            finite = (f for k in others if math.isfinite((f := sets.fits[k]).sse))
+            finite = (f for k in others if math.isfinite((f := sets.fits[k]).sse) and is_possible(f))
             rivals[name] = sorted(finite, key=lambda f: f.price)
         none, best = sets.fits[()], sets.fits[names]
         p_values = {n: self.p_value(best, without[n]) for n in names}

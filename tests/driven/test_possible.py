@@ -1,0 +1,40 @@
+"""What fits only where a cause ends that can be is no answer, however well it fits."""
+
+from dataclasses import replace
+
+import numpy as np
+from driven_rigs.draw import BASES, draw
+
+from fes_pin.data.study import read_study
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, is_possible
+from fes_pin.models.effects import CoulombFriction, SensorGain
+from fes_pin.models.nominal import nominal_model
+
+KNEE = next(k for k in range(99) if BASES[np.random.default_rng(k).integers(len(BASES))].name == "knee")
+GAIN, FRICTION = ("sensor_gain",), ("coulomb_friction",)
+
+
+def in_another_unit(folder, scale):
+    """A joint under gravity without a hidden cause, whose encoder is read in turns of a third, as it were."""
+    study = read_study(draw((), 0.3, KNEE, folder).study)
+    return replace(study, trials=tuple(t.with_columns(position=scale * t["position"]) for t in study.trials))
+
+
+def test_another_unit_is_no_gain(tmp_path):
+    study = in_another_unit(tmp_path, 0.3)
+    sets = LikelihoodFits(nominal_model(study), study.trials, [SensorGain, CoulombFriction])
+    nominal = sets.nominal()
+    sets.extend_all(())
+    gain = sets.fits[GAIN]
+    assert gain.model.effects[0].error == -0.5 and not is_possible(gain)
+    assert nominal.price - gain.price > 30.0
+    assert gain.price < sets.fits[FRICTION].price
+    assert sets.ranked(1) == [FRICTION, GAIN]
+
+
+def test_a_gain_that_is_small_is_possible(tmp_path):
+    study = in_another_unit(tmp_path, 1.0)
+    sets = LikelihoodFits(nominal_model(study), study.trials, [SensorGain, CoulombFriction])
+    sets.nominal()
+    sets.extend_all(())
+    assert all(is_possible(f) for f in sets.fits.values())
