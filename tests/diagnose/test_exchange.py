@@ -28,7 +28,8 @@ class Sets:
 
     def fit(self, names):
         sse = PRICE[names]
-        return SimpleNamespace(names=names, sse=sse, price=sse + 5.0 * len(names), degrees=len(names))
+        model = SimpleNamespace(effects=())
+        return SimpleNamespace(names=names, sse=sse, price=sse + 5.0 * len(names), degrees=len(names), model=model)
 
     def extend_all(self, base, most=None):
         for name in ("lag", "tendon", "velocity"):

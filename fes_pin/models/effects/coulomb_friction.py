@@ -103,7 +103,7 @@ class CoulombFriction(Effect):
 
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
-        """Of a joint, speeds in the measure of its own: those that it is at in a slow quarter of the time, and less."""
+        """Of a joint, speeds in the measure of its own: what a sine is below for a fifth of the time, and less."""
         grids, speed = super().grids(measured), _usual_speed(measured)
         grids["presliding"] = tuple(k * _imposed_way(measured) for k in WAYS)
         grids["stretch"] = tuple(k * _free_way(measured) for k in STRETCHES)
@@ -117,7 +117,7 @@ class CoulombFriction(Effect):
         return ({}, *({"presliding": way} for way in cls.grids(measured)["presliding"]))
 
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
-        """A fall of friction with speed ends among the speeds that a joint is mostly at; else it is less damping."""
+        """A fall of friction with speed ends among the speeds that a joint moves at; else it is less damping."""
         speed, way = _usual_speed(measured), _imposed_way(measured)
         limits = {"stribeck_speed": (0.0, 2.0 * speed)} if speed > 0.0 else {}
         return {**limits, "presliding": (0.0, 0.5 * way)} if way > 0.0 else limits
@@ -196,13 +196,16 @@ def _imposed_way(measured: Mapping[str, np.ndarray]) -> float:
 
 
 def _usual_speed(measured: Mapping[str, np.ndarray]) -> float:
-    """Median speed of a joint over SPAN_S, rad/s or m/s; 0 where no position was measured."""
+    """Root mean square of a joint's speed over SPAN_S, rad/s or m/s; 0 where no position was measured.
+
+    That of a sine is its median as well; but a joint that rests most of the time has the median of its noise.
+    """
     if "position" not in measured:
         return 0.0
     dt = float(np.median(np.diff(measured["time"])))
     lag = max(1, round(SPAN_S / dt))
-    moved = np.abs(measured["position"][lag:] - measured["position"][:-lag])
-    return float(np.nanmedian(moved)) / (lag * dt) if len(moved) else 0.0
+    moved = measured["position"][lag:] - measured["position"][:-lag]
+    return float(np.sqrt(np.nanmean(moved**2))) / (lag * dt) if len(moved) else 0.0
 
 
 def _length(x: Any) -> Any:
