@@ -31,3 +31,28 @@ def promised_gain(hessian: np.ndarray, gradient: np.ndarray, free: np.ndarray) -
     diagonal = np.diag(hessian)
     good = free & (diagonal > 0) & np.isfinite(gradient)
     return float(np.max(gradient[good] ** 2 / diagonal[good], initial=0.0))
+
+
+def moved_with(covariance: np.ndarray, at: list[int], change: np.ndarray) -> np.ndarray:
+    """How far all parameters go where some are moved: their mean, given those, of a Gaussian.
+
+    Parameters
+    ----------
+    covariance
+        Shape (n, n).
+    at
+        Places of those that are moved.
+    change
+        By how much, shape (len(at),).
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (n,); `change` alone where the covariance is not finite.
+    """
+    out, beside = np.zeros(len(covariance)), covariance[:, at]
+    known = np.isfinite(np.diag(covariance))
+    if known[at].all():
+        out[known] = beside[known] @ np.linalg.pinv(beside[at]) @ change
+    out[at] = change
+    return out

@@ -21,7 +21,7 @@ Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic gre
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -43,8 +43,9 @@ ROUNDS = 12
 WORTH = 1.0
 """Change of twice the log-likelihood that is worth more work, as where it is promised and no step keeps it: a standard
 deviation of one parameter."""
-LOG_STEP = 1e-3
-"""Step of the differences in logarithms."""
+LOG_STEPS = (1e-3, 0.03)
+"""Steps of the differences in logarithms: the second where the first promises what no step keeps, as where the cost is
+rough: that of a play jumps where an estimate crosses its slack."""
 FOLLOWED_STEP = 0.01
 """Step of a difference of the cost by a parameter of the reading, in its standard deviations."""
 LONGEST_MOVE = 1.5
@@ -248,37 +249,46 @@ def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknown
     def at_all(many: np.ndarray) -> list[_Told]:
         return problem.told(values, unknowns, [at(z) for z in many])
 
-    now, *moved = at_all(z + LOG_STEP * np.eye(1 + len(z), len(z), -1))
-    damping = 1e-3
-    for step in range(steps):
-        if not math.isfinite(now.cost):
-            break
-        gradient, information = _scored(now, moved)
+    now, *moved = at_all(z + LOG_STEPS[0] * np.eye(1 + len(z), len(z), -1))
+    damping, widths = 1e-3, list(LOG_STEPS)
+    while math.isfinite(now.cost):
+        gradient, information = _scored(now, moved, widths[0])
         held = ((z <= low) & (gradient > 0)) | ((z >= high) & (gradient < 0))
         dampings = damping * 10.0 ** np.arange(1 + len(z))
-        for k in range(0, len(dampings), problem.abreast):
-            tried = dampings[k : k + problem.abreast]
-            ends = np.array([np.clip(z - _damped_step(information, gradient, ~held, d), low, high) for d in tried])
-            after = at_all(ends)
-            best = int(np.argmin([one.cost for one in after]))
-            gained = now.cost - after[best].cost
-            if gained > 0.0:
+        moves = [_damped_step(information, gradient, ~held, d) for d in dampings]
+        found = _first_below(now, np.clip(z - np.array(moves), low, high), at_all, problem.abreast)
+        if found is None:
+            if 2.0 * float(gradient @ moves[0]) < WORTH or len(widths) == 1:
                 break
+            widths.pop(0)
         else:
-            break
-        z, now, damping = ends[best], after[best], max(0.3 * float(tried[best]), 1e-6)
-        if gained < TOLERANCE or step == steps - 1:
-            break
-        moved = at_all(z + LOG_STEP * np.eye(len(z)))
+            k, end, after = found
+            gained, steps = now.cost - after.cost, steps - 1
+            z, now, damping = end, after, max(0.3 * float(dampings[k]), 1e-6)
+            if gained < TOLERANCE or not steps:
+                break
+        moved = at_all(z + widths[0] * np.eye(len(z)))
     problem.doubt = at(z)
     return now.cost
 
 
-def _scored(now: _Told, moved: Sequence[_Told]) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient and expected information of half the cost, of logarithms; see the module."""
+def _first_below(
+    now: _Told, ends: np.ndarray, at_all: Callable[[np.ndarray], list[_Told]], abreast: int
+) -> tuple[int, np.ndarray, _Told] | None:
+    """The lowest of the first points in a run that has one below: its place, itself, and what it tells."""
+    for k in range(0, len(ends), abreast):
+        after = at_all(ends[k : k + abreast])
+        best = int(np.argmin([one.cost for one in after]))
+        if after[best].cost < now.cost:
+            return k + best, ends[k + best], after[best]
+    return None
+
+
+def _scored(now: _Told, moved: Sequence[_Told], width: float) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient and expected information of half the cost, of logarithms, from differences; see the module."""
     r, v = now.innovations, now.variances
-    dr = np.stack([(m.innovations - r) / LOG_STEP for m in moved], axis=1)
-    dv = np.stack([(m.variances - v) / LOG_STEP for m in moved], axis=1) / v[:, None]
+    dr = np.stack([(m.innovations - r) / width for m in moved], axis=1)
+    dv = np.stack([(m.variances - v) / width for m in moved], axis=1) / v[:, None]
     gradient = (r / v) @ dr + 0.5 * (1.0 - r * r / v) @ dv
     return gradient, (dr / v[:, None]).T @ dr + 0.5 * dv.T @ dv
 

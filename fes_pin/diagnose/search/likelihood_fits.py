@@ -13,9 +13,11 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library, Probe, far_sizes, near_null
 from fes_pin.diagnose.search.score import Projection, Scored, Scores, best_by_effect
 from fes_pin.diagnose.search.simulation_fits import Names, is_identified, names_of
+from fes_pin.identify.covariance import moved_with
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit, fit_problem
 from fes_pin.identify.likelihood import ROUNDS, WORTH, LikelihoodProblem, maximise
+from fes_pin.identify.problem import limits_of
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
@@ -57,7 +59,7 @@ class LikelihoodFits:
         self.fits: dict[Names, Fit] = {}
         self._scores: dict[int, tuple[Fit, Scores]] = {}
         self._converged: set[Names] = set()
-        self._less: dict[tuple[Names, str], Fit] = {}
+        self._compared: dict[tuple[Names, str], Fit] = {}
         self._probing: dict[tuple, LikelihoodProblem] = {}
 
     def nominal(self) -> Fit:
@@ -167,13 +169,36 @@ class LikelihoodFits:
     def without(self, names: Names, name: str) -> Fit:
         """The fit of a set less one cause, from the set's own values where that is better."""
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
-        if self._less.get((names, name)) is not whole:
+        if self._compared.get((names, name)) is not whole:
             assert whole.doubt is not None
-            own = self._maximised(whole.model - name, whole.doubt, whole.unknowns)
+            effect = next(e for e in whole.model.effects if e.name == name)
+            own = self._maximised(self._less(whole, effect.amplitudes(), effect), whole.doubt, whole.unknowns)
             if rest not in self.fits or own.price < self.fits[rest].price:
                 self.fits[rest] = own
-            self._less[names, name] = whole
+            self._compared[names, name] = whole
         return self.fits[rest]
+
+    def _less(self, whole: Fit, gone: Sequence[str], effect: Effect) -> Model:
+        """The model of a fit with some parameters of an effect at their nulls; without the effect if these are all.
+
+        The others are where the fit's covariance takes them, or where they were: whichever is likelier. An effort's
+        gain stands for an inertia that is another without it.
+        """
+        info, names = effect.parameters(), [f"{effect.name}.{n}" for n in gone]
+        at = [whole.free.index(n) for n in names if n in whole.free]
+        nulls = np.array([info[n].null for n, path in zip(gone, names, strict=True) if path in whole.free], dtype=float)
+        here = np.array([whole.values[n] for n in whole.free])
+        there = here + moved_with(whole.covariance, at, nulls - here[at])
+        limits = limits_of(whole.model, self.trials)
+        values = {n: float(np.clip(v, *limits[n])) for n, v in zip(whole.free, there, strict=True)}
+        off = whole.model.with_parameters({n: float(info[k].null) for n, k in zip(names, gone, strict=True)})  # type: ignore[arg-type]
+        left = off - effect.name if set(gone) >= set(effect.amplitudes()) else off
+        assert whole.doubt is not None
+        problem = LikelihoodProblem(left, self.trials, whole.doubt)
+        unknowns = problem.completed(whole.unknowns)
+        moved = left.with_parameters({n: v for n, v in values.items() if n in left.parameters()})
+        costs = problem.bounds([(one.parameters(), unknowns) for one in (left, moved)])
+        return moved if costs[1] < costs[0] else left
 
     def refined(self, names: Names, demanded: float) -> Fit | None:
         """The best fit of a set with the form of one of its effects refined; None where no form is, or none is told.
@@ -197,7 +222,8 @@ class LikelihoodFits:
         A form that was demanded beside fewer causes may have stood for one that has been found since.
         """
         base = self.fits[names]
-        starts = [s for effect in base.model.effects for s in _less_refined(base.model, effect)]
+        both = ((e, n) for e in base.model.effects for n, *_ in e.refinements() if n in e.refined())
+        starts = in_parallel(lambda one: self._less(base, one[1:], one[0]), list(both))
         return self._cheaper(starts, base, base.price)
 
     def reformed(self, names: Names) -> Fit | None:
@@ -261,13 +287,6 @@ def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
         nothing = abs(value - null) < 1e-6 * one.scale
         values[name] = near_null(type(effect), name) if nothing else float(np.clip(value, one.lower, one.upper))
     return replace(effect, **values)
-
-
-def _less_refined(model: Model, effect: Effect) -> list[Model]:
-    """Starts with one refinement of an effect fewer."""
-    info, refined = effect.parameters(), effect.refined()
-    nulls = {n: info[n].null for n, *_ in effect.refinements() if n in refined}
-    return [model.with_parameters({f"{effect.name}.{n}": float(null)}) for n, null in nulls.items() if null is not None]
 
 
 def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
