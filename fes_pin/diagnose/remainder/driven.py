@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.diagnose.remainder.open_set import SIGN_DRAWS, Remainder
+from fes_pin.diagnose.search.likelihood_search import CLAIM_LEVEL
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
@@ -21,8 +22,6 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
 from fes_pin.models.stage import Effect
 
-LEVEL = 0.02
-"""Of all features together."""
 KEPT = 1e-3
 """Share of a feature's norm that what was fitted must leave for it to be judged."""
 
@@ -30,8 +29,9 @@ KEPT = 1e-3
 def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     """Test whether any feature stands out of what a fit leaves.
 
-    Half the level goes to the largest single feature, half to all together. The chi-square is divided by its inflation
-    under random signs of the trials, where there are enough.
+    A remainder is claimed at the level that a cause is: a filter's slopes are an approximation, and what they miss of a
+    friction that was found stood out at 0.01 and 0.02. Half of it goes to the largest single feature, half to all
+    together. The chi-square is divided by its inflation under random signs of the trials, where there are enough.
     """
     names, columns = _whitened(fitted)
     projection = Projection(fitted.parts)
@@ -51,7 +51,7 @@ def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     best = int(np.argmax(single))
     largest = rank * float(chi2_tail(float(single[best]) / inflation, 1))
     p_value = min(1.0, 2.0 * min(float(chi2_tail(statistic / inflation, rank)), largest))
-    unexplained = p_value < LEVEL
+    unexplained = p_value < CLAIM_LEVEL
     return Remainder(unexplained, p_value, names[best].split(":")[0] if unexplained else None)
 
 
