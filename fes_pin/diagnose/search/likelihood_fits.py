@@ -151,10 +151,16 @@ class LikelihoodFits:
         return {names: [fitted] for (names, _), fitted in zip(lowest, gone_on, strict=True)}
 
     def _converge(self, size: int) -> None:
-        """Let the best of a size converge."""
-        while slow := [n for n in self.ranked(size)[:CONVERGED_SETS] if n not in self._converged]:
+        """Let the best of a size converge, and what is half way there: equivalents of one cause are no others."""
+        while slow := [n for n in self._hopeful(size) if n not in self._converged]:
             self.fits.update(zip(slow, in_parallel(lambda n: self._go_on(self.fits[n]), slow), strict=True))
             self._converged.update(slow)
+
+    def _hopeful(self, size: int) -> list[Names]:
+        """The best sets of a size, and those that gain half of what the best does beside the best smaller one."""
+        ranked = self.ranked(size)
+        half = 0.5 * (self.fits[self.ranked(size - 1)[0]].price + self.fits[ranked[0]].price)
+        return [n for k, n in enumerate(ranked) if k < CONVERGED_SETS or self.fits[n].price < half]
 
     def extend_all(self, base: Names, most: int | None = None) -> list[Names]:
         """Fit a set with each further cause beside it, or with those of largest score; returns their names."""
