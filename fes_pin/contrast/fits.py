@@ -16,11 +16,10 @@ from fes_pin.diagnose.search.library import Library
 from fes_pin.diagnose.search.likelihood_fits import STARTS, refinements
 from fes_pin.diagnose.search.likelihood_search import REFINE_LEVEL
 from fes_pin.diagnose.search.score import Scores
-from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
-from fes_pin.identify.likelihood import WORTH, LikelihoodProblem, maximise, score_doubt
+from fes_pin.identify.likelihood import LikelihoodProblem, by_turns, maximise
 from fes_pin.identify.noise import Noise, NoiseModel, as_white
 from fes_pin.identify.noise_floor import rich_noise
 from fes_pin.identify.problem import Linearized, Problem
@@ -108,17 +107,7 @@ class Fits:
         if not self.driven:
             fitted = fit_problem(problem, model.parameters(), unknowns)  # type: ignore[arg-type]
             return self._scattered(Grouped(tuple(items), fitted, weights))
-        fitted = fit_problem(problem, model.parameters(), unknowns, LOOK_DRIVEN)  # type: ignore[arg-type]
-        for _ in range(ROUNDS):
-            before = fitted.sse
-            for group, part in problem.parts.items():
-                own = problem.by_group(fitted.unknowns)[group]
-                score_doubt(part, fitted.model.of(group, fitted.values), own)  # type: ignore[attr-defined]
-            fitted = fit_problem(problem, fitted.values, fitted.unknowns, LOOK_DRIVEN)  # type: ignore[arg-type]
-            if fitted.sse < before - 10.0 * TOLERANCE:
-                continue
-            if not (fitted.gradient_norm > WORTH and problem.sharpen()):
-                break
+        fitted = by_turns(problem, model.parameters(), unknowns, ROUNDS, LOOK_DRIVEN)
         return Grouped(tuple(items), fitted, {g: p.doubt for g, p in problem.parts.items()})
 
     def _scattered(self, one: Grouped) -> Grouped:

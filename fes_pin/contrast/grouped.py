@@ -214,9 +214,24 @@ class GroupedProblem:
             at += len(part.trials)
         return out
 
+    @property
+    def is_sharp(self) -> bool:
+        """True where slopes of a group are differences of the cost. Of driven rigs alone."""
+        return any(p.is_sharp for p in self.parts.values())
+
     def sharpen(self) -> bool:
         """Let slopes be differences of the cost; False where those of all groups are. Of driven rigs alone."""
         return sum(p.sharpen() for p in self.parts.values()) > 0
+
+    def score(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Improve what is random in each group, in place; returns by how much that lowers the cost. Of driven rigs."""
+        own = self.by_group(unknowns)
+        return sum(p.score(self.model.of(g, values), own[g]) for g, p in self.parts.items())
+
+    @property
+    def least_promise(self) -> float:
+        """What a step must promise to be tried once a longer one has failed."""
+        return max(p.least_promise for p in self.parts.values())
 
     @property
     def abreast(self) -> int:

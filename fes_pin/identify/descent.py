@@ -7,12 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.identify.problem import Linearized, NormalEquations, Problem, Unknowns, normal_equations, whitened_sse
+from fes_pin.identify.problem import (
+    TOLERANCE,
+    Linearized,
+    NormalEquations,
+    Problem,
+    Unknowns,
+    normal_equations,
+    whitened_sse,
+)
 
-TOLERANCE = 0.01
-"""A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
 TRIES = 12
 """Steps that are tried, each ten times as damped as the last, before a point counts as the lowest there is."""
+SHORTER = 0.5
+"""Share of what a failed step promised that a shorter one promises at most: in directions that the data tell well, ten
+times the damping changes nothing at first."""
+LARGEST_DAMPING = 1e12
+"""Beyond it a step is none."""
 UNIDENTIFIED = 1e-10
 """Eigenvalue of the scaled information matrix, relative to the largest, below which a direction is not identified."""
 
@@ -61,6 +72,7 @@ class Descent:
         self.unknowns = problem.start_unknowns() if unknowns is None else problem.completed(unknowns)
         self.damping, self._gained = 1e-4, 0.0
         known = parts is not None and all(start[n] == v for n, v in zip(self.names, self.x, strict=True))
+        self._system: NormalEquations | None = None
         self.parts = list(parts) if parts and known else self._linearize(self.x, self.unknowns)
         self.sse = whitened_sse(self.parts)
 
@@ -86,11 +98,11 @@ class Descent:
         first = self._proposed(self.damping)
         if first.promises_little or self._takes(first):
             return first.promises_little or self._gained < TOLERANCE
-        left = TRIES - 1
+        left, last = TRIES - 1, first
         while left > 0:
-            shorter = self._shorter(min(left, self.problem.abreast))
-            left -= len(shorter)
-            worth = [one for one in shorter if not one.promises_little]
+            shorter = self._shorter(last, min(left, self.problem.abreast))
+            left, last = left - len(shorter), shorter[-1]
+            worth = [one for one in shorter if self._is_worth(one)]
             bounds = self.problem.bounds([(self.values(one.x), one.unknowns) for one in worth])
             for one, bound in zip(worth, bounds, strict=True):
                 self.damping = one.damping
@@ -101,19 +113,26 @@ class Descent:
         return True
 
     def _proposed(self, damping: float) -> _Proposal:
-        system = normal_equations(self.parts, damping)
+        if self._system is None or self.problem.unknown_names:
+            self._system = normal_equations(self.parts, damping)
+        system = self._system
         move = self._bounded_move(system, damping)
         promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
         return _Proposal(damping, self.x + move, self._moved(system.local_steps(move)), float(promised))
 
-    def _shorter(self, count: int) -> list[_Proposal]:
-        """Proposals of growing damping, so many at most, to the first that promises little."""
+    def _shorter(self, failed: _Proposal, count: int) -> list[_Proposal]:
+        """Proposals of growing damping, so many at most, to the first that is not worth a try."""
         out: list[_Proposal] = []
-        damping = self.damping
-        while len(out) < count and not (out and out[-1].promises_little):
-            damping = max(damping * 10.0, 1e-4)
-            out.append(self._proposed(damping))
+        last = failed
+        while len(out) < count and (not out or self._is_worth(last)):
+            most, last = SHORTER * last.promised, self._proposed(max(last.damping * 10.0, 1e-4))
+            while last.promised > most > 0.0 and last.damping < LARGEST_DAMPING:
+                last = self._proposed(last.damping * 10.0)
+            out.append(last)
         return out
+
+    def _is_worth(self, shorter: _Proposal) -> bool:
+        return not 0.0 <= shorter.promised < self.problem.least_promise
 
     def _takes(self, one: _Proposal) -> bool:
         """Go where a proposal leads, if that is down."""
@@ -122,7 +141,7 @@ class Descent:
         if not (one.promised > 0.0 and np.isfinite(sse) and sse <= self.sse):
             return False
         self._gained = self.sse - sse
-        self.x, self.unknowns, self.parts, self.sse = one.x, one.unknowns, parts, sse
+        self.x, self.unknowns, self.parts, self.sse, self._system = one.x, one.unknowns, parts, sse, None
         self.damping = max(one.damping * _relief(self._gained / one.promised), 1e-9)
         return True
 

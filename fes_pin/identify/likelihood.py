@@ -24,22 +24,24 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.doubts import doubt_limits, first_doubt
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.noise import Noise
-from fes_pin.identify.problem import Linearized, Unknowns, limits_of
+from fes_pin.identify.problem import TOLERANCE, Linearized, Unknowns, limits_of, whitened_sse
 from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, ForetoldTrial, Predictor
 
 ROUNDS = 12
 """Turns of parameters and randomness, at most."""
+LITTLE = 0.1
+"""Fall of twice the log-likelihood with which turns end: a third of a standard deviation of one parameter."""
 WORTH = 1.0
 """Change of twice the log-likelihood that is worth more work, as where it is promised and no step keeps it: a standard
 deviation of one parameter."""
@@ -93,6 +95,7 @@ class LikelihoodProblem:
         self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
         self.priors = [first_doubt(model, t) for t in starts or self.trials]
         self.is_sharp = False
+        self._missed: np.ndarray | None = None
         self._predictor: Predictor | None = None
         self._abreast: Predictor | None = None
 
@@ -177,6 +180,16 @@ class LikelihoodProblem:
         return True
 
     @property
+    def least_promise(self) -> float:
+        """What a step must promise to be tried once a longer one failed: slopes for gains as they are promise more."""
+        return TOLERANCE if self.is_sharp else WORTH
+
+    def score(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Improve what is random, in place; returns by how much that lowers the cost."""
+        self._missed = None
+        return score_doubt(self, values, unknowns)
+
+    @property
     def followed(self) -> tuple[str, ...]:
         """Free parameters whose slopes are differences of the cost."""
         return self.free if self.is_sharp else self._scales
@@ -193,19 +206,28 @@ class LikelihoodProblem:
         """Sensitivities to `followed` without what gains that stay as they are add along the innovations.
 
         Where a filter takes up nearly all of what it reads, a scale of the reading seems to shrink the innovations as a
-        whole, as long as the gains do not go with it. The true slope of the cost is its difference.
+        whole, as long as the gains do not go with it. The true slope of the cost is its difference. Of a sharp problem
+        what is missed is taken once a turn: it bends little.
         """
         at, squares = [self.free.index(n) for n in self.followed], sum(float(p.residual @ p.residual) for p in parts)
-        sizes = np.sqrt(sum(np.sum(p.jacobian[:, at] ** 2, axis=0) for p in parts))
-        if not (np.isfinite(squares) and squares > 0.0 and np.isfinite(sizes).all()):
-            return parts
-        felt = sizes > 0.0
-        steps = FOLLOWED_STEP / np.where(felt, sizes, np.inf)
-        moved = [{**values, n: values[n] + float(h)} for n, h in zip(self.followed, steps, strict=True)]
-        now = squares + sum(p.log_determinant for p in parts)
-        slopes = 0.5 * (np.array(self.bounds([(m, unknowns) for m in moved])) - now) / np.where(felt, steps, np.inf)
-        factors = (-slopes - sum(p.residual @ p.jacobian[:, at] for p in parts)) / squares
-        return [_added(p, at, np.nan_to_num(factors)) for p in parts]
+        if self._missed is None or not self.is_sharp:
+            self._missed = self._missed_slopes(parts, at, values, unknowns)
+        return (
+            [_added(p, at, self._missed / squares) for p in parts] if np.isfinite(squares) and squares > 0.0 else parts
+        )
+
+    def _missed_slopes(
+        self, parts: Sequence[Linearized], at: Sequence[int], values: Mapping[str, float], unknowns: Unknowns
+    ) -> np.ndarray:
+        """What slopes for gains as they are miss of those of half the cost, by parameter; 0 where that is no number."""
+        now, felt = whitened_sse(parts), np.sqrt(sum(np.sum(p.jacobian[:, at] ** 2, axis=0) for p in parts))
+        if not np.isfinite(now):
+            return np.zeros(len(at))
+        steps = np.where(felt > 0.0, FOLLOWED_STEP / np.where(felt > 0.0, felt, 1.0), np.inf)
+        moved = [{**values, n: values[n] + float(h)} for n, h in zip(self.followed, steps, strict=True) if h < np.inf]
+        slopes = np.zeros(len(at))
+        slopes[felt > 0.0] = 0.5 * (np.array(self.bounds([(m, unknowns) for m in moved])) - now) / steps[felt > 0.0]
+        return np.nan_to_num(-slopes - sum(p.residual @ p.jacobian[:, at] for p in parts))
 
     def _whitened(self, one: ForetoldTrial) -> Linearized:
         with np.errstate(all="ignore"):
@@ -237,7 +259,10 @@ def _joined(run: Sequence[ForetoldTrial]) -> _Told:
 
 
 def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknowns: Unknowns, steps: int = 2) -> float:
-    """Improve what is random about a problem by Fisher scoring, in place; returns the cost."""
+    """Improve what is random about a problem by Fisher scoring, in place; returns by how much that lowers the cost.
+
+    Where no step promises `LITTLE` it stays.
+    """
     limits = doubt_limits(problem.model, problem.trials)
     names = tuple(problem.doubt.values())
     low, high = (np.log([limits[n][k] for n in names]) for k in (0, 1))
@@ -250,12 +275,14 @@ def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknown
         return problem.told(values, unknowns, [at(z) for z in many])
 
     now, *moved = at_all(z + LOG_STEPS[0] * np.eye(1 + len(z), len(z), -1))
-    damping, widths = 1e-3, list(LOG_STEPS)
+    damping, widths, begin = 1e-3, list(LOG_STEPS), now.cost
     while math.isfinite(now.cost):
         gradient, information = _scored(now, moved, widths[0])
         held = ((z <= low) & (gradient > 0)) | ((z >= high) & (gradient < 0))
         dampings = damping * 10.0 ** np.arange(1 + len(z))
         moves = [_damped_step(information, gradient, ~held, d) for d in dampings]
+        if float(gradient @ moves[0]) < LITTLE:
+            break
         found = _first_below(now, np.clip(z - np.array(moves), low, high), at_all, problem.abreast)
         if found is None:
             if 2.0 * float(gradient @ moves[0]) < WORTH or len(widths) == 1:
@@ -265,11 +292,11 @@ def score_doubt(problem: LikelihoodProblem, values: Mapping[str, float], unknown
             k, end, after = found
             gained, steps = now.cost - after.cost, steps - 1
             z, now, damping = end, after, max(0.3 * float(dampings[k]), 1e-6)
-            if gained < TOLERANCE or not steps:
+            if gained < LITTLE or not steps:
                 break
         moved = at_all(z + widths[0] * np.eye(len(z)))
     problem.doubt = at(z)
-    return now.cost
+    return begin - now.cost if math.isfinite(begin) else 0.0
 
 
 def _first_below(
@@ -312,8 +339,22 @@ def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray
     return step * min(1.0, LONGEST_MOVE / max(longest, 1e-300))
 
 
-def maximise(
-    problem: LikelihoodProblem,
+class TurnsProblem(Protocol):
+    """A problem to `Descent` with something random about it."""
+
+    @property
+    def is_sharp(self) -> bool:
+        """True where slopes are differences of the cost."""
+
+    def score(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Improve what is random, in place; returns by how much that lowers the cost."""
+
+    def sharpen(self) -> bool:
+        """Let slopes be differences of the cost; False where they are."""
+
+
+def by_turns(
+    problem: TurnsProblem,
     start: Mapping[str, float],
     unknowns: Unknowns | None = None,
     rounds: int = ROUNDS,
@@ -324,15 +365,26 @@ def maximise(
     Returns
     -------
     Fit
-        `sse` is twice the negative log-likelihood, `doubt` what is random. `converged` is False where turns ran out.
+        `sse` is twice the negative log-likelihood. `converged` is False where turns ran out.
     """
     fitted = fit_problem(problem, start, unknowns, iterations)  # type: ignore[arg-type]
     for _ in range(rounds):
-        before = fitted.sse
-        score_doubt(problem, fitted.values, fitted.unknowns)
-        fitted = fit_problem(problem, fitted.values, fitted.unknowns, iterations)  # type: ignore[arg-type]
-        if fitted.sse < before - 10.0 * TOLERANCE:
+        before, moved = fitted.sse, problem.score(fitted.values, fitted.unknowns) >= LITTLE
+        if moved or problem.is_sharp or not fitted.converged:
+            fitted = fit_problem(problem, fitted.values, fitted.unknowns, iterations)  # type: ignore[arg-type]
+        if fitted.sse < before - LITTLE:
             continue
         if not (fitted.gradient_norm > WORTH and problem.sharpen()):
-            return replace(fitted, doubt=problem.doubt)
-    return replace(fitted, doubt=problem.doubt, converged=False)
+            return fitted
+        fitted = fit_problem(problem, fitted.values, fitted.unknowns, iterations)  # type: ignore[arg-type]
+    return replace(fitted, converged=False)
+
+
+def maximise(
+    problem: LikelihoodProblem,
+    start: Mapping[str, float],
+    unknowns: Unknowns | None = None,
+    rounds: int = ROUNDS,
+) -> Fit:
+    """The likelihood's maximum; see `by_turns`. The fit's `doubt` is what is random there."""
+    return replace(by_turns(problem, start, unknowns, rounds), doubt=problem.doubt)

@@ -16,6 +16,8 @@ from fes_pin.models.simulate import Abreast, Simulated, Simulator
 from fes_pin.workers import check_limit
 
 Unknowns = list[dict[str, float]]
+TOLERANCE = 0.01
+"""A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
 SINGULAR = 1e-12
 """Share of an unknown's own information added to it: two that the trial cannot tell apart do not stop a fit."""
 
@@ -120,6 +122,8 @@ class Problem:
 
     abreast = 1
     """How many points `bounds` takes at once."""
+    least_promise = TOLERANCE
+    """What a step must promise of twice the log-likelihood to be tried once a longer one has failed."""
 
     def bounds(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
         """What the sums of squares are at least: nothing is cheaper to tell than all that `linearize` does."""
