@@ -34,10 +34,10 @@ def items(count: int) -> Iterator[tuple[str, ...]]:
         yield rows[k % len(rows)]
 
 
-def judged(causes: tuple[str, ...], size: float, seed: int) -> dict[str, Any]:
+def judged(causes: tuple[str, ...], size: float, seed: int, recorded: bool = False) -> dict[str, Any]:
     """Make a study, diagnose it, and say how the answer compares with the truth."""
     with tempfile.TemporaryDirectory(prefix="driven") as folder:
-        drawn = draw(causes, size, seed, Path(folder))
+        drawn = draw(causes, size, seed, Path(folder), recorded)
         began = time.perf_counter()
         try:
             found = diagnose_joint(read_study(drawn.study))
@@ -101,10 +101,6 @@ def table(rows: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _missed(row: dict[str, Any]) -> str:
-    return f"    missed: {row['seed']} {row['rig']} {row['causes']} -> {row['verdict']} {row['named']}"
-
-
 def _adequate(row: dict[str, Any]) -> bool:
     return row["verdict"] == "adequate"
 
@@ -118,12 +114,13 @@ def main(
     size: Annotated[float, typer.Option(help="Torque of what is hidden, as a share of the effort.")] = 0.3,
     seed: Annotated[int, typer.Option(help="Of the first; each next one has the next seed.")] = 0,
     nulls: Annotated[bool, typer.Option(help="Hide nothing in any.")] = False,
+    recorded: Annotated[bool, typer.Option(help="Friction of bristles, effort read with noise.")] = False,
     results: Annotated[
         Path | None, typer.Option(help="A file of one line a study, with which a run can go on.")
     ] = None,
 ) -> None:
     """Hide known causes in rigs that a controller drives, and count what the diagnosis makes of them."""
-    rows = results_of(items(count), seed, lambda causes, k: judged(() if nulls else causes, size, k), results)
+    rows = results_of(items(count), seed, lambda causes, k: judged(() if nulls else causes, size, k, recorded), results)
     typer.echo("\n".join(table(rows)))
 
 

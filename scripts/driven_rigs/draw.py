@@ -57,7 +57,14 @@ class Drawn:
     truth: dict[str, float]
 
 
-def draw(causes: tuple[str, ...], size: float, seed: int, folder: Path) -> Drawn:
+BRISTLES = (3e-5, 1e-3)
+"""Way over which bristles bend, as a share of how far the rig moves: 4 to 120 um of a slide. Metal on metal breaks away
+within micrometres (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30, 1994), a gear or a belt later."""
+READ_EFFORT = 0.01
+"""Deviation of the noise that an effort is recorded with, as a share of it."""
+
+
+def draw(causes: tuple[str, ...], size: float, seed: int, folder: Path, recorded: bool = False) -> Drawn:
     """Make a study with these causes hidden.
 
     Parameters
@@ -68,6 +75,8 @@ def draw(causes: tuple[str, ...], size: float, seed: int, folder: Path) -> Drawn
         Of everything that is random.
     folder
         Where the study is written.
+    recorded
+        As rigs are in a laboratory: friction is that of bristles, and the effort is measured, with noise.
     """
     rng = np.random.default_rng(seed)
     base = BASES[int(rng.integers(len(BASES)))]
@@ -85,6 +94,9 @@ def draw(causes: tuple[str, ...], size: float, seed: int, folder: Path) -> Drawn
     usual = float(np.sqrt(np.mean(effort**2)))
     speed = float(np.sqrt(np.mean((np.diff(position, axis=0) / DT) ** 2)))
     hidden = _sizes(causes, size * usual, position, speed, rng)
+    own = np.random.default_rng([seed, 1])
+    if recorded and "coulomb_friction" in hidden:
+        hidden["bristles"] = base.reach * float(np.exp(own.uniform(*np.log(BRISTLES))))
     plant = replace(
         plant,
         hidden=hidden,
@@ -94,6 +106,8 @@ def draw(causes: tuple[str, ...], size: float, seed: int, folder: Path) -> Drawn
         torque_s=float(rng.choice([0.02, 0.2])),
     )
     effort, position = run(plant, references, rng)
+    if recorded:
+        effort = effort + READ_EFFORT * usual * own.standard_normal(effort.shape)
     believed = (float(rng.uniform(0.7, 1.3)), base.damping * float(rng.uniform(0.4, 1.6)))
     truth = {"inertia_scale": 1.0, "damping": base.damping, **hidden}
     return Drawn(_written(base, effort, position, believed, folder), base.name, causes, truth)

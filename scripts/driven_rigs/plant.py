@@ -1,8 +1,8 @@
 """One-joint rigs under feedback in plain numpy: what hides in them, the controller, the encoder, and a random torque.
 
-Nothing here is the engine's: another integrator (Heun's, four steps a sample), other functional forms (a hyperbolic
-tangent for friction or one that jumps and sticks, a one-sided spring with damping for a stop, a discrete Maxwell
-element), noise by a recursion.
+Nothing here is the engine's: another integrator (Heun's, four steps a sample), other functional forms (for friction a
+hyperbolic tangent, one that jumps and sticks, or bristles; a one-sided spring with damping for a stop, a discrete
+Maxwell element), noise by a recursion.
 """
 
 from __future__ import annotations
@@ -83,6 +83,7 @@ class _State:
         self.q, self.v, self.rate = q, np.zeros_like(q), np.zeros_like(q)
         self.relaxed, self.lagged, self.followed = q.copy(), q.copy(), q.copy()
         self.random = plant.torque * rng.standard_normal(len(q))
+        self.bent = np.zeros_like(q)
 
     def read(self) -> np.ndarray:
         """The encoder's reading now."""
@@ -101,10 +102,10 @@ class _State:
         p, h = self.plant, DT / STEPS
         keep = np.exp(-h / p.torque_s)
         for j in range(STEPS):
-            t = time + j * h
-            a0 = self._acceleration(effort, t, self.q, self.v, self.relaxed)
+            t, bristles = time + j * h, self._bristles(h)
+            a0 = self._acceleration(effort, t, self.q, self.v, self.relaxed) - bristles
             q1, v1 = self.q + h * self.v, self.v + h * a0
-            a1 = self._acceleration(effort, t + h, q1, v1, self.relaxed)
+            a1 = self._acceleration(effort, t + h, q1, v1, self.relaxed) - bristles
             lag, relax = p.hidden.get("sensor_lag", 0.0), p.hidden.get("relaxation_s", 0.0)
             if lag:
                 self.lagged = self.q + (self.lagged - self.q) * np.exp(-h / lag)
@@ -116,6 +117,22 @@ class _State:
             self.q, self.v = self.q + 0.5 * h * (self.v + v1), v
             shock = p.torque * np.sqrt(1.0 - keep**2) * self.rng.standard_normal(len(self.q))
             self.random = keep * self.random + shock
+
+    def _bristles(self, h: float) -> np.ndarray | float:
+        """Deceleration by bristles that bend by `bristles` before they slip; z' = v - |v| z / g by an implicit step.
+
+        Source: Canudas de Wit, Olsson, Astrom and Lischinsky, A new model for control of systems with friction, IEEE
+        Transactions on Automatic Control 40 (1995).
+        """
+        p = self.plant
+        if not (way := p.hidden.get("bristles", 0.0)):
+            return 0.0
+        size, slope = p.hidden["coulomb_friction"], p.hidden["stiction"]
+        g = way * (1.0 + slope * np.exp(-((0.2 * self.v / p.hidden["friction_speed"]) ** 2)))
+        self.bent = (self.bent + h * self.v) / (1.0 + h * np.abs(self.v) / g)
+        stiffness = size / way
+        creeping = self.v - np.abs(self.v) * self.bent / g
+        return (stiffness * self.bent + np.sqrt(stiffness * p.inertia) * creeping) / p.inertia
 
     def _acceleration(
         self, effort: np.ndarray, t: float, q: np.ndarray, v: np.ndarray, relaxed: np.ndarray
@@ -132,7 +149,7 @@ def _friction(hidden: dict[str, float], torque: np.ndarray, v: np.ndarray) -> np
     Source of the second: Karnopp, Computer simulation of stick-slip friction in mechanical dynamic systems, J. Dyn.
     Syst. Meas. Control 107 (1985).
     """
-    if not (size := hidden.get("coulomb_friction", 0.0)):
+    if not (size := hidden.get("coulomb_friction", 0.0)) or hidden.get("bristles", 0.0):
         return 0.0
     ratio = v / hidden["friction_speed"]
     most = size * (1.0 + hidden.get("stiction", 0.0) * np.exp(-((0.2 * ratio) ** 2)))
