@@ -190,14 +190,15 @@ class LikelihoodFits:
         The others are where the fit's covariance takes them, or where they were: whichever is likelier. An effort's
         gain stands for an inertia that is another without it.
         """
-        info, names = effect.parameters(), [f"{effect.name}.{n}" for n in gone]
-        at = [whole.free.index(n) for n in names if n in whole.free]
-        nulls = np.array([info[n].null for n, path in zip(gone, names, strict=True) if path in whole.free], dtype=float)
+        info, shared = effect.parameters(), [n for n in gone if n in effect.common()]
+        nulls = {f"{effect.name}.{n}": float(info[n].null) for n in shared}  # type: ignore[arg-type]
+        moving = [n for n in nulls if n in whole.free]
         here = np.array([whole.values[n] for n in whole.free])
-        there = here + moved_with(whole.covariance, at, nulls - here[at])
+        change = np.array([nulls[n] - whole.values[n] for n in moving])
+        there = here + moved_with(whole.covariance, [whole.free.index(n) for n in moving], change)
         limits = limits_of(whole.model, self.trials)
         values = {n: float(np.clip(v, *limits[n])) for n, v in zip(whole.free, there, strict=True)}
-        off = whole.model.with_parameters({n: float(info[k].null) for n, k in zip(names, gone, strict=True)})  # type: ignore[arg-type]
+        off = whole.model.with_parameters(nulls)
         left = off - effect.name if set(gone) >= set(effect.amplitudes()) else off
         assert whole.doubt is not None
         problem = LikelihoodProblem(left, self.trials, whole.doubt)

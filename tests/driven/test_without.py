@@ -1,0 +1,22 @@
+"""A set less one cause."""
+
+import pytest
+from driven_rigs.draw import draw
+
+from fes_pin.data.study import read_study
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.identify.likelihood import LikelihoodProblem, maximise
+from fes_pin.models.effects import PeriodicTorque
+from fes_pin.models.nominal import nominal_model
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["a phase of all trials", "a phase of each trial's own"])
+def test_less_its_only_cause_a_set_is_the_nominal_model(tmp_path, own):
+    study, names = read_study(draw((), 0.3, 3, tmp_path).study), ("periodic_torque",)
+    sets = LikelihoodFits(nominal_model(study), study.trials, [PeriodicTorque])
+    nominal = sets.nominal()
+    torque = PeriodicTorque.of_each_trial(frequency_hz=0.4) if own else PeriodicTorque(0.01, frequency_hz=0.4)
+    problem = LikelihoodProblem(nominal.model + torque, study.trials, nominal.doubt)
+    sets.fits[names] = maximise(problem, problem.model.parameters())
+    del sets.fits[()]
+    assert sets.without(names, "periodic_torque").sse == pytest.approx(nominal.sse, abs=0.5)
