@@ -225,6 +225,7 @@ def _refitted(fitted: Fit, trials: Sequence[Trial]) -> Fit:
     known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
     problem = LikelihoodProblem(fitted.model, trials, fitted.doubt)
     unknowns = [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
+    problem.sharpen()  # it begins near its end
     return maximise(problem, fitted.values, unknowns)
 
 

@@ -212,28 +212,30 @@ class LikelihoodProblem:
         at, squares = [self.free.index(n) for n in self.followed], sum(float(p.residual @ p.residual) for p in parts)
         if self._missed is None or not self.is_sharp:
             self._missed = self._missed_slopes(parts, at, values, unknowns)
-        return (
-            [_added(p, at, self._missed / squares) for p in parts] if np.isfinite(squares) and squares > 0.0 else parts
-        )
+        if not (np.isfinite(squares) and squares > 0.0):
+            return parts
+        return [_added(p, at, self._missed / squares) for p in parts]
 
     def _missed_slopes(
         self, parts: Sequence[Linearized], at: Sequence[int], values: Mapping[str, float], unknowns: Unknowns
     ) -> np.ndarray:
         """What slopes for gains as they are miss of those of half the cost, by parameter; 0 where that is no number."""
-        now, felt = whitened_sse(parts), np.sqrt(sum(np.sum(p.jacobian[:, at] ** 2, axis=0) for p in parts))
-        if not np.isfinite(now):
-            return np.zeros(len(at))
-        steps = np.where(felt > 0.0, FOLLOWED_STEP / np.where(felt > 0.0, felt, 1.0), np.inf)
-        moved = [{**values, n: values[n] + float(h)} for n, h in zip(self.followed, steps, strict=True) if h < np.inf]
-        slopes = np.zeros(len(at))
-        slopes[felt > 0.0] = 0.5 * (np.array(self.bounds([(m, unknowns) for m in moved])) - now) / steps[felt > 0.0]
-        return np.nan_to_num(-slopes - sum(p.residual @ p.jacobian[:, at] for p in parts))
+        now, out = whitened_sse(parts), np.zeros(len(at))
+        sizes = np.sqrt(sum(np.sum(p.jacobian[:, at] ** 2, axis=0) for p in parts))
+        felt = np.flatnonzero(sizes) if np.isfinite(now) else np.empty(0, dtype=int)
+        names, steps = [self.followed[k] for k in felt], FOLLOWED_STEP / sizes[felt]
+        moved = [{**values, n: values[n] + float(h)} for n, h in zip(names, steps, strict=True)]
+        slopes = 0.5 * (np.array(self.bounds([(m, unknowns) for m in moved])) - now) / steps
+        out[felt] = -slopes - sum(p.residual @ p.jacobian[:, at] for p in parts)[felt]
+        return np.nan_to_num(out)
 
     def _whitened(self, one: ForetoldTrial) -> Linearized:
+        """A trial's innovations over their deviations; its sensitivities are scaled where they are."""
         with np.errstate(all="ignore"):
             scale = 1.0 / np.sqrt(one.of_seen(one.variances))
             residual = one.of_seen(one.values) * scale
-            moved = one.of_seen(one.sensitivities) * -scale[:, None]
+            moved = one.of_seen(one.sensitivities)
+            moved *= -scale[:, None]
             logs = -2.0 * float(np.sum(np.log(scale)))
         split = len(self.free)
         return Linearized(residual, moved[:, :split], moved[:, split:], logs)

@@ -259,11 +259,11 @@ class _Block:
 
     def innovations(self, y: np.ndarray, s: np.ndarray, width: int) -> Iterator[ForetoldTrial]:
         """The innovations of each lane, with sensitivities to `width` columns."""
-        k = len(self.outputs)
+        k, by_lane = len(self.outputs), np.ascontiguousarray(np.moveaxis(s, -1, 0))
         for lane, trial in enumerate(self.trials):
             n = len(trial)
             seen = self.seen[:n, :, lane]
-            own = s[:n, ..., lane]
+            own = by_lane[lane, :n]
             if self.places == list(range(width)):
                 sensitivities = own
             else:
