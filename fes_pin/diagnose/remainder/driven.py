@@ -19,9 +19,12 @@ from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.problem import limits_of
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
 from fes_pin.models.stage import Effect
 
+TRIED = (1.0, 0.5, 0.25, 0.1)
+"""Shares of the step to where slopes promise the most at which the cost is looked at."""
 KEPT = 1e-3
 """Share of a feature's norm that what was fitted must leave for it to be judged."""
 
@@ -29,47 +32,84 @@ KEPT = 1e-3
 def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     """Test whether any feature stands out of what a fit leaves.
 
-    A remainder is claimed at the level that a cause is: a filter's slopes are an approximation, and what they miss of a
-    friction that was found stood out at 0.01 and 0.02. Half of it goes to the largest single feature, half to all
-    together. The chi-square is divided by its inflation under random signs of the trials, where there are enough.
+    A remainder is claimed at the level that a cause is. Half of it goes to the largest single feature, half to all
+    together. The chi-square is divided by its inflation under random signs of the trials, where there are enough. What
+    slopes promise counts as far as the likelihood keeps it: those of a filter are an approximation, worst of a play.
     """
-    names, columns = _whitened(fitted)
+    featured = _Featured(fitted)
     projection = Projection(fitted.parts)
-    left = projection(columns)
-    before, after = np.linalg.norm(columns, axis=0), np.linalg.norm(left, axis=0)
-    good = after > KEPT * np.where(before > 0, before, 1.0)
-    if not good.any():
+    left = projection(featured.columns)
+    before, after = np.linalg.norm(featured.columns, axis=0), np.linalg.norm(left, axis=0)
+    good = np.flatnonzero(after > KEPT * np.where(before > 0, before, 1.0))
+    if not len(good):
         return Remainder(False, 1.0, None)
-    names, left = [names[k] for k in np.flatnonzero(good)], left[:, good] / after[good]
+    left = left[:, good] / after[good]
     by_trial = _by_trial(left, projection.residual, fitted)
     values, vectors = np.linalg.eigh(left.T @ left)
     kept = values > 1e-4 * values.max()
     shares = by_trial @ vectors[:, kept] / np.sqrt(values[kept])
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
     inflation = _inflation(shares, rank, seed)
-    single = by_trial.sum(axis=0) ** 2
-    best = int(np.argmax(single))
-    largest = rank * float(chi2_tail(float(single[best]) / inflation, 1))
-    p_value = min(1.0, 2.0 * min(float(chi2_tail(statistic / inflation, rank)), largest))
-    unexplained = p_value < CLAIM_LEVEL
-    return Remainder(unexplained, p_value, names[best].split(":")[0] if unexplained else None)
+    single = by_trial.sum(axis=0)
+    best = int(np.argmax(np.abs(single)))
+
+    def p_value(all_of_them: float, one: float) -> float:
+        p_values = (float(chi2_tail(all_of_them / inflation, rank)), rank * float(chi2_tail(one / inflation, 1)))
+        return min(1.0, 2.0 * min(p_values))
+
+    p = p_value(statistic, float(single[best] ** 2))
+    if p < CLAIM_LEVEL:
+        alone, together = np.zeros((2, len(featured.names)))
+        alone[good[best]] = single[best] / after[good[best]]
+        together[good] = vectors[:, kept] @ (shares.sum(axis=0) / np.sqrt(values[kept])) / after[good]
+        p = max(p, p_value(featured.gained(together), featured.gained(alone)))
+    unexplained = p < CLAIM_LEVEL
+    return Remainder(unexplained, p, featured.names[good[best]].split(":")[0] if unexplained else None)
 
 
-def _whitened(fitted: Fit) -> tuple[list[str], np.ndarray]:
-    """Names of the features, and the innovations' sensitivities to them in their deviations, all trials end to end."""
-    assert fitted.doubt is not None
-    signals = {s for t in fitted.trials for s in fitted.model.rig.signals(t.kind)}
-    kinds = [EffortFeatures if "torque" in signals else ForceFeatures]
-    kinds += [ReadingFeatures] if "reading" in signals else []
-    model = fitted.model
-    for kind in kinds:
-        model = model + _scaled(kind(), fitted)
-    names = [n for kind in kinds for n in kind.functions]
-    free = tuple(f"{kind.name}.a{k:02d}" for kind in kinds for k in range(len(kind.functions)))
-    problem = LikelihoodProblem(model, fitted.trials, fitted.doubt, free)
-    run = problem.innovations(model.parameters(), fitted.unknowns)
-    columns = [-i.sensitivities[i.seen][:, : len(free)] / np.sqrt(i.variances[i.seen])[:, None] for i in run]
-    return names, np.nan_to_num(np.concatenate(columns))
+class _Featured:
+    """A fit beside the features.
+
+    Attributes
+    ----------
+    names
+        Of the features.
+    columns
+        The innovations' sensitivities to them in their deviations, all trials end to end, shape (m, features).
+    """
+
+    def __init__(self, fitted: Fit) -> None:
+        assert fitted.doubt is not None
+        signals = {s for t in fitted.trials for s in fitted.model.rig.signals(t.kind)}
+        kinds = [EffortFeatures if "torque" in signals else ForceFeatures]
+        kinds += [ReadingFeatures] if "reading" in signals else []
+        self.fitted, self._model = fitted, fitted.model
+        for kind in kinds:
+            self._model = self._model + _scaled(kind(), fitted)
+        self.names = [n for kind in kinds for n in kind.functions]
+        free = tuple(f"{kind.name}.a{k:02d}" for kind in kinds for k in range(len(kind.functions)))
+        self._problem = LikelihoodProblem(self._model, fitted.trials, fitted.doubt, free)
+        run = self._problem.innovations(self._model.parameters(), fitted.unknowns)
+        columns = [-i.sensitivities[i.seen][:, : len(free)] / np.sqrt(i.variances[i.seen])[:, None] for i in run]
+        self.columns = np.nan_to_num(np.concatenate(columns))
+
+    def gained(self, amplitudes: np.ndarray) -> float:
+        """By how much the cost falls along a step of the features, and of what was fitted with them; 0 where it rises.
+
+        Parameters
+        ----------
+        amplitudes
+            Shape (features,).
+        """
+        fitted, values = self.fitted, self._model.parameters()
+        rows, residual = (np.concatenate([getattr(p, n) for p in fitted.parts]) for n in ("jacobian", "residual"))
+        beside = np.linalg.lstsq(rows, residual - self.columns @ amplitudes, rcond=1e-10)[0]
+        moves = dict(zip((*fitted.free, *self._problem.free), (*beside, *amplitudes), strict=True))
+        limits = limits_of(self._model, fitted.trials)
+        tried = [{n: float(np.clip(values[n] + t * m, *limits[n])) for n, m in moves.items()} for t in (0.0, *TRIED)]
+        points = [({**values, **one}, fitted.unknowns) for one in tried]
+        now, *costs = self._problem.bounds(points)
+        return max(0.0, now - min(costs))
 
 
 def _scaled(effect: Effect, fitted: Fit) -> Effect:
