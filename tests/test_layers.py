@@ -5,6 +5,8 @@ for its causes.
 """
 
 import ast
+import subprocess
+import sys
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -73,3 +75,11 @@ def test_files_import_one_way(chapter):
         tuple(TopologicalSorter(files).static_order())
     except CycleError as error:
         pytest.fail(f"a circle: {' -> '.join(path.name for path in error.args[1])}")
+
+
+def test_what_some_rigs_need_alone_is_not_imported_for_all():
+    """scipy.signal and scipy.stats take half a second, a sixth of a diagnosis."""
+    wanted = "import sys, fes_pin.diagnose.diagnosis, fes_pin.models.catalogue, fes_pin.view.report"
+    told = f"{wanted}; print([n for n in ('scipy.signal', 'scipy.stats') if n in sys.modules])"
+    run = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"

@@ -16,7 +16,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from fes_pin.data.smooth import smoothed_rates
 from fes_pin.data.trial import Trial
 
 MOTION = ("imposed", "imposed_rate", "imposed_acceleration")
@@ -113,4 +112,6 @@ class _Reading:
 
 @lru_cache(maxsize=REMEMBERED)
 def _rates(reading: _Reading) -> tuple[np.ndarray, np.ndarray, float]:
+    from fes_pin.data.smooth import smoothed_rates  # noqa: PLC0415 - half a second of SciPy, for imposed motion alone
+
     return smoothed_rates(reading.values, reading.time)

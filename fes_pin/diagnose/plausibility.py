@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.plausibility import implausible
@@ -110,6 +109,8 @@ def _swings(study: Study, model: Model) -> Iterable[str]:
 
 def _widest_swing(position: np.ndarray) -> float:
     """The longest way between two turning points, rad; small ripples are no turning points."""
+    from scipy.signal import find_peaks  # noqa: PLC0415 - half a second, for rigs under gravity alone
+
     ripple = 0.05 * float(np.ptp(position))
     turns = np.sort(np.concatenate([find_peaks(side * position, prominence=ripple)[0] for side in (1.0, -1.0)]))
     return float(np.max(np.abs(np.diff(position[turns.astype(int)])), initial=0.0))

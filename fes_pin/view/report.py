@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fes_pin.data.files import write_text
 from fes_pin.diagnose.errors_ahead import Ahead
@@ -30,7 +31,9 @@ from fes_pin.view.report_causes import causes_section, stage_mark, value_and_int
 from fes_pin.view.report_trials import missing_section, position_unit, trials_section
 from fes_pin.view.style import unit_of
 from fes_pin.view.words import answers, title
-from fes_pin.walk.result import WalkDiagnosis
+
+if TYPE_CHECKING:
+    from fes_pin.walk.result import WalkDiagnosis
 
 
 def report(diagnosis: Diagnosis | WalkDiagnosis, path: str | Path) -> None:

@@ -9,7 +9,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_negative, positive
@@ -169,6 +168,8 @@ class Ankle(Rig):
 
         Beside it acceleration, velocity and what any function of the angle nearly is: a parabola.
         """
+        from scipy.signal import lfilter  # noqa: PLC0415 - half a second, for dynamometers alone
+
         c, rows, read = {n: float(self.constants[n]) for n in CONSTANTS}, [], []
         for trial in trials:
             q, v, bend = imposed_motion(trial, self.schema.imposed).values
