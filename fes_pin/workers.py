@@ -59,14 +59,25 @@ def one_thread_each() -> Iterator[None]:
         _LIMIT.give_back()
 
 
+_IS_ONE_OF_MANY: ContextVar[bool] = ContextVar("is_one_of_many", default=False)
+
+
 def in_parallel(function: Callable[[In], Out], items: Iterable[In]) -> list[Out]:
-    """`function` of each item, in their order; the result does not depend on the number of threads."""
+    """`function` of each item, in their order; the result does not depend on the number of threads.
+
+    Work that is itself done beside other work is done in its own thread alone.
+    """
     work = list(items)
-    if threads() == 1 or len(work) < 2:
+    if threads() == 1 or len(work) < 2 or _IS_ONE_OF_MANY.get():
         return [function(item) for item in work]
+
+    def beside_others(item: In) -> Out:
+        _IS_ONE_OF_MANY.set(True)
+        return function(item)
+
     contexts = [copy_context() for _ in work]  # the limit of time holds in every thread
     with ThreadPoolExecutor(threads()) as pool:
-        return list(pool.map(lambda context, item: context.run(function, item), contexts, work))
+        return list(pool.map(lambda context, item: context.run(beside_others, item), contexts, work))
 
 
 class OutOfTime(Exception):

@@ -37,6 +37,7 @@ from fes_pin.identify.problem import TOLERANCE, Linearized, Unknowns, limits_of,
 from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, ForetoldTrial, Predictor
+from fes_pin.workers import in_parallel
 
 ROUNDS = 12
 """Turns of parameters and randomness, at most."""
@@ -142,16 +143,18 @@ class LikelihoodProblem:
         count, trials = self.abreast, len(self.trials)
         if self._abreast is None:
             self._abreast = Predictor(self.model, self.trials * count, (), self.doubt.processes, self.priors * count)
-        out: list[_Told] = []
-        for k in range(0, len(points), count):
-            some = list(points[k : k + count])
-            filled = some + some[-1:] * (count - len(some))
+        predictor = self._abreast
+
+        def abreast(some: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[_Told]:
+            filled = [*some, *[some[-1]] * (count - len(some))]
             values, doubts = ([one[j] for one in filled for _ in range(trials)] for j in (0, 2))
             own = [{**begin, **u} for one in filled for begin, u in zip(self.begins, one[1], strict=True)]
             with np.errstate(all="ignore"):
-                run = self._abreast.run(values, doubts, own)  # type: ignore[arg-type]
-            out += [_joined(run[j * trials : (j + 1) * trials]) for j in range(len(some))]
-        return out
+                run = predictor.run(values, doubts, own)  # type: ignore[arg-type]
+            return [_joined(run[j * trials : (j + 1) * trials]) for j in range(len(some))]
+
+        told = in_parallel(abreast, [points[k : k + count] for k in range(0, len(points), count)])
+        return [one for some in told for one in some]
 
     @property
     def abreast(self) -> int:

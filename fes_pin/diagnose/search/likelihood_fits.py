@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -110,13 +111,16 @@ class LikelihoodFits:
         """Begin a base with one more effect, from its shapes of largest score: the start, and first fits from there."""
         worth = [s for s in scored[:STARTS] if s.gain >= 0.5 * scored[0].gain]
         starts = [base.model + started(s.probe.effect, s.amplitudes) for s in worth]
-        others = self._elsewhere(worth[0].probe.effect, base)
+        others = [] if base.model.effects else self._elsewhere(worth[0].probe.effect)
         return starts[0], [*(self._first_fit(s, base) for s in starts), *others]
 
-    def _elsewhere(self, effect: Effect, base: Fit) -> list[Fit]:
-        """Fits from sizes of a cause that no line from its null leads to, beside the rig as it was believed."""
-        guess, believed = first_guess(self.model, self.trials), Model(self.model.rig, base.model.effects)
-        return [self._maximised(believed + one, guess, rounds=AFRESH_ROUNDS) for one in far_sizes(effect)]
+    def _elsewhere(self, effect: Effect) -> list[Fit]:
+        """Fits from sizes of a cause that no line from its null leads to, beside the rig as it was believed.
+
+        Beside nothing alone: an effort with the wrong sign shows there, or nowhere.
+        """
+        guess = first_guess(self.model, self.trials)
+        return [self._maximised(self.model + one, guess, rounds=AFRESH_ROUNDS) for one in far_sizes(effect)]
 
     def extend_with_both(self, base: Fit, pair: tuple[Scored, Scored]) -> tuple[Model, list[Fit]]:
         """Begin a base with two more effects at once, from their linear estimates."""
@@ -157,10 +161,16 @@ class LikelihoodFits:
             self._converged.update(slow)
 
     def _hopeful(self, size: int) -> list[Names]:
-        """The best sets of a size, and those that gain half of what the best does beside the best smaller one."""
+        """The best sets of a size, and those that come near the best."""
+        near = set(self.near(size))
+        return [n for k, n in enumerate(self.ranked(size)) if k < CONVERGED_SETS or n in near]
+
+    def near(self, size: int) -> list[Names]:
+        """Sets of a size that gain half of what the best does beside the best smaller one, best first; the best."""
         ranked = self.ranked(size)
-        half = 0.5 * (self.fits[self.ranked(size - 1)[0]].price + self.fits[ranked[0]].price)
-        return [n for k, n in enumerate(ranked) if k < CONVERGED_SETS or self.fits[n].price < half]
+        smaller = self.fits[self.ranked(size - 1)[0]].price if size else math.inf
+        half = 0.5 * (smaller + self.fits[ranked[0]].price)
+        return [n for n in ranked if n == ranked[0] or self.fits[n].price < half]
 
     def extend_all(self, base: Names, most: int | None = None) -> list[Names]:
         """Fit a set with each further cause beside it, or with those of largest score; returns their names."""

@@ -128,7 +128,7 @@ class LikelihoodSearch:
     def _extend(self, size: int) -> None:
         """Fit the sets of a size: the best smaller ones with further causes, and pairs that the screen proposes."""
         sets = self.sets
-        for names in sets.ranked(size - 1)[: BEAM if size > 1 else 1]:
+        for names in sets.near(size - 1)[:BEAM]:
             sets.extend_all(names, None if size == 1 else JOINT_FITS)
         if size == 2:
             base = sets.fits[()]
@@ -141,8 +141,8 @@ class LikelihoodSearch:
 
     def _refine_first(self, size: int) -> Names:
         """The best set of a size, once each of the best has the form that the data demand."""
-        for names in self.sets.ranked(size)[:BEAM]:
-            self._refine(names)
+        while rough := [n for n in self.sets.near(size)[:BEAM] if n not in self._formed]:
+            self._refine(rough[0])
         return self.sets.ranked(size)[0]
 
     def _refine(self, names: Names) -> None:
