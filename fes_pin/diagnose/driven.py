@@ -32,7 +32,7 @@ from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood import LikelihoodProblem, maximise
+from fes_pin.identify.likelihood import LikelihoodProblem, maximise, with_honest_intervals
 from fes_pin.identify.problem import normal_equations
 from fes_pin.workers import in_parallel
 
@@ -275,7 +275,7 @@ def driven_diagnosis(
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
     judged = judge_driven(search, found, *trials, seed, study.horizon_s)
     found, left = judged.found, judged.left
-    best = found.best
+    best = with_honest_intervals(found.best)
     searched = Searched(
         nominal=found.nominal,
         best=best,

@@ -56,3 +56,33 @@ def moved_with(covariance: np.ndarray, at: list[int], change: np.ndarray) -> np.
         out[known] = beside[known] @ np.linalg.pinv(beside[at]) @ change
     out[at] = change
     return out
+
+
+def widened(covariance: np.ndarray, scores: np.ndarray) -> np.ndarray:
+    """The covariance of a fit, as wide as scores of pieces of the data scatter where a model is not quite right.
+
+    With C the inverse information and g_k the slopes of the log-likelihood of m pieces, the variances of a right model
+    are those of C; of another they are those of the sandwich
+
+        C (m / (m - 1) sum g_k g_k') C
+
+    and the larger counts, the correlations being those of C.
+
+    Source: White, Maximum likelihood estimation of misspecified models, Econometrica 50 (1982); by pieces of a record,
+    Newey and West, A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent covariance
+    matrix, Econometrica 55 (1987).
+
+    Parameters
+    ----------
+    covariance
+        Shape (n, n).
+    scores
+        Shape (m, n).
+    """
+    known = np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0)
+    own, pieces = covariance[np.ix_(known, known)], len(scores)
+    spread = scores[:, known] @ own
+    variances = pieces / (pieces - 1.0) * np.sum(spread * spread, axis=0)
+    wider = np.ones(len(covariance))
+    wider[known] = np.sqrt(np.maximum(1.0, variances / np.diag(own)))
+    return covariance * np.outer(wider, wider)

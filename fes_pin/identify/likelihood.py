@@ -30,6 +30,7 @@ import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
+from fes_pin.identify.covariance import widened
 from fes_pin.identify.doubts import doubt_limits, first_doubt
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.noise import Noise
@@ -41,6 +42,9 @@ from fes_pin.workers import in_parallel
 
 ROUNDS = 12
 """Turns of parameters and randomness, at most."""
+PIECES = 40
+"""Pieces of the data by whose scores a model's errors of form show: as many as tell a deviation within a tenth, and so
+as long as they can be."""
 LITTLE = 0.1
 """Fall of twice the log-likelihood with which turns end: a third of a standard deviation of one parameter."""
 WORTH = 1.0
@@ -393,3 +397,17 @@ def maximise(
 ) -> Fit:
     """The likelihood's maximum; see `by_turns`. The fit's `doubt` is what is random there."""
     return replace(by_turns(problem, start, unknowns, rounds), doubt=problem.doubt)
+
+
+def with_honest_intervals(fitted: Fit) -> Fit:
+    """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter."""
+    lengths = [len(p.residual) for p in fitted.parts]
+    shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
+    scores = [
+        piece
+        for part, count in zip(fitted.parts, shares, strict=True)
+        for piece in np.add.reduceat(
+            part.jacobian * part.residual[:, None], np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
+        )
+    ]
+    return replace(fitted, covariance=widened(fitted.covariance, np.array(scores)))
