@@ -103,13 +103,13 @@ class CoulombFriction(Effect):
 
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
-        """Of a joint, speeds in the measure of its own: what a sine is below for a fifth of the time, and less."""
+        """Of a joint, speeds in the measure of its own: what a sine is below for a fifth of the time, more, and less."""
         grids, speed = super().grids(measured), _usual_speed(measured)
         grids["presliding"] = tuple(k * _imposed_way(measured) for k in WAYS)
         grids["stretch"] = tuple(k * _free_way(measured) for k in STRETCHES)
         if not speed > 0.0:
             return grids
-        return {**grids, "stribeck_speed": (0.3 * speed, 0.1 * speed, speed), "creep_speed": (0.1 * speed, 0.5 * speed)}
+        return {**grids, "stribeck_speed": (0.3 * speed, 0.1 * speed, speed), "creep_speed": (0.1 * speed, 0.5 * speed, 0.02 * speed)}
 
     @classmethod
     def forms(cls, measured: Mapping[str, np.ndarray]) -> tuple[Mapping[str, float], ...]:
