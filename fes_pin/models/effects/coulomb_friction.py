@@ -103,13 +103,14 @@ class CoulombFriction(Effect):
 
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
-        """Of a joint, speeds in the measure of its own: what a sine is below for a fifth of the time, more, and less."""
+        """Of a joint, speeds in the measure of its own, which a sine is below for a fifth of the time, more or less."""
         grids, speed = super().grids(measured), _usual_speed(measured)
         grids["presliding"] = tuple(k * _imposed_way(measured) for k in WAYS)
         grids["stretch"] = tuple(k * _free_way(measured) for k in STRETCHES)
         if not speed > 0.0:
             return grids
-        return {**grids, "stribeck_speed": (0.3 * speed, 0.1 * speed, speed), "creep_speed": (0.1 * speed, 0.5 * speed, 0.02 * speed)}
+        speeds = {"stribeck_speed": (0.3, 0.1, 1.0), "creep_speed": (0.1, 0.5, 0.02)}
+        return {**grids, **{n: tuple(k * speed for k in shares) for n, shares in speeds.items()}}
 
     @classmethod
     def forms(cls, measured: Mapping[str, np.ndarray]) -> tuple[Mapping[str, float], ...]:
