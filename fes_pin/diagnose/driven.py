@@ -32,8 +32,9 @@ from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood import LikelihoodProblem, maximise, with_honest_intervals
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import normal_equations
+from fes_pin.identify.turns import maximise, with_honest_intervals
 from fes_pin.workers import in_parallel
 
 LARGE_SHARE = 0.1

@@ -68,7 +68,7 @@ class Fit:
     parts
         Whitened residuals and sensitivities at the optimum, by trial.
     doubt
-        What is random, of a fit by `identify.likelihood`: its `sse` holds the log-determinant.
+        What is random, of a fit by `identify.turns`: its `sse` holds the log-determinant.
     """
 
     model: Model

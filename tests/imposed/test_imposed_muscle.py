@@ -13,7 +13,8 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.identify.doubts import first_guess
-from fes_pin.identify.likelihood import LikelihoodProblem, maximise
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.turns import maximise
 from fes_pin.models.catalogue import Catalogue, shipped
 from fes_pin.models.effects import ForceLength, ForceVelocity, ParallelStiffness, PulseSummation, SeriesElasticity
 from fes_pin.models.model import Model

@@ -17,8 +17,10 @@ from fes_pin.diagnose.search.simulation_fits import Names, is_identified, names_
 from fes_pin.identify.covariance import moved_with
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit, fit_problem
-from fes_pin.identify.likelihood import ROUNDS, WORTH, LikelihoodProblem, maximise
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import limits_of
+from fes_pin.identify.scoring import WORTH
+from fes_pin.identify.turns import ROUNDS, maximise
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
