@@ -229,9 +229,9 @@ class GroupedProblem:
         return sum(p.score(self.model.of(g, values), own[g]) for g, p in self.parts.items())
 
     @property
-    def least_promise(self) -> float:
-        """What a step must promise to be tried once a longer one has failed."""
-        return max(p.least_promise for p in self.parts.values())
+    def is_final(self) -> bool:
+        """True where slopes are as sharp as they will be."""
+        return all(p.is_final for p in self.parts.values())
 
     @property
     def abreast(self) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from fes_pin.identify.problem import (
     TOLERANCE,
+    WORTH,
     Linearized,
     NormalEquations,
     Problem,
@@ -20,8 +21,8 @@ from fes_pin.identify.problem import (
 TRIES = 12
 """Steps that are tried, each ten times as damped as the last, before a point counts as the lowest there is."""
 SHORTER = 0.5
-"""Share of what a failed step promised that a shorter one promises at most: in directions that the data tell well, ten
-times the damping changes nothing at first."""
+"""Share of what a failed step promised that a shorter one promises at most where its end is not final: in directions
+that the data tell well, ten times the damping changes nothing at first."""
 LARGEST_DAMPING = 1e12
 """Beyond it a step is none."""
 UNIDENTIFIED = 1e-10
@@ -125,14 +126,15 @@ class Descent:
         out: list[_Proposal] = []
         last = failed
         while len(out) < count and (not out or self._is_worth(last)):
-            most, last = SHORTER * last.promised, self._proposed(max(last.damping * 10.0, 1e-4))
+            most = np.inf if self.problem.is_final else SHORTER * last.promised
+            last = self._proposed(max(last.damping * 10.0, 1e-4))
             while last.promised > most > 0.0 and last.damping < LARGEST_DAMPING:
                 last = self._proposed(last.damping * 10.0)
             out.append(last)
         return out
 
     def _is_worth(self, shorter: _Proposal) -> bool:
-        return not 0.0 <= shorter.promised < self.problem.least_promise
+        return not 0.0 <= shorter.promised < (TOLERANCE if self.problem.is_final else WORTH)
 
     def _takes(self, one: _Proposal) -> bool:
         """Go where a proposal leads, if that is down."""

@@ -21,8 +21,8 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.doubts import first_doubt
 from fes_pin.identify.noise import Noise
-from fes_pin.identify.problem import TOLERANCE, Linearized, Unknowns, limits_of, whitened_sse
-from fes_pin.identify.scoring import WORTH, Told, score_doubt
+from fes_pin.identify.problem import Linearized, Unknowns, limits_of, whitened_sse
+from fes_pin.identify.scoring import Told, score_doubt
 from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, ForetoldTrial, Predictor
@@ -145,15 +145,15 @@ class LikelihoodProblem:
 
         There a lag would take up how smooth a random effort is, which no process of first order is.
         """
-        if self.is_sharp or not all(self.model.rig.unknowns(t.kind) for t in self.trials):
+        if self.is_final:
             return False
         self.is_sharp = True
         return True
 
     @property
-    def least_promise(self) -> float:
-        """What a step must promise to be tried once a longer one failed: slopes for gains as they are promise more."""
-        return TOLERANCE if self.is_sharp else WORTH
+    def is_final(self) -> bool:
+        """True where slopes are as sharp as they will be."""
+        return self.is_sharp or not all(self.model.rig.unknowns(t.kind) for t in self.trials)
 
     def score(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
         """Improve what is random, in place; returns by how much that lowers the cost."""

@@ -18,6 +18,9 @@ from fes_pin.workers import check_limit
 Unknowns = list[dict[str, float]]
 TOLERANCE = 0.01
 """A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
+WORTH = 1.0
+"""Change of twice the log-likelihood that is worth more work, as where it is promised and no step keeps it: a standard
+deviation of one parameter."""
 SINGULAR = 1e-12
 """Share of an unknown's own information added to it: two that the trial cannot tell apart do not stop a fit."""
 
@@ -122,8 +125,8 @@ class Problem:
 
     abreast = 1
     """How many points `bounds` takes at once."""
-    least_promise = TOLERANCE
-    """What a step must promise of twice the log-likelihood to be tried once a longer one has failed."""
+    is_final = True
+    """False where a descent need not try everything at its end, as better slopes will go on from there."""
 
     def bounds(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
         """What the sums of squares are at least: nothing is cheaper to tell than all that `linearize` does."""

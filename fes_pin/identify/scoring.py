@@ -18,15 +18,12 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.doubts import doubt_limits
-from fes_pin.identify.problem import Unknowns
+from fes_pin.identify.problem import WORTH, Unknowns
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 
 LITTLE = 0.1
 """Fall of twice the log-likelihood with which turns end: a third of a standard deviation of one parameter."""
-WORTH = 1.0
-"""Change of twice the log-likelihood that is worth more work, as where it is promised and no step keeps it: a standard
-deviation of one parameter."""
 LOG_STEPS = (1e-3, 0.03)
 """Steps of the differences in logarithms: the second where the first promises what no step keeps, as where the cost is
 rough: that of a play jumps where an estimate crosses its slack."""

@@ -34,7 +34,8 @@ def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
 
     A remainder is claimed at the level that a cause is. Half of it goes to the largest single feature, half to all
     together. The chi-square is divided by its inflation under random signs of the trials, where there are enough. What
-    slopes promise counts as far as the likelihood keeps it: those of a filter are an approximation, worst of a play.
+    slopes promise counts as far as the likelihood keeps it: those of a filter are an approximation, worst of a play. Not
+    where effort is read: there fits follow such slopes to their end, and leave promises that none keeps.
     """
     featured = _Featured(fitted)
     projection = Projection(fitted.parts)
@@ -58,7 +59,7 @@ def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
         return min(1.0, 2.0 * min(p_values))
 
     p = p_value(statistic, float(single[best] ** 2))
-    if p < CLAIM_LEVEL:
+    if p < CLAIM_LEVEL and featured.can_keep:
         alone, together = np.zeros((2, len(featured.names)))
         alone[good[best]] = single[best] / after[good[best]]
         together[good] = vectors[:, kept] @ (shares.sum(axis=0) / np.sqrt(values[kept])) / after[good]
@@ -76,6 +77,8 @@ class _Featured:
         Of the features.
     columns
         The innovations' sensitivities to them in their deviations, all trials end to end, shape (m, features).
+    can_keep
+        False where fits followed slopes for gains as they are to the end.
     """
 
     def __init__(self, fitted: Fit) -> None:
@@ -89,6 +92,7 @@ class _Featured:
         self.names = [n for kind in kinds for n in kind.functions]
         free = tuple(f"{kind.name}.a{k:02d}" for kind in kinds for k in range(len(kind.functions)))
         self._problem = LikelihoodProblem(self._model, fitted.trials, fitted.doubt, free)
+        self.can_keep = not self._problem.is_final
         run = self._problem.innovations(self._model.parameters(), fitted.unknowns)
         columns = [-i.sensitivities[i.seen][:, : len(free)] / np.sqrt(i.variances[i.seen])[:, None] for i in run]
         self.columns = np.nan_to_num(np.concatenate(columns))
