@@ -1,5 +1,9 @@
 """A set less one cause."""
 
+import math
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from driven_rigs.draw import draw
 
@@ -21,3 +25,13 @@ def test_less_its_only_cause_a_set_is_the_nominal_model(tmp_path, own):
     sets.fits[names] = maximise(problem, problem.model.parameters())
     del sets.fits[()]
     assert sets.without(names, "periodic_torque").sse == pytest.approx(nominal.sse, abs=0.5)
+
+
+def test_a_set_that_runs_away_is_not_extended(tmp_path):
+    """Less one of eight causes a muscle's model did, and the diagnosis ended there."""
+    study = read_study(draw((), 0.3, 3, tmp_path).study)
+    sets = LikelihoodFits(nominal_model(study), study.trials, [PeriodicTorque])
+    nominal = sets.nominal()
+    parts = tuple(replace(p, jacobian=np.full_like(p.jacobian, np.nan)) for p in nominal.parts)
+    sets.fits[()] = replace(nominal, sse=math.inf, parts=parts)
+    assert sets.extend_all(()) == []
