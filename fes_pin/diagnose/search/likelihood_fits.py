@@ -82,7 +82,9 @@ class LikelihoodFits:
         return self._maximised(fitted.model, fitted.doubt, fitted.unknowns, rounds)
 
     def scores(self, base: Fit) -> Scores:
-        """Promise of every effect that a fit does not have, at what is random in it."""
+        """Promise of every effect that a fit does not have, at what is random in it; none beside one that runs away."""
+        if not math.isfinite(base.sse):
+            return Scores([], np.zeros((0, 0)), np.zeros(0), [])
         if id(base) not in self._scores:
             wanted = [e for e in self.library.effects if e.name not in names_of(base) and self.library.felt(e)]
             groups = in_parallel(lambda e: self._probes(e, base), wanted)
@@ -195,7 +197,11 @@ class LikelihoodFits:
         if self._compared.get((names, name)) is not whole:
             assert whole.doubt is not None
             effect = next(e for e in whole.model.effects if e.name == name)
-            own = self._maximised(self._less(whole, effect.amplitudes(), effect), whole.doubt, whole.unknowns)
+            begun = self._less(whole, effect.amplitudes(), effect)
+            own = self._maximised(begun, whole.doubt, whole.unknowns)
+            if not math.isfinite(own.sse):  # it runs away from there: from the rig as it was believed
+                believed = Model(self.model.rig, begun.effects)
+                own = self._maximised(believed, first_guess(self.model, self.trials))
             if rest not in self.fits or own.price < self.fits[rest].price:
                 self.fits[rest] = own
             self._compared[names, name] = whole
