@@ -19,7 +19,7 @@ from fes_pin.models.effects.sensor_offset import SensorOffset
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator, simulate
 from fes_pin.muscles.nerves import Nerves
-from fes_pin.workers import one_thread_each
+from fes_pin.workers import in_parallel, one_thread_each
 
 THREADS = 8
 
@@ -130,3 +130,16 @@ def test_the_limit_on_linear_algebra_ends_with_its_last_user():
     assert set(linear_algebra_threads()) <= {1}  # the second still counts on it
     second.__exit__(None, None, None)
     assert linear_algebra_threads() == before
+
+
+def test_work_beside_other_work_stays_in_its_own_thread(monkeypatch):
+    """A fit among others evaluates its points one after another: threads are not multiplied."""
+    monkeypatch.setenv("FES_PIN_THREADS", "4")
+
+    def rows(k):
+        return threading.get_ident(), in_parallel(lambda j: (threading.get_ident(), 10 * k + j), range(5))
+
+    outer = in_parallel(rows, range(6))
+    assert [[value for _, value in inner] for _, inner in outer] == [[10 * k + j for j in range(5)] for k in range(6)]
+    assert all(thread == own for own, inner in outer for thread, _ in inner)
+    assert all(own != threading.get_ident() for own, _ in outer)

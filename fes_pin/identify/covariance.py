@@ -77,8 +77,10 @@ def widened(covariance: np.ndarray, scores: np.ndarray) -> np.ndarray:
     covariance
         Shape (n, n).
     scores
-        Shape (m, n).
+        Shape (m, n), m at least 2; a single piece does not scatter.
     """
+    if len(scores) < 2:
+        return covariance
     known = np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0)
     own, pieces = covariance[np.ix_(known, known)], len(scores)
     spread = scores[:, known] @ own

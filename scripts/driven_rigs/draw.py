@@ -25,6 +25,11 @@ CAUSES = (
 )
 OUTSIDE = ("damping_drift",)
 """Not in the library."""
+BRISTLES = (3e-5, 1e-3)
+"""Way over which bristles bend, as a share of how far the rig moves: 4 to 120 um of a slide. Metal on metal breaks away
+within micrometres (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30, 1994), a gear or a belt later."""
+READ_EFFORT = 0.01
+"""Deviation of the noise that an effort is recorded with, as a share of it."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +60,6 @@ class Drawn:
     base: str
     causes: tuple[str, ...]
     truth: dict[str, float]
-
-
-BRISTLES = (3e-5, 1e-3)
-"""Way over which bristles bend, as a share of how far the rig moves: 4 to 120 um of a slide. Metal on metal breaks away
-within micrometres (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30, 1994), a gear or a belt later."""
-READ_EFFORT = 0.01
-"""Deviation of the noise that an effort is recorded with, as a share of it."""
 
 
 def draw(causes: tuple[str, ...], size: float, seed: int, folder: Path, recorded: bool = False) -> Drawn:

@@ -44,3 +44,7 @@ def test_correlations_stay_and_what_is_not_identified_stays_so():
     assert wide[0, 1] / np.sqrt(wide[0, 0] * wide[1, 1]) == pytest.approx(0.5)
     assert wide[0, 0] > 1.0
     assert np.isinf(wide[2, 2])
+
+
+def test_a_single_piece_does_not_scatter():
+    assert np.array_equal(widened(np.eye(2), np.ones((1, 2))), np.eye(2))

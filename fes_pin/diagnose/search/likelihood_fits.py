@@ -177,13 +177,8 @@ class LikelihoodFits:
         return [n for n in ranked if n == ranked[0] or self.fits[n].price < half]
 
     def extend_all(self, base: Names, most: int | None = None) -> list[Names]:
-        """Fit a set with each further cause beside it, or with those of largest score; returns their names.
-
-        Beside a fit that runs away no cause has a score.
-        """
+        """Fit a set with each further cause beside it, or with those of largest score; returns their names."""
         fitted = self.fits[base]
-        if not math.isfinite(fitted.sse):
-            return []
         by_effect = best_by_effect(self.scores(fitted).scored)
         chosen = sorted(by_effect, key=lambda n: (-by_effect[n][0].gain, n))[:most]
         keys = {tuple(sorted((*base, n))): by_effect[n] for n in chosen}
