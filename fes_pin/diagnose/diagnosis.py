@@ -22,8 +22,8 @@ from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.restate import restated_study, search_with_conditions, with_misread
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
-from fes_pin.diagnose.search.simulation_search import NominalFitError
-from fes_pin.diagnose.searches import Searches
+from fes_pin.diagnose.search.simulation_search import NominalFitError, SimulationSearch
+from fes_pin.diagnose.searches import Result, Search, Searches
 from fes_pin.models.catalogue import Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.workers import Progress, one_thread_each, time_limit
@@ -85,10 +85,11 @@ def diagnose_joint(
             whole, stated = study, train
             if again is not None:
                 train, whole = again.trials, restated_study(study, nominal, again.misread)
-            if isinstance(search, LikelihoodSearch):
-                diagnosis = driven_diagnosis(whole, search, searched, (train, test), seed)  # type: ignore[arg-type]
-            else:
-                diagnosis = judge_free(whole, search, searched, test, seed)  # type: ignore[arg-type]
+            diagnosis = _judged(whole, search, searched, (train, test), seed)
+            if _may_be_driven(diagnosis, search, train):
+                with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
+                    search, searched = searches.by_likelihood(train)
+                diagnosis = _judged(whole, search, searched, (train, test), seed)
             if again is not None:
                 diagnosis = with_misread(diagnosis, again, stated, test, seed)
         except NominalFitError as problem:
@@ -103,6 +104,26 @@ def diagnose_joint(
         warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
     found = replace(diagnosis, left_out=measured.left_out, warnings=tuple(warnings), catalogue=catalogue)
     return replace(found, provenance=made, wall_s=time.perf_counter() - began)
+
+
+def _judged(
+    study: Study, search: Search, searched: Result, trials: tuple[list[Trial], list[Trial]], seed: int
+) -> Diagnosis:
+    """The verdict on what a search found."""
+    if isinstance(search, LikelihoodSearch):
+        return driven_diagnosis(study, search, searched, trials, seed)  # type: ignore[arg-type]
+    return judge_free(study, search, searched, trials[1], seed)  # type: ignore[arg-type]
+
+
+def _may_be_driven(diagnosis: Diagnosis, search: Search, trials: Sequence[Trial]) -> bool:
+    """True where free simulation explains nothing of a rig that an effort drives.
+
+    A controller's answer is not seen where a record was smoothed or interpolated before it was stored. Before it is
+    said that no cause of the library explains the rig, the likelihood is asked, which takes such an answer for what it
+    is.
+    """
+    free = isinstance(search, SimulationSearch) and not search.was_stopped
+    return free and diagnosis.verdict == "unexplained" and diagnosis.nominal.model.rig.is_driven(trials)
 
 
 @dataclass(frozen=True)

@@ -59,9 +59,13 @@ class Searches:
         self.last = search = self._begun(trials)
         found: Result = search.run()
         if isinstance(found, Searched) and self._is_undecided(found):
-            self.last = search = self._by_likelihood(trials)
-            found = search.run()
+            return self.by_likelihood(trials)
         return search, found
+
+    def by_likelihood(self, trials: Sequence[Trial]) -> tuple[LikelihoodSearch, Found]:
+        """Search trials by the likelihood, whatever drives the rig."""
+        self.last = search = self._by_likelihood(trials)
+        return search, search.run()
 
     def _begun(self, trials: Sequence[Trial]) -> Search:
         if any(t.kind == IMPOSED for t in trials) or is_fed_back(self.nominal.rig, trials):

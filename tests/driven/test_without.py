@@ -11,7 +11,7 @@ from fes_pin.data.study import read_study
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
-from fes_pin.models.effects import PeriodicTorque
+from fes_pin.models.effects import CoulombFriction, EffortGain, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
 
 
@@ -35,3 +35,16 @@ def test_a_set_that_runs_away_is_not_extended(tmp_path):
     parts = tuple(replace(p, jacobian=np.full_like(p.jacobian, np.nan)) for p in nominal.parts)
     sets.fits[()] = replace(nominal, sse=math.inf, parts=parts)
     assert sets.extend_all(()) == []
+
+
+def test_less_one_cause_a_set_that_runs_away_is_grown_from_the_part_that_does_not(tmp_path):
+    """As of eight causes of a muscle, which only together foretold anything."""
+    study, names = read_study(draw(("coulomb_friction",), 0.3, 13, tmp_path).study), ("coulomb_friction", "effort_gain")
+    sets = LikelihoodFits(nominal_model(study), study.trials, [CoulombFriction, EffortGain])
+    nominal = sets.nominal()
+    sets.extend_all(())
+    known = sets.fits.pop(("coulomb_friction",))
+    away = nominal.model + CoulombFriction(torque_nm=1e200) + EffortGain()
+    unknown = np.full((len(away.fitted_parameters()),) * 2, np.inf)
+    sets.fits[names] = replace(nominal, model=away, free=away.fitted_parameters(), covariance=unknown)
+    assert sets.without(names, "effort_gain").sse == pytest.approx(known.sse, abs=1.0)

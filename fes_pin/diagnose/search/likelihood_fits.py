@@ -194,13 +194,29 @@ class LikelihoodFits:
             effect = next(e for e in whole.model.effects if e.name == name)
             begun = self._less(whole, effect.amplitudes(), effect)
             own = self._maximised(begun, whole.doubt, whole.unknowns)
-            if not math.isfinite(own.sse):  # it runs away from there: from the rig as it was believed
-                believed = Model(self.model.rig, begun.effects)
-                own = self._maximised(believed, first_guess(self.model, self.trials))
+            if any(own.sse > f.sse + WORTH for f in self._parts(rest)):  # it ran away, or a part of it explains more
+                own = self._grown(rest, begun.effects)
             if rest not in self.fits or own.price < self.fits[rest].price:
                 self.fits[rest] = own
             self._compared[names, name] = whole
         return self.fits[rest]
+
+    def _parts(self, names: Names) -> list[Fit]:
+        """The fits of a set and of its parts, best first."""
+        return sorted((f for k, f in self.fits.items() if set(k) <= set(names)), key=lambda f: f.sse)
+
+    def _grown(self, names: Names, effects: Sequence[Effect]) -> Fit:
+        """The fit of a set from the best fit of a part of it, with one more of its effects after another.
+
+        Each begins at nothing, in its own form.
+        """
+        fitted = self._parts(names)[0]
+        for one in effects:
+            if one.name not in names_of(fitted):
+                assert fitted.doubt is not None
+                nothing = {n: float(one.parameters()[n].null) for n in one.amplitudes()}  # type: ignore[arg-type]
+                fitted = self._maximised(fitted.model + started(one, nothing), fitted.doubt, fitted.unknowns)
+        return fitted
 
     def _less(self, whole: Fit, gone: Sequence[str], effect: Effect) -> Model:
         """The model of a fit with some parameters of an effect at their nulls; without the effect if these are all.
