@@ -270,6 +270,17 @@ def _held_ahead(folds: Sequence[_Fold], horizon_s: float, falling: bool) -> tupl
     )
 
 
+def _of_smoothing(fitted: Fit) -> tuple[str, ...]:
+    """What is to be said of a reading whose noise lasts over samples."""
+    assert fitted.doubt is not None
+    if not fitted.doubt.lasts_s:
+        return ()
+    trial = fitted.trials[0]
+    name, step = fitted.model.rig.output(trial.kind), round(fitted.doubt.lasts_s / trial.dt)
+    said = f"{name} was smoothed or interpolated before it was stored: its noise lasts {fitted.doubt.lasts_s:.2g} s"
+    return (f"{said}, and one sample in {step} counts as a reading",)
+
+
 def driven_diagnosis(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
@@ -318,6 +329,7 @@ def driven_diagnosis(
         held_out_by=SEPARATE if trials[1] else CROSS_VALIDATED if held else NOTHING,
         left_out={},
         wall_s=0.0,
+        warnings=_of_smoothing(best),
         random=judged.random,
         ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
     )

@@ -166,10 +166,11 @@ def foretell(model: Model, trial: Trial, random: Random, horizon_s: float) -> di
 
 
 def one_step(model: Model, trial: Trial, doubt: Doubt) -> dict[str, np.ndarray]:
-    """Measured minus foretold one sample ahead, shape (n,), by output column."""
+    """Measured minus foretold one sample ahead, shape (n,), by output column; 0 where nothing was measured."""
     problem = LikelihoodProblem(model, [trial], doubt, ())
-    (one,) = problem.innovations(model.parameters(), problem.start_unknowns())
-    return {n: one.values[:, k] for k, n in enumerate(one.outputs)}
+    (foretold,) = problem.foretold(model.parameters())
+    judged = model.rig.follows(trial)
+    return {n: np.where(judged & np.isfinite(trial[n]), trial[n] - values, 0.0) for n, values in foretold.items()}
 
 
 def over_horizon(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dict[str, np.ndarray]:

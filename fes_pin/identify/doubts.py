@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import rough_noise
+from fes_pin.identify.noise import Noise
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 
@@ -46,18 +48,26 @@ def driving_size(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
     return {n: value for n, value in model.rig.driving_sizes(trials).items() if value > 0.0}
 
 
-def first_guess(model: Model, trials: Sequence[Trial]) -> Doubt:
+def first_guess(model: Model, trials: Sequence[Trial], lasts_s: float = 0.0) -> Doubt:
     """Randomness that a fit begins with: reading noise from second differences, and a small random effort."""
-    white = {n: noise.std for n, noise in rough_noise(model, trials).items()}
+    white = {n: noise.std for n, noise in _rough_noise(model, trials, lasts_s).items()}
     sizes = driving_size(model, trials)
-    return Doubt(white, {n: FIRST_SHARE * v for n, v in sizes.items()}, dict.fromkeys(sizes, FIRST_TIME_S))
+    return Doubt(white, {n: FIRST_SHARE * v for n, v in sizes.items()}, dict.fromkeys(sizes, FIRST_TIME_S), lasts_s)
 
 
-def doubt_limits(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, float]]:
+def _rough_noise(model: Model, trials: Sequence[Trial], lasts_s: float) -> dict[str, Noise]:
+    """Of readings so far apart that each has noise of its own."""
+    steps = [slice(None, None, max(1, round(lasts_s / t.dt))) for t in trials]
+    columns = [{n: v[own] for n, v in t.columns.items()} for t, own in zip(trials, steps, strict=True)]
+    apart = [replace(t, columns=c, time=t.time[own]) for t, c, own in zip(trials, columns, steps, strict=True)]
+    return rough_noise(model, apart)
+
+
+def doubt_limits(model: Model, trials: Sequence[Trial], lasts_s: float = 0.0) -> dict[str, tuple[float, float]]:
     """Bounds of everything that is random, by name."""
     step, longest = max(t.dt for t in trials), max(t.duration for t in trials)
     out: dict[str, tuple[float, float]] = {}
-    for name, noise in rough_noise(model, trials).items():
+    for name, noise in _rough_noise(model, trials, lasts_s).items():
         values = np.concatenate([t[name] for t in trials if name in t.columns])
         spread = max(float(np.nanmax(values) - np.nanmin(values)), 1e-9)
         out[f"white.{name}"] = (min(SMALLEST * spread, noise.std), spread)

@@ -78,7 +78,8 @@ class LikelihoodProblem:
         """The compiled predictor, with sensitivities to `free` and to the effects' unknowns."""
         if self._predictor is None:
             columns = (*self.free, *self.unknown_names)
-            self._predictor = Predictor(self.model, self.trials, columns, self.doubt.processes, self.priors)
+            own = (self.doubt.processes, self.priors, self.doubt.lasts_s)
+            self._predictor = Predictor(self.model, self.trials, columns, *own)
         return self._predictor
 
     def start_unknowns(self) -> Unknowns:
@@ -110,7 +111,8 @@ class LikelihoodProblem:
         """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
         count, trials = self.abreast, len(self.trials)
         if self._abreast is None:
-            self._abreast = Predictor(self.model, self.trials * count, (), self.doubt.processes, self.priors * count)
+            own = (self.doubt.processes, self.priors * count, self.doubt.lasts_s)
+            self._abreast = Predictor(self.model, self.trials * count, (), *own)
         predictor = self._abreast
 
         def abreast(some: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[Told]:

@@ -60,7 +60,7 @@ def score_doubt(problem: Foretelling, values: Mapping[str, float], unknowns: Unk
 
     Where no step promises `LITTLE` it stays.
     """
-    limits = doubt_limits(problem.model, problem.trials)
+    limits = doubt_limits(problem.model, problem.trials, problem.doubt.lasts_s)
     names = tuple(problem.doubt.values())
     low, high = (np.log([limits[n][k] for n in names]) for k in (0, 1))
     z = np.clip(np.log([problem.doubt.values()[n] for n in names]), low, high)

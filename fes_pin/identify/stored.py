@@ -24,7 +24,8 @@ _NOISE = {"std": NumberKey(""), "innovation_std": NumberKey(""), "step_s": Numbe
 def random_table(fitted: Fit) -> dict[str, Any]:
     """What is random in a fit, for `model_toml`."""
     if fitted.doubt is not None:
-        return {part: {n: float(v) for n, v in getattr(fitted.doubt, part).items()} for part in _PARTS}
+        parts = {part: {n: float(v) for n, v in getattr(fitted.doubt, part).items()} for part in _PARTS}
+        return {"lasts_s": float(fitted.doubt.lasts_s), **parts} if fitted.doubt.lasts_s else parts
     return {"noise": {n: _noise_table(one) for n, one in fitted.noise.items()}}
 
 
@@ -45,7 +46,9 @@ def load_random(path: str | Path) -> Random | None:
         return None
     table = document.table(KEY)
     if "noise" not in table:
-        return Doubt(**{part: _numbers(document, table, part) for part in _PARTS})
+        parts = {part: _numbers(document, table, part) for part in _PARTS}
+        lasts = {n: v for n, v in table.items() if n not in _PARTS}
+        return Doubt(**parts, **document.numbers(KEY, lasts, {"lasts_s": NumberKey("s")}))  # type: ignore[arg-type]
     channels = document.table(f"{KEY}.noise", table)
     return {name: _noise(document, name, channels) for name in channels}
 

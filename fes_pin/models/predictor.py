@@ -31,11 +31,15 @@ class Doubt:
     std, time
         Stationary standard deviation and time constant (s) of each first-order random process that acts, by its name:
         "effort" at the joint, "force" of a held muscle, "reading" of the first output.
+    lasts_s
+        How long the noise of a reading lasts, s: what is read within that time says nothing new, see
+        `identify.lasting`. 0 where the noise of every sample is its own.
     """
 
     white: Mapping[str, float]
     std: Mapping[str, float] = field(default_factory=dict)
     time: Mapping[str, float] = field(default_factory=dict)
+    lasts_s: float = 0.0
 
     @property
     def processes(self) -> tuple[str, ...]:
@@ -48,7 +52,7 @@ class Doubt:
         for name, value in values.items():
             part, _, which = name.partition(".")
             parts[part][which] = value
-        return Doubt(**parts)
+        return Doubt(**parts, lasts_s=self.lasts_s)
 
     def values(self) -> dict[str, float]:
         """Every value by name: white.position, std.effort, time.effort."""
@@ -106,6 +110,8 @@ class Predictor:
         Names of the random processes that act; see `Doubt`.
     priors
         Of each trial, standard deviation of each unknown of its start about what its first samples say.
+    lasts_s
+        How long the noise of a reading lasts; see `Doubt`.
     """
 
     def __init__(
@@ -115,12 +121,14 @@ class Predictor:
         columns: tuple[str, ...],
         processes: tuple[str, ...],
         priors: Sequence[Mapping[str, float]],
+        lasts_s: float = 0.0,
     ) -> None:
         self.model, self.trials, self.columns = model, tuple(trials), columns
         self.max_step_s = min(max_step(model), STEP_S)
         self._delayed = is_delayed(model)
         self._blocks = [
-            _Block(model, self.trials, lanes, columns, processes, priors, self.max_step_s) for lanes in self._groups()
+            _Block(model, self.trials, lanes, columns, processes, priors, self.max_step_s, lasts_s)
+            for lanes in self._groups()
         ]
 
     def _groups(self) -> Iterator[list[int]]:
@@ -195,6 +203,7 @@ class _Block:
         processes: tuple[str, ...],
         priors: Sequence[Mapping[str, float]],
         max_step_s: float,
+        lasts_s: float,
     ) -> None:
         first, self.lanes = trials[lanes[0]], lanes
         self.rig = rig = model.rig
@@ -223,7 +232,7 @@ class _Block:
         self.measured = np.zeros((self.count, len(self.outputs), WIDTH))
         self.repeated = np.ones((self.count, len(self.outputs), WIDTH))
         for lane, trial in enumerate(self.trials):
-            judged = rig.follows(trial)
+            judged = rig.follows(trial) & (np.arange(len(trial)) % max(1, round(lasts_s / trial.dt)) == 0)
             for k, name in enumerate(self.outputs):
                 column = trial[name]
                 finite = np.isfinite(column) & judged

@@ -17,6 +17,7 @@ from fes_pin.diagnose.search.simulation_fits import Names, is_identified, names_
 from fes_pin.identify.covariance import moved_with
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit, fit_problem
+from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import limits_of
 from fes_pin.identify.scoring import WORTH
@@ -67,10 +68,19 @@ class LikelihoodFits:
 
     def nominal(self) -> Fit:
         """Fit the nominal model, from several sizes of what is random."""
-        guess = first_guess(self.model, self.trials)
-        starts = [replace(guess, std={n: k * v for n, v in guess.std.items()}) for k in FIRST_DOUBTS]
-        self.fits[()] = min(in_parallel(lambda d: self._maximised(self.model, d), starts), key=lambda f: f.sse)
+        self.fits[()] = with_new_noise(self.trials, self._nominal)
         return self.fits[()]
+
+    def _nominal(self, lasts_s: float) -> Fit:
+        """The nominal fit where the noise of a reading lasts so long."""
+        guess = first_guess(self.model, self.trials, lasts_s)
+        starts = [replace(guess, std={n: k * v for n, v in guess.std.items()}) for k in FIRST_DOUBTS]
+        return min(in_parallel(lambda d: self._maximised(self.model, d), starts), key=lambda f: f.sse)
+
+    def _guess(self) -> Doubt:
+        """Little that is random, with noise that lasts as it does."""
+        known = self.fits[()].doubt
+        return first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
 
     def _maximised(
         self, model: Model, doubt: Doubt, unknowns: list[dict[str, float]] | None = None, rounds: int = ROUNDS
@@ -123,7 +133,7 @@ class LikelihoodFits:
 
         Beside nothing alone: an effort with the wrong sign shows there, or nowhere.
         """
-        guess = first_guess(self.model, self.trials)
+        guess = self._guess()
         return [self._maximised(self.model + one, guess, rounds=AFRESH_ROUNDS) for one in far_sizes(effect)]
 
     def extend_with_both(self, base: Fit, pair: tuple[Scored, Scored]) -> tuple[Model, list[Fit]]:
@@ -150,7 +160,7 @@ class LikelihoodFits:
         All take a turn there; those that explain most then go on.
         """
         assert base.doubt is not None
-        guess = first_guess(self.model, self.trials)
+        guess = self._guess()
         if all(base.doubt.std[n] <= FIRST_DOUBTS[-1] * small for n, small in guess.std.items()):
             return {}
         first = in_parallel(lambda start: self._maximised(start, guess, rounds=1), list(starts.values()))

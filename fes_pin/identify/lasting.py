@@ -1,0 +1,75 @@
+"""How long the noise of a reading lasts: over samples, where a record was smoothed or interpolated.
+
+The filter takes the noise of each reading for new. Noise that lasts it follows as it does motion, by a random effort
+that nothing exerts, and inertia is what that effort makes of it. Readings as far apart as their noise is new have
+innovations that are white; and every second of them tells of the same noise, the same random effort and the same rig as
+all do. Where they do not, readings are taken twice as far apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import LikelihoodProblem
+
+SHARED = 0.1
+"""Correlation of an innovation with one of the next two, from which noise is not new. A model that misses a cause
+brings 0.02 at the steps of a recording, noise that was averaged over ten samples 0.5; see
+`tests/identify/test_lasting.py`."""
+OTHER = 0.02
+"""Twice the log-likelihood, for each reading, by which every second of them may fit better by itself."""
+FEWEST = 30
+"""Readings that every trial keeps."""
+
+
+def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], Fit]) -> Fit:
+    """The nominal fit with readings as near to each other as their noise is new.
+
+    Parameters
+    ----------
+    nominal
+        The nominal model's fit where the noise of a reading is taken to last so long, s.
+
+    Returns
+    -------
+    Fit
+        Its `doubt.lasts_s` says how long; 0 where noise is new in every sample. Where it is nowhere new, the fit that
+        comes nearest to it.
+    """
+    now = nominal(0.0)
+    if not all(now.model.rig.unknowns(t.kind) for t in trials):  # a force may be as smooth as its reading
+        return now
+    step, tried = 1, [(math.inf, now)]
+    while 2 * step * FEWEST <= min(map(len, trials)):
+        step *= 2
+        sparser = nominal(step * max(t.dt for t in trials))
+        tried.append((max(_shared(now) / SHARED, _other(now, sparser) / OTHER), now))
+        if tried[-1][0] < 1.0:
+            break
+        now = sparser
+    return min(tried, key=lambda one: one[0])[1]
+
+
+def _shared(fitted: Fit) -> float:
+    """The larger correlation of an innovation with one of the next two; trials weigh as they are long."""
+    residuals = [p.residual for p in fitted.parts]
+    power = sum(float(r @ r) for r in residuals)
+    along = [abs(sum(float(r[k:] @ r[:-k]) for r in residuals)) for k in (1, 2)]
+    return max(along) / max(power, 1e-300)
+
+
+def _other(fitted: Fit, sparser: Fit) -> float:
+    """By how much less likely sparser readings are, each, under a fit than under their own."""
+    assert fitted.doubt is not None
+    assert sparser.doubt is not None
+    problem = LikelihoodProblem(sparser.model, sparser.trials, sparser.doubt)
+    as_it_was = replace(fitted.doubt, lasts_s=sparser.doubt.lasts_s)
+    lost = problem.cost(fitted.values, fitted.unknowns, as_it_was) - sparser.sse
+    return lost / sum(len(p.residual) for p in sparser.parts)
+
+
+__all__ = ["with_new_noise"]
