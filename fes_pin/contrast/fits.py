@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from fes_pin.diagnose.search.score import Scores
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel, as_white
 from fes_pin.identify.noise_floor import rich_noise
@@ -76,19 +78,28 @@ class Fits:
         """Fit the nominal model to all groups, under the noise that no item of the library could explain."""
         model = GroupedModel(dict.fromkeys(self.trials, self.nominal))
         if self.driven:
-            weights: dict[str, Weight] = {g: first_guess(self.nominal, t) for g, t in self.trials.items()}
-            alone = {
-                g: maximise(LikelihoodProblem(self.nominal, t, weights[g]), self.nominal.parameters())  # type: ignore[arg-type]
-                for g, t in self.trials.items()
-            }
-            self.first_weights = [weights, {g: f.doubt for g, f in alone.items() if f.doubt is not None}]
-            weights = self.first_weights[-1]
+            alone = self._alone()
+            doubts = {g: f.doubt for g, f in alone.items() if f.doubt is not None}
+            little = {g: first_guess(self.nominal, t, doubts[g].lasts_s) for g, t in self.trials.items()}
+            self.first_weights = [dict(little), dict(doubts)]
             begun = model.with_parameters(next(iter(alone.values())).values)
-            return self.converged(begun, (), weights, None)
+            return self.converged(begun, (), doubts, None)
         each = {g: self._rich(g) for g in self.trials}
         weights = {g: noise for g, (_, noise) in each.items()}
         fitted = [self.converged(model.with_parameters(v), (), weights, None) for v, _ in each.values()]
         return min(fitted, key=lambda f: f.fit.sse)
+
+    def _alone(self) -> dict[str, Fit]:
+        """The nominal fit of each group of a driven rig by itself; noise of a reading lasts as long in all of them."""
+
+        def fitted(group: str, lasts_s: float) -> Fit:
+            trials = self.trials[group]
+            problem = LikelihoodProblem(self.nominal, trials, first_guess(self.nominal, trials, lasts_s))
+            return maximise(problem, self.nominal.parameters())
+
+        each = {g: with_new_noise(t, partial(fitted, g)) for g, t in self.trials.items()}
+        lasts = max(f.doubt.lasts_s for f in each.values() if f.doubt is not None)
+        return {g: f if f.doubt and f.doubt.lasts_s == lasts else fitted(g, lasts) for g, f in each.items()}
 
     def _rich(self, group: str) -> tuple[dict[str, float], Weight]:
         """A group's own nominal values, and its noise beside everything that the library could explain in it alone."""

@@ -19,7 +19,7 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 SHARED = 0.1
 """Correlation of an innovation with one of the next two, from which noise is not new. A model that misses a cause
 brings 0.02 at the steps of a recording, noise that was averaged over ten samples 0.5; see
-`tests/identify/test_lasting.py`."""
+`tests/driven/test_lasting.py`."""
 OTHER = 0.02
 """Twice the log-likelihood, for each reading, by which every second of them may fit better by itself."""
 FEWEST = 30

@@ -232,7 +232,7 @@ class _Block:
         self.measured = np.zeros((self.count, len(self.outputs), WIDTH))
         self.repeated = np.ones((self.count, len(self.outputs), WIDTH))
         for lane, trial in enumerate(self.trials):
-            judged = rig.follows(trial) & (np.arange(len(trial)) % max(1, round(lasts_s / trial.dt)) == 0)
+            judged = rig.follows(trial) & with_new_noise(trial, lasts_s)
             for k, name in enumerate(self.outputs):
                 column = trial[name]
                 finite = np.isfinite(column) & judged
@@ -287,6 +287,16 @@ class _Block:
         for lane, trial in enumerate(self.trials):
             n = len(trial)
             yield {o: self.measured[:n, k, lane] - y[:n, k, lane] for k, o in enumerate(self.outputs)}
+
+
+def with_new_noise(trial: Trial, lasts_s: float) -> np.ndarray:
+    """Samples so far apart that the noise of each is its own, shape (n,).
+
+    Where noise lasts, those within twice its time of an end are left out: what made it last had less to average there.
+    """
+    step, k = max(1, round(lasts_s / trial.dt)), np.arange(len(trial))
+    inner = 2 * (step - 1)
+    return np.asarray((k % step == 0) & (k >= inner) & (k < len(trial) - inner))
 
 
 def repeated(column: np.ndarray) -> np.ndarray:

@@ -34,10 +34,12 @@ def items(count: int) -> Iterator[tuple[str, ...]]:
         yield rows[k % len(rows)]
 
 
-def judged(causes: tuple[str, ...], size: float, seed: int, recorded: bool = False) -> dict[str, Any]:
+def judged(
+    causes: tuple[str, ...], size: float, seed: int, recorded: bool = False, cutoff_hz: float | None = None
+) -> dict[str, Any]:
     """Make a study, diagnose it, and say how the answer compares with the truth."""
     with tempfile.TemporaryDirectory(prefix="driven") as folder:
-        drawn = draw(causes, size, seed, Path(folder), recorded)
+        drawn = draw(causes, size, seed, Path(folder), recorded, cutoff_hz)
         began = time.perf_counter()
         try:
             found = diagnose_joint(read_study(drawn.study))
@@ -115,12 +117,17 @@ def main(
     seed: Annotated[int, typer.Option(help="Of the first; each next one has the next seed.")] = 0,
     nulls: Annotated[bool, typer.Option(help="Hide nothing in any.")] = False,
     recorded: Annotated[bool, typer.Option(help="Friction of bristles, effort read with noise.")] = False,
+    low_pass: Annotated[
+        float | None, typer.Option(help="Hz at which effort and reading were low-passed, without delay, when stored.")
+    ] = None,
     results: Annotated[
         Path | None, typer.Option(help="A file of one line a study, with which a run can go on.")
     ] = None,
 ) -> None:
     """Hide known causes in rigs that a controller drives, and count what the diagnosis makes of them."""
-    rows = results_of(items(count), seed, lambda causes, k: judged(() if nulls else causes, size, k, recorded), results)
+    rows = results_of(
+        items(count), seed, lambda causes, k: judged(() if nulls else causes, size, k, recorded, low_pass), results
+    )
     typer.echo("\n".join(table(rows)))
 
 

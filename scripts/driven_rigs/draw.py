@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from driven_rigs.plant import DT, Plant, run
+from fes_pin.data.smooth import low_pass
 from fes_pin.data.study import Study, write_study
 from fes_pin.data.trial import Trial
 
@@ -62,7 +63,14 @@ class Drawn:
     truth: dict[str, float]
 
 
-def draw(causes: tuple[str, ...], size: float, seed: int, folder: Path, recorded: bool = False) -> Drawn:
+def draw(
+    causes: tuple[str, ...],
+    size: float,
+    seed: int,
+    folder: Path,
+    recorded: bool = False,
+    cutoff_hz: float | None = None,
+) -> Drawn:
     """Make a study with these causes hidden.
 
     Parameters
@@ -75,6 +83,8 @@ def draw(causes: tuple[str, ...], size: float, seed: int, folder: Path, recorded
         Where the study is written.
     recorded
         As rigs are in a laboratory: friction is that of bristles, and the effort is measured, with noise.
+    cutoff_hz
+        Where effort and reading were low-passed, without delay, before they were stored; by default they were not.
     """
     rng = np.random.default_rng(seed)
     base = BASES[int(rng.integers(len(BASES)))]
@@ -106,6 +116,8 @@ def draw(causes: tuple[str, ...], size: float, seed: int, folder: Path, recorded
     effort, position = run(plant, references, rng)
     if recorded:
         effort = effort + READ_EFFORT * usual * own.standard_normal(effort.shape)
+    if cutoff_hz is not None:
+        effort, position = low_pass(effort, DT, cutoff_hz), low_pass(position, DT, cutoff_hz)
     believed = (float(rng.uniform(0.7, 1.3)), base.damping * float(rng.uniform(0.4, 1.6)))
     truth = {"inertia_scale": 1.0, "damping": base.damping, **hidden}
     return Drawn(_written(base, effort, position, believed, folder), base.name, causes, truth)

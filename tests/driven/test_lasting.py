@@ -1,0 +1,62 @@
+"""How long the noise of a reading lasts: nothing of it where each sample has its own, whatever the model misses."""
+
+import numpy as np
+import pytest
+from driven_rigs.draw import draw
+from scipy.ndimage import uniform_filter1d
+
+from fes_pin.data.smooth import low_pass
+from fes_pin.data.study import read_study
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.identify.stored import load_random, random_table
+from fes_pin.models.nominal import nominal_model
+from fes_pin.models.predictor import with_new_noise
+from fes_pin.models.store import model_toml
+
+
+def nominal(study, made=lambda column: column):
+    trials = [t.with_columns(**{n: made(v) for n, v in t.columns.items()}) for t in study.trials]
+    return LikelihoodFits(nominal_model(study), trials, []).nominal()
+
+
+CAUSES = ["coulomb_friction", "backlash", "cogging", "sensor_lag", "quadratic_damping", "joint_stop"]
+
+
+@pytest.mark.parametrize("causes", [(), *((c,) for c in CAUSES)], ids=str)
+def test_noise_of_every_sample_is_its_own_whatever_the_model_misses(causes, tmp_path):
+    study = read_study(draw(causes, 0.3, 21, tmp_path, recorded=True).study)
+    assert nominal(study).doubt.lasts_s == 0.0
+
+
+@pytest.mark.parametrize(
+    ("made", "least", "most"),
+    [
+        (lambda x: uniform_filter1d(x, 5), 4, 8),
+        (lambda x: uniform_filter1d(x, 11), 8, 16),
+        (lambda x: low_pass(x, 0.002, 40.0), 4, 16),
+        (lambda x: low_pass(x, 0.002, 15.0), 16, 64),
+    ],
+    ids=["5 samples", "11 samples", "40 Hz", "15 Hz"],
+)
+def test_noise_that_was_averaged_lasts_and_is_no_motion(made, least, most, tmp_path):
+    """The random effort is told as it was, and inertia; with every sample as a reading they are far from it."""
+    drawn = draw((), 0.3, 22, tmp_path)
+    study = read_study(drawn.study)
+    recorded, found = nominal(study), nominal(study, made)
+    assert least <= found.doubt.lasts_s / study.trials[0].dt <= most
+    assert found.values["inertia_scale"] == pytest.approx(1.0, abs=0.02)
+    size, now = (f.doubt.std["effort"] * np.sqrt(f.doubt.time["effort"]) for f in (recorded, found))
+    assert now == pytest.approx(size, rel=0.35)
+
+
+def test_readings_that_count_are_apart_and_off_the_ends(tmp_path):
+    trial = read_study(draw((), 0.3, 22, tmp_path).study).trials[0].first(101)
+    assert with_new_noise(trial, 0.0).all()
+    assert list(np.flatnonzero(with_new_noise(trial, 10 * trial.dt))) == [20, 30, 40, 50, 60, 70, 80]
+
+
+def test_it_is_kept_with_a_model(tmp_path):
+    study = read_study(draw((), 0.3, 22, tmp_path).study)
+    found = nominal(study, lambda x: uniform_filter1d(x, 5))
+    (tmp_path / "model.toml").write_text(model_toml(found.model, random_table(found)))
+    assert load_random(tmp_path / "model.toml").lasts_s == pytest.approx(found.doubt.lasts_s, rel=1e-5)
