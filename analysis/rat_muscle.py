@@ -102,7 +102,7 @@ improved, traditional = (AUTHORS[f"{m}_rmse_percent_of_peak"] for m in ("IM", "T
 print(f"stretch-shortening cycles, never fitted: {told[-1][2]:.1f} % of peak")
 print(f"the authors: {improved:.1f} % by their improved method, {traditional:.1f} % by the traditional one")
 
-# %% The diagnosis by itself, where it was run: fes-pin diagnose FOLDER --out out/rat_diagnosed (20 minutes)
+# %% The diagnosis by itself, where it was run: fes-pin diagnose FOLDER --out out/rat_diagnosed (11 minutes)
 DIAGNOSED = OUT / "rat_diagnosed" / "model.toml"
 if DIAGNOSED.exists():
     newton, percent = on_the_cycles(load_model(DIAGNOSED))
