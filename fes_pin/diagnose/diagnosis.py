@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fes_pin.data.derived import without_derived
 from fes_pin.data.errors import InputError
 from fes_pin.data.provenance import provenance_now
 from fes_pin.data.spikes import without_spikes
@@ -167,6 +168,9 @@ def measured_study(study: Study) -> Measured:
                 found[piece.name] = spikes
     if not trials:
         raise InputError(f"no trial has a reading that is not stuck: {warnings[0]}", file=study.folder)
+    for rate, position in rig.rate_of.items():
+        trials, said = without_derived(trials, position, rate)
+        warnings += said
     return Measured(replace(study, trials=tuple(trials)) if found or warnings else study, found, warnings)
 
 

@@ -54,6 +54,8 @@ class Rig:
     """What tells causes apart that no input does."""
     settings: ClassVar[tuple[str, ...]] = ("",)
     """Examples of `fes-pin predict`'s options for its kinds of trial."""
+    rate_of: ClassVar[Mapping[str, str]] = {}
+    """Readings that are the rate of another, and may have been computed from it: their column and the other's."""
     begins: ClassVar[str] = ""
     """Where a prediction of it begins, one sentence, if that is to be told."""
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -52,6 +52,7 @@ class Joint(Rig):
 
     name, needed = "joint", ("inertia", "gravity_cos", "gravity_sin", "revolute")
     settings = ("--set position0=0.5 --set velocity0=0", "--set kind=imposed")
+    rate_of: ClassVar[Mapping[str, str]] = {"velocity": "position"}
     begins = "A column position gives the initial state by its first sample."
     schema = RigSchema(
         constants={},
