@@ -232,7 +232,7 @@ class _Block:
         self.measured = np.zeros((self.count, len(self.outputs), WIDTH))
         self.repeated = np.ones((self.count, len(self.outputs), WIDTH))
         for lane, trial in enumerate(self.trials):
-            judged = rig.follows(trial) & with_new_noise(trial, lasts_s)
+            judged = rig.follows(trial) & are_news(trial, lasts_s)
             for k, name in enumerate(self.outputs):
                 column = trial[name]
                 finite = np.isfinite(column) & judged
@@ -289,7 +289,7 @@ class _Block:
             yield {o: self.measured[:n, k, lane] - y[:n, k, lane] for k, o in enumerate(self.outputs)}
 
 
-def with_new_noise(trial: Trial, lasts_s: float) -> np.ndarray:
+def are_news(trial: Trial, lasts_s: float) -> np.ndarray:
     """Samples so far apart that the noise of each is its own, shape (n,).
 
     Where noise lasts, those within twice its time of an end are left out: what made it last had less to average there.

@@ -10,7 +10,7 @@ from fes_pin.data.study import read_study
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.stored import load_random, random_table
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.predictor import with_new_noise
+from fes_pin.models.predictor import are_news
 from fes_pin.models.store import model_toml
 
 
@@ -51,8 +51,8 @@ def test_noise_that_was_averaged_lasts_and_is_no_motion(made, least, most, tmp_p
 
 def test_readings_that_count_are_apart_and_off_the_ends(tmp_path):
     trial = read_study(draw((), 0.3, 22, tmp_path).study).trials[0].first(101)
-    assert with_new_noise(trial, 0.0).all()
-    assert list(np.flatnonzero(with_new_noise(trial, 10 * trial.dt))) == [20, 30, 40, 50, 60, 70, 80]
+    assert are_news(trial, 0.0).all()
+    assert list(np.flatnonzero(are_news(trial, 10 * trial.dt))) == [20, 30, 40, 50, 60, 70, 80]
 
 
 def test_it_is_kept_with_a_model(tmp_path):
