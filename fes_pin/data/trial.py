@@ -53,6 +53,9 @@ class Trial:
         A label of the condition that it was measured under, or None.
     remarks
         What was done to its samples when it was read: filled in, interpolated.
+    low_pass_hz
+        Where its readings were low-passed, without delay, before they were stored, Hz; None where they were not. What
+        is simulated of the trial is low-passed there as well.
 
     Raises
     ------
@@ -68,6 +71,7 @@ class Trial:
     role: str | None = None
     group: str | None = None
     remarks: tuple[str, ...] = ()
+    low_pass_hz: float | None = None
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)
@@ -89,6 +93,7 @@ class Trial:
             self.role,
             self.group,
             self.remarks,
+            self.low_pass_hz,
         )
 
     def __len__(self) -> int:

@@ -19,13 +19,15 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.driven import driven_diagnosis
 from fes_pin.diagnose.free import judge_free, unfitted
 from fes_pin.diagnose.long_records import searched_part, thinned
+from fes_pin.diagnose.misread import NAME as MISREAD
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.restate import restated_study, search_with_conditions, with_misread
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import NominalFitError, SimulationSearch
 from fes_pin.diagnose.searches import Result, Search, Searches
-from fes_pin.models.catalogue import Source, catalogue_of
+from fes_pin.identify.recording import earns, low_pass_of
+from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.workers import Progress, one_thread_each, time_limit
 
@@ -69,42 +71,102 @@ def diagnose_joint(
     tell = progress or (lambda _share, _words: None)
     catalogue, made = catalogue_of(library), provenance_now(study, seed)
     measured = measured_study(study)
-    study, nominal = measured.study, nominal_model(measured.study)
-    warnings = [*measured.warnings, *check_study(study, nominal)]
-    train, test = split(study)
-    train, spared, said = searched_part(train)
-    test, warnings = test or spared, warnings + said
-    effects = catalogue.effects_for(nominal.rig)
+    warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
+    work = _Work(catalogue, seed, tell, math.inf if limit is None else began + limit)
     with one_thread_each():
-        recorded = train if said else [t for t in study.trials if t.role != "held_out"]
-
-        searches = Searches(nominal, train, recorded, test, effects, seed, tell)
-        try:
-            with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
-                search, searched, again = search_with_conditions(nominal, train, searches.run)
-            tell(0.88, "held-out gain")
-            whole, stated = study, train
-            if again is not None:
-                train, whole = again.trials, restated_study(study, nominal, again.misread)
-            diagnosis = _judged(whole, search, searched, (train, test), seed)
-            if _may_be_driven(diagnosis, search, train):
-                with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
-                    search, searched = searches.by_likelihood(train)
-                diagnosis = _judged(whole, search, searched, (train, test), seed)
-            if again is not None:
-                diagnosis = with_misread(diagnosis, again, stated, test, seed)
-        except NominalFitError as problem:
-            diagnosis = unfitted(study, problem.nominal, str(problem), test)
-        except (ArithmeticError, np.linalg.LinAlgError) as problem:
-            reason = f"the search met numbers that cannot be calculated with ({problem})"
-            assert searches.last is not None
-            diagnosis = unfitted(study, searches.last.nominal(), reason, test)
+        diagnosis = work.diagnosis(measured.study)
+        if (passed := _low_passed(diagnosis)) is not None:
+            diagnosis = _likelier(work.diagnosis(passed), diagnosis)
     tell(1.0, "done")
     warnings += diagnosis.warnings
-    if limit is not None and searches.last is not None and searches.last.was_stopped:
+    if work.was_stopped:
         warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
     found = replace(diagnosis, left_out=measured.left_out, warnings=tuple(warnings), catalogue=catalogue)
     return replace(found, provenance=made, wall_s=time.perf_counter() - began)
+
+
+class _Work:
+    """What turns a study that was measured into a diagnosis.
+
+    Parameters
+    ----------
+    catalogue, seed, tell
+        As of `diagnose_joint`.
+    end
+        When searches must have ended, of `time.perf_counter`.
+
+    Attributes
+    ----------
+    was_stopped
+        True if one had to.
+    """
+
+    def __init__(self, catalogue: Catalogue, seed: int, tell: Progress, end: float) -> None:
+        self.catalogue, self.seed, self.tell, self.end, self.was_stopped = catalogue, seed, tell, end, False
+
+    def diagnosis(self, study: Study) -> Diagnosis:
+        """Search the causes of one study, and judge what is found."""
+        nominal = nominal_model(study)
+        train, test = split(study)
+        train, spared, said = searched_part(train)
+        test = test or spared
+        recorded = train if said else [t for t in study.trials if t.role != "held_out"]
+        effects = self.catalogue.effects_for(nominal.rig)
+        searches = Searches(nominal, train, recorded, test, effects, self.seed, self.tell)
+        try:
+            found = self._judged(study, searches, train, test)
+        except NominalFitError as problem:
+            found = unfitted(study, problem.nominal, str(problem), test)
+        except (ArithmeticError, np.linalg.LinAlgError) as problem:
+            reason = f"the search met numbers that cannot be calculated with ({problem})"
+            assert searches.last is not None
+            found = unfitted(study, searches.last.nominal(), reason, test)
+        self.was_stopped |= searches.last is not None and searches.last.was_stopped
+        return replace(found, warnings=(*said, *found.warnings))
+
+    def _judged(self, study: Study, searches: Searches, train: list[Trial], test: list[Trial]) -> Diagnosis:
+        with time_limit(self.end - time.perf_counter()):
+            search, searched, again = search_with_conditions(searches.nominal, train, searches.run)
+        self.tell(0.88, "held-out gain")
+        whole, stated = study, train
+        if again is not None:
+            train, whole = again.trials, restated_study(study, searches.nominal, again.misread)
+        diagnosis = _judged(whole, search, searched, (train, test), self.seed)
+        if _may_be_driven(diagnosis, search, train):
+            with time_limit(self.end - time.perf_counter()):
+                search, searched = searches.by_likelihood(train)
+            diagnosis = _judged(whole, search, searched, (train, test), self.seed)
+        return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
+
+
+def _low_passed(diagnosis: Diagnosis) -> Study | None:
+    """The study with the low pass that its readings seem to have gone through; None where nothing speaks for one.
+
+    Only where something is left is it asked for. Of rigs that are judged by the likelihood, `identify.lasting` finds
+    how long noise lasts instead.
+    """
+    restated = any(c.name == MISREAD for c in diagnosis.causes)
+    if not diagnosis.remainder.unexplained or diagnosis.extended.doubt is not None or restated:
+        return None
+    nominal, study = diagnosis.nominal, diagnosis.study
+    try:
+        cutoff = low_pass_of(nominal.model, nominal.trials)
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return None
+    return (
+        None if cutoff is None else replace(study, trials=tuple(replace(t, low_pass_hz=cutoff) for t in study.trials))
+    )
+
+
+def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:
+    """The diagnosis of readings as low-passed, if what it leaves is the likelier noise by what a low pass must earn."""
+    fits = passed.extended, recorded.extended
+    if passed.extended.doubt is not None or not earns(*fits):
+        return recorded
+    trials = passed.extended.trials
+    names = " and ".join(dict.fromkeys(n for t in trials for n in passed.extended.model.rig.outputs(t.kind) if n in t))
+    said = f"{names} seems low-passed at {trials[0].low_pass_hz:.2g} Hz: what is simulated was low-passed there as well"
+    return replace(passed, warnings=(said, *passed.warnings))
 
 
 def _judged(
