@@ -67,7 +67,13 @@ def low_pass(values: np.ndarray, dt: float, cutoff_hz: float = CUTOFF_HZ) -> np.
         raise InputError(
             f"{len(values)} samples are too few for a low pass of {cutoff_hz:g} Hz; {reach + 1} are needed"
         )
-    return sosfiltfilt(butter(ORDER, design, fs=1.0 / dt, output="sos"), values, axis=0, padlen=reach)
+    return sosfiltfilt(_butterworth(design * dt), values, axis=0, padlen=reach)
+
+
+@lru_cache(maxsize=64)
+def _butterworth(cutoff: float) -> np.ndarray:
+    """Second-order sections of the filter, from its cut-off in units of the sampling rate."""
+    return np.asarray(butter(ORDER, cutoff, fs=1.0, output="sos"))
 
 
 def rates(values: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -29,7 +29,7 @@ from fes_pin.diagnose.searches import Result, Search, Searches
 from fes_pin.identify.recording import earns, low_pass_of
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
-from fes_pin.workers import Progress, one_thread_each, time_limit
+from fes_pin.workers import OutOfTime, Progress, one_thread_each, time_limit
 
 
 def diagnose_joint(
@@ -75,7 +75,7 @@ def diagnose_joint(
     work = _Work(catalogue, seed, tell, math.inf if limit is None else began + limit)
     with one_thread_each():
         diagnosis = work.diagnosis(measured.study)
-        if (passed := _low_passed(diagnosis)) is not None:
+        if not work.was_stopped and (passed := _low_passed(diagnosis, work.end)) is not None:
             diagnosis = _likelier(work.diagnosis(passed), diagnosis)
     tell(1.0, "done")
     warnings += diagnosis.warnings
@@ -139,7 +139,7 @@ class _Work:
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
 
 
-def _low_passed(diagnosis: Diagnosis) -> Study | None:
+def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
     """The study with the low pass that its readings seem to have gone through; None where nothing speaks for one.
 
     Only where something is left is it asked for. Of rigs that are judged by the likelihood, `identify.lasting` finds
@@ -150,12 +150,12 @@ def _low_passed(diagnosis: Diagnosis) -> Study | None:
         return None
     nominal, study = diagnosis.nominal, diagnosis.study
     try:
-        cutoff = low_pass_of(nominal.model, nominal.trials)
-    except (ArithmeticError, np.linalg.LinAlgError):
+        with time_limit(end - time.perf_counter()):
+            cutoff = low_pass_of(nominal.model, nominal.trials)
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
         return None
-    return (
-        None if cutoff is None else replace(study, trials=tuple(replace(t, low_pass_hz=cutoff) for t in study.trials))
-    )
+    passed = tuple(replace(t, low_pass_hz=cutoff) for t in study.trials)
+    return None if cutoff is None else replace(study, trials=passed)
 
 
 def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:

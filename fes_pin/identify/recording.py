@@ -27,8 +27,9 @@ Of ten samples' averages it is below 0.15, of a sensor's noise above 0.5 (`tests
 EARNED = 0.1
 """Twice the log-likelihood that a low pass must earn for each sample: of readings that were low-passed 0.2 to 10, of
 others, whose model misses a cause, at most 0.07."""
-LEAST_HZ, MOST = 1.0, 0.2
-"""Cut-offs that are tried: from here to this share of the sampling rate."""
+PERIODS, MOST = 10.0, 0.2
+"""Cut-offs that are tried: from so many periods in the shortest trial, of which the ends are one or two, to this share
+of the sampling rate."""
 TRIED = 12
 """Cut-offs, each as many times the one before, between which the best is then sought."""
 
@@ -42,24 +43,38 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
         The nominal one, with start values.
     trials
         What was measured: freely simulated, not imposed.
+
+    Returns
+    -------
+    float or None
+        Hz, between what ten periods of the shortest trial and a fifth of the sampling rate can tell.
+
+    Raises
+    ------
+    FloatingPointError
+        For residuals that are not finite.
+    OutOfTime
+        Where a limit of time ends.
     """
-    if any(t.kind == IMPOSED for t in trials):
+    dt, shortest = max(t.dt for t in trials), min(t.duration for t in trials)
+    if any(t.kind == IMPOSED for t in trials) or PERIODS / shortest >= MOST / dt:
         return None
     rough = rough_noise(model, trials)
     begun = fit_multistart(Problem(model, trials, rough), model.parameters())
     left = noise_of(begun)
     if any(rough[n].std > SMOOTH * left[n].std for n in left):
         return None
-    dt = max(t.dt for t in trials)
 
     def fitted(log_hz: float) -> Fit:
         passed = [replace(t, low_pass_hz=float(np.exp(log_hz))) for t in trials]
         return fit_problem(Problem(model, passed, rough), begun.values)
 
-    grid = np.linspace(math.log(LEAST_HZ), math.log(MOST / dt), TRIED)
+    grid = np.linspace(math.log(PERIODS / shortest), math.log(MOST / dt), TRIED)
     costs = [_cost(fitted(x)) for x in grid]
     best = int(np.argmin(costs))
-    near = (grid[max(best - 1, 0)], grid[min(best + 1, TRIED - 1)])
+    if best in (0, TRIED - 1):  # at the end of what can be told
+        return None
+    near = (grid[best - 1], grid[best + 1])
     found = minimize_scalar(lambda x: _cost(fitted(x)), bounds=near, method="bounded", options={"xatol": 0.01})
     return float(np.exp(found.x)) if earns(fitted(found.x), begun) else None
 

@@ -16,6 +16,7 @@ from fes_pin.models.compile.program import Program, compiled_program
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
+from fes_pin.models.storage import pass_as_stored
 
 MAX_STEP_S = 2.5e-3
 """Longest integration step, s: 1/20 of a muscle's time constant; at 1/17 s of damping RK4 errs by 1e-6 rad a swing."""
@@ -24,8 +25,6 @@ FIRST_S = 0.2
 its power 3/2, and a model that is worth its name is right for so short a time."""
 FEWEST = 6
 """Samples that an estimate of position and rate is made from at least."""
-FEWEST_PERIODS = 2.0
-"""Periods of a low pass that a record has at least to be filtered; its ends are of another kind."""
 NEWTON_STEPS = 3
 NUDGE = 1e-4
 """Step of the differences in position (rad or m) and rate that the estimate is made with."""
@@ -261,19 +260,8 @@ class _Block:
         for lane, trial in enumerate(self.trials):
             if len(trial) < self.count:
                 y[len(trial) :, :, lane] = s[len(trial) :, ..., lane] = 0.0
-            if trial.low_pass_hz is not None:
-                _low_passed(y[: len(trial), ..., lane], trial)
-                _low_passed(s[: len(trial), ..., lane], trial)
+        pass_as_stored(self.trials, (y, s))
         return Abreast(tuple(self.lanes), self.places, y, s)
-
-
-def _low_passed(values: np.ndarray, trial: Trial) -> None:
-    """Filter readings of a trial, or their sensitivities, in place, as its record was; not of one that is too short."""
-    from fes_pin.data.smooth import low_pass  # noqa: PLC0415 - half a second, for few records
-
-    assert trial.low_pass_hz is not None
-    if len(values) * trial.dt * trial.low_pass_hz > FEWEST_PERIODS and np.isfinite(values).all():
-        values[:] = low_pass(values, trial.dt, trial.low_pass_hz)
 
 
 def max_step(model: Model) -> float:
