@@ -12,8 +12,9 @@ import numpy as np
 from fes_pin.contrast.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight, group_problem
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.significance import MIN_UNITS
-from fes_pin.diagnose.search.library import Library, near_null
+from fes_pin.diagnose.search.library import Library
 from fes_pin.diagnose.search.score import Projection, Scores
+from fes_pin.diagnose.search.starts import started
 from fes_pin.identify.problem import Linearized
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -206,7 +207,7 @@ def _promise(
         nulls = np.array([info[n.split(".")[1]].null or 0.0 for n in names])
         low, high = np.array([[info[n.split(".")[1]].lower, info[n.split(".")[1]].upper] for n in names]).T
         step = np.clip(step, low - nulls, high - nulls)
-        effect = _started(effect, dict(zip(names, (float(v) for v in step + nulls), strict=True)))
+        effect = started(effect, dict(zip(effect.amplitudes(), (float(v) for v in step + nulls), strict=True)))
         start: dict[str, float] = {}
     else:
         assert item.group is not None
@@ -218,16 +219,6 @@ def _promise(
             start[f"{name}@{item.group}"] = wanted if wanted else values[path]
     gain = float(2.0 * along @ step - step @ gram @ step)
     return Promise(item, effect, gain, degrees, kept, deviation, start)
-
-
-def _started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
-    """The effect at a linear estimate, or a step from its null where that says nothing."""
-    info, values = effect.parameters(), {}
-    for path, value in amplitudes.items():
-        name = path.split(".")[1]
-        null = info[name].null or 0.0
-        values[name] = near_null(type(effect), name) if abs(value - null) < 1e-6 * info[name].scale else value
-    return replace(effect, **values)  # type: ignore[arg-type]
 
 
 def units(parts: Sequence[Linearized]) -> list[slice]:

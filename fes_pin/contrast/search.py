@@ -17,6 +17,7 @@ from fes_pin.contrast.grouped import Grouped, Item
 from fes_pin.contrast.promises import Promise
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.experiment import SEPARABLE
+from fes_pin.diagnose.search.starts import STARTS
 from fes_pin.identify.fit import PARAMETER_PRICE
 from fes_pin.workers import Progress, in_parallel
 
@@ -28,8 +29,6 @@ FITTED_DRIVEN = 6
 """The same on driven rigs, where a fit is some five times as long and the screen already holds what is random."""
 CONVERGED = 3
 """Sets that go on until they converge, those that are cheapest after a few steps."""
-STARTS = 2
-"""Shapes that a fit starts from."""
 SWAPS = 2
 """Rounds in which items may be replaced by better ones."""
 

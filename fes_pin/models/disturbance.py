@@ -67,7 +67,7 @@ def disturbed(model: Model, kind: str, processes: Sequence[str]) -> Model:
     """The model with those of the processes that a kind of trial can feel; a random force only where no joint moves."""
     signals = model.rig.signals(kind)
     for one in DISTURBANCES:
-        moves = one is RandomForce and RandomEffort.signal in signals and model.rig.name in RandomEffort.rigs
-        if set(one.states) <= set(processes) and one.signal in signals and not moves and model.rig.name in one.rigs:
+        moves = one is RandomForce and RandomEffort.signal in signals and model.rig.takes(RandomEffort)
+        if set(one.states) <= set(processes) and one.signal in signals and not moves and model.rig.takes(one):
             model = model + one()
     return model

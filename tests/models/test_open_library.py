@@ -14,8 +14,12 @@ from scipy.integrate import solve_ivp
 
 import fes_pin as fp
 from fes_pin.cli.main import main
+from fes_pin.diagnose.search.starts import refinements
 from fes_pin.models import rigs
 from fes_pin.models.catalogue import installed, shipped
+from fes_pin.models.disturbance import disturbed
+from fes_pin.models.effects import CoulombFriction
+from fes_pin.models.model import Model
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "own_causes_and_rigs.md"
 INERTIA, STIFFNESS, DAMPING, ONE_WAY = 0.02, 0.9, 0.01, 0.03
@@ -262,3 +266,15 @@ def test_nothing_asks_for_a_rigs_name():
             if len(found & names) and not {"nerve", "sensor"} <= found:  # a table by stage is another matter
                 asked.append(f"{path.name}:{node.lineno}")
     assert not asked
+
+
+def test_a_rig_like_a_joint_has_its_random_effort_and_its_forms_of_friction(own):
+    """A band's stretch is one that only joints have, and whatever is like one."""
+    (rig,) = (one for one in fp.load_library(own / "tail.py").rigs if one.name == "tail")
+    model = Model(rig(constants={"stiffness_nm_per_rad": 1.0})) + CoulombFriction()
+    assert [e.name for e in disturbed(model, "motion", ("effort",)).effects] == ["coulomb_friction", "random_effort"]
+    time = np.linspace(0.0, 9.0, 100)
+    measured = {"time": time, "position": np.sin(time), "reading": np.sin(time)}
+    forms = [m.effects[0].refined() for m in refinements(model, CoulombFriction(), measured)]
+    assert ("stretch",) in forms
+    assert ("asymmetry",) not in forms

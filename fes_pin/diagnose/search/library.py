@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.search.starts import near_null
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.problem import Problem, measured_columns
@@ -17,9 +18,6 @@ from fes_pin.models.catalogue import installed
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
-
-TINY = 0.02
-"""Share of an amplitude's scale at which a one-sided effect is linearized: next to its null, on its own side."""
 
 
 @dataclass(frozen=True)
@@ -105,18 +103,3 @@ class Library:
             self._problems[key] = Problem(model, trials, noise, free)
         self._problems[key].noise = noise
         return self._problems[key]
-
-
-def near_null(effect: type[Effect], name: str) -> float:
-    """The null of an amplitude, or next to it where that is a bound."""
-    info = effect.parameters()[name]
-    assert info.null is not None
-    one_sided = info.null in {info.lower, info.upper}
-    return info.null + (TINY * info.scale if one_sided else 0.0)
-
-
-def far_sizes(effect: Effect) -> list[Effect]:
-    """The effect at the start values that its amplitudes have of themselves."""
-    info = effect.parameters()
-    chosen: list[dict[str, Any]] = [{name: value} for name in effect.amplitudes() for value in info[name].grid]
-    return [replace(effect, **one) for one in chosen]

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.search.library import Library, Probe, far_sizes, near_null
+from fes_pin.diagnose.search.library import Library, Probe
 from fes_pin.diagnose.search.score import Projection, Scored, Scores, best_by_effect
 from fes_pin.diagnose.search.simulation_fits import Names, is_identified, names_of
+from fes_pin.diagnose.search.starts import STARTS, begun_anew, far_sizes, refinements, started
 from fes_pin.identify.covariance import moved_with
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit, fit_problem
@@ -27,8 +26,6 @@ from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
-STARTS = 2
-"""Shapes that a fit of a set starts from, largest score first, if it is half the largest at least."""
 SCREEN_ITERATIONS = 4
 """Steps of a first fit of a set, at what is random in a smaller one."""
 CONVERGED_SETS = 4
@@ -283,7 +280,7 @@ class LikelihoodFits:
         They were adopted one after another, and the first may have bent to what a later one says.
         """
         base = self.fits[names]
-        starts = [s for effect in base.model.effects for s in self._begun_anew(base.model, effect)]
+        starts = [s for effect in base.model.effects for s in begun_anew(base.model, effect, self.library.measured)]
         return self._cheaper(starts, base, base.price - WORTH)
 
     def _cheaper(self, starts: Sequence[Model], base: Fit, price: float) -> Fit | None:
@@ -295,15 +292,6 @@ class LikelihoodFits:
         worth = [f for f in looks[:STARTS] if f.price < base.price + PARAMETER_PRICE]
         best = min(in_parallel(self._go_on, worth), key=lambda f: f.price, default=None)
         return best if best is not None and best.price < price else None
-
-    def _begun_anew(self, model: Model, effect: Effect) -> list[Model]:
-        """The start of an effect with several refinements from their most likely values; none of others."""
-        adopted = [names for names in effect.refinements() if names[0] in effect.refined()]
-        if len(adopted) < 2:
-            return []
-        grids = effect.grids(self.library.measured)
-        starts = {f"{effect.name}.{n}": grids[n][0] for names in adopted for n in names if len(grids[n])}
-        return [model.with_parameters(starts)]
 
     def _first_fit(self, start: Model, base: Fit) -> Fit:
         """A few steps from a start, at what is random in another fit."""
@@ -326,27 +314,3 @@ def is_possible(fitted: Fit) -> bool:
             if f"{effect.name}.{n}" in fitted.at_bound and getattr(effect, n) != info[n].null:
                 return False
     return True
-
-
-def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
-    """The effect at a linear estimate of its amplitudes, or a step from its null where that says nothing."""
-    info = effect.parameters()
-    values: dict[str, Any] = {}
-    for name, value in amplitudes.items():
-        null, one = info[name].null, info[name]
-        assert null is not None
-        nothing = abs(value - null) < 1e-6 * one.scale
-        values[name] = near_null(type(effect), name) if nothing else float(np.clip(value, one.lower, one.upper))
-    return replace(effect, **values)
-
-
-def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
-    """Starts with one more refinement of an effect switched on."""
-    out, info, refined, grids = [], effect.parameters(), effect.refined(), effect.grids(measured)
-    for names in effect.refinements():
-        if names[0] in refined or model.rig.name not in (info[names[0]].rigs or effect.rigs):
-            continue
-        paths = [f"{effect.name}.{n}" for n in names]
-        for values in itertools.product(*(grids[n] for n in names)):
-            out.append(model.with_parameters(dict(zip(paths, values, strict=True))))
-    return out

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.search.library import Library, far_sizes, near_null
+from fes_pin.diagnose.search.library import Library
 from fes_pin.diagnose.search.score import Projection, Scored, Scores
+from fes_pin.diagnose.search.starts import STARTS, far_sizes, fits_rig, near_null
 from fes_pin.identify.fit import (
     CONFIDENCE_95,
     GROSS,
@@ -30,8 +31,6 @@ from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
-STARTS = 2
-"""Shapes that a joint fit starts from."""
 FIRST_ITERATIONS = 15
 """Iterations of a first fit. Most fits end in fewer; the others go on only while they are among the best."""
 SCREEN_ITERATIONS = 5
@@ -289,7 +288,7 @@ def _refined(model: Model, effect: Effect) -> list[list[Model]]:
         return []
     out, info = [], effect.parameters()
     for names in effect.refinements():
-        if (only := info[names[0]].rigs) and {model.rig.name, *model.rig.like}.isdisjoint(only):
+        if not fits_rig(model, info[names[0]]):
             continue
         paths = [f"{effect.name}.{n}" for n in names]
         choices = itertools.product(*(info[n].grid for n in names))

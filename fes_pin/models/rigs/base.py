@@ -79,7 +79,12 @@ class Rig:
     @classmethod
     def takes(cls, effect: type[Effect] | Effect) -> bool:
         """True if the effect can be part of it."""
-        return not {cls.name, *cls.like}.isdisjoint(effect.rigs)
+        return cls.is_one_of(effect.rigs)
+
+    @classmethod
+    def is_one_of(cls, rigs: Collection[str]) -> bool:
+        """True if it, or one that it is like, has one of these names."""
+        return not {cls.name, *cls.like}.isdisjoint(rigs)
 
     def time_constants(self, kinds: Collection[str]) -> dict[str, float]:
         """Times in s that its answer takes at its own parameters, by what they are; only those that there are.

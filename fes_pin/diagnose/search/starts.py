@@ -1,0 +1,73 @@
+"""Where the fit of a cause starts: next to its null, at a linear estimate, far from it, and in another form."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fes_pin.models.model import Model
+from fes_pin.models.parameters import ParameterInfo
+from fes_pin.models.stage import Effect
+
+STARTS = 2
+"""Shapes that a fit of a set starts from, largest score first, if it is half the largest at least."""
+TINY = 0.02
+"""Share of an amplitude's scale at which a one-sided effect is linearized: next to its null, on its own side."""
+
+
+def near_null(effect: type[Effect], name: str) -> float:
+    """The null of an amplitude, or next to it where that is a bound."""
+    info = effect.parameters()[name]
+    assert info.null is not None
+    one_sided = info.null in {info.lower, info.upper}
+    return info.null + (TINY * info.scale if one_sided else 0.0)
+
+
+def far_sizes(effect: Effect) -> list[Effect]:
+    """The effect at the start values that its amplitudes have of themselves."""
+    info = effect.parameters()
+    chosen: list[dict[str, Any]] = [{name: value} for name in effect.amplitudes() for value in info[name].grid]
+    return [replace(effect, **one) for one in chosen]
+
+
+def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
+    """The effect at a linear estimate of its amplitudes, or a step from its null where that says nothing."""
+    info = effect.parameters()
+    values: dict[str, Any] = {}
+    for name, value in amplitudes.items():
+        null, one = info[name].null, info[name]
+        assert null is not None
+        nothing = abs(value - null) < 1e-6 * one.scale
+        values[name] = near_null(type(effect), name) if nothing else float(np.clip(value, one.lower, one.upper))
+    return replace(effect, **values)
+
+
+def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
+    """Starts with one more refinement of an effect switched on."""
+    out, info, refined, grids = [], effect.parameters(), effect.refined(), effect.grids(measured)
+    for names in effect.refinements():
+        if names[0] in refined or not fits_rig(model, info[names[0]]):
+            continue
+        paths = [f"{effect.name}.{n}" for n in names]
+        for values in itertools.product(*(grids[n] for n in names)):
+            out.append(model.with_parameters(dict(zip(paths, values, strict=True))))
+    return out
+
+
+def fits_rig(model: Model, refinement: ParameterInfo) -> bool:
+    """True if a refinement is for the model's rig."""
+    return not refinement.rigs or model.rig.is_one_of(refinement.rigs)
+
+
+def begun_anew(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
+    """The start of an effect with several refinements from their most likely values; none of others."""
+    adopted = [names for names in effect.refinements() if names[0] in effect.refined()]
+    if len(adopted) < 2:
+        return []
+    grids = effect.grids(measured)
+    starts = {f"{effect.name}.{n}": grids[n][0] for names in adopted for n in names if len(grids[n])}
+    return [model.with_parameters(starts)]
