@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from fes_pin.identify.problem import (
     normal_equations,
     whitened_sse,
 )
+from fes_pin.models.parameters import ParameterInfo
 
 TRIES = 12
 """Steps that are tried, each ten times as damped as the last, before a point counts as the lowest there is."""
@@ -68,6 +69,7 @@ class Descent:
         self.problem, self.names = problem, problem.free
         self.lower = np.array([problem.limits[n][0] for n in self.names])
         self.upper = np.array([problem.limits[n][1] for n in self.names])
+        self.products = list(_products(self.names, problem.model.parameter_info()))
         self.fixed = dict(start)
         self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
         self.unknowns = problem.start_unknowns() if unknowns is None else problem.completed(unknowns)
@@ -119,7 +121,7 @@ class Descent:
         system = self._system
         move = self._bounded_move(system, damping)
         promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
-        return _Proposal(damping, self.x + move, self._moved(system.local_steps(move)), float(promised))
+        return _Proposal(damping, self._end(move), self._moved(system.local_steps(move)), float(promised))
 
     def _shorter(self, failed: _Proposal, count: int) -> list[_Proposal]:
         """Proposals of growing damping, so many at most, to the first that is not worth a try."""
@@ -162,6 +164,15 @@ class Descent:
             move[first], free[first] = room[first], False
         return np.clip(self.x + move, self.lower, self.upper) - self.x
 
+    def _end(self, move: np.ndarray) -> np.ndarray:
+        """Where a step leads that is straight in an amplitude k and in its product k r with a shape."""
+        out = self.x + move
+        for shape, k in self.products:
+            if out[k] != 0.0:
+                bent = self.x[shape] + move[shape] * self.x[k] / out[k]
+                out[shape] = np.clip(bent, self.lower[shape], self.upper[shape])
+        return out
+
     def _moved(self, steps: list[np.ndarray]) -> Unknowns:
         if not steps:
             return self.unknowns
@@ -170,6 +181,15 @@ class Descent:
             {n: u[n] + float(d) for n, d in zip(names, step, strict=True)}
             for u, step in zip(self.unknowns, steps, strict=True)
         ]
+
+
+def _products(names: Sequence[str], info: Mapping[str, ParameterInfo]) -> Iterator[tuple[int, int]]:
+    """Places of shapes and of the amplitudes that they are factors of; those of a group are that group's."""
+    for at, name in enumerate(names):
+        path, mark, group = name.partition("@")
+        amplitude = f"{path.rpartition('.')[0]}.{info[name].times}{mark}{group}"
+        if info[name].times and amplitude in names:
+            yield at, names.index(amplitude)
 
 
 def _relief(kept: float) -> float:

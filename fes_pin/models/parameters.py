@@ -41,6 +41,8 @@ class ParameterInfo:
         True for a refinement of the form: it stays at its null (or default) until data demand it.
     rigs
         The rigs on which a refinement is tried; empty for all of its effect's.
+    times
+        The amplitude that a shape is a factor of: what acts is linear in the amplitude and in their product.
     """
 
     unit: str = ""
@@ -52,6 +54,7 @@ class ParameterInfo:
     fitted: bool = True
     optional: bool = False
     rigs: tuple[str, ...] = ()
+    times: str = ""
 
     def in_units(self, units: Mapping[str, str]) -> ParameterInfo:
         """The same with the unit that it has on a rig.
@@ -76,9 +79,10 @@ def parameter(
     fitted: bool = True,
     optional: bool = False,
     rigs: tuple[str, ...] = (),
+    times: str = "",
 ) -> Any:
     """A dataclass field that is a parameter; see `ParameterInfo`."""
-    info = ParameterInfo(unit, null, lower, upper, scale, grid, fitted, optional, rigs)
+    info = ParameterInfo(unit, null, lower, upper, scale, grid, fitted, optional, rigs, times)
     return dataclasses.field(default=default, metadata={_KEY: info})
 
 
