@@ -7,7 +7,7 @@ of causes is judged by the likelihood of its one-step-ahead predictions, with a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,14 +15,14 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
-from fes_pin.diagnose.decide.held_out import Errors, Evidence, Gain, folds_of, held_out_gain, speaks_for
+from fes_pin.diagnose.decide.held_out import Evidence, Gain, speaks_for
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
+from fes_pin.diagnose.driven_held_out import Again, Fold, evidence_of, gains_of, held_errors_ahead, make_folds
 from fes_pin.diagnose.errors_ahead import (
     Ahead,
     AheadErrors,
     RandomPart,
     errors_ahead,
-    errors_over_horizon,
     random_parts,
 )
 from fes_pin.diagnose.remainder.driven import driven_remainder
@@ -32,15 +32,10 @@ from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import normal_equations
-from fes_pin.identify.turns import maximise, with_honest_intervals
-from fes_pin.workers import in_parallel
+from fes_pin.identify.turns import with_honest_intervals
 
 LARGE_SHARE = 0.1
 """Random effort, as a share of what drives the rig, from which something acts that no cause explains."""
-WIDE = 10.0
-"""Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size."""
 
 
 @dataclass(frozen=True)
@@ -110,12 +105,11 @@ def judge_driven(
     refused: dict[str, float] = {}
     horizon = horizon_s or default_horizon(train)
     settled = frozenset(found.without)
-    again = _Again()
+    again = Again()
     while True:
-        folds = _folds(found, train, test, again)
-        evidence = _evidence(folds, found, again) if folds else {}
-        errors = _errors(folds or [_Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon)
-        gains = {n: held_out_gain(errors[""], errors[n], errors["+"], seed) for n in found.without}
+        folds = make_folds(found, train, test, again)
+        evidence = evidence_of(folds, found, again) if folds else {}
+        gains = gains_of(folds or [Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon, seed)
         left = driven_remainder(found.best, seed)
         known = {n: None if left.unexplained else e for n, e in evidence.items()}
         weak = [n for n, e in known.items() if not speaks_for(e, gains[n], alone=len(known) == 1)]
@@ -137,18 +131,11 @@ def judge_driven(
         evidence=evidence,
         gains=gains,
         ahead=tuple(errors_ahead([(f, train)], horizon, falling) for f in (found.nominal, found.best)),  # type: ignore[arg-type]
-        held_out_ahead=_held_ahead(folds, horizon, falling),
+        held_out_ahead=held_errors_ahead(folds, horizon, falling),
         horizon_s=horizon,
         random=random,
         ceiling_percent=_ceiling(found.best),
     )
-
-
-def _errors(folds: Sequence[_Fold], found: Found, horizon_s: float) -> dict[str, Errors]:
-    """Over the horizon, on trials of each fold: of the nominal model (""), the best ("+"), and without each cause."""
-    chosen: dict[str, Callable[[_Fold], Fit]] = {"": lambda f: f.nominal, "+": lambda f: f.best}
-    chosen |= {n: lambda f, n=n: f.without[n] for n in found.without}  # type: ignore[misc]
-    return {n: errors_over_horizon([(of(f), f.best, f.test) for f in folds], horizon_s) for n, of in chosen.items()}
 
 
 def _ceiling(fitted: Fit) -> float:
@@ -175,99 +162,6 @@ def _left(
         stage = next(str(e.stage) for e in search.sets.library.effects if e.name == surest)
         return replace(left, unexplained=True, p_value=certain[surest], where=stage)
     return left
-
-
-@dataclass(frozen=True)
-class _Fold:
-    """Fits without some trials, and those trials."""
-
-    nominal: Fit
-    best: Fit
-    without: dict[str, Fit]
-    test: tuple[Trial, ...]
-    within: bool = True
-    """False if the trials were held out by the study itself, and are in no fit."""
-
-
-class _Again:
-    """Fits made again to other trials, each once: a set less a cause that is refused is the next set."""
-
-    def __init__(self) -> None:
-        self._kept: dict[tuple[int, tuple[int, ...]], tuple[Fit, Fit]] = {}
-
-    def __call__(self, wanted: Sequence[tuple[Fit, Sequence[Trial]]]) -> list[Fit]:
-        keys = [(id(fitted), tuple(map(id, trials))) for fitted, trials in wanted]
-        missing = {k: w for k, w in zip(keys, wanted, strict=True) if k not in self._kept}
-        made = in_parallel(lambda w: _refitted(*w), list(missing.values()))
-        self._kept |= {k: (w[0], one) for (k, w), one in zip(missing.items(), made, strict=True)}
-        return [self._kept[k][1] for k in keys]
-
-
-def _folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refitted: _Again) -> list[_Fold]:
-    """The study's own held-out trials, or every trial in its turn; none where there is but one."""
-    if test:
-        return [_Fold(found.nominal, found.best, found.without, tuple(test), within=False)]
-    if len(train) < 2:
-        return []
-    held = folds_of(train)
-    fits = {"": found.nominal, "+": found.best, **found.without}
-    others = [[t for i, t in enumerate(found.best.trials) if i not in out] for out in held]
-    wanted = [(k, n) for k in range(len(held)) for n in fits]
-    again = dict(zip(wanted, refitted([(fits[n], others[k]) for k, n in wanted]), strict=True))
-    return [
-        _Fold(again[k, ""], again[k, "+"], {n: again[k, n] for n in found.without}, tuple(train[i] for i in out))
-        for k, out in enumerate(held)
-    ]
-
-
-def _refitted(fitted: Fit, trials: Sequence[Trial]) -> Fit:
-    """A fit again, to other trials."""
-    assert fitted.doubt is not None
-    known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
-    problem = LikelihoodProblem(fitted.model, trials, fitted.doubt)
-    unknowns = [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
-    problem.sharpen()  # it begins near its end
-    return maximise(problem, fitted.values, unknowns)
-
-
-def _evidence(folds: Sequence[_Fold], found: Found, again: _Again) -> dict[str, Evidence]:
-    """What each cause adds to twice the log-likelihood of held-out trials, foretold by fits to the others.
-
-    By Bayes' rule p(held | others) = p(all) / p(others), each the integral over the parameters about its fit (Laplace):
-
-        -2 log p(trials) = cost + log det(1 + H S^2),   H the information, S the widths of a prior,
-
-    so that what the others leave in doubt of a parameter is doubt about the held trials as well. The ratio of
-    likelihoods of a true cause scatters by twice the root of its mean.
-    """
-    foretold = {n: 0.0 for n in ("", *found.without)}
-    for fold in folds:
-        whole, part = {"": found.best, **found.without}, {"": fold.best, **fold.without}
-        if not fold.within:
-            every = again([(whole[n], (*part[n].trials, *fold.test)) for n in foretold])
-            whole = dict(zip(foretold, every, strict=True))
-        for n in foretold:
-            foretold[n] += _weight(whole[n]) - _weight(part[n])
-    gains = {n: foretold[n] - foretold[""] for n in found.without}
-    return {n: Evidence(g, max(g, 0.0)) if np.isfinite(g) else Evidence(0.0, 0.0) for n, g in gains.items()}
-
-
-def _weight(fitted: Fit) -> float:
-    """Twice the negative log of the probability of a fit's trials; see `_evidence`."""
-    system = normal_equations(fitted.parts)
-    info = fitted.model.parameter_info()
-    widths = [WIDE * max(abs(fitted.values[n]), info[n].scale) for n in fitted.free]
-    scaled = system.hessian * np.outer(widths, widths)
-    return fitted.sse + float(np.linalg.slogdet(np.eye(len(widths)) + scaled)[1])
-
-
-def _held_ahead(folds: Sequence[_Fold], horizon_s: float, falling: bool) -> tuple[Ahead, Ahead] | None:
-    if not folds:
-        return None
-    return (
-        errors_ahead([(f.nominal, f.test) for f in folds], horizon_s, falling),
-        errors_ahead([(f.best, f.test) for f in folds], horizon_s, falling),
-    )
 
 
 def _of_smoothing(fitted: Fit) -> tuple[str, ...]:

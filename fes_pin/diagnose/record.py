@@ -94,6 +94,7 @@ def _cause(cause: Cause, held_out: bool) -> dict[str, Any]:
             "fit": shown(cause.gain_fit),
             "held_out": shown(held.percent) if held_out else None,
             "ci95": [shown(held.low), shown(held.high)],
+            **({"ahead_s": shown(held.ahead_s)} if held.ahead_s is not None else {}),
         },
     }
 

@@ -51,9 +51,7 @@ def cause_row(cause: Cause) -> tuple[str, str, str, str, str]:
     values = "\n".join(f"{n} {quantity(p.value, p.std, p.unit)}" for n, p in cause.parameters.items())
     if cause.trial is not None:
         values = f"trial {cause.trial}: {values}"
-    held = cause.gain_held_out
-    gain = f"{held.percent:.0f} % [{held.low:.0f}, {held.high:.0f}]"
-    return cause.name, cause.stage, values, gain, ", ".join(cause.equivalents) or "-"
+    return cause.name, cause.stage, values, str(cause.gain_held_out), ", ".join(cause.equivalents) or "-"
 
 
 def cause_table(causes: Sequence[Cause], gain: str) -> list[str]:

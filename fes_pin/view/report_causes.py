@@ -25,7 +25,7 @@ def causes_section(diagnosis: Diagnosis) -> list[Markup]:
         [
             element("code", c.name),
             stage_mark(c.stage),
-            _gain_text(c),
+            str(c.gain_held_out),
             probability(c.p_value).removeprefix("p = ").removeprefix("p "),
             ", ".join(c.equivalents) or "-",
         ]
@@ -50,14 +50,9 @@ def _rivals(diagnosis: Diagnosis, cause: Cause) -> Markup:
     return figure(rivals_drawing(diagnosis, cause), caption, "narrow", f"rivals_{cause.name}")
 
 
-def _gain_text(cause: Cause) -> str:
-    held = cause.gain_held_out
-    return f"{held.percent:.0f} % [{held.low:.0f}, {held.high:.0f}]"
-
-
 def _of_one_trial(diagnosis: Diagnosis, cause: Cause) -> Markup:
     """The card of a cause that concerns one trial, and is no part of the model."""
-    gain = f"Restated, it removes {_gain_text(cause)} of that trial's error above the noise, told by its other parts."
+    gain = f"Restated, it removes {cause.gain_held_out} of that trial's error above the noise, told by its other parts."
     return element(
         "article",
         element(
@@ -83,7 +78,7 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
     where = f"held-out trials ({cause.gain_fit:.0f} % on the fitted ones)"
     if not diagnosis.was_held_out:
         where = "the trials that were fitted: there was nothing to hold out"
-    gain = f"It removes {_gain_text(cause)} of the error above the noise on {where}."
+    gain = f"It removes {cause.gain_held_out} of the error above the noise on {where}."
     return element(
         "article",
         element(

@@ -33,11 +33,19 @@ nine drawn rigs the low end was 0.27 % and more."""
 
 @dataclass(frozen=True)
 class Gain:
-    """Share, in percent, of the nominal model's squared error above the noise that an extension removes."""
+    """Share, in percent, of the nominal model's squared error above the noise that an extension removes.
+
+    `ahead_s` says how far ahead, where that is further than the horizon.
+    """
 
     percent: float
     low: float
     high: float
+    ahead_s: float | None = None
+
+    def __str__(self) -> str:
+        further = "" if self.ahead_s is None else f", {self.ahead_s:.2g} s ahead"
+        return f"{self.percent:.0f} % [{self.low:.0f}, {self.high:.0f}]{further}"
 
     @property
     def is_material(self) -> bool:

@@ -1,0 +1,145 @@
+"""Trials held out of the diagnosis of a driven rig: what its causes add to their likelihood, and to errors ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.decide.held_out import Errors, Evidence, Gain, folds_of, held_out_gain
+from fes_pin.diagnose.errors_ahead import Ahead, errors_ahead, errors_over_horizon
+from fes_pin.diagnose.search.likelihood_search import Found
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.problem import normal_equations
+from fes_pin.identify.turns import maximise
+from fes_pin.workers import in_parallel
+
+WIDE = 10.0
+"""Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size."""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Fits without some trials, and those trials."""
+
+    nominal: Fit
+    best: Fit
+    without: dict[str, Fit]
+    test: tuple[Trial, ...]
+    within: bool = True
+    """False if the trials were held out by the study itself, and are in no fit."""
+
+
+class Again:
+    """Fits made again to other trials, each once: a set less a cause that is refused is the next set."""
+
+    def __init__(self) -> None:
+        self._kept: dict[tuple[int, tuple[int, ...]], tuple[Fit, Fit]] = {}
+
+    def __call__(self, wanted: Sequence[tuple[Fit, Sequence[Trial]]]) -> list[Fit]:
+        keys = [(id(fitted), tuple(map(id, trials))) for fitted, trials in wanted]
+        missing = {k: w for k, w in zip(keys, wanted, strict=True) if k not in self._kept}
+        made = in_parallel(lambda w: _refitted(*w), list(missing.values()))
+        self._kept |= {k: (w[0], one) for (k, w), one in zip(missing.items(), made, strict=True)}
+        return [self._kept[k][1] for k in keys]
+
+
+def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refitted: Again) -> list[Fold]:
+    """The study's own held-out trials, or every trial in its turn; none where there is but one."""
+    if test:
+        return [Fold(found.nominal, found.best, found.without, tuple(test), within=False)]
+    if len(train) < 2:
+        return []
+    held = folds_of(train)
+    fits = {"": found.nominal, "+": found.best, **found.without}
+    others = [[t for i, t in enumerate(found.best.trials) if i not in out] for out in held]
+    wanted = [(k, n) for k in range(len(held)) for n in fits]
+    again = dict(zip(wanted, refitted([(fits[n], others[k]) for k, n in wanted]), strict=True))
+    return [
+        Fold(again[k, ""], again[k, "+"], {n: again[k, n] for n in found.without}, tuple(train[i] for i in out))
+        for k, out in enumerate(held)
+    ]
+
+
+def _refitted(fitted: Fit, trials: Sequence[Trial]) -> Fit:
+    """A fit again, to other trials."""
+    assert fitted.doubt is not None
+    known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
+    problem = LikelihoodProblem(fitted.model, trials, fitted.doubt)
+    unknowns = [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
+    problem.sharpen()  # it begins near its end
+    return maximise(problem, fitted.values, unknowns)
+
+
+def evidence_of(folds: Sequence[Fold], found: Found, again: Again) -> dict[str, Evidence]:
+    """What each cause adds to twice the log-likelihood of held-out trials, foretold by fits to the others.
+
+    By Bayes' rule p(held | others) = p(all) / p(others), each the integral over the parameters about its fit (Laplace):
+
+        -2 log p(trials) = cost + log det(1 + H S^2),   H the information, S the widths of a prior,
+
+    so that what the others leave in doubt of a parameter is doubt about the held trials as well. The ratio of
+    likelihoods of a true cause scatters by twice the root of its mean.
+    """
+    foretold = {n: 0.0 for n in ("", *found.without)}
+    for fold in folds:
+        whole, part = {"": found.best, **found.without}, {"": fold.best, **fold.without}
+        if not fold.within:
+            every = again([(whole[n], (*part[n].trials, *fold.test)) for n in foretold])
+            whole = dict(zip(foretold, every, strict=True))
+        for n in foretold:
+            foretold[n] += _weight(whole[n]) - _weight(part[n])
+    gains = {n: foretold[n] - foretold[""] for n in found.without}
+    return {n: Evidence(g, max(g, 0.0)) if np.isfinite(g) else Evidence(0.0, 0.0) for n, g in gains.items()}
+
+
+def _weight(fitted: Fit) -> float:
+    """Twice the negative log of the probability of a fit's trials; see `evidence_of`."""
+    system = normal_equations(fitted.parts)
+    info = fitted.model.parameter_info()
+    widths = [WIDE * max(abs(fitted.values[n]), info[n].scale) for n in fitted.free]
+    scaled = system.hessian * np.outer(widths, widths)
+    return fitted.sse + float(np.linalg.slogdet(np.eye(len(widths)) + scaled)[1])
+
+
+def held_errors_ahead(folds: Sequence[Fold], horizon_s: float, falling: bool) -> tuple[Ahead, Ahead] | None:
+    """Errors ahead of the nominal and of the extended model on trials held out; None where none are."""
+    if not folds:
+        return None
+    return (
+        errors_ahead([(f.nominal, f.test) for f in folds], horizon_s, falling),
+        errors_ahead([(f.best, f.test) for f in folds], horizon_s, falling),
+    )
+
+
+def gains_of(folds: Sequence[Fold], found: Found, horizon_s: float, seed: int) -> dict[str, Gain]:
+    """What each cause gains over the horizon.
+
+    Where that is nothing, over as long as the random effort lasts that stands for the cause in the fit without it: a
+    filter follows what is slow, as a spring's torque, and foretells it for so long.
+    """
+    found_over = _gains_over(folds, tuple(found.without), horizon_s, seed)
+    shortest = min(t.duration for f in folds for t in f.test)
+    for name, gain in found_over.items():
+        doubt = found.without[name].doubt
+        assert doubt is not None
+        lasts = min(max(doubt.time.values(), default=0.0), shortest)
+        if not gain.is_material and lasts > horizon_s:
+            longer = _gains_over(folds, (name,), lasts, seed)[name]
+            found_over[name] = replace(longer, ahead_s=lasts) if longer.is_material else gain
+    return found_over
+
+
+def _gains_over(folds: Sequence[Fold], names: Sequence[str], horizon_s: float, seed: int) -> dict[str, Gain]:
+    """What causes gain on the trials of the folds, so far ahead."""
+
+    def errors(of: Callable[[Fold], Fit]) -> Errors:
+        return errors_over_horizon([(of(f), f.best, f.test) for f in folds], horizon_s)
+
+    if not names:
+        return {}
+    nominal, best = errors(lambda f: f.nominal), errors(lambda f: f.best)
+    return {n: held_out_gain(nominal, errors(lambda f, n=n: f.without[n]), best, seed) for n in names}  # type: ignore[misc]
