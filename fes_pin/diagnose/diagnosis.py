@@ -26,6 +26,7 @@ from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import NominalFitError, SimulationSearch
 from fes_pin.diagnose.searches import Result, Search, Searches
+from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.recording import earns, low_pass_of
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
@@ -108,11 +109,12 @@ class _Work:
         """Search the causes of one study, and judge what is found."""
         nominal = nominal_model(study)
         train, test = split(study)
-        train, spared, said = searched_part(train)
+        driven = is_fed_back(nominal.rig, train)
+        train, spared, said = searched_part(train, study.schema, driven)
         test = test or spared
         recorded = train if said else [t for t in study.trials if t.role != "held_out"]
         effects = self.catalogue.effects_for(nominal.rig)
-        searches = Searches(nominal, train, recorded, test, effects, self.seed, self.tell)
+        searches = Searches(nominal, train, recorded, test, driven, effects, self.seed, self.tell)
         try:
             found = self._judged(study, searches, train, test)
         except NominalFitError as problem:
@@ -242,9 +244,8 @@ def split(study: Study) -> tuple[list[Trial], list[Trial]]:
     Free motion is fitted at the rate that its noise is modelled at: without an input there is nothing faster to follow.
     """
     test = [t for t in study.trials if t.role == "held_out"]
-    train = [
-        t if set(study.schema.inputs) & set(t.columns) else thinned(t) for t in study.trials if t.role != "held_out"
-    ]
+    schema, fitted = study.schema, [t for t in study.trials if t.role != "held_out"]
+    train = [t if set(schema.inputs) & set(t.columns) else thinned(t, schema) for t in fitted]
     if not train:
         raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)
     return train, test

@@ -7,25 +7,39 @@ from dataclasses import replace
 
 import numpy as np
 
+from fes_pin.data.schema import RigSchema
 from fes_pin.data.trial import Trial
 from fes_pin.identify.noise import noise_step, thin, thinning
 
 MOST_SAMPLES = 120_000
 """Samples of all trials together that a search takes: sensitivities to every cause of the library take about 10 kB a
 sample, and a computer of 4 GB must do. Ten minutes of motion at 200 Hz, or four trials of 30 s at 1 kHz."""
+MOST_DRIVEN = 60_000
+"""The same of a rig whose effort answers its reading, before samples are averaged: a search by the likelihood predicts
+them some thousand times, and a step of 4 ms tells what one of 1 ms does: dry friction of 20 N as 19.4 N or 19.6 N, an
+offset of -3 N as -3.5 N or -3.6 N, in 30 s or 57 s (`scripts/benchmark slide`)."""
 
 
-def searched_part(trials: Sequence[Trial]) -> tuple[list[Trial], list[Trial], list[str]]:
+def searched_part(
+    trials: Sequence[Trial], schema: RigSchema, driven: bool = False
+) -> tuple[list[Trial], list[Trial], list[str]]:
     """The trials, or the part of them, that a search takes; trials left for judging it; and what is to be said.
 
     First samples are averaged to the step that noise is modelled at; then whole trials are left out, evenly spread over
     the session; a single record that is too long even so is cut at its end, as a simulation begins at its beginning.
+
+    Parameters
+    ----------
+    driven
+        True if the rig's effort answers its reading.
     """
-    if _size(trials) <= MOST_SAMPLES:
+    if _size(trials) <= (MOST_DRIVEN if driven else MOST_SAMPLES):
         return list(trials), [], []
-    said, short = [], [thinned(t) for t in trials]
+    said, short = [], [thinned(t, schema, driven) for t in trials]
     if _size(short) < _size(trials):
-        said.append(f"{_size(trials)} samples are too many for one search: they were averaged to {_size(short)}")
+        said.append(
+            f"{_size(trials)} samples are more than a search needs: they were {'thinned' if driven else 'averaged'} to {_size(short)}"
+        )
     left: list[Trial] = []
     if _size(short) > MOST_SAMPLES and len(short) > 1:
         longest = max(map(len, short))
@@ -45,11 +59,29 @@ def searched_part(trials: Sequence[Trial]) -> tuple[list[Trial], list[Trial], li
     return [t.first(most) for t in short], [t.first(most) for t in left], said
 
 
-def thinned(trial: Trial) -> Trial:
-    """Means of samples in a row, at the time step that noise is modelled at."""
+def thinned(trial: Trial, schema: RigSchema, driven: bool = False) -> Trial:
+    """The trial at the time step that noise is modelled at.
+
+    What is held between samples is averaged over the new step. What is read is averaged about its beginning: about its
+    middle, a rig would seem to answer half a step before it is driven. Without an input there is no such time. Where
+    the effort answers the reading, only what is read there is kept: noise comes in with the effort, and a mean of an
+    encoder's counts is no count.
+    """
     count = thinning(trial.dt, noise_step([trial.dt]))
-    columns = {n: thin(values, count) for n, values in trial.columns.items()}
-    return replace(trial, columns=columns, time=thin(trial.time, count))
+    held = [n for n in schema.inputs if n in trial.columns and n != schema.outputs[trial.kind]]
+    if not held or count == 1:
+        columns = {n: thin(values, count) for n, values in trial.columns.items()}
+        return replace(trial, columns=columns, time=thin(trial.time, count))
+    side = 0 if driven else (count - 1) // 2
+    columns = {n: thin(v, count) if n in held else _about(v, count, side) for n, v in trial.columns.items()}
+    return replace(trial, columns=columns, time=trial.time[: len(trial) // count * count : count])
+
+
+def _about(values: np.ndarray, count: int, side: int) -> np.ndarray:
+    """Means of so many samples to either side of every `count`-th; mirrored in the ends."""
+    before, after = 2.0 * values[0] - values[side:0:-1], 2.0 * values[-1] - values[-2 : -2 - side : -1]
+    whole = np.convolve(np.concatenate([before, values, after]), np.full(2 * side + 1, 1.0 / (2 * side + 1)), "valid")
+    return whole[: len(values) // count * count : count]
 
 
 def _size(trials: Sequence[Trial]) -> int:

@@ -10,7 +10,6 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import Searched, SimulationSearch
-from fes_pin.identify.feedback import is_fed_back
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 
@@ -29,6 +28,8 @@ class Searches:
         The trials that are searched, and the same before any thinning.
     test
         Those that the study holds out.
+    driven
+        True if the rig's effort answers its reading.
     effects
         The causes that are looked for.
     seed, progress
@@ -46,11 +47,13 @@ class Searches:
         train: Sequence[Trial],
         recorded: Sequence[Trial],
         test: Sequence[Trial],
+        driven: bool,
         effects: Sequence[type[Effect]],
         seed: int,
         progress: Callable[[float, str], None],
     ) -> None:
         self.nominal, self.train, self.recorded, self.test = nominal, tuple(train), tuple(recorded), tuple(test)
+        self.driven = driven
         self._effects, self._seed, self._progress = effects, seed, progress
         self.last: Search | None = None
 
@@ -68,7 +71,7 @@ class Searches:
         return search, search.run()
 
     def _begun(self, trials: Sequence[Trial]) -> Search:
-        if any(t.kind == IMPOSED for t in trials) or is_fed_back(self.nominal.rig, trials):
+        if self.driven or any(t.kind == IMPOSED for t in trials):
             return self._by_likelihood(trials)
         now = {id(old): new for old, new in zip(self.train, trials, strict=True)}
         stated = {t.name: t.conditions for t in trials}

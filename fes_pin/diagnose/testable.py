@@ -81,7 +81,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
     """
     nominal = nominal_model(study)
     trials = [t for t in study.trials if t.role != "held_out"] or list(study.trials)
-    trials, _, _ = searched_part(trials)
+    trials, _, _ = searched_part(trials, study.schema)
     effects = (catalogue or installed()).effects_for(nominal.rig)
     with one_thread_each():
         try:
