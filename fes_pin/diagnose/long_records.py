@@ -37,9 +37,8 @@ def searched_part(
         return list(trials), [], []
     said, short = [], [thinned(t, schema, driven) for t in trials]
     if _size(short) < _size(trials):
-        said.append(
-            f"{_size(trials)} samples are more than a search needs: they were {'thinned' if driven else 'averaged'} to {_size(short)}"
-        )
+        done = "thinned" if driven else "averaged"
+        said.append(f"{_size(trials)} samples are more than a search needs: they were {done} to {_size(short)}")
     left: list[Trial] = []
     if _size(short) > MOST_SAMPLES and len(short) > 1:
         longest = max(map(len, short))

