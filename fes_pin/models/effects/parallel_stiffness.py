@@ -23,12 +23,14 @@ class ParallelStiffness(Effect):
         torque - stiffness x (1 + hardening x^2),   x = q - rest_angle                a joint
         force + stiffness (exp(a x) - 1) / a,   a = sqrt(6 hardening),   x > 0        a muscle on a lever
 
+    It pulls back: what pushes a joint away from an angle is gravity, or a muscle.
+
     Tell-tale: the joint is held too softly, at all speeds and activations alike, around some angle of its own.
     Source: Zajac, Crit. Rev. Biomed. Eng. 17 (1989), for passive muscle, which only pulls; for joints Winters,
     in Multiple Muscle Systems, Springer 1990: passive joint elasticity; it stiffens with the angle.
     """
 
-    stiffness_nm_per_rad: float = parameter(0.05, unit="{effort}/{q}", null=0.0, lower=-1.0, upper=1e8, scale=0.05)
+    stiffness_nm_per_rad: float = parameter(0.05, unit="{effort}/{q}", null=0.0, lower=0.0, upper=1e8, scale=0.05)
     rest_angle_rad: float = parameter(1.6, unit="{q}", lower=-20.0, upper=20.0, scale=0.1, times="stiffness_nm_per_rad")
     hardening_per_rad2: float = parameter(
         0.0, unit="1/{q}2", null=0.0, lower=0.0, upper=1e7, scale=1.0, optional=True, grid=(1.0,)
