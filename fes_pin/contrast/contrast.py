@@ -19,16 +19,21 @@ from fes_pin.contrast.search import ContrastFound, ContrastSearch
 from fes_pin.contrast.words import of_cause, of_nominal
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import ParameterEstimate
 from fes_pin.diagnose.diagnosis import measured_study, split
 from fes_pin.diagnose.experiment import SEPARABLE
+from fes_pin.diagnose.long_records import searched_part
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.remainder.open_set import Remainder, unexplained_remainder
 from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.feedback import is_fed_back
+from fes_pin.identify.lasting import words_of_smoothing
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
+from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
+from fes_pin.models.predictor import Doubt
 from fes_pin.workers import Progress, in_parallel, one_thread_each
 
 SEEN = 0.95
@@ -82,10 +87,9 @@ def contrast(
     measured = measured_study(grouped_study(study, after, by, groups))
     joined, nominal = measured.study, nominal_model(measured.study)
     warnings = [*measured.warnings, *check_study(joined, nominal)]
-    train, _ = split(joined)
     names = tuple(dict.fromkeys(t.group for t in joined.trials if t.group is not None))
-    trials = {g: [t for t in train if t.group == g] for g in names}
-    driven = any(t.kind == IMPOSED for t in train) or is_fed_back(nominal.rig, train)
+    trials, driven, said = _by_group(joined, names, nominal)
+    warnings += said
     if any(len(many) < 2 for many in trials.values()):
         warnings.append("a group has one trial only: how much repeats differ is judged from its parts")
     with one_thread_each():
@@ -102,6 +106,7 @@ def contrast(
     changes = [_change(fits, found, i, names, catalogue) for i in found.best.changes] + misread_change(searched)
     changes.sort(key=lambda c: c.p_value)
     unchanged, excluded, untestable = _not_changed(found, driven)
+    said = [*said, *_smoothed(found.best, trials)]
     if left.unexplained:  # sizes that would have been seen are those beside a model that is right
         unchanged, excluded = {}, {}
         said = [*said, "beside what is left unexplained it cannot be said what did not change"]
@@ -122,6 +127,25 @@ def contrast(
         warnings=tuple([*warnings, *said]),
         wall_s=time.perf_counter() - began,
     )
+
+
+def _by_group(study: Study, names: Sequence[str], nominal: Model) -> tuple[dict[str, list[Trial]], bool, list[str]]:
+    """The trials of each group that are searched; whether the likelihood judges them; what is to be said."""
+    train, _ = split(study)
+    fed_back = is_fed_back(nominal.rig, train)
+    trials: dict[str, list[Trial]] = {}
+    warnings: list[str] = []
+    for group in names:
+        own = [t for t in train if t.group == group]
+        trials[group], _, said = searched_part(own, study.schema, fed_back, len(names))
+        warnings += [f"group {group}: {one}" for one in said]
+    return trials, fed_back or any(t.kind == IMPOSED for t in train), warnings
+
+
+def _smoothed(best: Grouped, trials: Trials) -> tuple[str, ...]:
+    """What is to be said of readings of a driven rig that were smoothed: their noise lasts as long in all groups."""
+    group, doubt = next(iter(best.weights.items()))
+    return words_of_smoothing(doubt if isinstance(doubt, Doubt) else None, best.model.rig, trials[group][0])
 
 
 def _common(best: Grouped) -> tuple[str, ...]:

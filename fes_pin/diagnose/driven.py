@@ -32,6 +32,7 @@ from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.lasting import words_of_smoothing
 from fes_pin.identify.turns import with_honest_intervals
 
 LARGE_SHARE = 0.1
@@ -164,17 +165,6 @@ def _left(
     return left
 
 
-def _of_smoothing(fitted: Fit) -> tuple[str, ...]:
-    """What is to be said of a reading whose noise lasts over samples."""
-    assert fitted.doubt is not None
-    if not fitted.doubt.lasts_s:
-        return ()
-    trial = fitted.trials[0]
-    name, step = fitted.model.rig.output(trial.kind), round(fitted.doubt.lasts_s / trial.dt)
-    said = f"{name} was smoothed or interpolated before it was stored: its noise lasts {fitted.doubt.lasts_s:.2g} s"
-    return (f"{said}, and one sample in {step} counts as a reading",)
-
-
 def driven_diagnosis(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
@@ -223,7 +213,7 @@ def driven_diagnosis(
         held_out_by=SEPARATE if trials[1] else CROSS_VALIDATED if held else NOTHING,
         left_out={},
         wall_s=0.0,
-        warnings=_of_smoothing(best),
+        warnings=words_of_smoothing(best.doubt, best.model.rig, trials[0][0]),
         random=judged.random,
         ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
     )

@@ -21,7 +21,7 @@ offset of -3 N as -3.5 N or -3.6 N, in 30 s or 57 s (`scripts/benchmark slide`).
 
 
 def searched_part(
-    trials: Sequence[Trial], schema: RigSchema, driven: bool = False
+    trials: Sequence[Trial], schema: RigSchema, driven: bool = False, groups: int = 1
 ) -> tuple[list[Trial], list[Trial], list[str]]:
     """The trials, or the part of them, that a search takes; trials left for judging it; and what is to be said.
 
@@ -32,25 +32,28 @@ def searched_part(
     ----------
     driven
         True if the rig's effort answers its reading.
+    groups
+        How many groups of trials are searched together, of which this is one; none are left for judging then.
     """
-    if _size(trials) <= (MOST_DRIVEN if driven else MOST_SAMPLES):
+    room = MOST_SAMPLES // groups
+    if _size(trials) <= (min(room, MOST_DRIVEN // groups) if driven else room):
         return list(trials), [], []
     said, short = [], [thinned(t, schema, driven) for t in trials]
     if _size(short) < _size(trials):
         done = "thinned" if driven else "averaged"
         said.append(f"{_size(trials)} samples are more than a search needs: they were {done} to {_size(short)}")
     left: list[Trial] = []
-    if _size(short) > MOST_SAMPLES and len(short) > 1:
+    if _size(short) > room and len(short) > 1:
         longest = max(map(len, short))
-        count = max(1, min(len(short) - 1, MOST_SAMPLES // longest))
+        count = max(1, min(len(short) - 1, room // longest))
         chosen = {round(k) for k in np.linspace(0, len(short) - 1, count)}
         others = [t for k, t in enumerate(short) if k not in chosen]
-        left = [others[round(k)] for k in np.linspace(0, len(others) - 1, min(count, len(others)))]
+        if groups == 1:
+            left = [others[round(k)] for k in np.linspace(0, len(others) - 1, min(count, len(others)))]
         short = [t for k, t in enumerate(short) if k in chosen]
-        said.append(
-            f"{len(short)} of {len(trials)} trials were searched, evenly spread, and {len(left)} others judged it"
-        )
-    most = MOST_SAMPLES // len(short)
+        judged = f", and {len(left)} others judged it" if left else ""
+        said.append(f"{len(short)} of {len(trials)} trials were searched, evenly spread{judged}")
+    most = room // len(short)
     cut = [t for t in short if len(t) > most]
     if cut:
         seconds = sum(t.duration for t in cut) / len(cut)

@@ -15,6 +15,8 @@ from dataclasses import replace
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.models.predictor import Doubt
+from fes_pin.models.rigs.base import Rig
 
 SHARED = 0.1
 """Correlation of an innovation with one of the next two, from which noise is not new. A model that misses a cause
@@ -73,3 +75,12 @@ def _other(fitted: Fit, sparser: Fit) -> float:
 
 
 __all__ = ["with_new_noise"]
+
+
+def words_of_smoothing(doubt: Doubt | None, rig: Rig, trial: Trial) -> tuple[str, ...]:
+    """What is to be said of a reading whose noise lasts over samples, if it does."""
+    if doubt is None or not doubt.lasts_s:
+        return ()
+    step = round(doubt.lasts_s / trial.dt)
+    said = f"{rig.output(trial.kind)} was smoothed or interpolated before it was stored: its noise lasts"
+    return (f"{said} {doubt.lasts_s:.2g} s, and one sample in {step} counts as a reading",)
