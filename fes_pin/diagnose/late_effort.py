@@ -1,0 +1,75 @@
+"""Efforts that were written down after they acted: a fault of the record, not of the rig."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.data.study import Study
+from fes_pin.data.timing import advanced
+from fes_pin.diagnose.result import Diagnosis
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.lateness import lateness_of
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.turns import maximise
+from fes_pin.workers import OutOfTime, time_limit
+
+LAG = "sensor_lag"
+"""What a late record of the effort may be taken for: a reading that is early."""
+
+
+def late_by(diagnosis: Diagnosis, end: float) -> float | None:
+    """How late the efforts of a driven rig were written down, s; None where they were not, or there is no time to tell.
+
+    Parameters
+    ----------
+    end
+        When searches must have ended, of `time.perf_counter`.
+    """
+    fitted, trials = diagnosis.extended, diagnosis.study.trials
+    if fitted.doubt is None or not all("effort" in t.columns for t in fitted.trials):
+        return None
+    try:
+        with time_limit(end - time.perf_counter()):
+            return lateness_of(_in_time(fitted), min(t.dt for t in trials))
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
+        return None
+
+
+def _in_time(fitted: Fit) -> Fit:
+    """The fit without a reading that is early."""
+    if not fitted.values.get(f"{LAG}.lag_s", 0.0) < 0.0:
+        return fitted
+    assert fitted.doubt is not None
+    model = fitted.model - LAG
+    problem = LikelihoodProblem(model, fitted.trials, fitted.doubt)
+    return maximise(problem, model.parameters(), problem.completed(fitted.unknowns))
+
+
+def moved(study: Study, late_s: float) -> Study:
+    """The study with its efforts where they acted."""
+    return replace(study, trials=tuple(advanced(t, "effort", late_s) for t in study.trials))
+
+
+def better_timed(timed: Diagnosis, recorded: Diagnosis, late_s: float) -> Diagnosis:
+    """The diagnosis with efforts in time, where it is no worse than that of the record; else that."""
+    if not (_is_likelier(timed.extended, recorded.extended) or _spares_a_lag(timed, recorded)):
+        return recorded
+    said = f"the effort was written down {1e3 * late_s:.2g} ms after it acted, and was moved to when it did"
+    return replace(timed, warnings=(said, *timed.warnings))
+
+
+def _is_likelier(timed: Fit, recorded: Fit) -> bool:
+    """True if more readings are news, or as many are foretold better for as many parameters."""
+    assert timed.doubt is not None
+    assert recorded.doubt is not None
+    return (timed.doubt.lasts_s, timed.price) < (recorded.doubt.lasts_s, recorded.price)
+
+
+def _spares_a_lag(timed: Diagnosis, recorded: Diagnosis) -> bool:
+    """True if no reading is early any more, and no more is left than was."""
+    early = recorded.extended.values.get(f"{LAG}.lag_s", 0.0) < 0.0
+    more = timed.remainder.unexplained and not recorded.remainder.unexplained
+    return early and not more and all(c.name != LAG for c in timed.causes)

@@ -1,0 +1,51 @@
+"""By how much an effort was written down after it acted.
+
+A log that asks a controller less often than it works holds an effort for as long as a row lasts, and the rig seems to
+answer before it is driven: by half a row where rows are regular, by one and more where they are not. How late an effort
+is the likelihood says, beside the model that was found.
+"""
+
+from __future__ import annotations
+
+from scipy.optimize import minimize_scalar
+
+from fes_pin.data.timing import advanced
+from fes_pin.identify.distributions import chi2_quantile
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.turns import maximise
+
+CERTAIN = chi2_quantile(1.0 - 1e-6, 1)
+"""Twice the log-likelihood that moving the effort must bring: whatever it stands for, it must be there."""
+MOST_ROWS = 2.0
+"""Rows of a log by which an effort may be late: one that it is held when it is written down, and one until the next."""
+
+
+def lateness_of(fitted: Fit, row_s: float) -> float | None:
+    """How late the efforts of a fit's trials are, s; None where they are in time.
+
+    Parameters
+    ----------
+    fitted
+        By the likelihood, of a rig that an effort drives.
+    row_s
+        Time step of the log.
+    """
+    doubt = fitted.doubt
+    assert doubt is not None
+    tried: dict[float, float] = {}
+
+    def cost(late: float) -> float:
+        if late not in tried:
+            moved = [advanced(t, "effort", late) for t in fitted.trials]
+            problem = LikelihoodProblem(fitted.model, moved, doubt)
+            tried[late] = maximise(problem, fitted.values, fitted.unknowns).sse
+        return tried[late]
+
+    if cost(0.5 * row_s) > fitted.sse - CERTAIN:
+        return None
+    most = {"bounds": (0.0, MOST_ROWS * row_s), "method": "bounded", "options": {"xatol": 0.02 * row_s}}
+    return float(minimize_scalar(cost, **most).x)
+
+
+__all__ = ["lateness_of"]
