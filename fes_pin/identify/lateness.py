@@ -17,6 +17,8 @@ from fes_pin.identify.turns import maximise
 
 CERTAIN = chi2_quantile(1.0 - 1e-6, 1)
 """Twice the log-likelihood that moving the effort must bring: whatever it stands for, it must be there."""
+LEAST_ROWS = 0.25
+"""The least: of a log that asks in every second sample of a controller, which holds for half a row."""
 MOST_ROWS = 2.0
 """Rows of a log by which an effort may be late: one that it is held when it is written down, and one until the next."""
 
@@ -42,7 +44,7 @@ def lateness_of(fitted: Fit, row_s: float) -> float | None:
             tried[late] = maximise(problem, fitted.values, fitted.unknowns).sse
         return tried[late]
 
-    if cost(0.5 * row_s) > fitted.sse - CERTAIN:
+    if cost(LEAST_ROWS * row_s) > fitted.sse - CERTAIN:
         return None
     most = {"bounds": (0.0, MOST_ROWS * row_s), "method": "bounded", "options": {"xatol": 0.02 * row_s}}
     return float(minimize_scalar(cost, **most).x)
