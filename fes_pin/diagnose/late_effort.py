@@ -33,7 +33,8 @@ def late_by(diagnosis: Diagnosis, end: float) -> float | None:
         return None
     try:
         with time_limit(end - time.perf_counter()):
-            return lateness_of(_in_time(fitted), min(t.dt for t in trials))
+            timed = _in_time(fitted)
+            return lateness_of(timed, min(t.dt for t in trials), timed is not fitted)
     except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
         return None
 

@@ -166,7 +166,7 @@ def speaks_for(evidence: Evidence | None, gain: Gain, alone: bool) -> bool:
 
     By their likelihood where the model leaves only noise, by their errors over time where it does not; where other
     causes stand beside it by both, for several flexible forms together come near to anything. A cause alone may have no
-    gain: if one trial of many reaches a stop, the others do not foretell it.
+    gain: if one trial of many reaches a stop, the others do not foretell it. None may be sure to do harm.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def speaks_for(evidence: Evidence | None, gain: Gain, alone: bool) -> bool:
         Whether no other cause stands beside it.
     """
     likely = evidence is None or evidence.low > 0.0
-    return likely and (gain.is_material or (evidence is not None and alone))
+    return likely and (gain.is_material or (evidence is not None and alone and gain.high > 0.0))
 
 
 @dataclass(frozen=True)
