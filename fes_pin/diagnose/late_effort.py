@@ -29,7 +29,7 @@ def late_by(diagnosis: Diagnosis, end: float) -> float | None:
         When searches must have ended, of `time.perf_counter`.
     """
     fitted, trials = diagnosis.extended, diagnosis.study.trials
-    if fitted.doubt is None or not all("effort" in t.columns for t in fitted.trials):
+    if fitted.doubt is None or not all("effort" in fitted.model.rig.input_columns(t) for t in trials):
         return None
     try:
         with time_limit(end - time.perf_counter()):

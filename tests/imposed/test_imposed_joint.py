@@ -1,5 +1,6 @@
 """A joint whose motion is imposed: the effort that it takes, its noise, and what hides in it."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from imposed_rigs.motion import drawn
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
+from fes_pin.diagnose import late_effort
 from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -135,9 +137,13 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
     assert np.abs(foretold - simulate(found.model, study.trials[0])["effort"]).max() < 1e-9
 
 
-def test_nothing_hidden_is_adequate(tmp_path):
+def test_nothing_hidden_is_adequate(tmp_path, monkeypatch):
+    """And the effort, which is what is read here, is never moved."""
     made = joint.study((), 0.0, np.random.default_rng(11), tmp_path)
-    assert diagnose_joint(made).verdict == "adequate"
+    found = diagnose_joint(made)
+    assert found.verdict == "adequate"
+    monkeypatch.setattr(late_effort, "lateness_of", lambda *_: pytest.fail("the effort of an imposed motion was moved"))
+    assert late_effort.late_by(found, math.inf) is None
 
 
 def test_a_spring_and_damper_in_series_begin_relaxed(tmp_path):
