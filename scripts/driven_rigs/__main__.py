@@ -35,11 +35,16 @@ def items(count: int) -> Iterator[tuple[str, ...]]:
 
 
 def judged(
-    causes: tuple[str, ...], size: float, seed: int, recorded: bool = False, cutoff_hz: float | None = None
+    causes: tuple[str, ...],
+    size: float,
+    seed: int,
+    recorded: bool = False,
+    cutoff_hz: float | None = None,
+    every: int = 1,
 ) -> dict[str, Any]:
     """Make a study, diagnose it, and say how the answer compares with the truth."""
     with tempfile.TemporaryDirectory(prefix="driven") as folder:
-        drawn = draw(causes, size, seed, Path(folder), recorded, cutoff_hz)
+        drawn = draw(causes, size, seed, Path(folder), recorded, cutoff_hz, every)
         began = time.perf_counter()
         try:
             found = diagnose_joint(read_study(drawn.study))
@@ -120,14 +125,17 @@ def main(
     low_pass: Annotated[
         float | None, typer.Option(help="Hz at which effort and reading were low-passed, without delay, when stored.")
     ] = None,
+    every: Annotated[int, typer.Option(help="Samples of the controller from one row of the log to the next.")] = 1,
     results: Annotated[
         Path | None, typer.Option(help="A file of one line a study, with which a run can go on.")
     ] = None,
 ) -> None:
     """Hide known causes in rigs that a controller drives, and count what the diagnosis makes of them."""
-    rows = results_of(
-        items(count), seed, lambda causes, k: judged(() if nulls else causes, size, k, recorded, low_pass), results
-    )
+
+    def one(causes: tuple[str, ...], k: int) -> dict[str, Any]:
+        return judged(() if nulls else causes, size, k, recorded, low_pass, every)
+
+    rows = results_of(items(count), seed, one, results)
     typer.echo("\n".join(table(rows)))
 
 

@@ -70,6 +70,7 @@ def draw(
     folder: Path,
     recorded: bool = False,
     cutoff_hz: float | None = None,
+    every: int = 1,
 ) -> Drawn:
     """Make a study with these causes hidden.
 
@@ -85,6 +86,8 @@ def draw(
         As rigs are in a laboratory: friction is that of bristles, and the effort is measured, with noise.
     cutoff_hz
         Where effort and reading were low-passed, without delay, before they were stored; by default they were not.
+    every
+        Samples of the controller from one row of the log to the next.
     """
     rng = np.random.default_rng(seed)
     base = BASES[int(rng.integers(len(BASES)))]
@@ -120,7 +123,8 @@ def draw(
         effort, position = low_pass(effort, DT, cutoff_hz), low_pass(position, DT, cutoff_hz)
     believed = (float(rng.uniform(0.7, 1.3)), base.damping * float(rng.uniform(0.4, 1.6)))
     truth = {"inertia_scale": 1.0, "damping": base.damping, **hidden}
-    return Drawn(_written(base, effort, position, believed, folder), base.name, causes, truth)
+    study = _written(base, effort[::every], position[::every], every * DT, believed, folder)
+    return Drawn(study, base.name, causes, truth)
 
 
 def _references(base: Base, trials: int, n: int, rng: np.random.Generator) -> np.ndarray:
@@ -202,10 +206,12 @@ def urdf(base: Base) -> str:
     return URDF.format(name=base.name, lever=place, mass=mass, about=about, kind="revolute", axis="0 1 0")
 
 
-def _written(base: Base, effort: np.ndarray, position: np.ndarray, believed: tuple[float, float], folder: Path) -> Path:
+def _written(
+    base: Base, effort: np.ndarray, position: np.ndarray, dt: float, believed: tuple[float, float], folder: Path
+) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "rig.urdf").write_text(urdf(base))
-    time = np.arange(len(effort)) * DT
+    time = np.arange(len(effort)) * dt
     trials = tuple(
         Trial(f"{k:02d}", "motion", {"effort": np.round(effort[:, k], 6), "position": position[:, k]}, time)
         for k in range(effort.shape[1])
