@@ -49,7 +49,7 @@ def _in_time(fitted: Fit) -> Fit:
     return maximise(problem, model.parameters(), problem.completed(fitted.unknowns))
 
 
-def moved(study: Study, late_s: float) -> Study:
+def with_effort_earlier(study: Study, late_s: float) -> Study:
     """The study with its efforts where they acted."""
     return replace(study, trials=tuple(advanced(t, "effort", late_s) for t in study.trials))
 
