@@ -124,7 +124,9 @@ def value_text(value: float, std: float) -> str:
         return f"{value:.4g}"
     digits = 1 - math.floor(math.log10(std))
     if abs(value) >= 1e5 or digits > 6:
-        lead = math.floor(math.log10(abs(value))) if value else 0
+        if value == 0.0:
+            return "0"
+        lead = math.floor(math.log10(abs(value)))
         return f"{value:.{min(max(lead + digits, 0), 8)}e}"
     return f"{value:.{max(digits, 0)}f}"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.record import NEXT_FILE
@@ -11,6 +12,9 @@ from fes_pin.diagnose.text import LEAST_P, percent, probability, quantity
 from fes_pin.models.describe import sentence
 from fes_pin.models.stage import Effect
 from fes_pin.view.page import Content, Markup, element, joined, unit_text
+
+UNIT_IN_NAME = re.compile(r"(?<=.)(_(nms|nm|us|s|hz|n|kg|rad))?(_per_(rad[23]?|s))?$")
+"""What a parameter's name says of its unit, which stands beside the value: of a slide it is another."""
 
 
 def plain(name: str) -> str:
@@ -79,10 +83,7 @@ def _size(diagnosis: Diagnosis, cause: Cause) -> Markup:
 
 
 def _without_unit(name: str) -> str:
-    for unit in ("_nm", "_us", "_per_s", "_s", "_rad", "_hz", "_n", "_kg"):
-        if name.endswith(unit) and name != unit.strip("_"):
-            return name.removesuffix(unit)
-    return name
+    return UNIT_IN_NAME.sub("", name)
 
 
 def _sure(diagnosis: Diagnosis, cause: Cause) -> Markup:

@@ -24,8 +24,10 @@ from fes_pin.models.describe import equation
 from fes_pin.models.effects import effect_named
 from fes_pin.models.predictor import Doubt
 from fes_pin.view.mathml import equations_mathml
+from fes_pin.view.page import value_text
 from fes_pin.view.report import report_html
 from fes_pin.view.report_trials import got_worse
+from fes_pin.view.words import UNIT_IN_NAME
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
 
@@ -281,3 +283,24 @@ def test_the_page_renders_in_chromium_without_asking_for_anything(tmp_path):
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, env=os.environ)
     assert (tmp_path / "shot.png").stat().st_size > 20_000, done.stderr[-500:]
     assert "Refused to" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("stiffness_nm_per_rad", "stiffness"),
+        ("rate_us_per_s", "rate"),
+        ("slope_s_per_rad", "slope"),
+        ("skew_per_rad3", "skew"),
+        ("rest_angle_rad", "rest_angle"),
+        ("second_s", "second"),
+        ("half_width", "half_width"),
+        ("creep_speed", "creep_speed"),
+    ],
+)
+def test_words_of_a_size_are_without_its_unit(name, words):
+    assert UNIT_IN_NAME.sub("", name) == words
+
+
+def test_a_bound_at_nothing_is_no_row_of_noughts():
+    assert [value_text(v, 3.9e-7) for v in (0.0, 1.05e-6)] == ["0", "1.05e-06"]
