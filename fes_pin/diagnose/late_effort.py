@@ -23,6 +23,8 @@ LAG = "sensor_lag"
 def late_by(diagnosis: Diagnosis, end: float) -> float | None:
     """How late the efforts of a driven rig were written down, s; None where they were not, or there is no time to tell.
 
+    Where something is left beside the causes that were found, they may stand for it: then the nominal model is asked.
+
     Parameters
     ----------
     end
@@ -33,8 +35,11 @@ def late_by(diagnosis: Diagnosis, end: float) -> float | None:
         return None
     try:
         with time_limit(end - time.perf_counter()):
-            timed = _in_time(fitted)
-            return lateness_of(timed, min(t.dt for t in trials), timed is not fitted)
+            timed, row_s = _in_time(fitted), min(t.dt for t in trials)
+            late_s = lateness_of(timed, row_s, timed is not fitted)
+            if late_s is None and diagnosis.causes and diagnosis.remainder.unexplained:
+                late_s = lateness_of(diagnosis.nominal, row_s)
+            return late_s
     except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
         return None
 
@@ -63,10 +68,18 @@ def better_timed(timed: Diagnosis, recorded: Diagnosis, late_s: float) -> Diagno
 
 
 def _is_likelier(timed: Fit, recorded: Fit) -> bool:
-    """True if more readings are news, or as many are foretold better for as many parameters."""
-    assert timed.doubt is not None
-    assert recorded.doubt is not None
-    return (timed.doubt.lasts_s, timed.price) < (recorded.doubt.lasts_s, recorded.price)
+    """True if the same readings are foretold better for as many parameters: those that are news to both."""
+    lasts_s = max(f.doubt.lasts_s for f in (timed, recorded) if f.doubt is not None)
+    one, other = (_with_noise_that_lasts(f, lasts_s) for f in (timed, recorded))
+    return one.price < other.price
+
+
+def _with_noise_that_lasts(fitted: Fit, lasts_s: float) -> Fit:
+    """The fit to readings so far apart."""
+    if fitted.doubt is None or fitted.doubt.lasts_s == lasts_s:
+        return fitted
+    problem = LikelihoodProblem(fitted.model, fitted.trials, replace(fitted.doubt, lasts_s=lasts_s))
+    return maximise(problem, fitted.values, fitted.unknowns)
 
 
 def _spares_a_lag(timed: Diagnosis, recorded: Diagnosis) -> bool:
