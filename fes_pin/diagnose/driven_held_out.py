@@ -96,6 +96,7 @@ def evidence_of(folds: Sequence[Fold], found: Found, again: Again) -> dict[str, 
     return {n: Evidence(g, max(g, 0.0)) if np.isfinite(g) else Evidence(0.0, 0.0) for n, g in gains.items()}
 
 
+@np.errstate(all="ignore")
 def _weight(fitted: Fit) -> float:
     """Twice the negative log of the probability of a fit's trials; see `evidence_of`."""
     system = normal_equations(fitted.parts)

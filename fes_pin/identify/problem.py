@@ -233,8 +233,12 @@ class NormalEquations:
         return [constant - slope @ step for constant, slope in self.eliminated]
 
 
+@np.errstate(all="ignore")
 def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> NormalEquations:
-    """Sum the trials; each trial's unknowns are eliminated by its Schur complement, damped as Marquardt does."""
+    """Sum the trials; each trial's unknowns are eliminated by its Schur complement, damped as Marquardt does.
+
+    Of a model that runs away the sums are no numbers; `whitened_sse` is infinite there.
+    """
     size = parts[0].jacobian.shape[1]
     sse, gradient, hessian, local_gain = 0.0, np.zeros(size), np.zeros((size, size)), 0.0
     eliminated = []
