@@ -16,9 +16,6 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
 from fes_pin.workers import OutOfTime, time_limit
 
-LAG = "sensor_lag"
-"""What a late record of the effort may be taken for: a reading that is early."""
-
 
 def late_by(diagnosis: Diagnosis, end: float) -> float | None:
     """How late the efforts of a driven rig were written down, s; None where they were not, or there is no time to tell.
@@ -35,23 +32,13 @@ def late_by(diagnosis: Diagnosis, end: float) -> float | None:
         return None
     try:
         with time_limit(end - time.perf_counter()):
-            timed, row_s = _in_time(fitted), min(t.dt for t in trials)
-            late_s = lateness_of(timed, row_s, timed is not fitted)
+            row_s = min(t.dt for t in trials)
+            late_s = lateness_of(fitted, row_s)
             if late_s is None and diagnosis.causes and diagnosis.remainder.unexplained:
                 late_s = lateness_of(diagnosis.nominal, row_s)
             return late_s
     except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
         return None
-
-
-def _in_time(fitted: Fit) -> Fit:
-    """The fit without a reading that is early."""
-    if not fitted.values.get(f"{LAG}.lag_s", 0.0) < 0.0:
-        return fitted
-    assert fitted.doubt is not None
-    model = fitted.model - LAG
-    problem = LikelihoodProblem(model, fitted.trials, fitted.doubt)
-    return maximise(problem, model.parameters(), problem.completed(fitted.unknowns))
 
 
 def with_effort_earlier(study: Study, late_s: float) -> Study:
@@ -60,8 +47,8 @@ def with_effort_earlier(study: Study, late_s: float) -> Study:
 
 
 def better_timed(timed: Diagnosis, recorded: Diagnosis, late_s: float) -> Diagnosis:
-    """The diagnosis with efforts in time, where it is no worse than that of the record; else that."""
-    if not (_is_likelier(timed.extended, recorded.extended) or _spares_a_lag(timed, recorded)):
+    """The diagnosis with efforts in time, if it is likelier than that of the record; else that."""
+    if not _is_likelier(timed.extended, recorded.extended):
         return recorded
     said = f"the effort was written down {1e3 * late_s:.2g} ms after it acted, and was moved to when it did"
     return replace(timed, warnings=(said, *timed.warnings))
@@ -80,10 +67,3 @@ def _with_noise_that_lasts(fitted: Fit, lasts_s: float) -> Fit:
         return fitted
     problem = LikelihoodProblem(fitted.model, fitted.trials, replace(fitted.doubt, lasts_s=lasts_s))
     return maximise(problem, fitted.values, fitted.unknowns)
-
-
-def _spares_a_lag(timed: Diagnosis, recorded: Diagnosis) -> bool:
-    """True if no reading is early any more, and no more is left than was."""
-    early = recorded.extended.values.get(f"{LAG}.lag_s", 0.0) < 0.0
-    more = timed.remainder.unexplained and not recorded.remainder.unexplained
-    return early and not more and all(c.name != LAG for c in timed.causes)

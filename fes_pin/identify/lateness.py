@@ -23,7 +23,7 @@ MOST_ROWS = 2.0
 """Rows of a log by which an effort may be late: one that it is held when it is written down, and one until the next."""
 
 
-def lateness_of(fitted: Fit, row_s: float, suspected: bool = False) -> float | None:
+def lateness_of(fitted: Fit, row_s: float) -> float | None:
     """How late the efforts of a fit's trials are, s; None where they are in time.
 
     Parameters
@@ -32,8 +32,6 @@ def lateness_of(fitted: Fit, row_s: float, suspected: bool = False) -> float | N
         By the likelihood, of a rig that an effort drives.
     row_s
         Time step of the log.
-    suspected
-        True if a reading that is early has earned its place already.
     """
     doubt = fitted.doubt
     assert doubt is not None
@@ -46,7 +44,7 @@ def lateness_of(fitted: Fit, row_s: float, suspected: bool = False) -> float | N
             tried[late] = maximise(problem, fitted.values, fitted.unknowns).sse
         return tried[late]
 
-    if cost(LEAST_ROWS * row_s) > fitted.sse - (0.0 if suspected else CERTAIN):
+    if cost(LEAST_ROWS * row_s) > fitted.sse - CERTAIN:
         return None
     most = {"bounds": (0.0, MOST_ROWS * row_s), "method": "bounded", "options": {"xatol": 0.02 * row_s}}
     return float(minimize_scalar(cost, **most).x)

@@ -10,7 +10,6 @@ from fes_pin.data.study import read_study
 from fes_pin.data.timing import advanced
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.models.effects import SensorLag
 
 ROWS = (2, 3, 4)
 """Samples of the controller between two rows of the log, at random."""
@@ -60,10 +59,3 @@ def test_what_is_held_is_moved_by_parts_of_a_sample():
     assert np.allclose(advanced(trial, "effort", 0.0)["effort"], trial["effort"])
     assert np.allclose(advanced(trial, "effort", 0.0025)["effort"], [0.0, 1.0, 4.0, 3.0, 2.0, 8.0])
     assert np.allclose(advanced(trial, "effort", 0.02)["effort"], [4.0, 4.0, 0.0, 8.0, 8.0, 8.0])
-
-
-def test_nothing_is_early_where_no_effort_is_recorded():
-    time = np.linspace(0.0, 1.0, 50)
-    columns = {"time": time, "position": np.sin(time), "reading": np.sin(time)}
-    assert SensorLag().limits(columns) == {"lag_s": (0.0, np.inf)}
-    assert SensorLag().limits({**columns, "effort": time}) == {}

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage, lag
 
@@ -22,14 +20,11 @@ class SensorLag(Effect):
     (1 - b s) / (1 + b s): a pure delay to second order in s. Where nothing but the stimulus drives the rig a shift of
     the reading's clock is an electromechanical delay in all that it does, and has that name.
 
-    Below zero the reading is early: y - lag_s y'. No sensor is; but an effort that was asked for less often than it
-    changed, or was written down after it acted, makes it seem so. It is sought where an effort drives a joint.
-
-    Tell-tale: every motion is read late, or early, in proportion to its speed, stimulated or not.
+    Tell-tale: every motion is read late, in proportion to its speed, stimulated or not.
     Source: an anti-aliasing filter, or clocks that differ. All-pass: Pade's approximant of a delay, of order (1, 1).
     """
 
-    lag_s: float = parameter(0.005, unit="s", null=0.0, lower=-0.1, upper=0.5, scale=0.005)
+    lag_s: float = parameter(0.005, unit="s", null=0.0, lower=0.0, upper=0.5, scale=0.005)
     shift: float = parameter(
         0.0, null=0.0, lower=0.0, upper=1.0, scale=1.0, fitted=False, optional=True, grid=(1.0,), rigs=("joint",)
     )
@@ -37,11 +32,6 @@ class SensorLag(Effect):
     name, stage, signal, rigs = "sensor_lag", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
     states = ("filtered",)
     max_step_s = 1.25e-3
-
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
-        """A reading is early only beside the record of an effort."""
-        reads_position = np.array_equal(measured.get("position", ()), measured.get("reading", ()))
-        return {} if "effort" in measured and reads_position else {"lag_s": (0.0, np.inf)}
 
     def apply(self, value: Any, s: Any) -> Any:
         return value + (1.0 + self.shift) * (self._lagged(s)[0] - s.sensed)
