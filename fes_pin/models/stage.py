@@ -11,7 +11,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from fes_pin.models.maths import ramp, sqrt, where
+from fes_pin.models.maths import sqrt, where
 from fes_pin.models.parameters import ParameterInfo, parameters_of
 
 
@@ -272,7 +272,7 @@ def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, An
     With e = (T^8 + (h/2)^8)^(1/8), h the integration step: x' = (target - x) / e, out = target - T x'.
     The transfer function (1 + (e - T) s) / (1 + e s) has the low pass's delay T. It differs from the low pass where T
     is below a step, and then only above 2/h: e - T is h/2 at T = 0, h/4000 at T = h. Runge-Kutta steps of order four
-    are stable down to e = 0.36 h. A time constant below zero is a lead: out = target + |T| x', as at 0 for the rest.
+    are stable down to e = 0.36 h.
 
     Returns
     -------
@@ -280,7 +280,7 @@ def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, An
         The lagged signal and the time derivative of `state`.
     """
     shortest = 0.5 * step
-    ratio = ramp(time_constant) / shortest
+    ratio = time_constant / shortest
     fourth = ratio * ratio * ratio * ratio
     e = shortest * sqrt(sqrt(sqrt(1.0 + fourth * fourth)))
     rate = (target - state) / e
