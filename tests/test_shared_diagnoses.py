@@ -28,6 +28,7 @@ def test_practice(shared, name):
 def test_a_servo_rubs(shared):
     """Its log was interpolated: no answer of the controller is seen in it, and free simulation explains nothing."""
     diagnosis = diagnose_joint(read_study(shared / "data" / "servo_pendulum"))
-    (friction,) = (c for c in diagnosis.causes if c.name == "coulomb_friction")
-    assert friction.gain_held_out.low > 25.0
+    assert "coulomb_friction" in [c.name for c in diagnosis.causes]
+    held = (diagnosis.ahead.nominal_held_out, diagnosis.ahead.extended_held_out)
+    assert held[1].horizon < 0.6 * held[0].horizon
     assert diagnosis.remainder.unexplained  # its torque is computed, by no one scale
