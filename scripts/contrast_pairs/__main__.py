@@ -15,7 +15,7 @@ import typer
 
 from contrast_pairs.driven import CAUSES as DRIVEN_CAUSES
 from contrast_pairs.driven import NOMINAL as DRIVEN_NOMINAL
-from contrast_pairs.driven import driven_pair
+from contrast_pairs.driven import Recording, driven_pair
 from contrast_pairs.free import CAUSES, NOMINAL, free_pair
 from contrast_pairs.practice import EXACT, practice_pair
 from fes_pin.contrast.contrast import contrast
@@ -25,11 +25,11 @@ RIGS = ("ankle", "ankle", "driven", "muscle", "ankle", "joint", "driven", "ankle
 """In turn."""
 
 
-def plan(count: int, seed: int, nulls: bool) -> Iterator[tuple[int, str, tuple[str, ...]]]:
+def plan(count: int, seed: int, nulls: bool, only: str | None = None) -> Iterator[tuple[int, str, tuple[str, ...]]]:
     """Seed, rig and changes of each study: none in every third, two in every ninth."""
     for k in range(seed, seed + count):
         rng = np.random.default_rng([k, 76])
-        rig = RIGS[k % len(RIGS)]
+        rig = only or RIGS[k % len(RIGS)]
         names = (*DRIVEN_NOMINAL, *DRIVEN_CAUSES) if rig == "driven" else (*NOMINAL[rig], *CAUSES[rig])
         wanted = 0 if nulls or k % 3 == 0 else 2 if k % 9 == 4 else 1
         yield k, rig, tuple(str(n) for n in rng.choice(names, wanted, replace=False))
@@ -94,6 +94,10 @@ def main(
     ] = 80.0,
     seed: Annotated[int, typer.Option(help="Of the first; each next one has the next seed.")] = 0,
     nulls: Annotated[bool, typer.Option(help="Change nothing in any.")] = False,
+    rig: Annotated[str | None, typer.Option(help="One rig alone: ankle, muscle, joint or driven.")] = None,
+    recorded: Annotated[bool, typer.Option(help="Driven rigs: their effort is measured, with noise.")] = False,
+    low_pass: Annotated[float | None, typer.Option(help="Driven rigs: stored below so many Hz.")] = None,
+    every: Annotated[int, typer.Option(help="Driven rigs: samples of the controller to a row of the log.")] = 1,
     practice: Annotated[
         list[Path] | None, typer.Option(help="Pairs out of the studies in this folder instead; may be repeated.")
     ] = None,
@@ -111,19 +115,20 @@ def main(
                 file.write(json.dumps(row) + "\n")
 
     if practice:
-        for k, (study, rig, changes) in enumerate(of_practice(practice, nulls)):
+        for k, (study, own, changes) in enumerate(of_practice(practice, nulls)):
             if seed <= k < seed + count and k not in done:
-                keep(judged(study, k, rig, changes))
+                keep(judged(study, k, own, changes))
     else:
-        for k, rig, changes in plan(count, seed, nulls):
+        recording = Recording(recorded, low_pass, every)
+        for k, drawn, changes in plan(count, seed, nulls, rig):
             if k in done:
                 continue
             with tempfile.TemporaryDirectory(prefix="contrast") as folder:
-                if rig == "driven":
-                    study = driven_pair(changes, size / 200.0, k, Path(folder))
+                if drawn == "driven":
+                    study = driven_pair(changes, size / 200.0, k, Path(folder), recording)
                 else:
-                    study = free_pair(rig, changes, size, k, Path(folder))
-                keep(judged(study, k, rig, changes))
+                    study = free_pair(drawn, changes, size, k, Path(folder))
+                keep(judged(study, k, drawn, changes))
     typer.echo("\n".join(table(rows)))
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from driven_rigs.draw import BASES, _references, _sizes, urdf
+from driven_rigs.draw import BASES, READ_EFFORT, _references, _sizes, urdf
 from driven_rigs.plant import DT, Plant, run
 
+from fes_pin.data.smooth import low_pass
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 
@@ -16,7 +17,41 @@ CAUSES = ("coulomb_friction", "quadratic_damping", "effort_offset", "parallel_st
 NOMINAL = ("inertia_scale", "damping")
 
 
-def driven_pair(changes: tuple[str, ...], size: float, seed: int, folder: Path) -> Study:
+@dataclass(frozen=True)
+class Recording:
+    """How a laboratory records a rig.
+
+    Attributes
+    ----------
+    measured
+        The effort is read, with noise, instead of what the controller commands.
+    cutoff_hz
+        Where effort and reading were low-passed, without delay, before they were stored; None where they were not.
+    every
+        Samples of the controller from one row of the log to the next.
+    """
+
+    measured: bool = False
+    cutoff_hz: float | None = None
+    every: int = 1
+
+    def stored(
+        self, effort: np.ndarray, position: np.ndarray, usual: float, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Efforts and positions as the log has them, shape (rows, trials)."""
+        if self.measured:
+            effort = effort + READ_EFFORT * usual * rng.standard_normal(effort.shape)
+        if self.cutoff_hz is not None:
+            effort, position = low_pass(effort, DT, self.cutoff_hz), low_pass(position, DT, self.cutoff_hz)
+        return effort[:: self.every], position[:: self.every]
+
+
+COMMANDED = Recording()
+
+
+def driven_pair(
+    changes: tuple[str, ...], size: float, seed: int, folder: Path, recording: Recording = COMMANDED
+) -> Study:
     """A study of two groups of two trials; the second has the changes.
 
     Parameters
@@ -24,7 +59,7 @@ def driven_pair(changes: tuple[str, ...], size: float, seed: int, folder: Path) 
     size
         Torque of a cause as a share of the effort that moves the rig.
     """
-    rng = np.random.default_rng([seed, 78])
+    rng, own = np.random.default_rng([seed, 78]), np.random.default_rng([seed, 79])
     base = BASES[int(rng.integers(len(BASES)))]
     omega = base.bandwidth * rng.uniform(0.8, 1.2)
     gain = base.inertia * omega**2 + abs(base.weight)
@@ -50,12 +85,13 @@ def driven_pair(changes: tuple[str, ...], size: float, seed: int, folder: Path) 
     trials = []
     for label, one, columns in (("before", plant, slice(0, 2)), ("after", other, slice(2, 4))):
         effort, position = run(one, references[:, columns], rng)
+        effort, position = recording.stored(effort, position, usual, own)
         trials += [
             Trial(
                 f"{label}{k}",
                 "motion",
                 {"effort": np.round(effort[:, k], 6), "position": position[:, k]},
-                np.arange(len(effort)) * DT,
+                np.arange(len(effort)) * DT * recording.every,
                 group=label,
             )
             for k in range(effort.shape[1])
