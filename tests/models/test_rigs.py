@@ -241,6 +241,18 @@ def test_a_joint_idles_where_it_hangs(tmp_path, base):
     assert abs(beside[1]) < 1e-12 * beside[0]
 
 
+@pytest.mark.parametrize(("held", "turns"), [(0.1, 0.0), (-0.1, 0.0), (3.0, 1.0), (-3.3, -1.0), (6.4, 2.0)])
+def test_a_joint_that_an_effort_holds_idles_beside_it(tmp_path, held, turns):
+    """A gain about where an upright joint would hang is an offset by another name."""
+    rig = joint_model(robot(tmp_path, "revolute", "0 1 0"), {}, {"inertia_scale": 1.0, "damping": 0.0})
+    hanging = rig.trial_constants(Trial("swing", "motion", {"position": np.zeros(2)}, np.arange(2.0)))["idle"]
+    columns = {"position": np.full(2, hanging + held), "effort": np.zeros(2)}
+    measured = Trial("held", "motion", columns, np.arange(2.0))
+    stated = Trial("held", "motion", {"effort": np.zeros(2)}, np.arange(2.0), {"position0": hanging + held})
+    for trial in (measured, stated):
+        assert rig.trial_constants(trial)["idle"] == pytest.approx(hanging + turns * np.pi)
+
+
 @pytest.mark.parametrize(
     ("kind", "units"),
     [("revolute", ("N m/rad", "rad", "rad/s", "N m s/rad")), ("prismatic", ("N/m", "m", "m/s", "N s/m"))],

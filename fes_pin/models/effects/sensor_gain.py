@@ -18,8 +18,8 @@ class SensorGain(Effect):
 
         y_rest + (1 + error) (y - y_rest)
 
-    On a joint y_rest is where a trial begins (`place` 0), where the joint hangs (1), or the zero of its URDF (2),
-    whichever fits.
+    On a joint y_rest is where a trial begins (`place` 0), where no effort need hold the joint (1), or the zero of its
+    URDF (2), whichever fits.
 
     An error beyond a factor of two is another unit, not a gain.
 

@@ -18,8 +18,8 @@ class SensorNonlinearity(Effect):
 
         y + curvature x^2 (1 + skew x),   x = y - y_rest
 
-    On a joint y_rest is where a trial begins (`place` 0), where the joint hangs (1), or the zero of its URDF (2),
-    whichever fits.
+    On a joint y_rest is where a trial begins (`place` 0), where no effort need hold the joint (1), or the zero of its
+    URDF (2), whichever fits.
 
     Tell-tale: large excursions are read wrongly to one side, small ones and rest rightly.
     Source: the second-order term of a potentiometer's characteristic, loaded or off its axis, and the third.

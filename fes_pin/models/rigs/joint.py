@@ -37,8 +37,9 @@ class Joint(Rig):
 
     M, A and B are read off Pinocchio's CRBA and gravity of the URDF (`constants`: `inertia`, `gravity_cos`,
     `gravity_sin`, `revolute`); for a prismatic joint (`revolute` 0) gravity is the constant A. The effort is held
-    between samples. Each trial has its own initial position and velocity. `idle` is where it rests without an effort:
-    A cos(q) + B sin(q) = 0, hanging; 0 for a prismatic joint.
+    between samples. Each trial has its own initial position and velocity. `idle` is where no effort is needed to rest:
+    A cos(q) + B sin(q) = 0; hanging, or standing if that is nearer to where an effort holds the joint; 0 for a
+    prismatic joint.
 
     The bearing of a revolute joint carries the pull along the arm, in units of the URDF's weight at rest W (that of the
     simple pendulum with the same A, B and M; 1 for a prismatic joint, and where the joint feels no gravity):
@@ -137,8 +138,17 @@ class Joint(Rig):
 
     def trial_constants(self, trial: Trial) -> dict[str, float]:
         known = {name: float(self.constants[name]) for name in self.needed}
-        a, b = known["gravity_cos"], known["gravity_sin"]
-        return {**known, "idle": math.atan2(-a, b) if known["revolute"] and (a or b) else 0.0}
+        return {**known, "idle": self._idle(trial)}
+
+    def _idle(self, trial: Trial) -> float:
+        a, b = float(self.constants["gravity_cos"]), float(self.constants["gravity_sin"])
+        if not (self.constants["revolute"] and (a or b)):
+            return 0.0
+        hanging = math.atan2(-a, b)
+        if not self.is_driven([trial]):
+            return hanging
+        held = trial["position"] if "position" in trial.columns else trial.conditions.get("position0", hanging)
+        return hanging + math.pi * round((float(np.nanmedian(held)) - hanging) / math.pi)
 
     def initial_unknowns(self, trial: Trial) -> dict[str, float]:
         if trial.kind == IMPOSED:
