@@ -18,11 +18,11 @@ def test_friction_that_grew_with_the_load_is_plain_beside_another_damping(tmp_pa
     model = sets.nominal().model + CoulombFriction(0.1, load_exponent=1.5) + QuadraticDamping(0.05)
     problem = LikelihoodProblem(model, study.trials, sets.fits[()].doubt)
     sets.fits[PAIR] = stood = maximise(problem, model.parameters())
-    simpler = sets.simplified(PAIR)
+    simpler = sets.forms.simplified(sets.fits[PAIR])
     assert simpler.price < stood.price - 100.0
     assert simpler.values["coulomb_friction.load_exponent"] == 0.0
     sets.fits[PAIR] = simpler
-    assert sets.simplified(PAIR) is None
+    assert sets.forms.simplified(sets.fits[PAIR]) is None
 
 
 def test_forms_that_bent_one_to_the_other_are_begun_anew(tmp_path):
@@ -34,7 +34,7 @@ def test_forms_that_bent_one_to_the_other_are_begun_anew(tmp_path):
     model = sets.nominal().model + friction + SensorLag(0.0094)
     problem = LikelihoodProblem(model, study.trials, sets.fits[()].doubt)
     sets.fits[names] = bent = maximise(problem, model.parameters())
-    anew = sets.reformed(names)
+    anew = sets.forms.reformed(sets.fits[names])
     assert anew.price < bent.price - 50.0
     damping = drawn.truth["damping"]
     assert abs(anew.values["damping"] - damping) < 0.3 * abs(bent.values["damping"] - damping)

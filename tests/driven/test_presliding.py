@@ -62,7 +62,7 @@ def test_bristles_are_read_as_friction_with_a_stretch():
     nominal = sets.nominal()
     sets.extend_all(())
     plain, demanded = sets.fits[NAMES], chi2_quantile(0.999, 1)
-    while better := sets.refined(NAMES, demanded):
+    while better := sets.forms.refined(sets.fits[NAMES], demanded):
         if sets.fits[NAMES].sse - better.sse < demanded:
             break
         sets.fits[NAMES] = better

@@ -88,7 +88,7 @@ class LikelihoodSearch:
             nominal = self.sets.nominal()
             if not math.isfinite(nominal.sse):
                 raise NominalFitError("the nominal model foretells nothing finite from its start values on", nominal)
-            self.family = Family(self.sets.scores(nominal), self.seed)
+            self.family = Family(self.sets.screen.scores(nominal), self.seed)
         self._fallback: Names = ()
         try:
             return self._search()
@@ -121,7 +121,7 @@ class LikelihoodSearch:
 
     def _worth_extending(self, names: Names) -> bool:
         """True where the score of a further cause beside a set is not what chance brings."""
-        scored = [s for s in self.sets.scores(self.sets.fits[names]).scored if s.gain > 0.0]
+        scored = [s for s in self.sets.screen.scores(self.sets.fits[names]).scored if s.gain > 0.0]
         single = min((float(chi2_tail(s.gain, max(len(s.amplitudes), 1))) for s in scored), default=1.0)
         return self.family.adjusted(single) < EXTEND_LEVEL
 
@@ -133,7 +133,8 @@ class LikelihoodSearch:
         if size == 2:
             base = sets.fits[()]
             pairs = {
-                tuple(sorted((a.probe.name, b.probe.name))): (a, b) for a, b in best_pairs(sets.scores(base), SEEDS)
+                tuple(sorted((a.probe.name, b.probe.name))): (a, b)
+                for a, b in best_pairs(sets.screen.scores(base), SEEDS)
             }
             missing = {k: v for k, v in pairs.items() if k not in sets.fits}
             begun = {k: lambda v=v: sets.extend_with_both(base, v) for k, v in missing.items()}
@@ -147,10 +148,11 @@ class LikelihoodSearch:
 
     def _refine(self, names: Names) -> None:
         """Give a set, once, the form that the data demand."""
+        forms = self.sets.forms
         while names not in self._formed and (
-            self._replaced(names, self.sets.simplified(names))
+            self._replaced(names, forms.simplified(self.sets.fits[names]))
             or self._refined(names)
-            or self._replaced(names, self.sets.reformed(names))
+            or self._replaced(names, forms.reformed(self.sets.fits[names]))
         ):
             pass
         self._formed.add(names)
@@ -163,7 +165,8 @@ class LikelihoodSearch:
 
     def _refined(self, names: Names) -> bool:
         """Adopt the refinement of a set that the data demand most; False if they demand none."""
-        base, refined = self.sets.fits[names], self.sets.refined(names, chi2_quantile(1.0 - REFINE_LEVEL, 1))
+        base = self.sets.fits[names]
+        refined = self.sets.forms.refined(base, chi2_quantile(1.0 - REFINE_LEVEL, 1))
         if refined is None:
             return False
         degrees = max(refined.degrees - base.degrees, 1)
@@ -219,7 +222,7 @@ class LikelihoodSearch:
             rivals[name] = sorted(finite, key=lambda f: f.price)
         none, best = sets.fits[()], sets.fits[names]
         p_values = {n: self.p_value(best, without[n]) for n in names}
-        scored = sets.scores(none).scored + (sets.scores(best).scored if names else [])
+        scored = sets.screen.scores(none).scored + (sets.screen.scores(best).scored if names else [])
         return Found(none, best, p_values, rivals, without, scored, self.family, sets.library.silent())
 
 
