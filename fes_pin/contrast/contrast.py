@@ -11,6 +11,7 @@ from fes_pin.contrast.conditions import ContrastSearched, Trials, contrast_with_
 from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.grouped import Grouped
 from fes_pin.contrast.groups import BY_GROUP, grouped_study
+from fes_pin.contrast.late import is_cheaper, late_in_groups
 from fes_pin.contrast.left import left_in_groups
 from fes_pin.contrast.result import Contrast
 from fes_pin.contrast.search import ContrastFound, ContrastSearch
@@ -23,6 +24,7 @@ from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.lasting import words_of_smoothing
+from fes_pin.identify.lateness import with_effort_earlier, words_of_lateness
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -85,6 +87,11 @@ def contrast(
             return made, ContrastSearch(made, seed, tell).run()
 
         searched = contrast_with_conditions(nominal, trials, run)
+        if (late_s := late_in_groups(searched.fits, searched.found.best)) is not None:
+            moved = {g: [with_effort_earlier(t, late_s) for t in many] for g, many in trials.items()}
+            timed = contrast_with_conditions(nominal, moved, run)
+            if is_cheaper(timed, searched):
+                searched, said = timed, [words_of_lateness(late_s), *said]
         tell(0.95, "what is left")
         left, words = left_in_groups(searched.fits, searched.found.best, seed)
     said += [*words, *_smoothed(searched.found.best, trials)]

@@ -18,7 +18,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.driven import driven_diagnosis
 from fes_pin.diagnose.free import judge_free, unfitted
-from fes_pin.diagnose.late_effort import better_timed, late_by, with_effort_earlier
+from fes_pin.diagnose.late_effort import better_timed, in_time, late_by
 from fes_pin.diagnose.long_records import searched_part, thinned
 from fes_pin.diagnose.misread import NAME as MISREAD
 from fes_pin.diagnose.plausibility import check_study
@@ -80,7 +80,7 @@ def diagnose_joint(
         if not work.was_stopped and (passed := _low_passed(diagnosis, work.end)) is not None:
             diagnosis = _likelier(work.diagnosis(passed), diagnosis)
         if not work.was_stopped and (late_s := late_by(diagnosis, work.end)) is not None:
-            diagnosis = better_timed(work.diagnosis(with_effort_earlier(measured.study, late_s)), diagnosis, late_s)
+            diagnosis = better_timed(work.diagnosis(in_time(measured.study, late_s)), diagnosis, late_s)
     tell(1.0, "done")
     warnings += diagnosis.warnings
     if work.was_stopped:

@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.study import Study
-from fes_pin.data.timing import advanced
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.lateness import lateness_of
+from fes_pin.identify.lateness import lateness_of, with_effort_earlier, words_of_lateness
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
 from fes_pin.workers import OutOfTime, time_limit
@@ -41,17 +40,16 @@ def late_by(diagnosis: Diagnosis, end: float) -> float | None:
         return None
 
 
-def with_effort_earlier(study: Study, late_s: float) -> Study:
+def in_time(study: Study, late_s: float) -> Study:
     """The study with its efforts where they acted."""
-    return replace(study, trials=tuple(advanced(t, "effort", late_s) for t in study.trials))
+    return replace(study, trials=tuple(with_effort_earlier(t, late_s) for t in study.trials))
 
 
 def better_timed(timed: Diagnosis, recorded: Diagnosis, late_s: float) -> Diagnosis:
     """The diagnosis with efforts in time, if it is likelier than that of the record; else that."""
     if not _is_likelier(timed.extended, recorded.extended):
         return recorded
-    said = f"the effort was written down {1e3 * late_s:.2g} ms after it acted, and was moved to when it did"
-    return replace(timed, warnings=(said, *timed.warnings))
+    return replace(timed, warnings=(words_of_lateness(late_s), *timed.warnings))
 
 
 def _is_likelier(timed: Fit, recorded: Fit) -> bool:

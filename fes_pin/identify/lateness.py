@@ -10,6 +10,7 @@ from __future__ import annotations
 from scipy.optimize import minimize_scalar
 
 from fes_pin.data.timing import advanced
+from fes_pin.data.trial import Trial
 from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -39,7 +40,7 @@ def lateness_of(fitted: Fit, row_s: float) -> float | None:
 
     def cost(late: float) -> float:
         if late not in tried:
-            moved = [advanced(t, "effort", late) for t in fitted.trials]
+            moved = [with_effort_earlier(t, late) for t in fitted.trials]
             problem = LikelihoodProblem(fitted.model, moved, doubt)
             tried[late] = maximise(problem, fitted.values, fitted.unknowns).sse
         return tried[late]
@@ -50,4 +51,11 @@ def lateness_of(fitted: Fit, row_s: float) -> float | None:
     return float(minimize_scalar(cost, **most).x)
 
 
-__all__ = ["lateness_of"]
+def with_effort_earlier(trial: Trial, late_s: float) -> Trial:
+    """The trial with its effort where it acted."""
+    return advanced(trial, "effort", late_s)
+
+
+def words_of_lateness(late_s: float) -> str:
+    """What is to be said of efforts that were moved."""
+    return f"the effort was written down {1e3 * late_s:.2g} ms after it acted, and was moved to when it did"

@@ -1,0 +1,45 @@
+"""Efforts of all groups that were written down after they acted: a fault of the log that they share, and no change."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fes_pin.contrast.conditions import ContrastSearched
+from fes_pin.contrast.fits import Fits
+from fes_pin.contrast.grouped import Grouped
+from fes_pin.identify.lateness import lateness_of
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.turns import maximise
+from fes_pin.models.predictor import Doubt
+from fes_pin.workers import in_parallel
+
+
+def late_in_groups(fits: Fits, best: Grouped) -> float | None:
+    """How late the efforts of a driven rig were written down, s, in the mean over groups; None where one is in time."""
+    every = [t for many in fits.trials.values() for t in many]
+    if not fits.driven or not all("effort" in fits.nominal.rig.input_columns(t) for t in every):
+        return None
+    try:
+        late = in_parallel(lambda group: _late_in(fits, best, group), list(fits.trials))
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return None
+    known = [one for one in late if one is not None]
+    return float(np.mean(known)) if len(known) == len(late) else None
+
+
+def _late_in(fits: Fits, best: Grouped, group: str) -> float | None:
+    """How late the efforts of one group are beside what was found, with nominal values of its own."""
+    part = fits.part(best, group)
+    assert part.doubt is not None
+    own = maximise(LikelihoodProblem(part.model, part.trials, part.doubt), part.values, part.unknowns)
+    return lateness_of(own, min(t.dt for t in part.trials))
+
+
+def is_cheaper(timed: ContrastSearched, recorded: ContrastSearched) -> bool:
+    """True if efforts in time explain the same readings at a lower price."""
+    one, other = timed.found.best, recorded.found.best
+    return _lasting(one) == _lasting(other) and one.price < other.price
+
+
+def _lasting(one: Grouped) -> set[float]:
+    return {w.lasts_s for w in one.weights.values() if isinstance(w, Doubt)}
