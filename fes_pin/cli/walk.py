@@ -32,7 +32,7 @@ def diagnose_walking(
     tell(0.9, "report")
     files = {**walk_files(diagnosis), "report.html": walk_report_html(diagnosis)}
     tell(0.95, "playback")
-    first = diagnosis.search.recordings[0]
+    first = diagnosis.search.banks.recordings[0]
     files[PLAYBACK_FILE] = show_reactions(first.motion, first.plates, f"{study.name}, {first.name}").html()
     write_files(out, files, without={NEXT_FILE} - set(files))
     return str(diagnosis)

@@ -28,7 +28,7 @@ def walk_report_html(diagnosis: WalkDiagnosis) -> str:
 
 def _html(diagnosis: WalkDiagnosis) -> str:
     words = diagnosis.headline()
-    strides = diagnosis.search.strides.count
+    strides = diagnosis.search.banks.strides.count
     partly = " partly" if diagnosis.causes and diagnosis.remainder.unexplained else ""
     head = element(
         "header",
@@ -96,14 +96,14 @@ def _use(diagnosis: WalkDiagnosis) -> list[Markup]:
 
 
 def _trials(diagnosis: WalkDiagnosis) -> list[Markup]:
-    search, best = diagnosis.search, diagnosis.best
+    banks, best = diagnosis.search.banks, diagnosis.best
     legend = key(("measured", "measured"), ("nominal", "required"), ("extended", "required by the extended model"))
     out = [legend]
-    for number, scene in enumerate(search.banks[False].scenes):
+    for number, scene in enumerate(banks.as_read.scenes):
         made = None
         if best.forms:
-            with_it = search.bank(best.forms).scenes[number]
-            columns = np.concatenate([search.forms[i].columns(with_it) for i in best.forms], axis=2)
+            with_it = banks.bank(best.forms).scenes[number]
+            columns = np.concatenate([banks.forms[i].columns(with_it) for i in best.forms], axis=2)
             made = scene.measured - (with_it.residual - columns @ best.fitted.values)
         drawn = _figure(scene.motion.time, scene.measured, scene.needed, made, scene.plates.loaded)
         out.append(figure(inline_svg(drawn, f"Ground reaction of trial {scene.name}"), scene.name))

@@ -11,7 +11,9 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
+from fes_pin.walk.banks import Banks
 from fes_pin.walk.experiment import NextWalk, next_walk
+from fes_pin.walk.fits import Set
 from fes_pin.walk.judge import (
     WalkGain,
     floor_percent,
@@ -23,12 +25,14 @@ from fes_pin.walk.judge import (
     walk_remainder,
 )
 from fes_pin.walk.likelihood import white_level
-from fes_pin.walk.nulls import Nulls
+from fes_pin.walk.nulls import LEVEL, Nulls, simulated_nulls
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.result import Estimate, WalkCause, WalkDiagnosis, WalkRemainder
-from fes_pin.walk.search import LEVEL, SEPARABLE, Set, WalkSearch
+from fes_pin.walk.search import WalkSearch
 from fes_pin.workers import Progress, one_thread_each, time_limit
 
+SEPARABLE = 6.0
+"""Twice the log-likelihood by which a rival must fall short: odds of 20 to 1."""
 LEFT_LEVEL = 0.01
 """Level at which what is left counts as something."""
 ORDINARY_MM = 2.0
@@ -74,12 +78,12 @@ def diagnose_walk(
     with one_thread_each():
         tell(0.02, "inverse dynamics")
         _, recordings = recordings_of(replace(study, trials=trials), cutoff_hz=cutoff_hz)
-        search = WalkSearch(recordings, cutoff_hz, seed)
+        search = WalkSearch(Banks(recordings, cutoff_hz, seed))
         tell(0.3, "sets of causes")
         with time_limit(math.inf if limit is None else limit - (time.perf_counter() - began)):
             sizes = search.run()
         tell(0.7, "critical values")
-        nulls = search.nulls(sizes[-1], seed)
+        nulls = simulated_nulls(search.banks, sizes[-1].fitted.variance, seed)
         best = _chosen(sizes, nulls.critical(LEVEL))
         tell(0.85, "strides held out")
         out = _judged(study, search, best, nulls, seed)
@@ -99,37 +103,38 @@ def _chosen(sizes: list[Set], critical: float) -> Set:
 
 
 def _judged(study: Study, search: WalkSearch, best: Set, nulls: Nulls, seed: int) -> WalkDiagnosis:
-    many = search.strides.count > 1
+    banks, fits = search.banks, search.fits
+    many = banks.strides.count > 1
     refused = False
     causes = _causes(search, best, nulls, seed)
     while weak := [c for c in causes if not c[1].helps()]:
         refused = True
         gone = max(weak, key=lambda c: c[1].p_value)[0]
-        best = search.fit(tuple(i for i in best.forms if i != gone))
+        best = fits.fit(tuple(i for i in best.forms if i != gone))
         causes = _causes(search, best, nulls, seed)
     named = [c for _, c in causes]
-    if (noise := _marker_noise(search)) is not None and all(c.name != noise.name for c in named):
+    if (noise := _marker_noise(banks)) is not None and all(c.name != noise.name for c in named):
         named.append(noise)
-    p_value, where = walk_remainder(search, best)
+    p_value, where = walk_remainder(banks, best)
     left = refused or p_value < LEFT_LEVEL
     order = sorted(named, key=lambda c: -(c.gain_held_out.percent if c.gain_held_out else c.gain_fit))
-    none = search.fit(())
+    none = fits.fit(())
     in_a_set = {n for c in named for n in (c.name, *c.equivalents)}  # these may be what is there
     return WalkDiagnosis(
         study=study,
         verdict="causes_found" if named else ("unexplained" if left else "adequate"),
         causes=tuple(order),
         remainder=WalkRemainder(left, p_value, where if left else None),
-        absorbed=tuple(n for n in unseen(search, best) if n not in in_a_set),
+        absorbed=tuple(n for n in unseen(banks, best) if n not in in_a_set),
         nominal_error=(
-            walk_error_percent(search, none, False),
-            walk_error_percent(search, none, True) if many else None,
+            walk_error_percent(banks, none, False),
+            walk_error_percent(banks, none, True) if many else None,
         ),
         extended_error=(
-            walk_error_percent(search, best, False),
-            walk_error_percent(search, best, True) if many else None,
+            walk_error_percent(banks, best, False),
+            walk_error_percent(banks, best, True) if many else None,
         ),
-        ceiling_percent=floor_percent(search),
+        ceiling_percent=floor_percent(banks),
         next_experiment=_experiment(search, best, order),
         search=search,
         best=best,
@@ -137,18 +142,19 @@ def _judged(study: Study, search: WalkSearch, best: Set, nulls: Nulls, seed: int
 
 
 def _causes(search: WalkSearch, best: Set, nulls: Nulls, seed: int) -> list[tuple[int, WalkCause]]:
-    sizes = search.sizes(best)
+    banks, fits = search.banks, search.fits
+    sizes = fits.sizes(best)
     spread = np.sqrt(np.diag(best.fitted.covariance))
-    owners = [i for i in best.forms for _ in search.forms[i].parameters]
+    owners = [i for i in best.forms for _ in banks.forms[i].parameters]
     rivals: dict[int, list[Set]] = {i: [] for i in best.forms}
     for gone, other in search.swaps(best):
         if other.price - best.price < SEPARABLE:
             rivals[gone].append(other)
     out = []
     for i in best.forms:
-        form, without = search.forms[i], search.fit(tuple(k for k in best.forms if k != i))
+        form, without = banks.forms[i], fits.fit(tuple(k for k in best.forms if k != i))
         stds = [s for owner, s in zip(owners, spread, strict=True) if owner == i] * np.maximum(nulls.spread[i], 1.0)
-        instead = [search.forms[k] for r in rivals[i] for k in r.forms if k not in best.forms]
+        instead = [banks.forms[k] for r in rivals[i] for k in r.forms if k not in best.forms]
         others = tuple(sorted({f.cause for f in instead} - {form.cause}))
         sites = tuple(dict.fromkeys(f.site for f in instead if f.cause == form.cause))
         either = not form.site.startswith(("left", "right")) and not form.shifts  # a clock is of no leg
@@ -165,34 +171,34 @@ def _causes(search: WalkSearch, best: Set, nulls: Nulls, seed: int) -> list[tupl
                     equivalents=others,
                     elsewhere=sites,
                     p_value=nulls.p_value(without.price - best.price),
-                    gain_fit=walk_gain(search, without, best, False, seed).percent,
-                    gain_held_out=walk_gain(search, without, best, True, seed) if search.strides.count > 1 else None,
-                    evidence=walk_evidence(search, without, best, seed) if search.strides.count > 1 else None,
-                    other_leg_percent=other_leg(search, search.fit((i,))) if either else None,
+                    gain_fit=walk_gain(banks, without, best, False, seed).percent,
+                    gain_held_out=walk_gain(banks, without, best, True, seed) if banks.strides.count > 1 else None,
+                    evidence=walk_evidence(banks, without, best, seed) if banks.strides.count > 1 else None,
+                    other_leg_percent=other_leg(banks, fits.fit((i,))) if either else None,
                 ),
             )
         )
     return out
 
 
-def white_noise(search: WalkSearch) -> tuple[float, float, float] | None:
+def white_noise(banks: Banks) -> tuple[float, float, float] | None:
     """White noise of markers, mm, its standard deviation, and the deviance that it saves; None for a single stride."""
-    if search.strides.count < 2:
+    if banks.strides.count < 2:
         return None
-    y = search.strides.coefficients([s.residual[:, :, None] for s in search.banks[False].scenes])[..., 0]
-    waves = search.noise.harmonics > 0
-    shaken = search.shaken[..., waves]
+    y = banks.strides.coefficients([s.residual[:, :, None] for s in banks.as_read.scenes])[..., 0]
+    waves = banks.noise.harmonics > 0
+    shaken = banks.shaken[..., waves]
     values, vectors = np.linalg.eigh(np.einsum("dik,djk->ij", shaken, shaken) / (len(shaken) * waves.sum()))
     turn = (vectors / np.sqrt(values)).T  # channels in which white noise of the coordinates is independent
-    noise = replace(search.noise, turn=turn)
+    noise = replace(banks.noise, turn=turn)
     apart = noise.rotated((y - y.mean(axis=0)) * np.sqrt(len(y) / (len(y) - 1.0)))
-    level, std, saved = white_level(apart, noise, noise.rotated(search.shaken))
+    level, std, saved = white_level(apart, noise, noise.rotated(banks.shaken))
     return level, std * np.sqrt(len(y) / (len(y) - 1.0)), saved
 
 
-def _marker_noise(search: WalkSearch) -> WalkCause | None:
+def _marker_noise(banks: Banks) -> WalkCause | None:
     """White noise on the coordinates that is more than cameras' own, from what differs from stride to stride."""
-    level, std, saved = white_noise(search) or (0.0, 0.0, 0.0)
+    level, std, saved = white_noise(banks) or (0.0, 0.0, 0.0)
     if level - SURE * std < ORDINARY_MM or saved < SEPARABLE:
         return None
     from scipy.stats import chi2  # noqa: PLC0415

@@ -7,16 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.walk.banks import Banks
 from fes_pin.walk.dynamics import about, centre_of_mass, required
+from fes_pin.walk.fits import Set
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import Plates
 from fes_pin.walk.scene import Scene
-from fes_pin.walk.search import Set, WalkSearch
+from fes_pin.walk.search import WalkSearch
 
 CARRIED_KG = 10.0
 SLOWER = 0.6
 ENOUGH = 6.0
-"""Twice the log-likelihood that separates, as in the search."""
+"""Twice the log-likelihood that separates, as in the diagnosis."""
 
 
 @dataclass(frozen=True)
@@ -43,22 +45,22 @@ class NextWalk:
 
 def next_walk(search: WalkSearch, best: Set, cause: str, within: float) -> NextWalk | None:
     """The trial that separates a cause from its nearest rival of another name; None if it has none."""
-    rivals = []
+    banks, rivals = search.banks, []
     for gone, other in search.swaps(best):
         (new,) = set(other.forms) - set(best.forms) or {gone}
-        form = search.forms[new]
-        if search.forms[gone].cause == cause and form.cause != cause and other.price - best.price < within:
+        form = banks.forms[new]
+        if banks.forms[gone].cause == cause and form.cause != cause and other.price - best.price < within:
             rivals.append((other.price, gone, new, other))
     if not rivals:
         return None
     _, gone, new, other = min(rivals, key=lambda r: (r[0], r[2]))
-    pair = (cause, search.forms[new].cause)
-    signal = search.sizes(best)[gone]
+    pair = (cause, banks.forms[new].cause)
+    signal = search.fits.sizes(best)[gone]
     scores = {}
     for name, make in _TRIALS.items():
-        scene = make(search.banks[False].scenes[0])
-        mine, its = (search.forms[i].columns(scene) for i in (gone, new))
-        scores[name] = _separation(search, mine @ signal, its, np.array(search.forms[new].plausible), best)
+        scene = make(banks.as_read.scenes[0])
+        mine, its = (banks.forms[i].columns(scene) for i in (gone, new))
+        scores[name] = _separation(banks, mine @ signal, its, np.array(banks.forms[new].plausible), best)
     name = max(scores, key=lambda n: scores[n])
     if scores[name] < ENOUGH:
         why = (
@@ -66,7 +68,7 @@ def next_walk(search: WalkSearch, best: Set, cause: str, within: float) -> NextW
             "weigh the plates with known masses, or measure the body by other means"
         )
         return NextWalk(why, pair, None, None)
-    first = search.recordings[0]
+    first = banks.recordings[0]
     time, columns = first.coordinates_time, {n: c for n, c in first.coordinates.items() if n.startswith("q_")}
     time, columns, conditions = _program(name, time - time[0], columns, first.belt_speed_mps)
     why = f"{_WORDS[name]} (it separates {pair[0]} from {pair[1]} by {np.sqrt(scores[name]):.1f} standard deviations)"
@@ -130,14 +132,14 @@ _WORDS = {
 }
 
 
-def _separation(search: WalkSearch, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: Set) -> float:
+def _separation(banks: Banks, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: Set) -> float:
     """Squared distance of a signal (n, 6) from what a rival (n, 6, p) can make of it, in the noise that was found."""
     root = 1.0 / np.sqrt(best.fitted.variance)
     scenes = [np.concatenate([signal[:, :, None], rival], axis=2)]
-    one = type(search.strides)(
-        [w for w in search.strides.windows if w[0] == 0][:1] or search.strides.windows[:1], search.strides.harmonics
+    one = type(banks.strides)(
+        [w for w in banks.strides.windows if w[0] == 0][:1] or banks.strides.windows[:1], banks.strides.harmonics
     )
-    waves = search.noise.rotated(one.mean(scenes)) * root[..., None]
+    waves = banks.noise.rotated(one.mean(scenes)) * root[..., None]
     y, x = waves[..., 0].ravel(), waves[..., 1:].reshape(root.size, -1) * prior
     values = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ y)
     return float(np.sum((y - x @ values) ** 2))

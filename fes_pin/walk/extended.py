@@ -10,10 +10,10 @@ from defusedxml.ElementTree import fromstring
 from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
 from fes_pin.walk.effect import central
-from fes_pin.walk.search import Set, WalkSearch
+from fes_pin.walk.fits import Set, WalkFits
 
 
-def extended_body(search: WalkSearch, best: Set) -> Body:
+def extended_body(fits: WalkFits, best: Set) -> Body:
     """The body with the segments' masses, centres and inertias of a set of causes; the same where it has none.
 
     Raises
@@ -21,11 +21,11 @@ def extended_body(search: WalkSearch, best: Set) -> Body:
     InputError
         The figures are no body's: a mass that is not positive, say.
     """
-    body = search.recordings[0].motion.body
-    believed = search.banks[False].scenes[0].parameters
+    body = fits.banks.recordings[0].motion.body
+    believed = fits.banks.as_read.scenes[0].parameters
     found = {s: p.copy() for s, p in believed.items()}
-    for i, sizes in search.sizes(best).items():
-        change = search.forms[i].segments
+    for i, sizes in fits.sizes(best).items():
+        change = fits.banks.forms[i].segments
         if change is not None:
             for segment, columns in change(believed).items():
                 found[segment] += columns @ sizes

@@ -6,6 +6,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fes_pin.walk.banks import Banks
+from fes_pin.walk.likelihood import fit_many
+
+SIMULATED = 100
+"""Residuals without a cause that the critical value is taken from."""
+LEVEL = 1e-4
+"""Chance that anything is named where nothing is wrong, over the whole library, in soft tissue as it is simulated. That
+is one law among many, and the channels' rotation has seen the data: what is counted in walks made otherwise is more."""
+SIMULATED_ROUNDS = 4
+FLOOR_SHARE = 0.3
+"""Of the fitted noise beside soft tissue's, as amplitudes."""
+
 
 @dataclass(frozen=True)
 class Nulls:
@@ -37,3 +49,37 @@ class Nulls:
         """Chance of at least this gain."""
         place, scale = self._gumbel
         return float(max(-np.expm1(-np.exp(-(gain - place) / scale)), 1e-300))
+
+
+def simulated_nulls(banks: Banks, variance: np.ndarray, seed: int) -> Nulls:
+    """What the library makes of residuals where there is no cause, in noise of this variance, (1, 6, k)."""
+    drawn = _without_a_cause(banks, variance, seed)
+    none = np.zeros((*variance.shape, 0))
+    alone = fit_many(drawn, none, np.zeros(0), banks.noise, SIMULATED_ROUNDS)[2]
+    best, spread = np.full(SIMULATED, -np.inf), []
+    for i, form in enumerate(banks.forms):
+        x = banks.noise.rotated(banks.as_read.x[i])
+        values, covariance, deviance, *_ = fit_many(drawn, x, np.array(form.plausible), banks.noise, SIMULATED_ROUNDS)
+        best = np.maximum(best, alone - deviance)
+        stds = np.sqrt(np.einsum("bpp->bp", covariance))
+        spread.append(np.sqrt(np.mean((values / stds) ** 2, axis=0)))
+    return Nulls(best, tuple(spread))
+
+
+def _without_a_cause(banks: Banks, variance: np.ndarray, seed: int) -> np.ndarray:
+    """Residuals in rotated channels: (draws, 1, 6, k).
+
+    Noise is soft tissue's, errors in the coordinates carried through the body, in each wave as large as what was found
+    there, some of the fitted noise, and what is in every session.
+    """
+    random = np.random.default_rng(seed)
+    drawn = random.normal(size=(SIMULATED, *variance.shape)) * np.sqrt(variance)
+    always = random.normal(size=(SIMULATED, banks.ordinary.shape[3])) @ banks.ordinary.reshape(variance.size, -1).T
+    mixed = random.normal(size=(SIMULATED, len(banks.tissue))) / np.sqrt(len(banks.tissue))
+    shared = banks.noise.rotated(np.einsum("sd,djk->sjk", mixed, banks.tissue))
+    waves = banks.noise.harmonics > 0
+    power = np.mean(shared[..., waves] ** 2, axis=0)
+    h = banks.noise.harmonics[waves]
+    size = np.array([np.sqrt(variance[0][:, waves][:, h == w].sum() / power[:, h == w].sum()) for w in h])
+    drawn[:, 0][..., waves] = size * shared[..., waves] + FLOOR_SHARE * drawn[:, 0][..., waves]
+    return drawn + always.reshape(drawn.shape)

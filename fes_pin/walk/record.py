@@ -78,10 +78,10 @@ def _cause(cause: WalkCause) -> dict[str, Any]:
 
 def _noise(diagnosis: WalkDiagnosis) -> dict[str, Any]:
     """Root mean square of what the extended model leaves in the mean stride, by channel: N and N m."""
-    search, best = diagnosis.search, diagnosis.best
-    left = search.bank(best.forms).y
+    banks, best = diagnosis.search.banks, diagnosis.best
+    left = banks.bank(best.forms).y
     if best.forms:
-        columns = np.concatenate([search.bank(best.forms).x[i] for i in best.forms], axis=3)
+        columns = np.concatenate([banks.bank(best.forms).x[i] for i in best.forms], axis=3)
         left = left - columns @ best.fitted.values
     size = np.sqrt(np.sum(left[0] ** 2, axis=1))
     return {name.replace(" ", "_"): {"std": _shown(float(s)), "ar": []} for name, s in zip(CHANNELS, size, strict=True)}

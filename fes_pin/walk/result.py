@@ -12,8 +12,10 @@ from fes_pin.data.study import Study
 from fes_pin.walk.effect import STAGE
 from fes_pin.walk.experiment import NextWalk
 from fes_pin.walk.extended import extended_body
+from fes_pin.walk.fits import Set
 from fes_pin.walk.judge import WalkGain
-from fes_pin.walk.search import LEVEL, Set, WalkSearch
+from fes_pin.walk.nulls import LEVEL
+from fes_pin.walk.search import WalkSearch
 
 CERTAIN = 1e-6
 """Level of a cause in a single stride."""
@@ -142,7 +144,7 @@ class WalkDiagnosis:
     @property
     def model(self) -> Body:
         """The body with the masses, centres and inertias that were found."""
-        return extended_body(self.search, self.best)
+        return extended_body(self.search.fits, self.best)
 
     def headline(self) -> str:
         """The verdict in one sentence."""

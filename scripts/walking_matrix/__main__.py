@@ -12,10 +12,11 @@ import numpy as np
 
 from fes_pin.body.measured_walk import data_folder
 from fes_pin.data.study import read_study
+from fes_pin.walk.banks import Banks
 from fes_pin.walk.diagnosis import diagnose_walk, white_noise
+from fes_pin.walk.fits import WalkFits
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.result import WalkDiagnosis
-from fes_pin.walk.search import WalkSearch
 from walking_matrix.plan import KINDS, drawn
 from walking_matrix.synthetic import Gait, Wrong, gait_of, make
 
@@ -47,13 +48,13 @@ def strength(gait: Gait, wrong: Wrong, seed: int, found: WalkDiagnosis) -> float
     is weighed by the noise and the nuisance of the walk without it. Of marker noise the deviance that it saves.
     """
     if wrong.cause == "marker_noise":
-        return float((white_noise(found.search) or (0.0, 0.0, 0.0))[2])
+        return float((white_noise(found.search.banks) or (0.0, 0.0, 0.0))[2])
     with tempfile.TemporaryDirectory() as folder:
         make(gait, Path(folder), replace(wrong, cause="none"), seed)
-        twin = WalkSearch(recordings_of(read_study(folder), cutoff_hz=found.cutoff_hz)[1], found.cutoff_hz)
-    waves = min(len(twin.strides.harmonics), len(found.search.strides.harmonics))
-    y = [s.banks[False].y[:, :, :waves] for s in (found.search, twin)]
-    noise, variance = twin.noise, twin.fit(()).fitted.variance[:, :, :waves]
+        twin = Banks(recordings_of(read_study(folder), cutoff_hz=found.cutoff_hz)[1], found.cutoff_hz)
+    waves = min(len(twin.strides.harmonics), len(found.search.banks.strides.harmonics))
+    y = [b.as_read.y[:, :, :waves] for b in (found.search.banks, twin)]
+    noise, variance = twin.noise, WalkFits(twin).fit(()).fitted.variance[:, :, :waves]
     means = twin.strides.harmonics[:waves] == 0
     change = np.where(means, y[0] - y[1], np.einsum("ij,njk->nik", noise.turn, y[0] - y[1])).ravel()
     nuisance = noise.nuisance[:, :, :waves].reshape(change.size, -1)

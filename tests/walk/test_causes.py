@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from fes_pin.data.study import read_study
-from fes_pin.walk.effects import EFFECTS
+from fes_pin.walk.effects import EFFECTS, walk_library
 from fes_pin.walk.recording import recordings_of
 from fes_pin.walk.scene import scene_of
-from fes_pin.walk.search import walk_library
 
 pytestmark = pytest.mark.shared
 HIDDEN = [  # cause, site as it is hidden, size, more of it, form that must take it away, size of its parameter

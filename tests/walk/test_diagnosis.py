@@ -132,7 +132,7 @@ def test_the_measured_walk_is_honestly_unexplained(walk, tmp_path):
                          ("reference/subject01_model.json", "segments.json")):  # fmt: skip
         (tmp_path / name).write_bytes((walk / source).read_bytes())
     found = diagnose_walk(read_study(tmp_path))
-    assert found.search.strides.count == 2
+    assert found.search.banks.strides.count == 2
     assert found.verdict == "unexplained" and not found.causes
 
 
@@ -150,11 +150,11 @@ def test_the_extended_body_requires_what_the_column_says(measured, hip):
 
 
 def test_the_extended_body_is_the_diagnosiss(heavy):
-    body = extended_body(heavy.search, heavy.best)
+    body = extended_body(heavy.search.fits, heavy.best)
     name, site = heavy.causes[0].name, heavy.causes[0].site
     share = heavy.causes[0].parameters.get("share", (0.0,))[0]
     if name == "segment_mass" and site == "trunk":
-        assert body.mass_kg > heavy.search.recordings[0].motion.body.mass_kg * (1 + 0.3 * share)
+        assert body.mass_kg > heavy.search.banks.recordings[0].motion.body.mass_kg * (1 + 0.3 * share)
     assert len(body.joint_names) == 19
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from pkgutil import iter_modules
 
-from fes_pin.walk.effect import WalkEffect
+from fes_pin.walk.effect import Form, WalkEffect
 
 
 def _written_here() -> Iterator[type[WalkEffect]]:
@@ -18,3 +18,8 @@ def _written_here() -> Iterator[type[WalkEffect]]:
 
 EFFECTS = tuple(sorted(_written_here(), key=lambda e: e.name))
 """Every cause, by name."""
+
+
+def walk_library() -> tuple[Form, ...]:
+    """Every form of every cause."""
+    return tuple(form for effect in EFFECTS for form in effect.forms())

@@ -1,0 +1,154 @@
+"""The recordings as they are fitted: waves of the mean stride, of the residual and of every form, and their noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from fes_pin.body.build import GRAVITY
+from fes_pin.walk.disturb import compressed, disturbed_waves, misplaced, tissue, white
+from fes_pin.walk.effects import walk_library
+from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_walk, rotation
+from fes_pin.walk.recording import WalkRecording
+from fes_pin.walk.scene import Scene, scene_of
+from fes_pin.walk.strides import Strides, strides_of
+
+TISSUE_DRAWS, WHITE_DRAWS = 40, 64
+TAKEN = 0.3
+"""Share of a wave of the required reaction that errors in the motion may make, as a standard deviation: soft tissue
+moves by 10 mm and more where a trunk moves by 20 to 40 (A. Leardini et al., Gait Posture 21:212, 2005)."""
+SHIFT_ROUNDS = 4
+"""Of following a shift of the clock."""
+
+Chosen = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Residual and columns of every form, (1, 6, k, ...) in the mean stride, for plates read `later_s` late."""
+
+    scenes: list[Scene] = field(repr=False)
+    y: np.ndarray = field(repr=False)
+    x: list[np.ndarray] = field(repr=False)
+    later_s: float = 0.0
+
+
+class Banks:
+    """One diagnosis's recordings on the plates' clock as it was read and as it fits best, and the noise of both.
+
+    Attributes
+    ----------
+    recordings, cutoff_hz, seed
+        As given.
+    forms
+        The library; a set of forms is their numbers in it.
+    shift
+        The number of the form that shifts the plates' clock.
+    strides
+        What signals are taken apart into.
+    as_read, shifted
+        The banks on either clock.
+    noise
+        What is common to all fits, in channels as `turn` left them.
+    ordinary
+        (1, 6, k, m) rotated: what ordinary errors of landmarks and plates leave.
+    """
+
+    def __init__(self, recordings: Sequence[WalkRecording], cutoff_hz: float, seed: int = 0) -> None:
+        self.recordings, self.cutoff_hz, self.seed = list(recordings), cutoff_hz, seed
+        self.forms = walk_library()
+        self.shift = next(i for i, f in enumerate(self.forms) if f.shifts)
+        scenes = [scene_of(r, cutoff_hz) for r in self.recordings]
+        self.strides: Strides = strides_of(scenes, cutoff_hz)
+        self._first = self.recordings[self.strides.windows[0][0]]
+        self.as_read = self._bank(scenes, 0.0)
+        self.turn(self.as_read.y)
+        self.shifted = self._shifted()
+
+    def _bank(self, scenes: list[Scene], later_s: float) -> Bank:
+        x = [self.strides.mean([form.columns(s) for s in scenes]) for form in self.forms]
+        return Bank(scenes, self._residual(scenes), x, later_s)
+
+    def _residual(self, scenes: list[Scene]) -> np.ndarray:
+        return self.strides.mean([s.residual[:, :, None] for s in scenes])[..., 0]
+
+    @cached_property
+    def landmarks(self) -> np.ndarray:
+        """Residuals that the ordinary error of each coordinate's zero leaves: (coordinates, 6, k)."""
+        return misplaced(self._first, self.strides)
+
+    @cached_property
+    def tissue(self) -> np.ndarray:
+        """Residuals that soft tissue leaves: (draws, 6, k)."""
+        return disturbed_waves(self._first, self.strides, tissue, TISSUE_DRAWS, self.seed)
+
+    @cached_property
+    def shaken(self) -> np.ndarray:
+        """Residuals that white noise of one unit leaves in a stride: (draws, 6, k)."""
+        return disturbed_waves(self._first, self.strides, white, WHITE_DRAWS, self.seed)
+
+    def turn(self, left: np.ndarray) -> None:
+        """Rotate the channels for what is left, (1, 6, k)."""
+        turn = rotation(left, self.strides.harmonics)
+        weight = GRAVITY * sum(p[0] for p in self.as_read.scenes[0].parameters.values())
+        means = np.r_[np.full(3, MEAN_FORCE * weight), np.full(2, MEAN_ARM_M * weight), MEAN_TWIST_NM] ** 2
+        if not self.strides.whole:  # soft tissue does not come back to what it was
+            means = means + np.mean(self.tissue[..., 0] ** 2, axis=0)
+        bare = WalkNoise(self.strides.harmonics, turn, means, self._none())
+        self.ordinary = bare.rotated(compressed(self._in_every_session()))
+        taken = bare.rotated(_taken(self.as_read.scenes, self.strides))
+        self.noise = replace(bare, nuisance=np.concatenate([taken, self.ordinary], axis=3))
+
+    def _in_every_session(self) -> np.ndarray:
+        """What ordinary errors of landmarks and plates leave, in units of their standard deviations: (1, 6, k, m)."""
+        forms = [(self.as_read.x[i], f.ordinary) for i, f in enumerate(self.forms) if f.ordinary > 0.0]
+        landmarks = np.moveaxis(self.landmarks, 0, 2)[None]
+        return np.concatenate([landmarks, *(size * columns for columns, size in forms)], axis=3)
+
+    def _shifted(self) -> Bank:
+        """The plates read as late as fits best, followed beyond the linear."""
+        form, later = self.forms[self.shift], 0.0
+        scenes, y, rate = self.as_read.scenes, self.as_read.y, self.as_read.x[self.shift]
+        for _ in range(SHIFT_ROUNDS):
+            found = fit_walk(self.noise.rotated(y), self.noise.rotated(rate), np.array(form.plausible), self.noise)
+            step = float(np.clip(found.values[0], -0.05, 0.05))
+            later = float(np.clip(later + step, -0.2, 0.2))
+            scenes = [scene_of(r, self.cutoff_hz, later) for r in self.recordings]
+            y, rate = self._residual(scenes), self.strides.mean([form.columns(s) for s in scenes])
+            if abs(step) < 5e-4:
+                break
+        return self._bank(scenes, later)
+
+    def bank(self, chosen: Chosen) -> Bank:
+        """The bank in which a set is fitted: with the clock moved if it holds a shift."""
+        return self.shifted if self.shift in chosen else self.as_read
+
+    def columns(self, chosen: Chosen) -> np.ndarray:
+        """Rotated columns of a set, one form after the other: (n, 6, k, p)."""
+        bank = self.bank(chosen)
+        return self.noise.rotated(np.concatenate([bank.x[i] for i in chosen], axis=3)) if chosen else self._none()
+
+    def _none(self) -> np.ndarray:
+        return np.zeros((*self.as_read.y.shape, 0))
+
+    def causes(self, chosen: Chosen) -> list[str]:
+        """Names of a set's causes."""
+        return [self.forms[i].cause for i in chosen]
+
+
+def _taken(scenes: list[Scene], strides: Strides) -> np.ndarray:
+    """What errors in the motion take from every wave of the required reaction, in units of `TAKEN`: (n, 6, k, 7).
+
+    A share of each channel, and one that grows with the square of the frequency, as of accelerations.
+    """
+    h = strides.harmonics
+    needed = strides.mean([s.needed[:, :, None] for s in scenes])[..., 0]
+    waves = needed * (h > 0)
+    out = np.zeros((*waves.shape, 7))
+    for channel in range(6):
+        out[:, channel, :, channel] = TAKEN * waves[:, channel]
+    out[..., 6] = TAKEN * waves * (h / 4.0) ** 2
+    return out
