@@ -9,9 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.search.cause_sets import Names, names_of
 from fes_pin.diagnose.search.library import Library, Probe
+from fes_pin.diagnose.search.refined_forms import is_identified
 from fes_pin.diagnose.search.score import Projection, Scored, Scores, best_by_effect
-from fes_pin.diagnose.search.simulation_fits import Names, is_identified, names_of
 from fes_pin.diagnose.search.starts import STARTS, begun_anew, far_sizes, refinements, started
 from fes_pin.identify.covariance import moved_with
 from fes_pin.identify.doubts import first_guess
