@@ -7,7 +7,7 @@ import pytest
 from identify.rigs import WHITE, measured
 from models.cases import RIGS, trial
 
-from fes_pin.diagnose.search.simulation_fits import is_identified
+from fes_pin.diagnose.search.refined_forms import is_identified
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.models.effects import CoulombFriction, SensorNonlinearity

@@ -23,10 +23,10 @@ def sets():
     trials = [measured(true, trial("joint", "motion", rng, 600), rng) for _ in range(3)]
     sets = SimulationFits(Model(RIGS["joint"]), trials)
     sets.set_noise(WHITE)
-    sets.fits[BOTH] = sets.fit_from([true], None)
-    sets.fits[OFFSET] = sets.fit_from([Model(RIGS["joint"]) + SensorOffset(0.05)], None, 60)
+    sets.fits[BOTH] = sets.fitter.fit_from([true], None)
+    sets.fits[OFFSET] = sets.fitter.fit_from([Model(RIGS["joint"]) + SensorOffset(0.05)], None, 60)
     absent = Model(RIGS["joint"]) + CoulombFriction(0.0)
-    sets.fits[FRICTION] = fit_problem(sets.problem(absent), absent.parameters(), None, max_iterations=0)
+    sets.fits[FRICTION] = fit_problem(sets.fitter.problem(absent), absent.parameters(), None, max_iterations=0)
     sets.finish = lambda names: None  # what ended at another minimum has converged
     return sets
 

@@ -72,7 +72,7 @@ def test_the_load_is_told_from_swings(exponent):
     sets = SimulationFits(nominal, trials)
     sets.set_noise(rough_noise(nominal, trials))
     names = ("coulomb_friction",)
-    sets.fits[names] = sets.fit_from([nominal + CoulombFriction(0.8 * TORQUE)], None)
+    sets.fits[names] = sets.fitter.fit_from([nominal + CoulombFriction(0.8 * TORQUE)], None)
     refined, base = sets.refinement(names), sets.fits[names]
     if exponent:
         assert refined.values["coulomb_friction.load_exponent"] == exponent

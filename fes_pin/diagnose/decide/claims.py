@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from fes_pin.diagnose.decide.significance import Family, coherence_p_value
 from fes_pin.diagnose.remainder.open_set import smooth_remainder
+from fes_pin.diagnose.search.cause_sets import Names
 from fes_pin.diagnose.search.score import Scores
-from fes_pin.diagnose.search.simulation_fits import Names, SimulationFits
+from fes_pin.diagnose.search.simulation_fits import SimulationFits
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
 from fes_pin.identify.problem import Problem

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.search.cause_sets import Names, names_of
 from fes_pin.diagnose.search.library import Library
 from fes_pin.diagnose.search.likelihood_forms import LikelihoodForms
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnose.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnose.search.score import Scored, best_by_effect
-from fes_pin.diagnose.search.simulation_fits import Names, names_of
 from fes_pin.diagnose.search.starts import STARTS, far_sizes, started
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
-from fes_pin.diagnose.search.simulation_fits import is_identified
+from fes_pin.diagnose.search.refined_forms import is_identified
 from fes_pin.diagnose.search.starts import STARTS, begun_anew, refinements
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.scoring import WORTH

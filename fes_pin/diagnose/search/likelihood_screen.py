@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from fes_pin.diagnose.search.cause_sets import names_of
 from fes_pin.diagnose.search.library import Library, Probe
 from fes_pin.diagnose.search.score import Projection, Scores
-from fes_pin.diagnose.search.simulation_fits import names_of
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.model import Model

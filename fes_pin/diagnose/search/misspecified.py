@@ -10,7 +10,9 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.claims import FORM_SHARE
 from fes_pin.diagnose.decide.held_out import folds_of, foretold
-from fes_pin.diagnose.search.simulation_fits import FIRST_ITERATIONS, Names, SimulationFits
+from fes_pin.diagnose.search.cause_sets import Names
+from fes_pin.diagnose.search.model_fitter import FIRST_ITERATIONS
+from fes_pin.diagnose.search.simulation_fits import SimulationFits
 from fes_pin.identify.fit import Fit, fit_problem, go_on, noise_of
 from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.problem import Problem

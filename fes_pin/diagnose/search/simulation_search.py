@@ -8,9 +8,12 @@ from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.claims import Claims
+from fes_pin.diagnose.search.cause_sets import Names, subsets
 from fes_pin.diagnose.search.misspecified import choose_by_prediction, fit_for_prediction
+from fes_pin.diagnose.search.model_fitter import FIRST_ITERATIONS
+from fes_pin.diagnose.search.restarts import at_null, restart, restart_beside, restart_every
 from fes_pin.diagnose.search.score import Scored, best_by_effect, best_pairs
-from fes_pin.diagnose.search.simulation_fits import CONVERGED_SETS, FIRST_ITERATIONS, Names, SimulationFits, subsets
+from fes_pin.diagnose.search.simulation_fits import CONVERGED_SETS, SimulationFits
 from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
@@ -154,7 +157,7 @@ class SimulationSearch:
 
     def _keep(self, best: Names) -> None:
         """Keep what a search that is stopped falls back on."""
-        self._fallback = (best, self.sets.noise, dict(self.sets.fits))
+        self._fallback = (best, self.sets.fitter.noise, dict(self.sets.fits))
 
     def stopped(self, names: Names) -> Searched:
         """What is known of a set of causes where the search was stopped, without another search for its rivals."""
@@ -204,7 +207,7 @@ class SimulationSearch:
         self.progress(0.02, "nominal model")
         sets.set_noise(rough_noise(sets.model, sets.trials))
         with time_limit(math.inf):
-            first = fit_multistart(sets.problem(sets.model), sets.model.parameters(), None, FIRST_ITERATIONS)
+            first = fit_multistart(sets.fitter.problem(sets.model), sets.model.parameters(), None, FIRST_ITERATIONS)
         self._begun = first
         self._fallback = ((), first.noise, {(): first})
         if not math.isfinite(first.sse):
@@ -213,7 +216,7 @@ class SimulationSearch:
             )
         self._misspecified = first.reduced > MISSPECIFIED
         sets.first_noise(first)
-        sets.fits[()] = sets.fit_from([first.model], first.unknowns)
+        sets.fits[()] = sets.fitter.fit_from([first.model], first.unknowns)
         sets.finish(())
         self._keep(())
 
@@ -225,15 +228,15 @@ class SimulationSearch:
         self._seeds = best_pairs(scores, SEEDS)
         self.progress(0.12, "every cause, fitted jointly")
         by_effect = best_by_effect(scores.scored)
-        sets.add({(n,): lambda v=v: sets.extend(base, v) for n, v in by_effect.items()})  # type: ignore[misc]
+        sets.add({(n,): lambda v=v: sets.fitter.extend(base, v) for n, v in by_effect.items()})  # type: ignore[misc]
         if self._misspecified:
-            sets.restart_every()
+            restart_every(sets)
         else:
-            sets.restart(list(dict.fromkeys([*sets.ranked(1)[:CONVERGED_SETS], *sets.at_null()])))
+            restart(sets, list(dict.fromkeys([*sets.ranked(1)[:CONVERGED_SETS], *at_null(sets)])))
 
     def _extend_beam(self, size: int, every: bool = False) -> bool:
         """Fit the sets of a size that score best, or every one; False if nothing at all is left to find."""
-        sets = self.sets
+        sets, extend = self.sets, self.sets.fitter.extend
         scored_sets: dict[Names, tuple[float, Names, list[Scored]]] = {}
         for names in sets.ranked(size - 1)[:BEAM]:
             base = sets.fits[names]
@@ -250,15 +253,15 @@ class SimulationSearch:
             chosen = chosen[:JOINT_FITS]
         if not chosen or not (every or self.claims.worth_extending(size, chosen[0][1][0])):
             return False
-        sets.add({k: lambda n=n, v=v: sets.extend(sets.fits[n], v) for k, (_, n, v) in chosen})  # type: ignore[misc]
+        sets.add({k: lambda n=n, v=v: extend(sets.fits[n], v) for k, (_, n, v) in chosen})  # type: ignore[misc]
         return True
 
     def _fit_screened_pairs(self) -> list[Names]:
         """Fit the pairs of the linear screen that no single leads to; returns their names."""
-        sets, base = self.sets, self.sets.fits[()]
+        sets, base, extend = self.sets, self.sets.fits[()], self.sets.fitter.extend_with_both
         wanted = {tuple(sorted((a.probe.name, b.probe.name))): (a, b) for a, b in self._seeds}
         missing = {k: v for k, v in wanted.items() if k not in sets.fits}
-        sets.add({k: lambda v=v: sets.extend_with_both(base, v) for k, v in missing.items()})  # type: ignore[misc]
+        sets.add({k: lambda v=v: extend(base, v) for k, v in missing.items()})  # type: ignore[misc]
         return list(missing)
 
     def _refine(self, names: Names) -> None:
@@ -292,7 +295,7 @@ class SimulationSearch:
         order = sorted(scored, key=lambda n: (-scored[n][0].gain, n))[:count]
         keys = {tuple(sorted((*rest, n))): scored[n] for n in order}
         missing = {k: v for k, v in keys.items() if again or k not in sets.fits}
-        sets.add({k: lambda v=v: sets.extend(base, v) for k, v in missing.items()})  # type: ignore[misc]
+        sets.add({k: lambda v=v: sets.fitter.extend(base, v) for k, v in missing.items()})  # type: ignore[misc]
         return list(keys)
 
     def _backward(self, names: Names) -> Names:
@@ -314,7 +317,7 @@ class SimulationSearch:
             alone = len(names) == 1 and len(sets.ranked(1)) < SWAPS  # what was withdrawn left no rivals behind
             replaced = self._replace(names, name, None if alone else SWAPS, rest in better)
             if len(names) == 1:
-                sets.restart_beside(names)
+                restart_beside(sets, names)
             keys = [*replaced, *self._siblings(names, name)]
             rivals[name] = sorted((sets.fits[k] for k in dict.fromkeys(keys) if k != names), key=lambda f: f.sse)
             p_values[name] = self.claims.p_value(sets.fits[names], without[name])

@@ -34,15 +34,31 @@ def far_sizes(effect: Effect) -> list[Effect]:
     return [replace(effect, **one) for one in chosen]
 
 
-def started(effect: Effect, amplitudes: Mapping[str, float]) -> Effect:
-    """The effect at a linear estimate of its amplitudes, or a step from its null where that says nothing."""
+def started(
+    effect: Effect, amplitudes: Mapping[str, float], step: float | None = None, reach: float | None = None
+) -> Effect:
+    """The effect at a linear estimate of its amplitudes, or a step from its null where that says nothing.
+
+    Parameters
+    ----------
+    step
+        Size of that step in an amplitude's scales, to the side that its bounds leave; by default that of `near_null`.
+    reach
+        Scales from its null within which an estimate is taken; by default an amplitude's bounds.
+    """
     info = effect.parameters()
     values: dict[str, Any] = {}
     for name, value in amplitudes.items():
         null, one = info[name].null, info[name]
         assert null is not None
         nothing = abs(value - null) < 1e-6 * one.scale
-        values[name] = near_null(type(effect), name) if nothing else float(np.clip(value, one.lower, one.upper))
+        if not nothing:
+            limits = (one.lower, one.upper) if reach is None else (null - reach * one.scale, null + reach * one.scale)
+            values[name] = float(np.clip(value, *limits))
+        elif step is None:
+            values[name] = near_null(type(effect), name)
+        else:
+            values[name] = null + (step if one.upper > null else -step) * one.scale
     return replace(effect, **values)
 
 

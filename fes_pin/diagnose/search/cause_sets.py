@@ -1,0 +1,17 @@
+"""Sets of causes, by the names of the causes in alphabetical order."""
+
+from __future__ import annotations
+
+from fes_pin.identify.fit import Fit
+
+Names = tuple[str, ...]
+
+
+def names_of(fitted: Fit) -> Names:
+    """The causes in a fit."""
+    return tuple(sorted(e.name for e in fitted.model.effects))
+
+
+def subsets(names: Names) -> list[Names]:
+    """The sets with one cause less."""
+    return [tuple(m for m in names if m != n) for n in names]
