@@ -16,10 +16,10 @@ from typing import Protocol
 
 import numpy as np
 
-from fes_pin.identify.covariance import widened
+from fes_pin.identify.covariance import covariance_of, widened
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import Unknowns
+from fes_pin.identify.problem import Unknowns, at_rest, normal_equations
 from fes_pin.identify.scoring import LITTLE, WORTH
 
 ROUNDS = 12
@@ -82,13 +82,16 @@ def maximise(
 
 def with_honest_intervals(fitted: Fit) -> Fit:
     """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter."""
-    lengths = [len(p.residual) for p in fitted.parts]
+    parts = at_rest(fitted.parts)
+    free = np.array([n not in fitted.at_bound for n in fitted.free])
+    covariance = covariance_of(normal_equations(parts).hessian, free)
+    lengths = [len(p.residual) for p in parts]
     shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
     scores = [
         piece
-        for part, count in zip(fitted.parts, shares, strict=True)
+        for part, count in zip(parts, shares, strict=True)
         for piece in np.add.reduceat(
             part.jacobian * part.residual[:, None], np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
         )
     ]
-    return replace(fitted, covariance=widened(fitted.covariance, np.array(scores)))
+    return replace(fitted, covariance=widened(covariance, np.array(scores)))

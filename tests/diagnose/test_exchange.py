@@ -25,6 +25,10 @@ class Sets:
     def __init__(self):
         self.fits, self.trials = {(): self.fit(())}, ()
         self.library = SimpleNamespace(silent=lambda: ())
+        self.screen = SimpleNamespace(scores=lambda base: SimpleNamespace(scored=[]))
+        self.forms = SimpleNamespace(
+            refined=lambda base, demanded: None, simplified=lambda base: None, reformed=lambda base: None
+        )
 
     def fit(self, names):
         sse = PRICE[names]
@@ -42,17 +46,6 @@ class Sets:
 
     def ranked(self, size):
         return sorted((n for n in self.fits if len(n) == size), key=lambda n: self.fits[n].price)
-
-    def refined(self, names, demanded):
-        return None
-
-    def simplified(self, names):
-        return None
-
-    reformed = simplified
-
-    def scores(self, base):
-        return SimpleNamespace(scored=[])
 
 
 @pytest.fixture
