@@ -79,14 +79,10 @@ def _equivalents(found: ContrastFound, item: Item) -> tuple[str, ...]:
     near = [
         f.items[-1].name
         for f in found.rivals[item]
-        if (f.price if not _driven(best) else min(f.price, f.fit.sse + best.price - best.fit.sse))
+        if (f.price if not best.is_driven else min(f.price, f.fit.sse + best.price - best.fit.sse))
         < best.price + SEPARABLE
     ]
     return tuple(sorted(set(near) - {item.name}))
-
-
-def _driven(one: Grouped) -> bool:
-    return any(hasattr(w, "white") for w in one.weights.values())
 
 
 def not_changed(found: ContrastFound) -> tuple[dict[str, float], dict[str, ParameterEstimate], tuple[str, ...]]:

@@ -296,6 +296,11 @@ class Grouped:
         return tuple(i for i in self.items if i.group is not None)
 
     @property
+    def is_driven(self) -> bool:
+        """True if predictions are judged, beside everything that is random."""
+        return any(isinstance(w, Doubt) for w in self.weights.values())
+
+    @property
     def repeats(self) -> dict[str, float]:
         """How much nominal parameters scatter between trials, as a share of the first group's value."""
         weight = next(iter(self.weights.values()))

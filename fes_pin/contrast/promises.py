@@ -15,7 +15,7 @@ from fes_pin.diagnose.decide.significance import MIN_UNITS
 from fes_pin.diagnose.search.library import Library
 from fes_pin.diagnose.search.score import Projection, Scores
 from fes_pin.diagnose.search.starts import started
-from fes_pin.identify.problem import Linearized
+from fes_pin.identify.problem import Linearized, at_rest
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
@@ -80,7 +80,7 @@ class Bench:
 
 def promises(bench: Bench, base: Grouped) -> tuple[list[Promise], Scores]:
     """Every item that a set does not have, scored; and the Gram matrix of what is left of all columns."""
-    projection = Projection(base.fit.parts)
+    projection = Projection(at_rest(base.fit.parts) if base.is_driven else base.fit.parts)
     before: list[np.ndarray] = []
     made: list[tuple[Item, Effect | None, tuple[str, ...], np.ndarray]] = []
     for item, effect, names, columns in _candidates(bench, base):
