@@ -20,6 +20,7 @@ import numpy as np
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.doubts import first_doubt
+from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Linearized, Unknowns, limits_of, whitened_sse
 from fes_pin.identify.scoring import Told, score_doubt
@@ -216,6 +217,17 @@ class LikelihoodProblem:
     def cost(self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None) -> float:
         """Twice the negative log-likelihood."""
         return sum(one.cost() for one in self.innovations(values, unknowns, doubt))
+
+
+def for_gains_as_they_are(fitted: Fit) -> list[Linearized]:
+    """The trials of a fit with sensitivities for gains as they are, as those of causes and features beside it are.
+
+    Where slopes were differences of the cost, a column has a multiple of the residual; and where the cost is rough, as
+    beside friction that jumps, it is little else, and would take the residual from everything that is looked for.
+    """
+    assert fitted.doubt is not None
+    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt, fitted.free)
+    return problem.linearize(fitted.values, fitted.unknowns)
 
 
 def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Linearized:

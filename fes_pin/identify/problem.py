@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -206,17 +206,6 @@ def limits_of(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, f
                 continue
             limits[name] = (max(limits[name][0], low), min(limits[name][1], high))
     return limits
-
-
-def at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
-    """The trials of a fit that has ended, without what its sensitivities have along the residual as a whole.
-
-    A slope that is left where no step keeps what it promises is roughness of the cost, as beside friction that jumps,
-    and no parameter takes up the residual.
-    """
-    power = sum(float(p.residual @ p.residual) for p in parts)
-    along = sum(p.residual @ p.jacobian for p in parts) / max(power, 1e-300)
-    return [replace(p, jacobian=p.jacobian - np.outer(p.residual, along)) for p in parts]
 
 
 @dataclass(frozen=True)

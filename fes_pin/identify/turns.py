@@ -10,7 +10,7 @@ wrong.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -19,7 +19,7 @@ import numpy as np
 from fes_pin.identify.covariance import covariance_of, widened
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import Unknowns, at_rest, normal_equations
+from fes_pin.identify.problem import Linearized, Unknowns, normal_equations
 from fes_pin.identify.scoring import LITTLE, WORTH
 
 ROUNDS = 12
@@ -82,7 +82,7 @@ def maximise(
 
 def with_honest_intervals(fitted: Fit) -> Fit:
     """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter."""
-    parts = at_rest(fitted.parts)
+    parts = _at_rest(fitted.parts)
     free = np.array([n not in fitted.at_bound for n in fitted.free])
     covariance = covariance_of(normal_equations(parts).hessian, free)
     lengths = [len(p.residual) for p in parts]
@@ -95,3 +95,14 @@ def with_honest_intervals(fitted: Fit) -> Fit:
         )
     ]
     return replace(fitted, covariance=widened(covariance, np.array(scores)))
+
+
+def _at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
+    """The trials of a fit that has ended, without what its sensitivities have along the residual as a whole.
+
+    A slope that is left where no step keeps what it promises is roughness of the cost, as beside friction that jumps:
+    it tells nothing of a parameter.
+    """
+    power = sum(float(p.residual @ p.residual) for p in parts)
+    along = sum(p.residual @ p.jacobian for p in parts) / max(power, 1e-300)
+    return [replace(p, jacobian=p.jacobian - np.outer(p.residual, along)) for p in parts]

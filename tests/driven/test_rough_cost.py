@@ -7,22 +7,23 @@ from driven_rigs.draw import draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
-from fes_pin.identify.problem import Linearized, at_rest
+from fes_pin.identify.likelihood import LikelihoodProblem, for_gains_as_they_are
 from fes_pin.models.effects import CoulombFriction, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
 
 
-def test_what_is_at_rest_has_no_slope_and_what_has_none_is_at_rest():
-    random = np.random.default_rng(5)
-    parts = [
-        Linearized(r, j, j[:, :0]) for r, j in ((random.normal(size=n), random.normal(size=(n, 2))) for n in (40, 70))
-    ]
-    rest = at_rest(parts)
-    assert np.abs(sum(p.residual @ p.jacobian for p in rest)).max() < 1e-12
-    assert sum(abs(p.residual @ p.jacobian).max() for p in rest) > 1.0, "of all trials, not of each"
-    for once, twice in zip(rest, at_rest(rest), strict=True):
-        assert np.array_equal(once.residual, twice.residual)
-        assert twice.jacobian == pytest.approx(once.jacobian, abs=1e-12)
+def test_slopes_for_gains_as_they_are_are_those_that_turns_begin_with(tmp_path):
+    study = read_study(draw((), 0.3, 3, tmp_path).study)
+    fitted = LikelihoodFits(nominal_model(study), study.trials, []).nominal()
+    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt)
+    assert problem.sharpen()
+    sharp = problem.linearize(fitted.values, fitted.unknowns)
+    for plain, other in zip(for_gains_as_they_are(fitted), sharp, strict=True):
+        assert np.array_equal(plain.residual, other.residual)
+        beyond = other.jacobian - plain.jacobian
+        assert np.linalg.matrix_rank(beyond, tol=1e-9 * np.abs(other.jacobian).max()) == 1
+        along = np.outer(plain.residual, plain.residual @ beyond) / (plain.residual @ plain.residual)
+        assert beyond == pytest.approx(along, abs=1e-9 * np.abs(beyond).max())
 
 
 def test_a_torque_is_found_beside_friction_whose_cost_is_rough(tmp_path):

@@ -10,8 +10,7 @@ from fes_pin.diagnose.search.cause_sets import names_of
 from fes_pin.diagnose.search.library import Library, Probe
 from fes_pin.diagnose.search.score import Projection, Scores
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import at_rest
+from fes_pin.identify.likelihood import LikelihoodProblem, for_gains_as_they_are
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
@@ -32,7 +31,10 @@ class LikelihoodScreen:
         if id(base) not in self._scores:
             wanted = [e for e in self._library.effects if e.name not in names_of(base) and self._library.felt(e)]
             groups = in_parallel(lambda e: self._probes(e, base), wanted)
-            self._scores[id(base)] = (base, Projection(at_rest(base.parts)).score([p for g in groups for p in g]))
+            self._scores[id(base)] = (
+                base,
+                Projection(for_gains_as_they_are(base)).score([p for g in groups for p in g]),
+            )
         return self._scores[id(base)][1]
 
     def _probes(self, effect: type[Effect], base: Fit) -> list[Probe]:
