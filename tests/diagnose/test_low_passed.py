@@ -12,6 +12,7 @@ from fes_pin.data.smooth import low_pass
 from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.identify.recording import low_pass_of
 from fes_pin.models.nominal import nominal_model
+from fes_pin.models.simulate import Simulator
 
 TWICE = (2.0**0.5 - 1.0) ** 0.25
 """A second-order Butterworth filter that runs forwards and backwards passes half of the power here, of its design."""
@@ -58,3 +59,24 @@ def test_what_is_simulated_is_low_passed_as_the_trial_was():
     free, passed = (fp.simulate(model, t)["angle_rad"] for t in (trial, replace(trial, low_pass_hz=5.0)))
     np.testing.assert_allclose(passed, low_pass(free, trial.dt, 5.0))
     assert np.abs(passed - free).max() > 1e-3
+
+
+def test_trials_of_different_lengths_are_low_passed_each_as_alone():
+    """Side by side in lanes the short one is padded; its padding is no part of it."""
+    study = study_of("ankle", seed=45)
+    model, first = nominal_model(study), study.trials[0]
+    short = replace(first, columns={n: v[:-150] for n, v in first.columns.items()}, time=first.time[:-150])
+    trials = [replace(t, low_pass_hz=hz) for t, hz in ((first, 5.0), (short, 5.0), (short, 8.0), (first, None))]
+    together = [one.readings[:, 0] for one in Simulator(model, trials).run(model.parameters())]
+    for one, trial in zip(together, trials, strict=True):
+        np.testing.assert_allclose(one, fp.simulate(model, trial)["angle_rad"], rtol=1e-12, atol=1e-12)
+    assert np.abs(together[1] - together[2]).max() > 1e-4
+
+
+def test_a_limit_of_time_holds_beside_a_low_pass():
+    """Where it ends before the record is asked, the readings stay as they were recorded."""
+    study = stored(study_of("ankle", ("coulomb_friction",), seed=46), 6.0)
+    found = diagnose_joint(study, limit=0.0)
+    assert any("stopped at its limit" in said for said in found.warnings)
+    assert not any("low-passed" in said for said in found.warnings)
+    assert all(t.low_pass_hz is None for t in found.extended.trials)
