@@ -106,15 +106,21 @@ def judge_driven(
     refused: dict[str, float] = {}
     horizon = horizon_s or default_horizon(train)
     settled = frozenset(found.without)
-    again = Again()
+    again, formed = Again(), set[frozenset[str]]()
     while True:
+        names = frozenset(found.without)
+        if names not in formed:
+            formed.add(names)
+            if search.form_otherwise(tuple(sorted(names))):
+                found = search.settle(tuple(sorted(names)), refused)
+                settled = frozenset(found.without)
+                continue
         folds = make_folds(found, train, test, again)
         evidence = evidence_of(folds, found, again) if folds else {}
         gains = gains_of(folds or [Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon, seed)
         left = driven_remainder(found.best, seed)
         known = {n: None if left.unexplained else e for n, e in evidence.items()}
         weak = [n for n, e in known.items() if not speaks_for(e, gains[n], alone=len(known) == 1)]
-        names = frozenset(found.without)
         if weak:
             weakest = min(weak, key=lambda n: gains[n].low)
             refused[weakest] = found.p_values[weakest]

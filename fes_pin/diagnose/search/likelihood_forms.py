@@ -9,9 +9,14 @@ import numpy as np
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnose.search.refined_forms import is_identified
 from fes_pin.diagnose.search.starts import STARTS, begun_anew, refinements
+from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.scoring import WORTH
+from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
+
+REFINE_LEVEL = 1e-3
+"""Level at which a refinement of an effect's form is adopted: some ten forms are tried for a set."""
 
 
 class LikelihoodForms:
@@ -28,20 +33,43 @@ class LikelihoodForms:
     def __init__(self, maxima: LikelihoodMaxima, measured: Mapping[str, np.ndarray]) -> None:
         self._maxima, self._measured = maxima, measured
 
-    def refined(self, base: Fit, demanded: float) -> Fit | None:
-        """The best fit of a set with the form of one of its effects refined; None where no form is, or none is told.
+    def refined(self, base: Fit, barred: str | None = None) -> Fit | None:
+        """The best fit of a set with the form of one of its effects refined; None where the data demand no form.
+
+        What is not half way to what is demanded once its parameters were fitted, beside randomness as it was, is not
+        gone on with.
 
         Parameters
         ----------
-        demanded
-            Fall of twice the negative log-likelihood below which no refinement is adopted. What is not half way there
-            once its parameters were fitted, beside randomness as it was, is not gone on with.
+        barred
+            A refinement that is not tried.
         """
-        starts = [s for effect in base.model.effects for s in refinements(base.model, effect, self._measured)]
-        looks = sorted(in_parallel(lambda s: self._maxima.look(s, base), starts), key=lambda f: f.price)
+        models = [refinements(base.model, effect, self._measured, barred) for effect in base.model.effects]
+        looks = in_parallel(lambda s: self._maxima.look(s, base), [s for many in models for s in many])
+        looks = sorted(looks, key=lambda f: f.price)
+        demanded = chi2_quantile(1.0 - REFINE_LEVEL, 1)
         worth = [f for f in looks[:STARTS] if base.sse - f.sse > 0.5 * max(demanded, base.sse - looks[0].sse)]
         found = [f for f in in_parallel(self._maxima.go_on, worth) if is_identified(f, base)]
-        return min(found, key=lambda f: f.price, default=None)
+        best = min(found, key=lambda f: f.price, default=None)
+        return best if best is not None and _is_demanded(best, base) else None
+
+    def otherwise(self, base: Fit) -> Fit | None:
+        """The best fit of a set whose form lacks one of several refinements, grown from none; None if none is cheaper.
+
+        Refinements are adopted one after another, the one that explains most first; two others may explain more.
+        """
+        each = [(e, [n for n, *_ in e.refinements() if n in e.refined()]) for e in base.model.effects]
+        found = (self._grown(base, e, n) for e, adopted in each if len(adopted) > 1 for n in adopted)
+        best = min(found, key=lambda f: f.price, default=base)
+        return best if best.price < base.price - WORTH else None
+
+    def _grown(self, base: Fit, effect: Effect, barred: str) -> Fit:
+        """A set with one of its effects in the form that the data demand if one refinement of it is barred."""
+        adopted = [n for n, *_ in effect.refinements() if n in effect.refined()]
+        fitted = self._maxima.go_on(self._maxima.look(self._maxima.less(base, adopted, effect), base))
+        while (better := self.refined(fitted, barred)) is not None:
+            fitted = better
+        return fitted
 
     def simplified(self, base: Fit) -> Fit | None:
         """The best fit of a set with one refinement of a form fewer; None where none is cheaper.
@@ -59,3 +87,8 @@ class LikelihoodForms:
         """
         starts = [s for effect in base.model.effects for s in begun_anew(base.model, effect, self._measured)]
         return self._maxima.cheaper(starts, base, base.price - WORTH)
+
+
+def _is_demanded(refined: Fit, base: Fit) -> bool:
+    degrees = max(refined.degrees - base.degrees, 1)
+    return float(chi2_tail(max(base.sse - refined.sse, 0.0), degrees)) < REFINE_LEVEL

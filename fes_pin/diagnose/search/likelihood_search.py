@@ -17,7 +17,7 @@ from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names, is_possible
 from fes_pin.diagnose.search.score import Scored, best_pairs
 from fes_pin.diagnose.search.simulation_search import NominalFitError
-from fes_pin.identify.distributions import chi2_quantile, chi2_tail
+from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.workers import OutOfTime, Progress, time_limit
 
@@ -27,8 +27,6 @@ CLAIM_LEVEL = 1e-3
 rig that is recorded for a minute is far beyond either."""
 EXTEND_LEVEL = 0.1
 """Family-wise level that the score of a further cause must reach for larger sets to be fitted."""
-REFINE_LEVEL = 1e-3
-"""Level at which a refinement of an effect's form is adopted: some ten forms are tried for a set."""
 MOST_CAUSES = 3
 """Causes that are named at most: every further one multiplies the sets."""
 MOST_IMPOSED = 8
@@ -151,7 +149,7 @@ class LikelihoodSearch:
         forms = self.sets.forms
         while names not in self._formed and (
             self._replaced(names, forms.simplified(self.sets.fits[names]))
-            or self._refined(names)
+            or self._replaced(names, forms.refined(self.sets.fits[names]))
             or self._replaced(names, forms.reformed(self.sets.fits[names]))
         ):
             pass
@@ -163,17 +161,9 @@ class LikelihoodSearch:
             self.sets.fits[names] = better
         return better is not None
 
-    def _refined(self, names: Names) -> bool:
-        """Adopt the refinement of a set that the data demand most; False if they demand none."""
-        base = self.sets.fits[names]
-        refined = self.sets.forms.refined(base, chi2_quantile(1.0 - REFINE_LEVEL, 1))
-        if refined is None:
-            return False
-        degrees = max(refined.degrees - base.degrees, 1)
-        demanded = float(chi2_tail(max(base.sse - refined.sse, 0.0), degrees)) < REFINE_LEVEL
-        if demanded:
-            self.sets.fits[names] = refined
-        return demanded
+    def form_otherwise(self, names: Names) -> bool:
+        """Give a set another form than it was led to, if one is better; False if none is, or time is up."""
+        return not self.was_stopped and self._replaced(names, self.sets.forms.otherwise(self.sets.fits[names]))
 
     def _backward(self, names: Names) -> Names:
         """Drop causes that the others have made superfluous."""

@@ -62,11 +62,13 @@ def started(
     return replace(effect, **values)
 
 
-def refinements(model: Model, effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Model]:
-    """Starts with one more refinement of an effect switched on."""
+def refinements(
+    model: Model, effect: Effect, measured: Mapping[str, np.ndarray], barred: str | None = None
+) -> list[Model]:
+    """Starts with one more refinement of an effect switched on, but for one that is barred."""
     out, info, refined, grids = [], effect.parameters(), effect.refined(), effect.grids(measured)
     for names in effect.refinements():
-        if names[0] in refined or not fits_rig(model, info[names[0]]):
+        if names[0] in refined or names[0] == barred or not fits_rig(model, info[names[0]]):
             continue
         paths = [f"{effect.name}.{n}" for n in names]
         for values in itertools.product(*(grids[n] for n in names)):

@@ -26,6 +26,8 @@ WAYS = (0.05, 0.2)
 STRETCHES = (1e-4, 1e-3)
 """Stretches of a contact that are tried, as shares of the way of a free motion: some ten micrometres on a slide, a
 milliradian on a joint that turns."""
+MOST_STRETCH = 0.1
+"""The largest stretch, in the same."""
 STANDING = 1e-6
 """Speed below which friction does not build up, rad/s or m/s: it keeps derivatives finite."""
 UNLOADED = 1e-3
@@ -118,9 +120,13 @@ class CoulombFriction(Effect):
         return ({}, *({"presliding": way} for way in cls.grids(measured)["presliding"]))
 
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
-        """A fall of friction with speed ends among the speeds that a joint moves at; else it is less damping."""
-        speed, way = _usual_speed(measured), _imposed_way(measured)
+        """A fall of friction with speed ends among the speeds that a joint moves at; else it is less damping.
+
+        What a joint moves by without slipping is little of its motion; else the contact is a spring.
+        """
+        speed, free, way = _usual_speed(measured), _free_way(measured), _imposed_way(measured)
         limits = {"stribeck_speed": (0.0, 2.0 * speed)} if speed > 0.0 else {}
+        limits |= {"stretch": (0.0, MOST_STRETCH * free)} if free > 0.0 else {}
         return {**limits, "presliding": (0.0, 0.5 * way)} if way > 0.0 else limits
 
     def apply(self, value: Any, s: Any) -> Any:
