@@ -27,7 +27,7 @@ class Sets:
         self.library = SimpleNamespace(silent=lambda: ())
         self.screen = SimpleNamespace(scores=lambda base: SimpleNamespace(scored=[]))
         self.forms = SimpleNamespace(
-            refined=lambda base, demanded: None, simplified=lambda base: None, reformed=lambda base: None
+            refined=lambda base: None, simplified=lambda base: None, reformed=lambda base: None
         )
 
     def fit(self, names):
