@@ -1,5 +1,6 @@
 """A form that stood for another cause is dropped once that is found, and several forms are begun anew together."""
 
+import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
@@ -38,3 +39,18 @@ def test_forms_that_bent_one_to_the_other_are_begun_anew(tmp_path):
     assert anew.price < bent.price - 50.0
     damping = drawn.truth["damping"]
     assert abs(anew.values["damping"] - damping) < 0.3 * abs(bent.values["damping"] - damping)
+
+
+def test_a_form_that_led_nowhere_is_grown_again_without_what_it_began_with(tmp_path):
+    """Friction that falls with speed had taken half of what is dry, and four times the damping."""
+    drawn = draw(PAIR, 0.3, 1430012, tmp_path, recorded=True)
+    study = read_study(drawn.study)
+    sets = LikelihoodFits(nominal_model(study), study.trials)
+    friction = CoulombFriction(0.027, stiction=0.94, stribeck_speed=0.38, creep_speed=0.0008)
+    model = sets.nominal().model + friction + QuadraticDamping(0.33)
+    problem = LikelihoodProblem(model, study.trials, sets.fits[()].doubt)
+    stuck = maximise(problem, model.parameters())
+    found, damping = sets.forms.otherwise(stuck), drawn.truth["damping"]
+    assert found.price < stuck.price - 100.0
+    assert abs(found.values["damping"] - damping) < 0.2 * abs(stuck.values["damping"] - damping)
+    assert found.values["coulomb_friction.torque_nm"] == pytest.approx(drawn.truth["coulomb_friction"], rel=0.1)
