@@ -90,7 +90,7 @@ def judge_driven(
 
     Trials that took no part speak for a cause, or not, by the rule of rigs that are simulated freely (`speaks_for`),
     with errors over the horizon: several forms together, none of them quite right, come near to anything one sample
-    ahead.
+    ahead. Before it is said that something is left, other forms of the causes are tried.
 
     Parameters
     ----------
@@ -105,35 +105,35 @@ def judge_driven(
     """
     refused: dict[str, float] = {}
     horizon = horizon_s or default_horizon(train)
-    settled = frozenset(found.without)
-    again, formed = Again(), set[frozenset[str]]()
+    settled, formed = frozenset(found.without), set[frozenset[str]]()
+    again = Again()
     while True:
-        names = frozenset(found.without)
-        if names not in formed:
-            formed.add(names)
-            if search.form_otherwise(tuple(sorted(names))):
-                found = search.settle(tuple(sorted(names)), refused)
-                settled = frozenset(found.without)
-                continue
         folds = make_folds(found, train, test, again)
         evidence = evidence_of(folds, found, again) if folds else {}
         gains = gains_of(folds or [Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon, seed)
-        left = driven_remainder(found.best, seed)
-        known = {n: None if left.unexplained else e for n, e in evidence.items()}
+        seen = driven_remainder(found.best, seed)
+        known = {n: None if seen.unexplained else e for n, e in evidence.items()}
         weak = [n for n, e in known.items() if not speaks_for(e, gains[n], alone=len(known) == 1)]
+        names = frozenset(found.without)
         if weak:
             weakest = min(weak, key=lambda n: gains[n].low)
             refused[weakest] = found.p_values[weakest]
             found = search.told(tuple(sorted(names - {weakest})))
-        elif names != settled:
+            continue
+        if names != settled:
             found, settled = search.settle(tuple(sorted(names)), refused), names
-        else:
+            continue
+        random = random_parts(found.best)
+        left = _left(seen, random, refused, search)
+        if not left.unexplained or names in formed or not search.form_otherwise(tuple(sorted(names))):
             break
-    random = random_parts(found.best)
+        formed.add(names)
+        refused, found = {}, search.settle(tuple(sorted(names)))  # what was refused was so beside another form
+        settled = frozenset(found.without)
     falling = falls(found.best.model, train)
     return Judged(
         found=found,
-        left=_left(left, random, refused, search),
+        left=left,
         refused=refused,
         evidence=evidence,
         gains=gains,
