@@ -97,6 +97,11 @@ def time_limit(seconds: float) -> Iterator[None]:
         _END.reset(token)
 
 
+def seconds_left() -> float:
+    """Until the end of the innermost `time_limit`; infinity without one."""
+    return _END.get() - time.monotonic()
+
+
 def check_limit() -> None:
     """End the work here if its time is over.
 

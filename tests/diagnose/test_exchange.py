@@ -1,11 +1,15 @@
 """Sets are extended one cause at a time; a rival that turns out better beside the others takes a cause's place."""
 
 import itertools
+import time
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnose.search.score import Scores
+from fes_pin.workers import check_limit, time_limit
 
 PRICE = {
     (): 0.0,
@@ -25,7 +29,7 @@ class Sets:
     def __init__(self):
         self.fits, self.trials = {(): self.fit(())}, ()
         self.library = SimpleNamespace(silent=lambda: ())
-        self.screen = SimpleNamespace(scores=lambda base: SimpleNamespace(scored=[]))
+        self.screen = SimpleNamespace(scores=lambda base: Scores([], np.zeros((0, 0)), np.zeros(0), []))
         self.forms = SimpleNamespace(
             refined=lambda base: None, simplified=lambda base: None, reformed=lambda base: None
         )
@@ -75,3 +79,15 @@ def test_an_answer_is_the_cheapest_of_its_size(search):
             search.sets.fits.setdefault(names, search.sets.fit(names))
             best = search.settle(names).best
             assert best.price == min(f.price for n, f in search.sets.fits.items() if len(n) == len(best.names))
+
+
+def test_no_other_form_is_tried_past_the_limit_of_the_search(search):
+    better = search.sets.fits[()]
+    search.sets.nominal, search.sets.forms.otherwise = lambda: better, lambda base: check_limit() or better
+    assert search.form_otherwise(())
+    search.sets.near = lambda size: check_limit()
+    with time_limit(0.0):
+        time.sleep(0.01)
+        search.run()
+    assert search.was_stopped
+    assert not search.form_otherwise(())

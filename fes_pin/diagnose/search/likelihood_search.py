@@ -9,6 +9,7 @@ effort, so that what stands beside a cause must earn its place against that.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -19,7 +20,7 @@ from fes_pin.diagnose.search.score import Scored, best_pairs
 from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
-from fes_pin.workers import OutOfTime, Progress, time_limit
+from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
 CLAIM_LEVEL = 1e-3
 """Family-wise error of each round of claims. 54 driven rigs with nothing hidden brought p-values of 0.002 and 0.004
@@ -76,12 +77,13 @@ class LikelihoodSearch:
 
     def __init__(self, sets: LikelihoodFits, seed: int, progress: Progress) -> None:
         self.sets, self.seed, self.progress = sets, seed, progress
-        self.was_stopped = False
+        self.was_stopped, self._end = False, math.inf
         self._formed: set[Names] = set()
 
     def run(self) -> Found:
         """Search, as long as the limit of time lets it; the nominal model is fitted and scored anyway."""
         self.progress(0.05, "nominal model")
+        self._end = time.monotonic() + seconds_left()
         with time_limit(math.inf):
             nominal = self.sets.nominal()
             if not math.isfinite(nominal.sse):
@@ -163,7 +165,11 @@ class LikelihoodSearch:
 
     def form_otherwise(self, names: Names) -> bool:
         """Give a set another form than it was led to, if one is better; False if none is, or time is up."""
-        return not self.was_stopped and self._replaced(names, self.sets.forms.otherwise(self.sets.fits[names]))
+        try:
+            with time_limit(self._end - time.monotonic()):
+                return self._replaced(names, self.sets.forms.otherwise(self.sets.fits[names]))
+        except OutOfTime:
+            return False
 
     def _backward(self, names: Names) -> Names:
         """Drop causes that the others have made superfluous."""
