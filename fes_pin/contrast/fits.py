@@ -14,7 +14,7 @@ from fes_pin.contrast.promises import Bench, Promise, promises
 from fes_pin.contrast.repeats import Repeats, scatter, without_locals, without_scatter
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library
-from fes_pin.diagnose.search.likelihood_forms import REFINE_LEVEL
+from fes_pin.diagnose.search.refined_forms import REFINE_LEVEL
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.diagnose.search.starts import STARTS, refinements
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fes_pin.diagnose.decide.significance import Family, coherence_p_value
 from fes_pin.diagnose.remainder.open_set import smooth_remainder
 from fes_pin.diagnose.search.cause_sets import Names
+from fes_pin.diagnose.search.refined_forms import REFINE_LEVEL
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.diagnose.search.simulation_fits import SimulationFits
 from fes_pin.identify.distributions import chi2_tail
@@ -27,8 +28,6 @@ SLOWEST_NOISE = 10.0
 """Standard deviation of a residual over that of its sample-to-sample part beyond which it counts as misfit. First-order
 autoregressive noise has 3.8 at a coefficient of 0.9, 5.5 at 0.95, 12 at 0.99; 270 studies without
 a cause, of three rigs in three kinds of noise, have 8.3 at most: `scripts/benchmarks/adequate.py --count 30`."""
-REFINE_LEVEL = 1e-3
-"""Level at which a refinement of an effect's form is adopted."""
 
 
 class Claims:
