@@ -46,10 +46,13 @@ def test_a_form_that_led_nowhere_is_grown_again_without_what_it_began_with(tmp_p
     drawn = draw(PAIR, 0.3, 1430012, tmp_path, recorded=True)
     study = read_study(drawn.study)
     sets = LikelihoodFits(nominal_model(study), study.trials)
-    friction = CoulombFriction(0.027, stiction=0.94, stribeck_speed=0.38, creep_speed=0.0008)
-    model = sets.nominal().model + friction + QuadraticDamping(0.33)
-    problem = LikelihoodProblem(model, study.trials, sets.fits[()].doubt)
-    stuck = maximise(problem, model.parameters())
+    friction = CoulombFriction(0.0269, stiction=0.962, stribeck_speed=0.3787, creep_speed=0.0008)
+    nominal = sets.nominal()
+    led = nominal.model.with_parameters({"inertia_scale": 1.0071, "damping": 0.0879, "gravity_scale": 0.9945})
+    doubt = nominal.doubt.with_values({"white.position": 2.9e-4, "std.effort": 1.9e-3, "time.effort": 0.084})
+    model = led + friction + QuadraticDamping(0.3269)
+    stuck = maximise(LikelihoodProblem(model, study.trials, doubt), model.parameters())
+    assert stuck.values["coulomb_friction.stiction"] > 0.5
     found, damping = sets.forms.otherwise(stuck), drawn.truth["damping"]
     assert found.price < stuck.price - 100.0
     assert abs(found.values["damping"] - damping) < 0.2 * abs(stuck.values["damping"] - damping)
