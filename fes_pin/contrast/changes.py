@@ -13,14 +13,13 @@ from fes_pin.contrast.result import Change
 from fes_pin.contrast.search import ContrastFound
 from fes_pin.contrast.words import of_cause, of_nominal
 from fes_pin.diagnose.cause import ParameterEstimate
+from fes_pin.diagnose.decide.rivals import ABSORBED_BELOW
 from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.identify.distributions import normal_quantile
 from fes_pin.models.catalogue import Catalogue
 
 SEEN = 0.95
 """Power at which a change that was not found is called excluded."""
-ABSORBED_BELOW = 0.04
-"""Share of its norm that a sensitivity must keep to be testable, as in a diagnosis."""
 
 
 def change_of(fits: Fits, found: ContrastFound, item: Item, groups: tuple[str, ...], catalogue: Catalogue) -> Change:

@@ -12,10 +12,11 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from driven_rigs.draw import Recording
 
 from contrast_pairs.driven import CAUSES as DRIVEN_CAUSES
 from contrast_pairs.driven import NOMINAL as DRIVEN_NOMINAL
-from contrast_pairs.driven import Recording, driven_pair
+from contrast_pairs.driven import driven_pair
 from contrast_pairs.free import CAUSES, NOMINAL, free_pair
 from contrast_pairs.practice import EXACT, practice_pair
 from fes_pin.contrast.contrast import contrast

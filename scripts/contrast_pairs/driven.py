@@ -2,48 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from driven_rigs.draw import BASES, READ_EFFORT, _references, _sizes, urdf
+from driven_rigs.draw import BASES, Recording, _references, _sizes, urdf
 from driven_rigs.plant import DT, Plant, run
 
-from fes_pin.data.smooth import low_pass
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 
 CAUSES = ("coulomb_friction", "quadratic_damping", "effort_offset", "parallel_stiffness", "joint_stop", "sensor_lag")
 NOMINAL = ("inertia_scale", "damping")
-
-
-@dataclass(frozen=True)
-class Recording:
-    """How a laboratory records a rig.
-
-    Attributes
-    ----------
-    measured
-        The effort is read, with noise, instead of what the controller commands.
-    cutoff_hz
-        Where effort and reading were low-passed, without delay, before they were stored; None where they were not.
-    every
-        Samples of the controller from one row of the log to the next.
-    """
-
-    measured: bool = False
-    cutoff_hz: float | None = None
-    every: int = 1
-
-    def stored(
-        self, effort: np.ndarray, position: np.ndarray, usual: float, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Efforts and positions as the log has them, shape (rows, trials)."""
-        if self.measured:
-            effort = effort + READ_EFFORT * usual * rng.standard_normal(effort.shape)
-        if self.cutoff_hz is not None:
-            effort, position = low_pass(effort, DT, self.cutoff_hz), low_pass(position, DT, self.cutoff_hz)
-        return effort[:: self.every], position[:: self.every]
 
 
 COMMANDED = Recording()

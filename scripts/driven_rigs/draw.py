@@ -63,6 +63,35 @@ class Drawn:
     truth: dict[str, float]
 
 
+@dataclass(frozen=True)
+class Recording:
+    """How a laboratory records a rig.
+
+    Attributes
+    ----------
+    measured
+        The effort is read, with noise, instead of what the controller commands.
+    cutoff_hz
+        Where effort and reading were low-passed, without delay, before they were stored; None where they were not.
+    every
+        Samples of the controller from one row of the log to the next.
+    """
+
+    measured: bool = False
+    cutoff_hz: float | None = None
+    every: int = 1
+
+    def stored(
+        self, effort: np.ndarray, position: np.ndarray, usual: float, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Efforts and positions as the log has them, shape (rows, trials)."""
+        if self.measured:
+            effort = effort + READ_EFFORT * usual * rng.standard_normal(effort.shape)
+        if self.cutoff_hz is not None:
+            effort, position = low_pass(effort, DT, self.cutoff_hz), low_pass(position, DT, self.cutoff_hz)
+        return effort[:: self.every], position[:: self.every]
+
+
 def draw(
     causes: tuple[str, ...],
     size: float,
@@ -117,13 +146,10 @@ def draw(
         torque_s=float(rng.choice([0.02, 0.2])),
     )
     effort, position = run(plant, references, rng)
-    if recorded:
-        effort = effort + READ_EFFORT * usual * own.standard_normal(effort.shape)
-    if cutoff_hz is not None:
-        effort, position = low_pass(effort, DT, cutoff_hz), low_pass(position, DT, cutoff_hz)
+    effort, position = Recording(recorded, cutoff_hz, every).stored(effort, position, usual, own)
     believed = (float(rng.uniform(0.7, 1.3)), base.damping * float(rng.uniform(0.4, 1.6)))
     truth = {"inertia_scale": 1.0, "damping": base.damping, **hidden}
-    study = _written(base, effort[::every], position[::every], every * DT, believed, folder)
+    study = _written(base, effort, position, every * DT, believed, folder)
     return Drawn(study, base.name, causes, truth)
 
 

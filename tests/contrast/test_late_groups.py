@@ -1,6 +1,7 @@
 """Groups that were logged less often than their controller works."""
 
-from contrast_pairs.driven import Recording, driven_pair
+from contrast_pairs.driven import driven_pair
+from driven_rigs.draw import Recording
 
 from fes_pin.contrast.contrast import contrast
 

@@ -225,3 +225,12 @@ def test_dissipative_effects_add_no_energy(one, speed):
 
 def test_those_that_only_take_energy_say_so():
     assert {e.name for e in EFFECTS if e.dissipative} == {"coulomb_friction", "quadratic_damping", "passive_relaxation"}
+
+
+def test_a_contact_stretches_by_little_of_the_motion():
+    """Where it is read as a position and free: an imposed way, and rates, say nothing of a contact."""
+    position = np.linspace(-0.2, 0.3, 50)
+    moved = {"position": position, "reading": position, "time": np.arange(50) * 0.01}
+    assert effects.CoulombFriction().limits(moved)["stretch"] == (0.0, pytest.approx(0.05))
+    assert max(effects.CoulombFriction.grids(moved)["stretch"]) < 0.05
+    assert "stretch" not in effects.CoulombFriction().limits({"time": moved["time"]})

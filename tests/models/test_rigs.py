@@ -249,7 +249,8 @@ def test_a_joint_that_an_effort_holds_idles_beside_it(tmp_path, held, turns):
     columns = {"position": np.full(2, hanging + held), "effort": np.zeros(2)}
     measured = Trial("held", "motion", columns, np.arange(2.0))
     stated = Trial("held", "motion", {"effort": np.zeros(2)}, np.arange(2.0), {"position0": hanging + held})
-    for trial in (measured, stated):
+    hidden = Trial("held", "motion", {**columns, "position": np.full(2, np.nan)}, np.arange(2.0), stated.conditions)
+    for trial in (measured, stated, hidden):
         assert rig.trial_constants(trial)["idle"] == pytest.approx(hanging + turns * np.pi)
 
 

@@ -141,14 +141,17 @@ class Joint(Rig):
         return {**known, "idle": self._idle(trial)}
 
     def _idle(self, trial: Trial) -> float:
+        """Where no effort is needed to rest, rad or m: beside what is read or stated of a trial that is driven."""
         a, b = float(self.constants["gravity_cos"]), float(self.constants["gravity_sin"])
         if not (self.constants["revolute"] and (a or b)):
             return 0.0
         hanging = math.atan2(-a, b)
         if not self.is_driven([trial]):
             return hanging
-        held = trial["position"] if "position" in trial.columns else trial.conditions.get("position0", hanging)
-        return hanging + math.pi * round((float(np.nanmedian(held)) - hanging) / math.pi)
+        read = trial["position"] if "position" in trial.columns else np.empty(0)
+        read = read[np.isfinite(read)]
+        held = float(np.median(read)) if len(read) else float(trial.conditions.get("position0", hanging))
+        return hanging + math.pi * round((held - hanging) / math.pi)
 
     def initial_unknowns(self, trial: Trial) -> dict[str, float]:
         if trial.kind == IMPOSED:
