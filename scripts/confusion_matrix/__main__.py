@@ -19,14 +19,15 @@ def main() -> None:
     parser.add_argument("--figure", type=Path, help="write the picture here")
     parser.add_argument("--read-only", action="store_true", help="run nothing: table of what the results hold")
     parser.add_argument("--check", action="store_true", help="80 studies; exit code 1 if they are worse than the table")
+    parser.add_argument("--oracle", type=Path, metavar="FILE", help="what an oracle tells of the singles, beside these")
     given = parser.parse_args()
     os.environ["FES_PIN_THREADS"] = "1"
 
-    from confusion_matrix import runner  # noqa: PLC0415
+    from confusion_matrix import oracle, runner  # noqa: PLC0415
     from confusion_matrix.check import complaints, slice_of  # noqa: PLC0415
     from confusion_matrix.picture import draw  # noqa: PLC0415
     from confusion_matrix.plan import Item  # noqa: PLC0415
-    from confusion_matrix.table import one_line, table  # noqa: PLC0415
+    from confusion_matrix.table import beside, one_line, table  # noqa: PLC0415
 
     if given.only:
         for record in runner.run([[Item.parse(name)] for name in given.only], None, given.workers):
@@ -36,6 +37,11 @@ def main() -> None:
         found = complaints(runner.run(slice_of(given.seed), None, given.workers))
         print("\n".join(found) or "as good as the table that is committed")
         raise SystemExit(bool(found))
+    if given.oracle:
+        singles = oracle.asked(runner.plan(given.quick or 1000, given.seed))
+        told = runner.run(singles, given.oracle, given.workers, oracle.oracle)
+        print(beside(told, runner.read(given.results)))
+        return
     if given.read_only:
         records = list(runner.read(given.results).values())
     else:

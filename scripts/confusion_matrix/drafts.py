@@ -134,17 +134,17 @@ TORQUE_SHARE = 0.6
 """Share of the third noise family that is a random torque; the rest is ARMA noise of the sensor."""
 
 
-def sensor_family(one: Draft) -> tuple[str, float]:
+def sensor_family(item: Item) -> tuple[str, float]:
     """Family of the sensor's noise, and its colour."""
-    rng = one.item.rng(3)
+    rng = item.rng(3)
     colour, kind = float(rng.random()), float(rng.random())
-    if one.item.noise != "process":
-        return one.item.noise, colour
-    return ("arma" if kind >= TORQUE_SHARE or one.plant.rig == "muscle" else "white"), colour
+    if item.noise != "process":
+        return item.noise, colour
+    return ("arma" if kind >= TORQUE_SHARE or item.rig == "muscle" else "white"), colour
 
 
 def with_noise(one: Draft, readings: Sequence[np.ndarray]) -> list[np.ndarray]:
-    family, colour = sensor_family(one)
+    family, colour = sensor_family(one.item)
     out, own = [], one.item.rng(4)
     for p, y in zip(one.trials, readings, strict=True):
         column = "force_n" if p.kind == "isometric" else COLUMN[one.plant.rig]

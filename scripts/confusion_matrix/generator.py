@@ -129,16 +129,18 @@ def noncentrality(one: Draft, readings: list[np.ndarray]) -> float:
     return float(np.sqrt(fitted.sse))
 
 
+def noise_as_it_is(item: Item) -> dict[str, Noise] | None:
+    """The noise of a study's readings, by column; None where a random torque makes more of it."""
+    family, colour = sensor_family(item)
+    if item.noise == "process" and family == "white":
+        return None
+    return {n: Noise(*innovations(family, n, colour), level, 0.0) for n, level in LEVEL.items()}
+
+
 def felt_noncentrality(one: Draft, readings: list[np.ndarray]) -> float | None:
     """The same, for the noise that the study has; None where it is a random torque."""
-    family, colour = sensor_family(one)
-    if one.item.noise == "process" and family == "white":
-        return None
-    noise = {}
-    for name, level in LEVEL.items():
-        innovation, ar = innovations(family, name, colour)
-        noise[name] = Noise(innovation, ar, level, 0.0)
-    return float(np.sqrt(nominal_fit(study_of(one, readings), one.plant.true, noise=noise).sse))
+    noise = noise_as_it_is(one.item)
+    return noise and float(np.sqrt(nominal_fit(study_of(one, readings), one.plant.true, noise=noise).sse))
 
 
 def nominal_fit(

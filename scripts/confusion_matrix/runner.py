@@ -6,15 +6,19 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from confusion_matrix.generator import make
+from confusion_matrix.generator import Made, make
 from confusion_matrix.judge import judge
 from confusion_matrix.plan import Item, groups
+
+Answer = Callable[[Made], dict[str, Any]]
+"""What is said of a study, as a record."""
 
 
 def plan(count: int, seed: int) -> list[tuple[Item, ...]]:
@@ -29,31 +33,33 @@ def plan(count: int, seed: int) -> list[tuple[Item, ...]]:
     return out
 
 
-def run_group(items: Sequence[Item]) -> list[dict[str, Any]]:
+def run_group(items: Sequence[Item], answer: Answer = judge) -> list[dict[str, Any]]:
     """Make and diagnose studies that are simulated together."""
     began = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="confusion") as folder:
         made = make(items, Path(folder))
         making = (time.perf_counter() - began) / len(items)
-        return [{**_judged(one), "making_s": round(making, 2)} for one in made]
+        return [{**_answered(one, answer), "making_s": round(making, 2)} for one in made]
 
 
-def _judged(made: Any) -> dict[str, Any]:
+def _answered(made: Made, answer: Answer) -> dict[str, Any]:
     try:
-        return judge(made)
+        return answer(made)
     except Exception as error:
         item = made.item
         known = {"id": item.name, "kind": item.kind, "rig": item.rig, "causes": list(item.causes), "form": item.form}
         return {**known, "noise": item.noise, "target": item.distance, "error": f"{type(error).__name__}: {error}"}
 
 
-def run(wanted: Iterable[Sequence[Item]], results: Path | None, workers: int = 1) -> list[dict[str, Any]]:
+def run(
+    wanted: Iterable[Sequence[Item]], results: Path | None, workers: int = 1, answer: Answer = judge
+) -> list[dict[str, Any]]:
     """Results of studies, those in the file `results` included; new ones are appended to it as they come."""
     done = read(results) if results else {}
     wanted = [tuple(group) for group in wanted]
     todo = [part for group in wanted if (part := tuple(i for i in group if i.name not in done))]
     total, began, fresh = sum(len(g) for g in todo), time.perf_counter(), 0
-    for records in _all(todo, workers):
+    for records in _all(todo, workers, answer):
         for record in records:
             done[record["id"]] = record
             fresh += 1
@@ -65,12 +71,13 @@ def run(wanted: Iterable[Sequence[Item]], results: Path | None, workers: int = 1
     return [done[name] for name in sorted(names) if name in done]
 
 
-def _all(todo: Sequence[Sequence[Item]], workers: int) -> Iterable[list[dict[str, Any]]]:
+def _all(todo: Sequence[Sequence[Item]], workers: int, answer: Answer) -> Iterable[list[dict[str, Any]]]:
+    each = partial(run_group, answer=answer)
     if workers < 2:
-        yield from map(run_group, todo)
+        yield from map(each, todo)
         return
     with ProcessPoolExecutor(workers) as pool:
-        yield from pool.map(run_group, todo)
+        yield from pool.map(each, todo)
 
 
 def read(results: Path) -> dict[str, dict[str, Any]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -91,6 +91,20 @@ def table(records: Iterable[Record]) -> str:
     lines += ["", *_times(good), "", *_confusions(good), "", *_by_cause(good), "", *failures(good)]
     lines += ["", *[f"no answer: {r['id']}: {r['error']}" for r in all_ if "error" in r]]
     return "\n".join(line.rstrip() for line in lines).rstrip()
+
+
+def beside(told: Sequence[Record], diagnosed: Mapping[str, Record]) -> str:
+    """What an oracle tells of studies, and what the diagnosis told of them, as text."""
+    both_told = [r for r in told if "error" not in r and "error" not in diagnosed.get(r["id"], {"error": ""})]
+    lines = []
+    for label, test in (("something claimed", claims), ("true cause in the first set", first), ("exactly", exact)):
+        for form, same in (("", None), (", the engine's form", True), (", another form", False)):
+            part = [r for r in both_told if same in (None, r["form"] == "same")]
+            lines.append(_row(f"{label}{form}: an oracle", "", [test(r) for r in part]))
+            lines.append(_row(f"{label}{form}: the diagnosis", "", [test(diagnosed[r["id"]]) for r in part]))
+    unlike = [r for r in both_told if r["sets"] != diagnosed[r["id"]]["sets"]]
+    lines += [f"  {r['id']}: {r['sets']}; the diagnosis {diagnosed[r['id']]['sets']}" for r in unlike]
+    return "\n".join(lines)
 
 
 def _row(label: str, target: str, hits: Sequence[bool]) -> str:
