@@ -19,8 +19,24 @@ def judge(made: Made) -> dict[str, Any]:
     began, used = time.perf_counter(), time.process_time()
     diagnosis = diagnose_joint(made.study)
     wall, cpu = time.perf_counter() - began, time.process_time() - used
+    named, causes = {c.name for c in diagnosis.causes}, made.item.causes
+    return {
+        **known(made),
+        "verdict": diagnosis.verdict,
+        "sets": [[c.name, *c.equivalents] for c in diagnosis.causes],
+        "unexplained": bool(diagnosis.verdict == "unexplained" or diagnosis.remainder.unexplained),
+        "where": diagnosis.remainder.where,
+        "absorbed": sorted(set(diagnosis.absorbed) & set(causes)),
+        "parameters": _parameters(made, diagnosis) if named == set(causes) and causes else [],
+        "share": _share(made, diagnosis),
+        "wall_s": round(wall, 2),
+        "cpu_s": round(cpu, 2),
+    }
+
+
+def known(made: Made) -> dict[str, Any]:
+    """What is known of a study before anybody is asked."""
     item = made.item
-    named = {c.name for c in diagnosis.causes}
     return {
         "id": item.name,
         "kind": item.kind,
@@ -33,15 +49,6 @@ def judge(made: Made) -> dict[str, Any]:
         "felt": None if made.felt is None else round(made.felt, 2),
         "size": [float(f"{s:.5g}") for s in made.sizes],
         "orthogonal": None if made.orthogonal is None else round(made.orthogonal, 2),
-        "verdict": diagnosis.verdict,
-        "sets": [[c.name, *c.equivalents] for c in diagnosis.causes],
-        "unexplained": bool(diagnosis.verdict == "unexplained" or diagnosis.remainder.unexplained),
-        "where": diagnosis.remainder.where,
-        "absorbed": sorted(set(diagnosis.absorbed) & set(item.causes)),
-        "parameters": _parameters(made, diagnosis) if named == set(item.causes) and item.causes else [],
-        "share": _share(made, diagnosis),
-        "wall_s": round(wall, 2),
-        "cpu_s": round(cpu, 2),
     }
 
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from confusion_matrix.generator import Made, noise_as_it_is
+from confusion_matrix.judge import known
 from confusion_matrix.plan import DISTANCES, Item
 from fes_pin.diagnose.decide.rivals import alternatives
 from fes_pin.diagnose.decide.significance import Family
@@ -31,9 +32,9 @@ def asked(groups: Iterable[Sequence[Item]]) -> list[tuple[Item, ...]]:
 
 def oracle(made: Made) -> dict[str, Any]:
     """The answer to one study, as a record of the matrix."""
-    model, item = nominal_model(made.study), made.item
+    model = nominal_model(made.study)
     sets = SimulationFits(model, made.study.trials)
-    sets.set_noise(noise_as_it_is(item) or {})
+    sets.set_noise(noise_as_it_is(made.item) or {})
     nominal = fit_multistart(sets.fitter.problem(model), model.parameters())
     scores = sets.scores(nominal)
     fits = {n: _fitted(sets, nominal, many, made) for n, many in best_by_effect(scores.scored).items()}
@@ -42,15 +43,7 @@ def oracle(made: Made) -> dict[str, Any]:
     degrees = len(best.free) - len(nominal.free)
     claimed = Family(scores, 0).p_value(nominal.sse - best.sse, degrees) < LEVEL
     return {
-        "id": item.name,
-        "kind": item.kind,
-        "rig": item.rig,
-        "causes": list(item.causes),
-        "form": item.form,
-        "noise": item.noise,
-        "target": item.distance,
-        "d": [round(d, 2) for d in made.distances],
-        "felt": None if made.felt is None else round(made.felt, 2),
+        **known(made),
         "verdict": "causes_found" if claimed else "adequate",
         "sets": [[name, *alternatives(best, list(fits.values()), name)]] if claimed else [],
     }
