@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fes_pin.contrast.decide import LEVEL, inflation
+from fes_pin.contrast.decide import inflation
 from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.grouped import Grouped, Item
 from fes_pin.contrast.result import Change
@@ -16,6 +16,7 @@ from fes_pin.diagnose.cause import ParameterEstimate
 from fes_pin.diagnose.decide.rivals import ABSORBED_BELOW
 from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.identify.distributions import normal_quantile
+from fes_pin.identify.levels import CLAIM_LEVEL
 from fes_pin.models.catalogue import Catalogue
 
 SEEN = 0.95
@@ -87,7 +88,7 @@ def _equivalents(found: ContrastFound, item: Item) -> tuple[str, ...]:
 def not_changed(found: ContrastFound) -> tuple[dict[str, float], dict[str, ParameterEstimate], tuple[str, ...]]:
     """How large a change would have been seen: of what the model has as a share, of other causes in their units."""
     changed = {i.name for i in found.best.items}
-    single = 1.0 - (1.0 - LEVEL) ** (1.0 / found.family.tests)
+    single = 1.0 - (1.0 - CLAIM_LEVEL) ** (1.0 / found.family.tests)
     reach = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN)
     unchanged: dict[str, float] = {}
     sizes: dict[str, list[tuple[float, str, float]]] = {}

@@ -15,8 +15,9 @@ from fes_pin.contrast.search import ContrastFound
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import ParameterEstimate
 from fes_pin.diagnose.experiment import SEPARABLE
-from fes_pin.diagnose.misread import LEVEL, NAME, Misread, find_misread, restated_trials
+from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated_trials
 from fes_pin.identify.fit import PARAMETER_PRICE
+from fes_pin.identify.levels import CLAIM_LEVEL
 from fes_pin.models.model import Model
 
 ROUNDS = 3
@@ -85,7 +86,7 @@ def _found(nominal: Model, trials: Sequence[Trial], groups: int) -> Misread | No
         found = find_misread(nominal, trials)
     except (ArithmeticError, np.linalg.LinAlgError):
         return None
-    if found is None or not groups * found.p_value < LEVEL:
+    if found is None or not groups * found.p_value < CLAIM_LEVEL:
         return None
     return replace(found, p_value=groups * found.p_value)
 

@@ -30,9 +30,7 @@ from fes_pin.contrast.promises import UNFELT, Promise, units
 from fes_pin.contrast.repeats import Repeats
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.identify.distributions import f_tail
-
-LEVEL = 0.01
-"""Family-wise error of each round of claims."""
+from fes_pin.identify.levels import CLAIM_LEVEL
 
 UNUSUAL = 0.05
 """p-value below which a spread is larger than what is usual, as repeats may differ in just this: the usual one counts
@@ -62,7 +60,7 @@ def p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> fl
     """
     degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
     noise = family.p_value(smaller.fit.sse - larger.fit.sse, degrees)
-    if not noise < LEVEL:
+    if not noise < CLAIM_LEVEL:
         return noise
     return max(noise, family.adjusted(between_trials(fits, larger, fits.weighed_as(smaller, larger), degrees)))
 

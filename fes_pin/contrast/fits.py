@@ -14,13 +14,13 @@ from fes_pin.contrast.promises import Bench, Promise, promises
 from fes_pin.contrast.repeats import Repeats, scatter, without_locals, without_scatter
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library
-from fes_pin.diagnose.search.refined_forms import REFINE_LEVEL
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.diagnose.search.starts import STARTS, refinements
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.lasting import with_new_noise
+from fes_pin.identify.levels import REFINE_LEVEL
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel, as_white
 from fes_pin.identify.noise_floor import rich_noise

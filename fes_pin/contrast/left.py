@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.contrast.decide import LEVEL
 from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.grouped import Grouped
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.remainder.open_set import Remainder, unexplained_remainder
+from fes_pin.identify.levels import CLAIM_LEVEL
 from fes_pin.workers import in_parallel
 
 
@@ -26,7 +26,7 @@ def left_in_groups(fits: Fits, best: Grouped, seed: int) -> tuple[Remainder, lis
     if len(open_) == len(each):
         words = "the model leaves something unexplained in every group; `diagnose` says what"
         return Remainder(False, p, least.where), [words]
-    if not open_ or not p < LEVEL:
+    if not open_ or not p < CLAIM_LEVEL:
         return Remainder(False, p, None), []
     return Remainder(True, p, least.where), [f"something is left unexplained in the group {g}" for g in open_]
 
@@ -39,4 +39,4 @@ def _in_single_trials(fits: Fits, best: Grouped, group: str, left: Remainder, se
     test = driven_remainder if fits.driven else unexplained_remainder
     alone = in_parallel(lambda k: fits.part(best, group, k), range(len(fits.trials[group])))
     p = min(1.0, 2.0 * float(np.median([test(one, seed).p_value for one in alone])))
-    return replace(left, unexplained=p < LEVEL, p_value=max(left.p_value, p))
+    return replace(left, unexplained=p < CLAIM_LEVEL, p_value=max(left.p_value, p))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.contrast.decide import LEVEL, noise_p_value, p_value
+from fes_pin.contrast.decide import noise_p_value, p_value
 from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.grouped import Grouped, Item
 from fes_pin.contrast.promises import Promise
@@ -19,6 +19,7 @@ from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.diagnose.search.starts import STARTS
 from fes_pin.identify.fit import PARAMETER_PRICE
+from fes_pin.identify.levels import CLAIM_LEVEL
 from fes_pin.workers import Progress, in_parallel
 
 MOST_ITEMS = 5
@@ -96,7 +97,9 @@ class ContrastSearch:
             common = self.fits.without(common, item)
         single = [p for p in self.fits.promises(common)[0] if p.effect is None]
         tried = in_parallel(lambda p: self.fits.go_on(self.fits.look(common, [p])), single)
-        cheaper = [f for f in tried if f.price < best.price and p_value(self.fits, self.family, f, common) < LEVEL]
+        cheaper = [
+            f for f in tried if f.price < best.price and p_value(self.fits, self.family, f, common) < CLAIM_LEVEL
+        ]
         return min(cheaper, key=lambda f: f.price, default=best)
 
     def _forward(self, base: Grouped, promises: list[Promise]) -> Grouped:
@@ -122,14 +125,14 @@ class ContrastSearch:
         """
         for one in tried:
             refined = self.fits.refined(one)
-            if p_value(self.fits, self.family, refined, base) < LEVEL:
+            if p_value(self.fits, self.family, refined, base) < CLAIM_LEVEL:
                 return refined
         return None
 
     def _common(self, tried: list[Grouped], base: Grouped) -> Grouped | None:
         """The cheapest set with a cause of all groups more, as long as no change stands out: it may hide one."""
         common = [f for f in tried if f.items[-1].group is None]
-        if base.changes or not common or not noise_p_value(self.family, common[0], base) < LEVEL:
+        if base.changes or not common or not noise_p_value(self.family, common[0], base) < CLAIM_LEVEL:
             return None
         return common[0]
 
@@ -139,14 +142,17 @@ class ContrastSearch:
         What a second change leaves in the trials of a group makes them differ, and hides the first.
         """
         degrees = max(len(one.fit.free) - len(base.fit.free), 1)
-        if len(base.items) + 2 > MOST_ITEMS or not self.family.p_value(base.fit.sse - one.fit.sse, degrees) < LEVEL:
+        if (
+            len(base.items) + 2 > MOST_ITEMS
+            or not self.family.p_value(base.fit.sse - one.fit.sse, degrees) < CLAIM_LEVEL
+        ):
             return None
         tried = self._beside(one, self.fits.promises(one)[0])
         if not tried:
             return None
         both = self._first(tried)
         rests = [self.fits.without(both, item) for item in both.items[len(base.items) :]]
-        return both if all(p_value(self.fits, self.family, both, rest) < LEVEL for rest in rests) else None
+        return both if all(p_value(self.fits, self.family, both, rest) < CLAIM_LEVEL for rest in rests) else None
 
     def _beside(self, base: Grouped, promises: list[Promise], leave: Item | None = None) -> list[Grouped]:
         """Fits of a set with each of the items of most promise beside it, cheapest first.
@@ -183,14 +189,14 @@ class ContrastSearch:
                 rest = self.fits.without(best, item)
                 tried = self._beside(rest, self.fits.promises(rest)[0], item)
                 cheaper = (f for f in tried[:CONVERGED] if f.price < best.price - 1.0)
-                best = next((f for f in cheaper if self._worth(f.items[-1], f, rest) < LEVEL), best)
+                best = next((f for f in cheaper if self._worth(f.items[-1], f, rest) < CLAIM_LEVEL), best)
             if best is before:
                 break
         while best.items:
             without = {i: self.fits.without(best, i) for i in best.items}
             values = {i: self._worth(i, best, w) for i, w in without.items()}
             weakest = max(values, key=lambda i: values[i])
-            if values[weakest] < LEVEL:
+            if values[weakest] < CLAIM_LEVEL:
                 break
             best = without[weakest]
         return best
@@ -226,7 +232,7 @@ class ContrastSearch:
     def _tenable(self, rivals: list[Grouped], best: Grouped, rest: Grouped) -> list[Grouped]:
         """Rivals without those that cost as little and are not significant themselves: what single trials differ by."""
         near = best.price + SEPARABLE
-        return [f for f in rivals if f.price >= near or self._worth(f.items[-1], f, rest) < LEVEL]
+        return [f for f in rivals if f.price >= near or self._worth(f.items[-1], f, rest) < CLAIM_LEVEL]
 
     def _better(self, best: Grouped, rivals: dict[Item, list[Grouped]]) -> Grouped | None:
         """The cheapest set in which a rival stands in a change's place, if it is cheaper."""
@@ -237,6 +243,6 @@ class ContrastSearch:
         """The set less the changes that are not significant any more."""
         for item in best.changes:
             rest = self.fits.without(best, item)
-            if not p_value(self.fits, self.family, best, rest) < LEVEL:
+            if not p_value(self.fits, self.family, best, rest) < CLAIM_LEVEL:
                 return self._dropped(rest)
         return best

@@ -33,6 +33,7 @@ from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_smoothing
+from fes_pin.identify.levels import CERTAIN_LEVEL
 from fes_pin.identify.turns import with_honest_intervals
 
 LARGE_SHARE = 0.1
@@ -163,7 +164,7 @@ def _left(
     large = [r for r in random if r.share > LARGE_SHARE]
     if large:
         return replace(left, unexplained=True, where="effort")
-    certain = {n: p for n, p in refused.items() if p < 1e-6}
+    certain = {n: p for n, p in refused.items() if p < CERTAIN_LEVEL}
     if certain:
         surest = min(certain, key=lambda n: certain[n])
         stage = next(str(e.stage) for e in search.sets.library.effects if e.name == surest)

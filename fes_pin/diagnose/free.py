@@ -19,11 +19,10 @@ from fes_pin.diagnose.search.misspecified import under_one_noise
 from fes_pin.diagnose.search.simulation_search import Searched, SimulationSearch
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import Fit, rough_noise
+from fes_pin.identify.levels import CERTAIN_LEVEL
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.models.model import Model
 
-REFUSED_LEVEL = 1e-6
-"""Level of a cause at which something is there even if held-out trials refuse the name."""
 OF_THE_MEAN = 100.0
 """E in percent of a prediction that is nothing but the mean of what was measured, by eq. (2): a set of causes that
 predicts worse than that, on the very trials it was fitted to, explains nothing."""
@@ -114,7 +113,7 @@ def unfitted(study: Study, nominal: Fit, reason: str, test: Sequence[Trial]) -> 
 
 def with_refused(left: Remainder, refused: Sequence[Cause]) -> Remainder:
     """A remainder also where a cause was certain, but trials that took no part did not bear out its form."""
-    certain = [c for c in refused if c.p_value < REFUSED_LEVEL]
+    certain = [c for c in refused if c.p_value < CERTAIN_LEVEL]
     if left.unexplained or not certain:
         return left
     surest = min(certain, key=lambda c: c.p_value)

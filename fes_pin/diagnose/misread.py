@@ -20,6 +20,7 @@ from scipy import special
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.levels import CLAIM_LEVEL
 from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Linearized, Problem, normal_equations
@@ -35,8 +36,6 @@ DESCRIBED = f"""{NAME} (rig; rigs: ankle, joint, muscle)
     value, of the condition that the trial states
 """
 """As `fes-pin effects` tells it: it is of a trial, not of the rig, and no effect of a model."""
-LEVEL = 0.01
-"""Family-wise over all trials and conditions, as every round of claims."""
 FEWEST = 4
 """Trials that state something: the others must tell how much trials differ anyway."""
 CANDIDATES = 3
@@ -229,7 +228,7 @@ def _left_out(
     t = abs(own.z) / math.sqrt(phi)
     p = min(1.0, 2.0 * len(wanted) * float(special.stdtr(len(told), -t)))
     usual = max(float(part.residual @ part.residual) / len(part.residual) for part in fitted.parts)
-    if not p < LEVEL or own.left > AS_WELL * max(usual, 1.0):
+    if not p < CLAIM_LEVEL or own.left > AS_WELL * max(usual, 1.0):
         return None
     stated = whole.model.rig.stated(trials[i])[name]
     told_by = [_step(fitted, trials[i], name, noise, sizes[name], half=k).value for k in (0, 1)]

@@ -13,10 +13,11 @@ from fes_pin.data.timing import advanced
 from fes_pin.data.trial import Trial
 from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import CERTAIN_LEVEL
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
 
-CERTAIN = chi2_quantile(1.0 - 1e-6, 1)
+CERTAIN = chi2_quantile(1.0 - CERTAIN_LEVEL, 1)
 """Twice the log-likelihood that moving the effort must bring: whatever it stands for, it must be there."""
 LEAST_ROWS = 0.25
 """The least: of a log that asks in every second sample of a controller, which holds for half a row."""

@@ -9,8 +9,9 @@ import pytest
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.decide.claims import Claims
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, added_likelihood, speaks_for
-from fes_pin.diagnose.free import REFUSED_LEVEL, with_refused
+from fes_pin.diagnose.free import with_refused
 from fes_pin.diagnose.remainder.open_set import Remainder
+from fes_pin.identify.levels import CERTAIN_LEVEL
 
 
 def test_evidence_covers_what_the_difference_is_worth():
@@ -66,7 +67,7 @@ def test_no_cause_is_named_that_is_sure_to_do_harm():
 
 def test_a_refused_certainty_is_a_remainder():
     nothing = Remainder(unexplained=False, p_value=0.4, where=None)
-    certain = cause(p_value=REFUSED_LEVEL / 10.0, stage="muscle")
+    certain = cause(p_value=CERTAIN_LEVEL / 10.0, stage="muscle")
     left = with_refused(nothing, [cause(p_value=1e-4), certain])
     assert left.unexplained and left.where == "muscle" and left.p_value == certain.p_value
     assert with_refused(nothing, [cause(p_value=1e-4)]) is nothing

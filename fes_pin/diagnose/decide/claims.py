@@ -5,23 +5,18 @@ from __future__ import annotations
 from fes_pin.diagnose.decide.significance import Family, coherence_p_value
 from fes_pin.diagnose.remainder.open_set import smooth_remainder
 from fes_pin.diagnose.search.cause_sets import Names
-from fes_pin.diagnose.search.refined_forms import REFINE_LEVEL
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.diagnose.search.simulation_fits import SimulationFits
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
+from fes_pin.identify.levels import CLAIM_LEVEL, EXTEND_LEVEL, REFINE_LEVEL
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 
-CLAIM_LEVEL = 0.01
-"""Family-wise error of each round of claims; with the tests of the remainder (0.02) a diagnosis stays below 5 %, with
-room for noise that is not quite autoregressive."""
 FORM_SHARE = 0.0625
 """A further cause must explain at least this share of what all causes do: a real cause differs from its equation, and
 an error of a quarter in its form leaves a sixteenth of its likelihood to whatever else comes near."""
-EXTEND_LEVEL = 0.1
-"""A round of joint fits is left out only if neither the score of a further cause nor smooth features reach this."""
 COMPLETE_BELOW = 25.0
 """Score of a further cause, in twice the log-likelihood, below which a set is complete: 5 sigma."""
 SLOWEST_NOISE = 10.0

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from fes_pin.diagnose.remainder.open_set import SIGN_DRAWS, Remainder
-from fes_pin.diagnose.search.likelihood_search import CLAIM_LEVEL
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import DRIVEN_LEVEL
 from fes_pin.identify.likelihood import LikelihoodProblem, for_gains_as_they_are
 from fes_pin.identify.problem import limits_of
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
@@ -59,12 +59,12 @@ def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
         return min(1.0, 2.0 * min(p_values))
 
     p = p_value(statistic, float(single[best] ** 2))
-    if p < CLAIM_LEVEL and featured.can_keep:
+    if p < DRIVEN_LEVEL and featured.can_keep:
         alone, together = np.zeros((2, len(featured.names)))
         alone[good[best]] = single[best] / after[good[best]]
         together[good] = vectors[:, kept] @ (shares.sum(axis=0) / np.sqrt(values[kept])) / after[good]
         p = max(p, p_value(featured.gained(together), featured.gained(alone)))
-    unexplained = p < CLAIM_LEVEL
+    unexplained = p < DRIVEN_LEVEL
     return Remainder(unexplained, p, featured.names[good[best]].split(":")[0] if unexplained else None)
 
 

@@ -31,7 +31,7 @@ from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel
 
 REMAINDER_LEVEL = 0.02
-"""Level of all tests of the remainder together; see `search.CLAIM_LEVEL`."""
+"""Level of all tests of the remainder together; see `identify.levels`."""
 OTHERS = ("burst", "line", "detent", "repeated", "heteroscedastic", "slip", "play")
 SHARES = {"smooth": 1 / 2, **dict.fromkeys(OTHERS, 1 / (2 * len(OTHERS)))}
 """Of the level, for each test."""

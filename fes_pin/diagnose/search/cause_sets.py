@@ -6,6 +6,9 @@ from fes_pin.identify.fit import Fit
 
 Names = tuple[str, ...]
 
+MOST_CAUSES = 3
+"""Causes that are named at most: every further one multiplies the sets."""
+
 
 def names_of(fitted: Fit) -> Names:
     """The causes in a fit."""

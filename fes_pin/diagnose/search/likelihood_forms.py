@@ -7,10 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
-from fes_pin.diagnose.search.refined_forms import REFINE_LEVEL, is_identified
+from fes_pin.diagnose.search.refined_forms import is_identified
 from fes_pin.diagnose.search.starts import STARTS, begun_anew, refinements
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import REFINE_LEVEL
 from fes_pin.identify.scoring import WORTH
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel

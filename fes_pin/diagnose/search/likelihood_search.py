@@ -15,23 +15,18 @@ from dataclasses import dataclass
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnose.decide.significance import Family
+from fes_pin.diagnose.search.cause_sets import MOST_CAUSES
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names, is_possible
 from fes_pin.diagnose.search.score import Scored, best_pairs
 from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import DRIVEN_LEVEL, EXTEND_LEVEL
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
-CLAIM_LEVEL = 1e-3
-"""Family-wise error of each round of claims. 54 driven rigs with nothing hidden brought p-values of 0.002 and 0.004
-(`scripts/driven --nulls`): as many as 0.01 allows, more than a person who is told a name would accept. What acts in a
-rig that is recorded for a minute is far beyond either."""
-EXTEND_LEVEL = 0.1
-"""Family-wise level that the score of a further cause must reach for larger sets to be fitted."""
-MOST_CAUSES = 3
-"""Causes that are named at most: every further one multiplies the sets."""
 MOST_IMPOSED = 8
-"""The same where motion is imposed: it excites a rig as nothing else does, and a muscle is a set of such causes."""
+"""Causes that are named at most where motion is imposed: it excites a rig as nothing else does, and a muscle is a set
+of such causes."""
 BEAM = 3
 """Sets that each round extends; greedy search (1) loses 5 to 8 points of exact pairs (DESIGN section 6)."""
 JOINT_FITS = 8
@@ -110,7 +105,7 @@ class LikelihoodSearch:
                 break
             self._extend(size)
             first = self._refine_first(size)
-            if not (self.p_value(sets.fits[first], sets.fits[best]) < CLAIM_LEVEL and is_possible(sets.fits[first])):
+            if not (self.p_value(sets.fits[first], sets.fits[best]) < DRIVEN_LEVEL and is_possible(sets.fits[first])):
                 break
             best = self._fallback = first
         return self.settle(self._backward(best))
@@ -176,7 +171,7 @@ class LikelihoodSearch:
         while names:
             fits = {n: self.sets.without(names, n) for n in names}
             weakest = min(names, key=lambda n: fits[n].sse)
-            if self.p_value(self.sets.fits[names], fits[weakest]) < CLAIM_LEVEL:
+            if self.p_value(self.sets.fits[names], fits[weakest]) < DRIVEN_LEVEL:
                 break
             names = tuple(n for n in names if n != weakest)
         return names

@@ -13,8 +13,6 @@ from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
-REFINE_LEVEL = 1e-3
-"""Level at which a refinement of an effect's form is adopted: some ten forms are tried for a set."""
 SCREEN_ITERATIONS = 5
 """Iterations after which the best start of a refinement is chosen, which alone goes on."""
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.claims import Claims
-from fes_pin.diagnose.search.cause_sets import Names, subsets
+from fes_pin.diagnose.search.cause_sets import MOST_CAUSES, Names, subsets
 from fes_pin.diagnose.search.misspecified import choose_by_prediction, fit_for_prediction
 from fes_pin.diagnose.search.model_fitter import FIRST_ITERATIONS
 from fes_pin.diagnose.search.restarts import at_null, restart, restart_beside, restart_every
@@ -20,8 +20,6 @@ from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import OutOfTime, Progress, time_limit
 
-MOST_CAUSES = 3
-"""Causes that are named at most: every further one multiplies the sets."""
 BEAM = 3
 """Sets that each round extends; greedy search (1) loses 5 to 8 points of exact pairs (DESIGN section 6)."""
 SEEDS = 4
