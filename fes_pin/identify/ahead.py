@@ -38,7 +38,7 @@ STRIDE = 0.25
 SEEN_AGAIN = 3
 """A prediction goes on from all that was measured, but for what earlier ones along the same run were not shown: between
 two of them this many times as long is seen as is not. A filter that remembers less than that loses nothing."""
-GROWTH = 100.0
+FALLS_BY = 100.0
 """Factor by which a free simulation may enlarge an error of its first sample before it says nothing of the model."""
 
 
@@ -209,7 +209,7 @@ def _abreast(ahead: int, stride: int) -> int:
 
 
 def falls(model: Model, trials: Sequence[Trial]) -> bool:
-    """True if a free simulation enlarges an error of its beginning by more than `GROWTH`: the rig falls by itself."""
+    """True if a free simulation enlarges an error of its beginning by more than `FALLS_BY`: the rig falls by itself."""
     unknowns = tuple(dict.fromkeys(n for t in trials for n in model.rig.unknowns(t.kind)))
     if not unknowns:
         return False
@@ -217,4 +217,4 @@ def falls(model: Model, trials: Sequence[Trial]) -> bool:
     with np.errstate(all="ignore"):
         run = simulator.run(model.parameters(), simulator.start(model.parameters()))
         largest = max(float(np.abs(one.sensitivities[:, 0, 0]).max()) for one in run)
-    return not largest < GROWTH
+    return not largest < FALLS_BY

@@ -9,14 +9,13 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.distributions import chi2_tail, f_tail
+from fes_pin.identify.levels import FEEDBACK_LEVEL
 from fes_pin.models.rigs.base import Rig
 
 LAGS = 4
 """Samples that a controller's answer is sought in: it acts in the sample in which it reads, or a few later."""
 JUMP = 5.0
 """Deviations beyond which a second difference is a jump, not noise."""
-CERTAIN = 1e-9
-"""Level of the test: the noise of a reading comes back through a controller in thousands of samples."""
 
 
 def is_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
@@ -33,7 +32,7 @@ def is_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
     (1969); Fisher, Statistical Methods for Research Workers, 1932, section 21.1.
     """
     logs = [math.log(max(p, 1e-300)) for p in _p_values(rig, trials)]
-    return bool(logs) and float(chi2_tail(-2.0 * sum(logs), 2 * len(logs))) < CERTAIN
+    return bool(logs) and float(chi2_tail(-2.0 * sum(logs), 2 * len(logs))) < FEEDBACK_LEVEL
 
 
 def _p_values(rig: Rig, trials: Sequence[Trial]) -> Iterator[float]:

@@ -17,7 +17,7 @@ from fes_pin.identify.levels import CERTAIN_LEVEL
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
 
-CERTAIN = chi2_quantile(1.0 - CERTAIN_LEVEL, 1)
+LEAST_GAIN = chi2_quantile(1.0 - CERTAIN_LEVEL, 1)
 """Twice the log-likelihood that moving the effort must bring: whatever it stands for, it must be there."""
 LEAST_ROWS = 0.25
 """The least: of a log that asks in every second sample of a controller, which holds for half a row."""
@@ -46,7 +46,7 @@ def lateness_of(fitted: Fit, row_s: float) -> float | None:
             tried[late] = maximise(problem, fitted.values, fitted.unknowns).sse
         return tried[late]
 
-    if cost(LEAST_ROWS * row_s) > fitted.sse - CERTAIN:
+    if cost(LEAST_ROWS * row_s) > fitted.sse - LEAST_GAIN:
         return None
     most = {"bounds": (0.0, MOST_ROWS * row_s), "method": "bounded", "options": {"xatol": 0.02 * row_s}}
     return float(minimize_scalar(cost, **most).x)

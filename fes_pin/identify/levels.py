@@ -17,3 +17,6 @@ EXTEND_LEVEL = 0.1
 CERTAIN_LEVEL = 1e-6
 """At which something is there, whatever it stands for: a cause whose name held-out trials refuse, or an effort that
 was written down late."""
+FEEDBACK_LEVEL = 1e-9
+"""At which an effort answers what is read: the noise of a reading comes back through a controller in thousands of
+samples."""
