@@ -160,6 +160,7 @@ def predict(
     from fes_pin.data.study import read_columns
     from fes_pin.data.tabular import check_table, table_bytes
     from fes_pin.data.trial import read_trial
+    from fes_pin.identify.stored import load_log
     from fes_pin.models.predict import predict as run
     from fes_pin.models.store import load_model
 
@@ -170,6 +171,7 @@ def predict(
     own = None if columns_of is None else read_columns(columns_of, rigs=catalogue.schemas())
     rig = loaded.rig.described()
     given = read_trial(trial, rig=rig, kind=kind, conditions=conditions, inputs_only=horizon is None, own=own)
+    given = load_log(model).applied(given)
     found = run(loaded, given) if horizon is None else _along(model, loaded, given, horizon)
     columns = {"time_s": found.time, **found.columns}
     if residuals:

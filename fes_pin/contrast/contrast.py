@@ -15,6 +15,7 @@ from fes_pin.contrast.late import is_cheaper, late_in_groups
 from fes_pin.contrast.left import left_in_groups
 from fes_pin.contrast.result import Contrast
 from fes_pin.contrast.search import ContrastFound, ContrastSearch
+from fes_pin.data.log import Log
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -24,7 +25,7 @@ from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.lasting import words_of_smoothing
-from fes_pin.identify.lateness import with_effort_earlier, words_of_lateness
+from fes_pin.identify.lateness import words_of_lateness
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -88,7 +89,7 @@ def contrast(
 
         searched = contrast_with_conditions(nominal, trials, run)
         if (late_s := late_in_groups(searched.fits, searched.found.best)) is not None:
-            moved = {g: [with_effort_earlier(t, late_s) for t in many] for g, many in trials.items()}
+            moved = {g: [Log(effort_late_s=late_s).applied(t) for t in many] for g, many in trials.items()}
             timed = contrast_with_conditions(nominal, moved, run)
             if is_cheaper(timed, searched):
                 searched, said = timed, [words_of_lateness(late_s), *said]

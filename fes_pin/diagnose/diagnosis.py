@@ -11,6 +11,7 @@ import numpy as np
 
 from fes_pin.data.derived import without_derived
 from fes_pin.data.errors import InputError
+from fes_pin.data.log import Log
 from fes_pin.data.provenance import provenance_now
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.stuck import without_stuck
@@ -159,8 +160,8 @@ def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
             cutoff = low_pass_of(nominal.model, nominal.trials)
     except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
         return None
-    passed = tuple(replace(t, low_pass_hz=cutoff) for t in study.trials)
-    return None if cutoff is None else replace(study, trials=passed)
+    log = Log(low_pass_hz=cutoff)
+    return None if cutoff is None else replace(study, trials=tuple(log.applied(t) for t in study.trials))
 
 
 def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:
@@ -170,8 +171,9 @@ def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:
         return recorded
     trials = passed.extended.trials
     names = " and ".join(dict.fromkeys(n for t in trials for n in passed.extended.model.rig.outputs(t.kind) if n in t))
-    said = f"{names} seems low-passed at {trials[0].low_pass_hz:.2g} Hz: what is simulated was low-passed there as well"
-    return replace(passed, warnings=(said, *passed.warnings))
+    cutoff = trials[0].low_pass_hz
+    said = f"{names} seems low-passed at {cutoff:.2g} Hz: what is simulated was low-passed there as well"
+    return replace(passed, log=replace(passed.log, low_pass_hz=cutoff), warnings=(said, *passed.warnings))
 
 
 def _judged(

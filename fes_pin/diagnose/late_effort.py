@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from fes_pin.data.log import Log
 from fes_pin.data.study import Study
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.lateness import lateness_of, with_effort_earlier, words_of_lateness
+from fes_pin.identify.lateness import lateness_of, words_of_lateness
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
 from fes_pin.workers import OutOfTime, time_limit
@@ -42,14 +43,16 @@ def late_by(diagnosis: Diagnosis, end: float) -> float | None:
 
 def in_time(study: Study, late_s: float) -> Study:
     """The study with its efforts where they acted."""
-    return replace(study, trials=tuple(with_effort_earlier(t, late_s) for t in study.trials))
+    log = Log(effort_late_s=late_s)
+    return replace(study, trials=tuple(log.applied(t) for t in study.trials))
 
 
 def better_timed(timed: Diagnosis, recorded: Diagnosis, late_s: float) -> Diagnosis:
     """The diagnosis with efforts in time, if it is likelier than that of the record; else that."""
     if not _is_likelier(timed.extended, recorded.extended):
         return recorded
-    return replace(timed, warnings=(words_of_lateness(late_s), *timed.warnings))
+    log = replace(timed.log, effort_late_s=late_s)
+    return replace(timed, log=log, warnings=(words_of_lateness(late_s), *timed.warnings))
 
 
 def _is_likelier(timed: Fit, recorded: Fit) -> bool:

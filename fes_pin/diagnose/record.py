@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from fes_pin.data.log import Log
 from fes_pin.data.numbers import printed
 from fes_pin.data.trial import trial_csv
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.stored import random_table
+from fes_pin.identify.stored import log_table, stored_tables
 from fes_pin.models.store import model_toml
 
 DIGITS = 6
@@ -54,6 +55,7 @@ def diagnosis_record(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": _experiment(diagnosis),
         **_left_out(diagnosis),
         **({"reason": diagnosis.reason} if diagnosis.reason else {}),
+        **({"log": log_table(diagnosis.log)} if diagnosis.log != Log() else {}),
         **_library(diagnosis),
         **_over_time(diagnosis),
         "warnings": list(diagnosis.warnings),
@@ -73,7 +75,7 @@ def diagnosis_files(diagnosis: Diagnosis) -> dict[str, str]:
     """Every file of a diagnosis but the report, by name."""
     files = {
         "diagnosis.json": json.dumps(diagnosis_record(diagnosis), indent=1, allow_nan=False) + "\n",
-        "model.toml": model_toml(diagnosis.model, random_table(diagnosis.extended)),
+        "model.toml": model_toml(diagnosis.model, stored_tables(diagnosis.extended, diagnosis.log)),
     }
     if diagnosis.next_experiment and diagnosis.next_experiment.trial is not None:
         files[NEXT_FILE] = trial_csv(diagnosis.next_experiment.trial)

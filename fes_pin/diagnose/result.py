@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fes_pin.data.log import Log
 from fes_pin.data.provenance import Provenance
 from fes_pin.data.show import explaining, frame, from_to, table_html
 from fes_pin.data.study import Study
@@ -75,6 +76,8 @@ class Diagnosis:
         The causes that were looked for, of which the rig can have some.
     random, ahead
         Of a rig that a recorded effort drives: what acts on it at random, and its errors over time.
+    log
+        What was found that the log of the study does to its trials; in `study` it is undone, where it can be.
     provenance
         When, by which versions, from which files it was made.
     """
@@ -99,6 +102,7 @@ class Diagnosis:
     catalogue: Catalogue = field(default_factory=installed, compare=False)
     random: tuple[RandomPart, ...] = ()
     ahead: AheadErrors | None = None
+    log: Log = field(default_factory=Log)
     provenance: Provenance | None = field(default=None, compare=False)
 
     @property

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from scipy.optimize import minimize_scalar
 
-from fes_pin.data.timing import advanced
-from fes_pin.data.trial import Trial
+from fes_pin.data.log import Log
 from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import CERTAIN_LEVEL
@@ -41,7 +40,7 @@ def lateness_of(fitted: Fit, row_s: float) -> float | None:
 
     def cost(late: float) -> float:
         if late not in tried:
-            moved = [with_effort_earlier(t, late) for t in fitted.trials]
+            moved = [Log(effort_late_s=late).applied(t) for t in fitted.trials]
             problem = LikelihoodProblem(fitted.model, moved, doubt)
             tried[late] = maximise(problem, fitted.values, fitted.unknowns).sse
         return tried[late]
@@ -50,11 +49,6 @@ def lateness_of(fitted: Fit, row_s: float) -> float | None:
         return None
     most = {"bounds": (0.0, MOST_ROWS * row_s), "method": "bounded", "options": {"xatol": 0.02 * row_s}}
     return float(minimize_scalar(cost, **most).x)
-
-
-def with_effort_earlier(trial: Trial, late_s: float) -> Trial:
-    """The trial with its effort where it acted."""
-    return advanced(trial, "effort", late_s)
 
 
 def words_of_lateness(late_s: float) -> str:

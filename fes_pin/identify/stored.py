@@ -1,4 +1,4 @@
-"""What is random about a rig, on disk: the table `random` of a `model.toml`.
+"""What is known beside a model, on disk: the tables `random` and `log` of a `model.toml`.
 
 A rig that is simulated freely has autoregressive noise by output column; one whose effort answers its reading has white
 noise of each column and first-order random processes.
@@ -6,9 +6,11 @@ noise of each column and first-order random processes.
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from fes_pin.data.log import Log
 from fes_pin.data.schema import NumberKey
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.identify.ahead import Random
@@ -17,12 +19,39 @@ from fes_pin.identify.noise import Noise
 from fes_pin.models.predictor import Doubt
 
 KEY = "random"
+LOG_KEY = "log"
 _PARTS = ("white", "std", "time")
+_LOG = {
+    "effort_late_s": NumberKey("s", lower=0.0, required=False),
+    "low_pass_hz": NumberKey("Hz", lower=0.0, required=False),
+}
+"""What `Log` holds, as a file may: no log is ahead of what acts, no cut-off is below 0."""
 _NOISE = {"std": NumberKey(""), "innovation_std": NumberKey(""), "step_s": NumberKey("s")}
 
 
-def random_table(fitted: Fit) -> dict[str, Any]:
-    """What is random in a fit, for `model_toml`."""
+def stored_tables(fitted: Fit, log: Log) -> dict[str, dict[str, Any]]:
+    """What is random in a fit, and what the log of its trials does, for `model_toml`."""
+    return {KEY: _random_table(fitted), **({LOG_KEY: log_table(log)} if log != Log() else {})}
+
+
+def log_table(log: Log) -> dict[str, float]:
+    """What a log does to its trials, by name."""
+    return {n: float(v) for n, v in asdict(log).items() if v}
+
+
+def load_log(path: str | Path) -> Log:
+    """What the log of a rig does to its trials, as `diagnose` found it.
+
+    Raises
+    ------
+    InputError
+        For a table that is not as `stored_tables` writes it: names the row and the key.
+    """
+    document = read_toml(path)
+    return Log(**document.numbers(LOG_KEY, document.table(LOG_KEY), _LOG))
+
+
+def _random_table(fitted: Fit) -> dict[str, Any]:
     if fitted.doubt is not None:
         parts = {part: {n: float(v) for n, v in getattr(fitted.doubt, part).items()} for part in _PARTS}
         return {"lasts_s": float(fitted.doubt.lasts_s), **parts} if fitted.doubt.lasts_s else parts
@@ -39,7 +68,7 @@ def load_random(path: str | Path) -> Random | None:
     Raises
     ------
     InputError
-        For a table that is not as `random_table` writes it: names the row and the key.
+        For a table that is not as `stored_tables` writes it: names the row and the key.
     """
     document = read_toml(path)
     if KEY not in document.data:

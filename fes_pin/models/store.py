@@ -27,13 +27,13 @@ EACH_TRIAL = "each_trial"
 """Key of an effect whose amplitudes are each trial's own."""
 
 
-def model_toml(model: Model, random: Mapping[str, Any] | None = None) -> str:
-    """A model as TOML: rig, constants, parameters to the last bit, effects; what is random about it, if that is known.
+def model_toml(model: Model, further: Mapping[str, Mapping[str, Any]] | None = None) -> str:
+    """A model as TOML: rig, constants, parameters to the last bit, effects; further tables, if there are any.
 
     Parameters
     ----------
-    random
-        As `identify.stored.random_table` writes it.
+    further
+        Tables by name, as `identify.stored.stored_tables` writes them.
     """
     rig = model.rig
     tables: dict[str, Any] = {
@@ -46,8 +46,7 @@ def model_toml(model: Model, random: Mapping[str, Any] | None = None) -> str:
     }
     if rig.session:
         tables["session"] = [list(one) for one in rig.session]
-    if random:
-        tables["random"] = random
+    tables |= further or {}
     parts: tuple[Rig | Effect, ...] = (rig, *model.effects)
     foreign = {one.name: Path(where).name for one in parts if (where := origin(type(one)))}
     return tomli_w.dumps({**tables, NEEDS: foreign} if foreign else tables)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fes_pin.data.files import write_text
+from fes_pin.data.log import Log
 from fes_pin.diagnose.errors_ahead import Ahead
 from fes_pin.diagnose.record import NEXT_FILE
 from fes_pin.diagnose.replay import replayed_trials
@@ -225,14 +226,21 @@ def _use(diagnosis: Diagnosis) -> list[Markup]:
     which = "extended" if diagnosis.causes else "fitted nominal"
     words = f" beside this page is the {which} model, whole. TRIAL.csv needs {columns}.{first}"
     library = f", library={libraries}".replace("'", '"') if libraries else ""
-    python = (
-        f'import fes_pin as fp\n\nmodel = fp.load_model("model.toml"{library})\npredicted = fp.predict(model, trial)'
-    )
+    python = _in_python(library, logged=diagnosis.log != Log())
     return [
         element("p", "The file ", element("code", "model.toml"), words),
         element("pre", "\n".join(lines)),
         element("pre", python),
     ]
+
+
+def _in_python(library: str, *, logged: bool) -> str:
+    """How a trial is predicted; `logged` says that its log must be undone before."""
+    given = 'load_log("model.toml").applied(trial)' if logged else "trial"
+    lines = ["import fes_pin as fp", *["from fes_pin.identify.stored import load_log"] * logged, ""]
+    return "\n".join(
+        [*lines, f'model = fp.load_model("model.toml"{library})', f"predicted = fp.predict(model, {given})"]
+    )
 
 
 def _provenance(diagnosis: Diagnosis) -> list[Markup]:

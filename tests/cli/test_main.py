@@ -128,7 +128,7 @@ def test_a_prediction_over_a_horizon_goes_on_from_what_was_measured(made, monkey
     nominal = load_model(made / "one/model.toml") - "coulomb_friction"
     residual = [t["angle_rad"] - simulate(nominal, t)["angle_rad"] for t in study.trials if t.kind == "motion"]
     table = {"noise": {"angle_rad": _table(estimate_noise(residual))}}
-    (tmp_path / "model.toml").write_text(model_toml(nominal, table))
+    (tmp_path / "model.toml").write_text(model_toml(nominal, {"random": table}))
     trial = next(t for t in study.trials if t.kind == "motion")
     write_trial(trial, tmp_path / "trial.csv")
     settings = [f"--set={n}={v!r}" for n, v in trial.conditions.items()]

@@ -10,7 +10,9 @@ from scipy.signal import butter, sosfiltfilt
 import fes_pin as fp
 from fes_pin.data.smooth import low_pass
 from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnose.record import diagnosis_files
 from fes_pin.identify.recording import low_pass_of
+from fes_pin.identify.stored import load_log
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import Simulator
 
@@ -46,11 +48,14 @@ def test_readings_as_they_were_read_have_none(names, noise):
     assert low_pass_of(nominal_model(study), study.trials) is None
 
 
-def test_nothing_hidden_is_adequate_after_a_low_pass():
+def test_nothing_hidden_is_adequate_after_a_low_pass(tmp_path):
     """Before, a vibration of the frame was named: what the low pass took of the motion."""
     found = diagnose_joint(stored(study_of("ankle", seed=43), 6.0))
     assert found.verdict == "adequate", str(found)
     assert "low-passed at 4.8 Hz" in " ".join(found.warnings)
+    (tmp_path / "model.toml").write_text(diagnosis_files(found)["model.toml"])
+    log = load_log(tmp_path / "model.toml")
+    assert log == found.log and log.low_pass_hz == pytest.approx(4.8, rel=0.05)
 
 
 def test_what_is_simulated_is_low_passed_as_the_trial_was():

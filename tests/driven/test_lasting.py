@@ -5,10 +5,11 @@ import pytest
 from driven_rigs.draw import draw
 from scipy.ndimage import uniform_filter1d
 
+from fes_pin.data.log import Log
 from fes_pin.data.smooth import low_pass
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
-from fes_pin.identify.stored import load_random, random_table
+from fes_pin.identify.stored import load_random, stored_tables
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predictor import are_news
 from fes_pin.models.store import model_toml
@@ -58,5 +59,5 @@ def test_readings_that_count_are_apart_and_off_the_ends(tmp_path):
 def test_it_is_kept_with_a_model(tmp_path):
     study = read_study(draw((), 0.3, 22, tmp_path).study)
     found = nominal(study, lambda x: uniform_filter1d(x, 5))
-    (tmp_path / "model.toml").write_text(model_toml(found.model, random_table(found)))
+    (tmp_path / "model.toml").write_text(model_toml(found.model, stored_tables(found, Log())))
     assert load_random(tmp_path / "model.toml").lasts_s == pytest.approx(found.doubt.lasts_s, rel=1e-5)

@@ -1,15 +1,21 @@
 """Efforts that were written down after they acted, as loggers do that ask a controller less often than it works."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from driven_rigs.draw import draw
 
+from fes_pin.cli.main import predict
+from fes_pin.data.log import advanced
 from fes_pin.data.study import read_study
-from fes_pin.data.timing import advanced
-from fes_pin.data.trial import Trial
+from fes_pin.data.table import read_csv
+from fes_pin.data.trial import Trial, trial_csv
 from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnose.record import diagnosis_files
+from fes_pin.identify.ahead import foretell
+from fes_pin.identify.stored import load_log
 
 ROWS = (2, 3, 4)
 """Samples of the controller between two rows of the log, at random."""
@@ -32,11 +38,32 @@ def test_an_effort_that_was_written_down_late_is_moved(causes, request, tmp_path
     number = next(iter(request.node.callspec.indices.values()))
     drawn = draw(causes, 0.3, 1151000 + number, tmp_path, recorded=True)
     study, rng = read_study(drawn.study), np.random.default_rng(number)
-    diagnosis = diagnose_joint(replace(study, trials=tuple(logged(t, rng) for t in study.trials)))
+    recorded = tuple(logged(t, rng) for t in study.trials)
+    diagnosis = diagnose_joint(replace(study, trials=recorded))
     assert tuple(c.name for c in diagnosis.causes) == causes, str(diagnosis)
     assert any("ms after it acted, and was moved" in said for said in diagnosis.warnings)
     fitted = diagnosis.extended
     assert abs(fitted.values["inertia_scale"] - 1.0) < 4.0 * fitted.std("inertia_scale")
+    check_that_a_prediction_knows(diagnosis, recorded[0], tmp_path)
+
+
+def check_that_a_prediction_knows(diagnosis, trial, folder):
+    """A later trial of the same log is foretold with its effort where it acted, from the files alone."""
+    for name, text in diagnosis_files(diagnosis).items():
+        (folder / name).write_text(text)
+    assert load_log(folder / "model.toml") == diagnosis.log
+    assert json.loads((folder / "diagnosis.json").read_text())["log"] == {"effort_late_s": diagnosis.log.effort_late_s}
+    (folder / "trial.csv").write_text(trial_csv(trial))
+    predict(folder / "model.toml", folder / "trial.csv", folder / "out.csv", horizon=0.1)
+    table = read_csv(folder / "out.csv")
+    found = table.values[:, table.names.index("position")]
+    near, far = (
+        foretell(diagnosis.model, t, diagnosis.extended.doubt, 0.1)["position"]
+        for t in (diagnosis.log.applied(trial), trial)
+    )
+    assert np.allclose(found, near, atol=1e-5)
+    errors = [np.sqrt(np.mean((trial["position"] - y) ** 2)) for y in (near, far)]
+    assert errors[0] < 0.8 * errors[1], errors
 
 
 def test_a_log_of_every_fifth_sample_is_read_between_its_rows(tmp_path):
