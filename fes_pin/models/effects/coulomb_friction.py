@@ -58,9 +58,11 @@ class CoulombFriction(Effect):
     a spring to an anchor a that it drags along, and not the torque itself:
 
         x = (q - a) / stretch + k v / S,   a+ = clip(a, q - stretch, q + stretch), once per sample
+        S = T + k sqrt(creep_speed^2 + T stretch / (4 J))
 
-    so that it comes to rest within the stretch of where it stopped, and `creep_speed` is what dampens it there; T over
-    the stretch is the spring's stiffness, no more than integration steps resolve. Where the motion is imposed, friction
+    so that it comes to rest within the stretch of where it stopped. T over the stretch is the spring's stiffness, no
+    more than integration steps resolve, and its damping is critical, as bristles' is chosen to be, or less where data
+    show a larger `creep_speed`. Where the motion is imposed, friction
     may build up over a way `presliding` as exponentials do: a share z acts, presliding z' = |v| (clip(x) - z). The
     velocity is known there; noise in one that is estimated would wear z away while the joint stands.
     Sliding contacts lose in proportion to the load; rolling ones by elastic hysteresis, the load times the width of the
@@ -73,6 +75,8 @@ class CoulombFriction(Effect):
     Soc. A 229 (1955); Greenwood, Minshall and Tabor, Hysteresis losses in rolling and sliding friction, 259 (1961).
     Smooth forms: Andersson, Soderberg and Bjorklund, Friction models for sliding dry, boundary and mixed lubricated
     contacts, Tribology International 40 (2007).
+    Critical damping of what bends before it slips: Canudas de Wit, Olsson, Astrom and Lischinsky, A new model for
+    control of systems with friction, IEEE Trans. Automatic Control 40 (1995).
     Presliding: Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1, 1968. Spring to an anchor:
     Hayward and Armstrong, A new computational model of friction applied to haptic rendering, in Experimental Robotics
     VI, Springer 2000; Prandtl, ZAMM 8 (1928).
@@ -163,6 +167,12 @@ class CoulombFriction(Effect):
         shortest = self.torque_nm * s.step / _stopping(s)
         return sqrt(self.stretch * self.stretch + shortest * shortest)
 
+    def _creeping(self, most: Any, s: Any) -> Any:
+        """Speed at which it creeps: on a contact that stretches at least as fast as critical damping has it."""
+        if not hasattr(s.own, "anchor"):
+            return self.creep_speed
+        return sqrt(self.creep_speed * self.creep_speed + 0.25 * most * self._way(s) / s.inertia)
+
     def rate(self, s: Any) -> Mapping[str, Any]:
         return {"share": self._acting(self.torque_nm, 0.0, s)[1]} if hasattr(s.own, "share") else {}
 
@@ -176,7 +186,7 @@ class CoulombFriction(Effect):
     def _share(self, most: Any, value: Any, s: Any) -> Any:
         """Share of the largest friction that acts, with its sign: clip(x)."""
         stopping = _stopping(s)
-        scale = most + stopping * self.creep_speed
+        scale = most + stopping * self._creeping(most, s)
         x = self._held(value / scale, s) + stopping * s.v / scale
         unsure = stopping * s.v_std / scale
         return _clip(x, sqrt(self.softness * self.softness + 0.5 * math.pi * unsure * unsure))
