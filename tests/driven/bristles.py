@@ -25,8 +25,12 @@ def moved(rng: np.random.Generator, dt: float, seconds: float) -> np.ndarray:
     return out
 
 
-def trial(seed: int, dt: float = DT, seconds: float = SECONDS) -> Trial:
+def trial(
+    seed: int, dt: float = DT, seconds: float = SECONDS, contact: tuple[float, float] = (STIFFNESS, BRISTLE_DAMPING)
+) -> Trial:
     """LuGre's friction: z' = v - |v| z / g, force stiffness z + damping z', by semi-implicit Euler steps.
+
+    `contact` has the stiffness and the damping.
 
     Source: Canudas de Wit, Olsson, Astrom and Lischinsky, A new model for control of systems with friction, IEEE
     Transactions on Automatic Control 40 (1995).
@@ -34,7 +38,7 @@ def trial(seed: int, dt: float = DT, seconds: float = SECONDS) -> Trial:
     rng = np.random.default_rng(seed)
     wanted, steps = moved(rng, dt, seconds), round(dt / STEP)
     n, h, newest = len(wanted), dt / steps, 1.0 - 0.5 ** (dt / 0.004)
-    effort, position, g = np.empty(n), np.empty(n), FRICTION / STIFFNESS
+    effort, position, g = np.empty(n), np.empty(n), FRICTION / contact[0]
     q = v = z = random = lagged = last = 0.0
     for k in range(n):
         position[k] = 2e-6 * round(q / 2e-6) + 3e-7 * rng.normal()
@@ -44,7 +48,7 @@ def trial(seed: int, dt: float = DT, seconds: float = SECONDS) -> Trial:
         random += -random * dt / 0.05 + 1.5 * np.sqrt(2.0 * dt / 0.05) * rng.normal()  # N, of 1.5 N and 50 ms
         for _ in range(steps):
             z = (z + h * v) / (1.0 + h * abs(v) / g)
-            bristles = STIFFNESS * z + BRISTLE_DAMPING * (v - abs(v) * z / g)
+            bristles = contact[0] * z + contact[1] * (v - abs(v) * z / g)
             v += h * (effort[k] + random - DAMPING * v - bristles) / MASS
             q += h * v
     return Trial(f"{seed:02d}", "motion", {"effort": effort, "position": position}, np.arange(n) * dt)
