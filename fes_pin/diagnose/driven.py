@@ -15,6 +15,7 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
+from fes_pin.diagnose.decide.claims import FORM_SHARE
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, speaks_for
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
 from fes_pin.diagnose.driven_held_out import Again, Fold, evidence_of, gains_of, held_errors_ahead, make_folds
@@ -41,6 +42,15 @@ LARGE_SHARE = 0.1
 
 
 @dataclass(frozen=True)
+class Refused:
+    """A cause that held-out trials did not bear out: where, how certain, its share of what all causes explained."""
+
+    stage: str
+    p_value: float
+    share: float
+
+
+@dataclass(frozen=True)
 class Judged:
     """A driven study, judged.
 
@@ -51,7 +61,7 @@ class Judged:
     left
         What is left.
     refused
-        Causes that were certain in the fit, but that held-out trials did not bear out, with their p-values.
+        Causes that were certain in the fit, but that held-out trials did not bear out.
     evidence
         Of each cause, from trials held out.
     gains
@@ -64,7 +74,7 @@ class Judged:
 
     found: Found
     left: Remainder
-    refused: dict[str, float]
+    refused: dict[str, Refused]
     evidence: dict[str, Evidence]
     gains: dict[str, Gain]
     ahead: tuple[Ahead, Ahead]
@@ -75,8 +85,7 @@ class Judged:
 
     def gain_fit(self, name: str) -> float:
         """Share, in percent, of what the extended model adds to the log-likelihood that is lost without a cause."""
-        none, best, without = self.found.nominal.sse, self.found.best.sse, self.found.without[name].sse
-        return 100.0 * (without - best) / max(none - best, 1e-9)
+        return 100.0 * _share(self.found, name)
 
 
 def judge_driven(
@@ -104,7 +113,7 @@ def judge_driven(
     horizon_s
         How far ahead errors over a horizon look; `default_horizon` by default.
     """
-    refused: dict[str, float] = {}
+    refused: dict[str, Refused] = {}
     horizon = horizon_s or default_horizon(train)
     settled, formed = frozenset(found.without), set[frozenset[str]]()
     again = Again()
@@ -113,19 +122,17 @@ def judge_driven(
         evidence = evidence_of(folds, found, again) if folds else {}
         gains = gains_of(folds or [Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon, seed)
         seen = driven_remainder(found.best, seed)
-        known = {n: None if seen.unexplained else e for n, e in evidence.items()}
-        weak = [n for n, e in known.items() if not speaks_for(e, gains[n], alone=len(known) == 1)]
         names = frozenset(found.without)
-        if weak:
+        if weak := unsupported(evidence, gains, seen):
             weakest = min(weak, key=lambda n: gains[n].low)
-            refused[weakest] = found.p_values[weakest]
+            refused[weakest] = _refused(found, weakest)
             found = search.told(tuple(sorted(names - {weakest})))
             continue
         if names != settled:
-            found, settled = search.settle(tuple(sorted(names)), refused), names
+            found, settled = search.settle(tuple(sorted(names)), {n: r.p_value for n, r in refused.items()}), names
             continue
         random = random_parts(found.best)
-        left = _left(seen, random, refused, search)
+        left = with_refused_causes(seen, random, refused)
         if not left.unexplained or names in formed or not search.form_otherwise(tuple(sorted(names))):
             break
         formed.add(names)
@@ -146,6 +153,28 @@ def judge_driven(
     )
 
 
+def unsupported(evidence: dict[str, Evidence], gains: dict[str, Gain], left: Remainder) -> list[str]:
+    """Causes that trials which took no part do not speak for.
+
+    Where none could be held out, a cause beside others must still gain something over the horizon.
+    """
+    if not evidence:
+        return [n for n, gain in gains.items() if len(gains) > 1 and not gain.is_material]
+    known = {n: None if left.unexplained else e for n, e in evidence.items()}
+    return [n for n, e in known.items() if not speaks_for(e, gains[n], alone=len(known) == 1)]
+
+
+def _refused(found: Found, name: str) -> Refused:
+    stage = next(str(e.stage) for e in found.best.model.effects if e.name == name)
+    return Refused(stage, found.p_values[name], _share(found, name))
+
+
+def _share(found: Found, name: str) -> float:
+    """Share of a cause in what all that were found add to the log-likelihood."""
+    whole = found.nominal.sse - found.best.sse
+    return (found.without[name].sse - found.best.sse) / max(whole, 1e-9)
+
+
 def _ceiling(fitted: Fit) -> float:
     """E of the reading noise alone, percent."""
     assert fitted.doubt is not None
@@ -155,20 +184,20 @@ def _ceiling(fitted: Fit) -> float:
     return 100.0 * noise / max(sum(float(np.nansum((y - np.nanmean(y)) ** 2)) for y, _ in columns), 1e-300)
 
 
-def _left(
-    left: Remainder, random: Sequence[RandomPart], refused: dict[str, float], search: LikelihoodSearch
-) -> Remainder:
-    """What is left: by the features, or a random effort that is too large, or a cause that was refused."""
+def with_refused_causes(left: Remainder, random: Sequence[RandomPart], refused: dict[str, Refused]) -> Remainder:
+    """What is left: by the features, or a random effort that is too large, or a cause that was refused.
+
+    A cause that explains less than another's error of form leaves to whatever comes near stands for that error.
+    """
     if left.unexplained:
         return left
     large = [r for r in random if r.share > LARGE_SHARE]
     if large:
         return replace(left, unexplained=True, where="effort")
-    certain = {n: p for n, p in refused.items() if p < CERTAIN_LEVEL}
+    certain = [r for r in refused.values() if r.p_value < CERTAIN_LEVEL and r.share >= FORM_SHARE]
     if certain:
-        surest = min(certain, key=lambda n: certain[n])
-        stage = next(str(e.stage) for e in search.sets.library.effects if e.name == surest)
-        return replace(left, unexplained=True, p_value=certain[surest], where=stage)
+        surest = min(certain, key=lambda r: r.p_value)
+        return replace(left, unexplained=True, p_value=surest.p_value, where=surest.stage)
     return left
 
 

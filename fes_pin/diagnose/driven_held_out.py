@@ -11,10 +11,9 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import Errors, Evidence, Gain, folds_of, held_out_gain
 from fes_pin.diagnose.errors_ahead import Ahead, errors_ahead, errors_over_horizon
 from fes_pin.diagnose.search.likelihood_search import Found
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import normal_equations
-from fes_pin.identify.turns import maximise
 from fes_pin.workers import in_parallel
 
 WIDE = 10.0
@@ -65,13 +64,14 @@ def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refi
 
 
 def _refitted(fitted: Fit, trials: Sequence[Trial]) -> Fit:
-    """A fit again, to other trials."""
+    """A fit again, to other trials, at what is random in all."""
     assert fitted.doubt is not None
     known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
     problem = LikelihoodProblem(fitted.model, trials, fitted.doubt)
     unknowns = [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
     problem.sharpen()  # it begins near its end
-    return maximise(problem, fitted.values, unknowns)
+    found = fit_problem(problem, fitted.values, unknowns)  # type: ignore[arg-type]
+    return replace(found, doubt=fitted.doubt)
 
 
 def evidence_of(folds: Sequence[Fold], found: Found, again: Again) -> dict[str, Evidence]:
@@ -81,8 +81,9 @@ def evidence_of(folds: Sequence[Fold], found: Found, again: Again) -> dict[str, 
 
         -2 log p(trials) = cost + log det(1 + H S^2),   H the information, S the widths of a prior,
 
-    so that what the others leave in doubt of a parameter is doubt about the held trials as well. The ratio of
-    likelihoods of a true cause scatters by twice the root of its mean.
+    so that what the others leave in doubt of a parameter is doubt about the held trials as well. What is random is as
+    in all trials: learned without one that is unlike the others, it made that one so unlikely that no cause could
+    speak for itself. The ratio of likelihoods of a true cause scatters by twice the root of its mean.
     """
     foretold = {n: 0.0 for n in ("", *found.without)}
     for fold in folds:

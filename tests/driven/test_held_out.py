@@ -1,0 +1,64 @@
+"""What trials held out say of the causes of a driven rig, and what a cause that they refuse says of the rig."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from driven_rigs.draw import draw
+from scipy.signal import lfilter
+
+from fes_pin.data.study import read_study
+from fes_pin.diagnose.decide.held_out import Evidence, Gain
+from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnose.driven import Refused, unsupported, with_refused_causes
+from fes_pin.diagnose.errors_ahead import RandomPart
+from fes_pin.diagnose.remainder.open_set import Remainder
+
+NOTHING = Remainder(False, 0.5, None)
+LITTLE = (RandomPart("effort", 0.1, 0.1, 0.01),)
+
+
+def gain(low):
+    return Gain(low + 1.0, low, low + 2.0)
+
+
+@pytest.mark.parametrize(
+    ("p_value", "share", "unexplained"),
+    [(1e-9, 0.3, True), (1e-9, 0.02, False), (1e-3, 0.3, False)],
+    ids=["certain", "another's error of form", "not certain"],
+)
+def test_a_refused_cause_is_something_where_it_is_certain_and_no_error_of_form(p_value, share, unexplained):
+    left = with_refused_causes(NOTHING, LITTLE, {"sensor_lag": Refused("sensor", p_value, share)})
+    assert left.unexplained == unexplained
+    assert left.where == ("sensor" if unexplained else None)
+
+
+def test_a_large_random_effort_is_something_whatever_was_refused():
+    left = with_refused_causes(NOTHING, (RandomPart("effort", 1.0, 0.1, 0.4),), {})
+    assert left.unexplained and left.where == "effort"
+
+
+def test_of_a_single_trial_a_cause_beside_others_gains_something_over_the_horizon():
+    """Before, a torque that repeats was named beside friction for 0.00 % of the error."""
+    gains = {"coulomb_friction": gain(40.0), "periodic_torque": gain(0.0)}
+    assert unsupported({}, gains, NOTHING) == ["periodic_torque"]
+    assert unsupported({}, {"periodic_torque": gain(0.0)}, NOTHING) == []
+
+
+def test_of_several_trials_a_cause_beside_others_needs_their_likelihood_too():
+    gains = {"coulomb_friction": gain(40.0), "sensor_lag": gain(2.0)}
+    evidence = {"coulomb_friction": Evidence(500.0, 500.0), "sensor_lag": Evidence(-3.0, 0.0)}
+    assert unsupported(evidence, gains, NOTHING) == ["sensor_lag"]
+    assert unsupported(evidence, gains, Remainder(True, 1e-9, "effort")) == []
+
+
+def test_one_trial_unlike_the_others_silences_no_cause(tmp_path):
+    """Another torque acts in it: learned without it, what is random made it too unlikely for the offset to show."""
+    study = read_study(draw(("coulomb_friction", "effort_offset"), 0.3, 33, tmp_path, recorded=True).study)
+    first, *others = study.trials
+    lasts = np.exp(-first.dt / 0.02)
+    torque = lfilter([np.sqrt(1.0 - lasts**2)], [1.0, -lasts], np.random.default_rng(0).normal(size=len(first)))
+    unlike = first.with_columns(effort=first["effort"] + 0.1 * np.std(first["effort"]) * torque)
+    found = diagnose_joint(replace(study, trials=(unlike, *others)))
+    assert {c.name for c in found.causes} == {"coulomb_friction", "effort_offset"}, str(found)
+    assert all(c.evidence.low > 0.0 for c in found.causes)
