@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from going_on import results_of
 
-from driven_rigs.draw import CAUSES, OUTSIDE, draw
+from driven_rigs import laboratory as other
+from driven_rigs.draw import CAUSES, OUTSIDE, Drawn, draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.result import Diagnosis
@@ -26,25 +27,23 @@ PAIRS = (
     ("coulomb_friction", "parallel_stiffness"),
 )
 
+Drawing = Callable[[tuple[str, ...], int, Path], Drawn]
+"""Draws a rig with such causes from such a seed into a folder."""
 
-def items(count: int) -> Iterator[tuple[str, ...]]:
+
+def items(count: int, laboratory: bool = False) -> Iterator[tuple[str, ...]]:
     """What is hidden in each of so many studies: nothing, every cause in turn, pairs, and something else."""
-    rows = [(), *((c,) for c in CAUSES[:5]), (), *((c,) for c in CAUSES[5:]), *PAIRS[:2], (), OUTSIDE, *PAIRS[2:]]
+    rows: list[tuple[str, ...]] = [(), *((c,) for c in other.CAUSES), (), other.CAUSES[:1], *other.PAIRS]
+    if not laboratory:
+        rows = [(), *((c,) for c in CAUSES[:5]), (), *((c,) for c in CAUSES[5:]), *PAIRS[:2], (), OUTSIDE, *PAIRS[2:]]
     for k in range(count):
         yield rows[k % len(rows)]
 
 
-def judged(
-    causes: tuple[str, ...],
-    size: float,
-    seed: int,
-    recorded: bool = False,
-    cutoff_hz: float | None = None,
-    every: int = 1,
-) -> dict[str, Any]:
+def judged(causes: tuple[str, ...], seed: int, drawing: Drawing) -> dict[str, Any]:
     """Make a study, diagnose it, and say how the answer compares with the truth."""
     with tempfile.TemporaryDirectory(prefix="driven") as folder:
-        drawn = draw(causes, size, seed, Path(folder), recorded, cutoff_hz, every)
+        drawn = drawing(causes, seed, Path(folder))
         began = time.perf_counter()
         try:
             found = diagnose_joint(read_study(drawn.study))
@@ -56,7 +55,6 @@ def judged(
         "seed": seed,
         "rig": drawn.base,
         "causes": causes,
-        "size": size,
         "verdict": found.verdict,
         "named": named,
         "left": found.remainder.unexplained,
@@ -126,16 +124,24 @@ def main(
         float | None, typer.Option(help="Hz at which effort and reading were low-passed, without delay, when stored.")
     ] = None,
     every: Annotated[int, typer.Option(help="Samples of the controller from one row of the log to the next.")] = 1,
+    laboratory: Annotated[
+        bool, typer.Option("--laboratory", help="Of another generator: other controllers, motions, encoders, rates.")
+    ] = False,
     results: Annotated[
         Path | None, typer.Option(help="A file of one line a study, with which a run can go on.")
     ] = None,
 ) -> None:
     """Hide known causes in rigs that a controller drives, and count what the diagnosis makes of them."""
 
-    def one(causes: tuple[str, ...], k: int) -> dict[str, Any]:
-        return judged(() if nulls else causes, size, k, recorded, low_pass, every)
+    def drawn(causes: tuple[str, ...], k: int, folder: Path) -> Drawn:
+        if laboratory:
+            return other.draw_laboratory(causes, k, folder)
+        return draw(causes, size, k, folder, recorded, low_pass, every)
 
-    rows = results_of(items(count), seed, one, results)
+    def one(causes: tuple[str, ...], k: int) -> dict[str, Any]:
+        return judged(() if nulls else causes, k, drawn)
+
+    rows = results_of(items(count, laboratory), seed, one, results)
     typer.echo("\n".join(table(rows)))
 
 

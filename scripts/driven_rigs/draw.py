@@ -149,7 +149,7 @@ def draw(
     effort, position = Recording(recorded, cutoff_hz, every).stored(effort, position, usual, own)
     believed = (float(rng.uniform(0.7, 1.3)), base.damping * float(rng.uniform(0.4, 1.6)))
     truth = {"inertia_scale": 1.0, "damping": base.damping, **hidden}
-    study = _written(base, effort, position, every * DT, believed, folder)
+    study = written(base, effort, position, every * DT, believed, folder)
     return Drawn(study, base.name, causes, truth)
 
 
@@ -232,9 +232,10 @@ def urdf(base: Base) -> str:
     return URDF.format(name=base.name, lever=place, mass=mass, about=about, kind="revolute", axis="0 1 0")
 
 
-def _written(
+def written(
     base: Base, effort: np.ndarray, position: np.ndarray, dt: float, believed: tuple[float, float], folder: Path
 ) -> Path:
+    """Write a study of a rig: its URDF, its trials, the inertia's scale and the damping that are believed."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "rig.urdf").write_text(urdf(base))
     time = np.arange(len(effort)) * dt
