@@ -18,7 +18,16 @@ from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.decide.claims import FORM_SHARE
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, speaks_for
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
-from fes_pin.diagnose.driven_held_out import Again, Fold, evidence_of, gains_of, held_errors_ahead, make_folds
+from fes_pin.diagnose.driven_held_out import (
+    Again,
+    Fold,
+    afresh,
+    as_random_as_in_all,
+    evidence_of,
+    gains_of,
+    held_errors_ahead,
+    make_folds,
+)
 from fes_pin.diagnose.errors_ahead import (
     Ahead,
     AheadErrors,
@@ -116,10 +125,10 @@ def judge_driven(
     refused: dict[str, Refused] = {}
     horizon = horizon_s or default_horizon(train)
     settled, formed = frozenset(found.without), set[frozenset[str]]()
-    again = Again()
+    again, alike = Again(afresh), Again(as_random_as_in_all)
     while True:
         folds = make_folds(found, train, test, again)
-        evidence = evidence_of(folds, found, again) if folds else {}
+        evidence = evidence_of(folds, found, alike) if folds else {}
         gains = gains_of(folds or [Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon, seed)
         seen = driven_remainder(found.best, seed)
         names = frozenset(found.without)

@@ -13,7 +13,8 @@ from fes_pin.diagnose.errors_ahead import Ahead, errors_ahead, errors_over_horiz
 from fes_pin.diagnose.search.likelihood_search import Found
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import normal_equations
+from fes_pin.identify.problem import Unknowns, normal_equations
+from fes_pin.identify.turns import maximise
 from fes_pin.workers import in_parallel
 
 WIDE = 10.0
@@ -33,15 +34,22 @@ class Fold:
 
 
 class Again:
-    """Fits made again to other trials, each once: a set less a cause that is refused is the next set."""
+    """Fits made again to other trials, each once: a set less a cause that is refused is the next set.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    refitted
+        Makes a fit to other trials from one.
+    """
+
+    def __init__(self, refitted: Callable[[Fit, Sequence[Trial]], Fit]) -> None:
+        self._refitted = refitted
         self._kept: dict[tuple[int, tuple[int, ...]], tuple[Fit, Fit]] = {}
 
     def __call__(self, wanted: Sequence[tuple[Fit, Sequence[Trial]]]) -> list[Fit]:
         keys = [(id(fitted), tuple(map(id, trials))) for fitted, trials in wanted]
         missing = {k: w for k, w in zip(keys, wanted, strict=True) if k not in self._kept}
-        made = in_parallel(lambda w: _refitted(*w), list(missing.values()))
+        made = in_parallel(lambda w: self._refitted(*w), list(missing.values()))
         self._kept |= {k: (w[0], one) for (k, w), one in zip(missing.items(), made, strict=True)}
         return [self._kept[k][1] for k in keys]
 
@@ -63,18 +71,29 @@ def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refi
     ]
 
 
-def _refitted(fitted: Fit, trials: Sequence[Trial]) -> Fit:
-    """A fit again, to other trials, at what is random in all."""
-    assert fitted.doubt is not None
-    known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
-    problem = LikelihoodProblem(fitted.model, trials, fitted.doubt)
-    unknowns = [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
-    problem.sharpen()  # it begins near its end
+def afresh(fitted: Fit, trials: Sequence[Trial]) -> Fit:
+    """A fit again, to other trials, with what is random in these."""
+    problem, unknowns = _problem(fitted, trials)
+    return maximise(problem, fitted.values, unknowns)
+
+
+def as_random_as_in_all(fitted: Fit, trials: Sequence[Trial]) -> Fit:
+    """A fit again, to other trials, at what was random in its own."""
+    problem, unknowns = _problem(fitted, trials)
     found = fit_problem(problem, fitted.values, unknowns)  # type: ignore[arg-type]
     return replace(found, doubt=fitted.doubt)
 
 
-def evidence_of(folds: Sequence[Fold], found: Found, again: Again) -> dict[str, Evidence]:
+def _problem(fitted: Fit, trials: Sequence[Trial]) -> tuple[LikelihoodProblem, Unknowns]:
+    """The problem of a fit on other trials, and where their unknowns begin."""
+    assert fitted.doubt is not None
+    known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
+    problem = LikelihoodProblem(fitted.model, trials, fitted.doubt)
+    problem.sharpen()  # it begins near its end
+    return problem, [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
+
+
+def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, Evidence]:
     """What each cause adds to twice the log-likelihood of held-out trials, foretold by fits to the others.
 
     By Bayes' rule p(held | others) = p(all) / p(others), each the integral over the parameters about its fit (Laplace):
@@ -87,10 +106,11 @@ def evidence_of(folds: Sequence[Fold], found: Found, again: Again) -> dict[str, 
     """
     foretold = {n: 0.0 for n in ("", *found.without)}
     for fold in folds:
-        whole, part = {"": found.best, **found.without}, {"": fold.best, **fold.without}
-        if not fold.within:
-            every = again([(whole[n], (*part[n].trials, *fold.test)) for n in foretold])
-            whole = dict(zip(foretold, every, strict=True))
+        whole = part = {"": found.best, **found.without}
+        if fold.within:
+            part = dict(zip(whole, alike([(f, fold.best.trials) for f in whole.values()]), strict=True))
+        else:
+            whole = dict(zip(part, alike([(f, (*f.trials, *fold.test)) for f in part.values()]), strict=True))
         for n in foretold:
             foretold[n] += _weight(whole[n]) - _weight(part[n])
     gains = {n: foretold[n] - foretold[""] for n in found.without}

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from driven_rigs.draw import draw
+from driven_rigs.laboratory import draw_laboratory
 from scipy.signal import lfilter
 
 from fes_pin.data.study import read_study
@@ -62,3 +63,10 @@ def test_one_trial_unlike_the_others_silences_no_cause(tmp_path):
     found = diagnose_joint(replace(study, trials=(unlike, *others)))
     assert {c.name for c in found.causes} == {"coulomb_friction", "effort_offset"}, str(found)
     assert all(c.evidence.low > 0.0 for c in found.causes)
+
+
+def test_a_stop_that_one_of_two_trials_reaches_is_named(tmp_path):
+    """Errors of a model without it are those of what is random in the other trial alone, which has no stop to follow."""
+    found = diagnose_joint(read_study(draw_laboratory(("joint_stop",), 1601016, tmp_path).study))
+    assert [c.name for c in found.causes] == ["joint_stop"], str(found)
+    assert not found.remainder.unexplained
