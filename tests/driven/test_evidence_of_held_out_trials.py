@@ -66,7 +66,7 @@ def test_one_trial_unlike_the_others_silences_no_cause(tmp_path):
 
 
 def test_a_stop_that_one_of_two_trials_reaches_is_named(tmp_path):
-    """Errors of a model without it are those of what is random in the other trial alone, which has no stop to follow."""
+    """Errors of a model without it are those of what is random in the other trial, which has no stop to follow."""
     found = diagnose_joint(read_study(draw_laboratory(("joint_stop",), 1601016, tmp_path).study))
     assert [c.name for c in found.causes] == ["joint_stop"], str(found)
     assert not found.remainder.unexplained
