@@ -17,7 +17,7 @@ sample, and a computer of 4 GB must do. Ten minutes of motion at 200 Hz, or four
 MOST_DRIVEN = 60_000
 """The same of a rig whose effort answers its reading, before samples are averaged: a search by the likelihood predicts
 them some thousand times, and a step of 4 ms tells what one of 1 ms does: dry friction of 20 N as 19.4 N or 19.6 N, an
-offset of -3 N as -3.5 N or -3.6 N, in 30 s or 57 s (`scripts/benchmark slide`)."""
+offset of -3 N as -3.5 N or -3.6 N, in half the time (`scripts/benchmark slide`)."""
 
 
 def searched_part(

@@ -15,10 +15,6 @@ from fes_pin.models.disturbance import disturbed
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import is_delayed, lane_inputs, lane_values, max_step, substeps, timing, total_delay
 
-STEP_S = 1.25e-3
-"""Longest integration step of any predictor, s, as short as an effect with a fast lag needs: models that are compared
-by their likelihood are integrated alike."""
-
 
 @dataclass(frozen=True)
 class Doubt:
@@ -124,7 +120,7 @@ class Predictor:
         lasts_s: float = 0.0,
     ) -> None:
         self.model, self.trials, self.columns = model, tuple(trials), columns
-        self.max_step_s = min(max_step(model), STEP_S)
+        self.max_step_s = min([max_step(model), *(e.foretold_step_s for e in model.effects)])
         self._delayed = is_delayed(model)
         self._blocks = [
             _Block(model, self.trials, lanes, columns, processes, priors, self.max_step_s, lasts_s)

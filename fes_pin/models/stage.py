@@ -54,6 +54,8 @@ class Effect:
         True if it can only take energy from the joint.
     max_step_s
         Longest integration step that resolves it, s.
+    foretold_step_s
+        The same of a predictor, where it depends on how well the rig's velocity is known.
     varies
         True if its amplitudes can be other in each trial: those of what does not begin with the trial.
     beside
@@ -78,6 +80,7 @@ class Effect:
     inputs: ClassVar[tuple[str, ...]] = ()
     dissipative: ClassVar[bool] = False
     max_step_s: ClassVar[float] = math.inf
+    foretold_step_s: ClassVar[float] = math.inf
     varies: ClassVar[bool] = False
     beside: ClassVar[tuple[str, ...]] = ()
     remembers: ClassVar[bool] = False
@@ -191,6 +194,12 @@ class Effect:
         return {n: info.grid or (getattr(cls, n),) for n, info in cls.parameters().items()}
 
     @classmethod
+    def far_sizes(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """Sizes of amplitudes that no slope leads to, and a fit begins with as well; `measured` as in `grids`."""
+        info = cls.parameters()
+        return {n: info[n].grid for n in cls.amplitudes() if info[n].grid}
+
+    @classmethod
     def forms(cls, measured: Mapping[str, np.ndarray]) -> tuple[Mapping[str, float], ...]:
         """Forms that a screen tries, each by the values of the refinements that it has: the plain one, by default.
 
@@ -200,6 +209,10 @@ class Effect:
 
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
         """Bounds that the measured range sets to parameters, inside the physical ones; `measured` as in `grids`."""
+        return {}
+
+    def smallest(self, measured: Mapping[str, np.ndarray]) -> dict[str, float]:
+        """Sizes of amplitudes below which readings as coarse as these do not tell them; `measured` as in `grids`."""
         return {}
 
     @classmethod

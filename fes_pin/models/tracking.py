@@ -21,7 +21,6 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import STEP_S
 from fes_pin.models.simulate import Simulator
 from fes_pin.models.stage import Effect, Stage
 
@@ -94,7 +93,7 @@ def tracking_effort(model: Model, trial: Trial, position: np.ndarray, rate: np.n
     wanted = [curve(finer.time), curve(finer.time, 1)]
     servo = model + TrackingEffort()
     given = finer.with_columns(tracked=_held(wanted[0]), tracked_rate=_held(wanted[1]))
-    simulator = Simulator(servo, [given], max_step_s=STEP_S)
+    simulator = Simulator(servo, [given])
     (run,) = simulator.run(servo.parameters(), [{**model.initial_unknowns(trial), "initial_velocity": float(rate[0])}])
     inertia = float(getattr(model.rig, "inertia_scale")) * float(model.rig.constants["inertia"])  # noqa: B009
     added = inertia * _servo(*(_held(y) - _held(run.readings[:, k]) for k, y in enumerate(wanted)))

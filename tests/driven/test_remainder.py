@@ -18,9 +18,9 @@ class Promised(driven._Featured):
         self.can_keep = False
 
 
-@pytest.mark.parametrize("seed", [1118011, 1118030])
+@pytest.mark.parametrize("seed", [1118011, 1118025])
 def test_a_promise_counts_as_far_as_the_likelihood_keeps_it(seed, tmp_path, monkeypatch):
-    """Two of nine rigs of `scripts/driven --count 60 --seed 1118000 --recorded` where something was "left"."""
+    """Two rigs of those seeds of `scripts/driven --count 60 --seed 1118000 --recorded` where something was "left"."""
     study = read_study(draw(("backlash",), 0.3, seed, tmp_path, recorded=True).study)
     sets = LikelihoodFits(nominal_model(study), study.trials, [Backlash])
     sets.nominal()

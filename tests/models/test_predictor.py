@@ -5,9 +5,10 @@ import pytest
 import scipy.linalg
 
 from fes_pin.data.trial import Trial
+from fes_pin.models import predictor
 from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import STEP_S, Doubt, Predictor, repeated
+from fes_pin.models.predictor import Doubt, Predictor, repeated
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import Simulator
 
@@ -84,12 +85,23 @@ def test_what_was_not_measured_corrects_nothing_and_counts_for_nothing():
     assert found.cost() == pytest.approx(cost, rel=1e-4)
 
 
+@pytest.mark.parametrize("name", ["quadratic_damping", "joint_stop", "frame_vibration", "sensor_lag", "backlash"])
+def test_the_step_of_a_smooth_model_leaves_its_likelihood(name, monkeypatch):
+    """Models that are integrated in other steps are compared by their likelihood."""
+    trial = driven(3, n=2000)
+    model = Model(PENDULUM) + effect_named(name)()
+    (one,) = foretold(model, [trial])
+    monkeypatch.setattr(predictor, "max_step", lambda model: DT / 16.0)
+    (finer,) = foretold(model, [trial])
+    assert one.cost() == pytest.approx(finer.cost(), abs=0.05)
+
+
 def test_without_randomness_it_is_the_free_simulation():
     trial, model = driven(1), Model(PENDULUM)
     begin = {"initial_position": float(trial["position"][0]), "initial_velocity": 0.3}
     predictor = Predictor(model, [trial], (), (), [dict.fromkeys(PRIOR, 0.0)])
     (found,) = predictor.run(model.parameters(), Doubt({"position": 1e-3}), [begin])
-    (free,) = Simulator(model, [trial], max_step_s=STEP_S).run(model.parameters(), [begin])
+    (free,) = Simulator(model, [trial]).run(model.parameters(), [begin])
     assert np.allclose(found.values[:, 0], trial["position"] - free.readings[:, 0], rtol=0.0, atol=1e-12)
 
 
@@ -129,7 +141,8 @@ def test_lags_shorter_than_a_step_do_not_blow_up():
     assert found.cost() == pytest.approx(without.cost(), rel=1e-3)
 
 
-def test_a_count_that_is_read_again_and_again_is_one_reading():
+def test_a_count_that_is_read_again_and_again_is_one_reading(monkeypatch):
+    monkeypatch.setattr(predictor, "max_step", lambda model: DT / 4.0)
     column = np.array([0.0, 0.1, 0.1, 0.1, np.nan, np.nan, 0.3, 0.3, 0.1])
     assert repeated(column).tolist() == [1.0, 3.0, 3.0, 3.0, 1.0, 1.0, 2.0, 2.0, 1.0]
     trial = driven(4)

@@ -123,7 +123,7 @@ class LikelihoodSearch:
     def _extend(self, size: int) -> None:
         """Fit the sets of a size: the best smaller ones with further causes, and pairs that the screen proposes."""
         sets = self.sets
-        for names in sets.ranked(size - 1)[: BEAM if size > 1 else 1]:
+        for names in sets.near(size - 1)[:BEAM]:
             sets.extend_all(names, None if size == 1 else JOINT_FITS)
         if size == 2:
             base = sets.fits[()]
