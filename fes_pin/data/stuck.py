@@ -125,10 +125,21 @@ def without_stuck(trial: Trial, columns: Sequence[str], starts_anywhere: bool) -
         pieces = [p for p in pieces if p.start == 0]
     longest = max((p.stop - p.start for p in pieces), default=0)
     pieces = [p for p in pieces if p.stop - p.start >= max(FEW, SHORTEST * longest)]
-    return [_piece(trial, p, k) for k, p in enumerate(pieces)], [_said(trial, n, many) for n, many in found.items()]
+    return [piece(trial, p, k) for k, p in enumerate(pieces)], [_said(trial, n, many) for n, many in found.items()]
 
 
-def _piece(trial: Trial, rows: slice, number: int) -> Trial:
+def piece(trial: Trial, rows: slice, number: int) -> Trial:
+    """Some rows of a trial as a trial, the first of its pieces under its own name; what is stated of its start is lost.
+
+    Parameters
+    ----------
+    trial
+        As measured.
+    rows
+        Of its samples.
+    number
+        Of the piece, from 0.
+    """
     name = f"{trial.name}_part{number + 1}" if number else trial.name
     stated = {n: v for n, v in trial.conditions.items() if not rows.start or n not in OF_THE_START}
     columns = {n: v[rows] for n, v in trial.columns.items()}

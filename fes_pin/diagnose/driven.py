@@ -16,7 +16,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.decide.claims import FORM_SHARE
-from fes_pin.diagnose.decide.held_out import Evidence, Gain, speaks_for
+from fes_pin.diagnose.decide.held_out import MATERIAL_PERCENT, Evidence, Gain, speaks_for
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
 from fes_pin.diagnose.driven_held_out import (
     Again,
@@ -52,11 +52,22 @@ LARGE_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Refused:
-    """A cause that held-out trials did not bear out: where, how certain, its share of what all causes explained."""
+    """A cause that held-out trials did not bear out.
+
+    Attributes
+    ----------
+    stage, p_value
+        Where it acts, and how certain it was.
+    share
+        Of what all causes explained.
+    percent
+        What it gains over the horizon.
+    """
 
     stage: str
     p_value: float
     share: float
+    percent: float
 
 
 @dataclass(frozen=True)
@@ -134,7 +145,7 @@ def judge_driven(
         names = frozenset(found.without)
         if weak := unsupported(evidence, gains, seen):
             weakest = min(weak, key=lambda n: gains[n].low)
-            refused[weakest] = _refused(found, weakest)
+            refused[weakest] = _refused(found, weakest, gains[weakest].percent)
             found = search.told(tuple(sorted(names - {weakest})))
             continue
         if names != settled:
@@ -173,9 +184,9 @@ def unsupported(evidence: dict[str, Evidence], gains: dict[str, Gain], left: Rem
     return [n for n, e in known.items() if not speaks_for(e, gains[n], alone=len(known) == 1)]
 
 
-def _refused(found: Found, name: str) -> Refused:
+def _refused(found: Found, name: str, percent: float) -> Refused:
     stage = next(str(e.stage) for e in found.best.model.effects if e.name == name)
-    return Refused(stage, found.p_values[name], _share(found, name))
+    return Refused(stage, found.p_values[name], _share(found, name), percent)
 
 
 def _share(found: Found, name: str) -> float:
@@ -196,7 +207,8 @@ def _ceiling(fitted: Fit) -> float:
 def with_refused_causes(left: Remainder, random: Sequence[RandomPart], refused: dict[str, Refused]) -> Remainder:
     """What is left: by the features, or a random effort that is too large, or a cause that was refused.
 
-    A cause that explains less than another's error of form leaves to whatever comes near stands for that error.
+    A cause that explains less than another's error of form leaves to whatever comes near stands for that error; one
+    that gains nothing over the horizon stands for noise that is not white, as that of an encoder's counts.
     """
     if left.unexplained:
         return left
@@ -204,6 +216,7 @@ def with_refused_causes(left: Remainder, random: Sequence[RandomPart], refused: 
     if large:
         return replace(left, unexplained=True, where="effort")
     certain = [r for r in refused.values() if r.p_value < CERTAIN_LEVEL and r.share >= FORM_SHARE]
+    certain = [r for r in certain if r.percent > MATERIAL_PERCENT]
     if certain:
         surest = min(certain, key=lambda r: r.p_value)
         return replace(left, unexplained=True, p_value=surest.p_value, where=surest.stage)
@@ -214,7 +227,7 @@ def driven_diagnosis(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
-    judged = judge_driven(search, found, *trials, seed, study.horizon_s)
+    judged = judge_driven(search, found, search.sets.trials, trials[1], seed, study.horizon_s)
     found, left = judged.found, judged.left
     best = with_honest_intervals(found.best)
     searched = Searched(

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.parts import in_parts
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import Searched, SimulationSearch
@@ -79,7 +80,8 @@ class Searches:
         return SimulationSearch(self.nominal, trials, recorded, self._seed, self._progress, self._effects)
 
     def _by_likelihood(self, trials: Sequence[Trial]) -> LikelihoodSearch:
-        return LikelihoodSearch(LikelihoodFits(self.nominal, trials, self._effects), self._seed, self._progress)
+        parts = in_parts(self.nominal.rig, trials)
+        return LikelihoodSearch(LikelihoodFits(self.nominal, parts, self._effects), self._seed, self._progress)
 
     def _is_undecided(self, found: Searched) -> bool:
         """True where no set of causes leaves only noise of the reading, and there is no second trial to compare by.

@@ -24,12 +24,12 @@ def gain(low):
 
 
 @pytest.mark.parametrize(
-    ("p_value", "share", "unexplained"),
-    [(1e-9, 0.3, True), (1e-9, 0.02, False), (1e-3, 0.3, False)],
-    ids=["certain", "another's error of form", "not certain"],
+    ("p_value", "share", "percent", "unexplained"),
+    [(1e-9, 0.3, 5.0, True), (1e-9, 0.02, 5.0, False), (1e-3, 0.3, 5.0, False), (1e-9, 0.3, -1.0, False)],
+    ids=["certain", "another's error of form", "not certain", "nothing over the horizon"],
 )
-def test_a_refused_cause_is_something_where_it_is_certain_and_no_error_of_form(p_value, share, unexplained):
-    left = with_refused_causes(NOTHING, LITTLE, {"sensor_lag": Refused("sensor", p_value, share)})
+def test_a_refused_cause_is_something_where_it_is_certain_and_no_error_of_form(p_value, share, percent, unexplained):
+    left = with_refused_causes(NOTHING, LITTLE, {"sensor_lag": Refused("sensor", p_value, share, percent)})
     assert left.unexplained == unexplained
     assert left.where == ("sensor" if unexplained else None)
 
