@@ -3,11 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from driven_rigs.draw import BASES, draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, is_possible
-from fes_pin.models.effects import CoulombFriction, SensorGain
+from fes_pin.identify.doubts import first_guess
+from fes_pin.identify.fit import fit_problem
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.models.effects import Backlash, CoulombFriction, SensorGain
 from fes_pin.models.nominal import nominal_model
 
 KNEE = next(k for k in range(99) if BASES[np.random.default_rng(k).integers(len(BASES))].name == "knee")
@@ -38,3 +42,14 @@ def test_a_gain_that_is_small_is_possible(tmp_path):
     sets.nominal()
     sets.extend_all(())
     assert all(is_possible(f) for f in sets.fits.values())
+
+
+@pytest.mark.parametrize(("half_width", "possible"), [(0.4, False), (0.6, True), (0.0, True)])
+def test_a_play_of_less_than_a_count_is_the_counts(half_width, possible, tmp_path):
+    """An encoder that stands between two counts reads as a play does that is as wide."""
+    count = 0.01
+    study = in_another_unit(tmp_path, 1.0)
+    trials = [t.with_columns(position=count * np.round(t["position"] / count)) for t in study.trials]
+    model = nominal_model(study) + Backlash(half_width=half_width * count)
+    problem = LikelihoodProblem(model, trials, first_guess(model, trials), free=("damping",))
+    assert is_possible(fit_problem(problem, model.parameters())) == possible

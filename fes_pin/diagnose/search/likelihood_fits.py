@@ -13,10 +13,11 @@ from fes_pin.diagnose.search.likelihood_forms import LikelihoodForms
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnose.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnose.search.score import Scored, best_by_effect
-from fes_pin.diagnose.search.starts import STARTS, far_sizes, started
+from fes_pin.diagnose.search.starts import STARTS, from_afar, started
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import with_new_noise
+from fes_pin.identify.problem import measured_columns
 from fes_pin.identify.scoring import WORTH
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
@@ -97,7 +98,8 @@ class LikelihoodFits:
         Beside nothing alone: an effort with the wrong sign shows there, or nowhere.
         """
         guess = self._guess()
-        return [self._maxima.from_start(self.model + one, guess, rounds=AFRESH_ROUNDS) for one in far_sizes(effect)]
+        begun = [self.model + one for one in from_afar(effect, self.library.measured)]
+        return [self._maxima.from_start(one, guess, rounds=AFRESH_ROUNDS) for one in begun]
 
     def extend_with_both(self, base: Fit, pair: tuple[Scored, Scored]) -> tuple[Model, list[Fit]]:
         """Begin a base with two more effects at once, from their linear estimates."""
@@ -198,10 +200,17 @@ class LikelihoodFits:
 
 
 def is_possible(fitted: Fit) -> bool:
-    """False if the size of a cause ended where what it can be ends, other than at nothing: it stands for another."""
+    """False if the size of a cause is nothing that it can be: it stands for another.
+
+    It ended where that ends, other than at nothing, or is less than what is read can tell.
+    """
+    measured = measured_columns(fitted.model, fitted.trials)
     for effect in fitted.model.effects:
-        info = effect.parameters()
+        info, smallest = effect.parameters(), effect.smallest(measured)
         for n in effect.amplitudes():
-            if f"{effect.name}.{n}" in fitted.at_bound and getattr(effect, n) != info[n].null:
+            size = getattr(effect, n)
+            if f"{effect.name}.{n}" in fitted.at_bound and size != info[n].null:
+                return False
+            if 0.0 < abs(size) < smallest.get(n, 0.0):
                 return False
     return True

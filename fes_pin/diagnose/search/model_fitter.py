@@ -9,7 +9,7 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.cause_sets import Names
 from fes_pin.diagnose.search.score import Scored
-from fes_pin.diagnose.search.starts import STARTS, far_sizes, started
+from fes_pin.diagnose.search.starts import STARTS, from_afar, started
 from fes_pin.identify.fit import MAX_ITERATIONS, Fit, fit_multistart, fit_problem, go_on
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.problem import Problem
@@ -73,7 +73,7 @@ class ModelFitter:
         at sizes of their own, beside the rig as it was believed.
         """
         starts = [base.model + _at_estimate(s) for s in scored[:STARTS]]
-        starts += [Model(self.model.rig, base.model.effects) + one for one in far_sizes(scored[0].probe.effect)]
+        starts += [Model(self.model.rig, base.model.effects) + one for one in from_afar(scored[0].probe.effect, {})]
         fitted = self.fit_from(starts, base.unknowns)
         if np.isfinite(fitted.sse):
             return fitted

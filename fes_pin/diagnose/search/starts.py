@@ -27,10 +27,9 @@ def near_null(effect: type[Effect], name: str) -> float:
     return info.null + (TINY * info.scale if one_sided else 0.0)
 
 
-def far_sizes(effect: Effect) -> list[Effect]:
-    """The effect at the start values that its amplitudes have of themselves."""
-    info = effect.parameters()
-    chosen: list[dict[str, Any]] = [{name: value} for name in effect.amplitudes() for value in info[name].grid]
+def from_afar(effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Effect]:
+    """The effect at the sizes that it has of itself, on what was measured."""
+    chosen: list[dict[str, Any]] = [{n: value} for n, many in effect.far_sizes(measured).items() for value in many]
     return [replace(effect, **one) for one in chosen]
 
 

@@ -12,6 +12,9 @@ from fes_pin.models.maths import where
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 
+WIDTHS = (0.003, 0.03)
+"""Half widths that a fit begins with beside those that slopes lead to, as shares of the range of the motion."""
+
 
 @dataclass(frozen=True)
 class Backlash(Effect):
@@ -33,11 +36,23 @@ class Backlash(Effect):
     name, stage, signal, rigs = "backlash", Stage.JOINT, "play", ("joint",)
     memories = ("followed",)
 
+    @classmethod
+    def far_sizes(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+        """Shares of the motion: slopes beside a reading that follows at once end at a slack of a few counts."""
+        position = measured.get("position", np.zeros(1))
+        size = float(np.max(position) - np.min(position))
+        return {"half_width": tuple(share * size for share in WIDTHS)} if size > 0.0 else {}
+
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
         """A slack that the motion never crosses would hide all of it."""
         position = measured.get("position", np.zeros(1))
         size = float(np.max(position) - np.min(position))
         return {"half_width": (0.0, 0.5 * size)} if size > 0.0 else {}
+
+    def smallest(self, measured: Mapping[str, np.ndarray]) -> dict[str, float]:
+        """Half a count: a reading that stands still for less has not come to the next."""
+        steps = np.abs(np.diff(measured.get("position", np.zeros(1))))
+        return {"half_width": 0.5 * float(np.min(steps, where=steps > 0.0, initial=np.inf))} if steps.any() else {}
 
     def apply(self, value: Any, s: Any) -> Any:
         return self._play(value, s)
