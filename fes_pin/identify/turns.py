@@ -1,11 +1,11 @@
 """The maximum of the likelihood of measured trials: parameters and what is random, by turns.
 
 Parameters move by Gauss-Newton steps with the filter's gains as they are (`identify.descent`), what is random by
-Fisher scoring (`identify.scoring`), until neither gains. Where steps by slopes for gains as they are promise more than
-a turn has gained, and none of them keeps it, slopes are then differences of the cost, in which gains go with the
-parameters: the two are one only where a model is right, and it is the first that lead there from afar. A parameter that
-scales a reading always has a slope of the second kind. What is random begins small: begun large it takes all that the
-model gets wrong.
+Fisher scoring (`identify.scoring`), until neither gains. Where steps by slopes for gains as they are still promise
+what none of them keeps, slopes are then differences of the cost, in which gains go with the parameters: the two are
+one only where a model is right, and it is the first that lead there from afar. A parameter that scales a reading
+always has a slope of the second kind. What is random begins small: begun large it takes all that the model gets
+wrong.
 """
 
 from __future__ import annotations
@@ -62,12 +62,11 @@ def by_turns(
         before, moved = fitted.sse, problem.score(fitted.values, fitted.unknowns) >= LITTLE
         if moved or problem.is_sharp or not fitted.converged:
             fitted = fit_problem(problem, fitted.values, fitted.unknowns, iterations)  # type: ignore[arg-type]
-        gained = before - fitted.sse
-        stalled = fitted.converged and fitted.gradient_norm > max(WORTH, gained)
-        if stalled and problem.sharpen():
-            fitted = fit_problem(problem, fitted.values, fitted.unknowns, iterations)  # type: ignore[arg-type]
-        elif gained <= LITTLE:
+        if fitted.sse < before - LITTLE:
+            continue
+        if not (fitted.gradient_norm > WORTH and problem.sharpen()):
             return fitted
+        fitted = fit_problem(problem, fitted.values, fitted.unknowns, iterations)  # type: ignore[arg-type]
     return replace(fitted, converged=False)
 
 

@@ -7,12 +7,14 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated, Any
 
 import typer
 from going_on import results_of
 
-from driven_rigs import laboratory as other
+from driven_rigs import laboratory as laboratories
+from driven_rigs import swing_up as pendulums
 from driven_rigs.draw import CAUSES, OUTSIDE, Drawn, draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.diagnosis import diagnose_joint
@@ -31,11 +33,12 @@ Drawing = Callable[[tuple[str, ...], int, Path], Drawn]
 """Draws a rig with such causes from such a seed into a folder."""
 
 
-def items(count: int, laboratory: bool = False) -> Iterator[tuple[str, ...]]:
+def items(count: int, drawn: ModuleType | None = None) -> Iterator[tuple[str, ...]]:
     """What is hidden in each of so many studies: nothing, every cause in turn, pairs, and something else."""
-    rows: list[tuple[str, ...]] = [(), *((c,) for c in other.CAUSES), (), other.CAUSES[:1], *other.PAIRS]
-    if not laboratory:
-        rows = [(), *((c,) for c in CAUSES[:5]), (), *((c,) for c in CAUSES[5:]), *PAIRS[:2], (), OUTSIDE, *PAIRS[2:]]
+    rows: list[tuple[str, ...]] = [(), *((c,) for c in CAUSES[:5]), (), *((c,) for c in CAUSES[5:])]
+    rows += [*PAIRS[:2], (), OUTSIDE, *PAIRS[2:]]
+    if drawn is not None:
+        rows = [(), *((c,) for c in drawn.CAUSES), (), drawn.CAUSES[:1], *drawn.PAIRS]
     for k in range(count):
         yield rows[k % len(rows)]
 
@@ -127,6 +130,7 @@ def main(
     laboratory: Annotated[
         bool, typer.Option("--laboratory", help="Of another generator: other controllers, motions, encoders, rates.")
     ] = False,
+    swing_up: Annotated[bool, typer.Option("--swing-up", help="Pendulums that are swung up and held.")] = False,
     results: Annotated[
         Path | None, typer.Option(help="A file of one line a study, with which a run can go on.")
     ] = None,
@@ -134,14 +138,17 @@ def main(
     """Hide known causes in rigs that a controller drives, and count what the diagnosis makes of them."""
 
     def drawn(causes: tuple[str, ...], k: int, folder: Path) -> Drawn:
+        if swing_up:
+            return pendulums.draw_swing_up(causes, k, folder)
         if laboratory:
-            return other.draw_laboratory(causes, k, folder)
+            return laboratories.draw_laboratory(causes, k, folder)
         return draw(causes, size, k, folder, recorded, low_pass, every)
 
     def one(causes: tuple[str, ...], k: int) -> dict[str, Any]:
         return judged(() if nulls else causes, k, drawn)
 
-    rows = results_of(items(count, laboratory), seed, one, results)
+    other = pendulums if swing_up else laboratories if laboratory else None
+    rows = results_of(items(count, other), seed, one, results)
     typer.echo("\n".join(table(rows)))
 
 

@@ -70,7 +70,7 @@ class Bench:
             rate += min(1.0, self.dt / FILTER_S) * ((read - last) / self.dt - rate)
             last, error = read, self.wanted[k] - read
             gathered += self.integral * error * self.dt
-            command = self._command(error, rate, read, self.wanted[k], wanted_rate[k], wanted_bend[k]) + gathered
+            command = self.command(error, rate, read, self.wanted[k], wanted_rate[k], wanted_bend[k]) + gathered
             most = self.hidden.get("most", np.inf)
             effort[k], position[k] = np.clip(command, -most, most), read
             pushed = lasts * pushed + self.torque * np.sqrt(1.0 - lasts**2) * rng.standard_normal(trials)
@@ -78,7 +78,7 @@ class Bench:
                 q, v, bristles = self._step(effort[k] + pushed, q, v, bristles)
         return effort, position
 
-    def _command(
+    def command(
         self,
         error: np.ndarray,
         rate: np.ndarray,
@@ -87,6 +87,7 @@ class Bench:
         wanted_rate: np.ndarray,
         wanted_bend: np.ndarray,
     ) -> np.ndarray:
+        """The effort that the controller asks for."""
         b = self.base
         stiff, damped = b.inertia * b.bandwidth**2 + abs(b.weight), 1.4 * b.inertia * b.bandwidth
         if self.control == "cascade":
@@ -140,7 +141,7 @@ def draw_laboratory(causes: tuple[str, ...], seed: int, folder: Path) -> Drawn:
     bench = Bench(own, dt, control, wanted, slow)
     effort, position = bench.run(np.random.default_rng([seed, 5]))
     usual = float(np.sqrt(np.mean(effort**2)))
-    bench.hidden = _hidden(causes, float(rng.uniform(0.15, 0.4)) * usual, position, dt, base.reach, rng)
+    bench.hidden = hidden_numbers(causes, float(rng.uniform(0.15, 0.4)) * usual, position, dt, base.reach, rng)
     bench.hidden["most"] = float(rng.choice([np.inf, np.inf, 1.1])) * max(float(np.abs(effort).max()), 2.0 * usual)
     bench.count = base.reach * float(np.exp(rng.uniform(*np.log([5e-5, 1.5e-3]))))
     bench.noise = base.reach * float(np.exp(rng.uniform(*np.log([2e-5, 6e-4]))))
@@ -157,7 +158,7 @@ def draw_laboratory(causes: tuple[str, ...], seed: int, folder: Path) -> Drawn:
     return Drawn(written(base, effort, position, dt, believed, folder), base.name, causes, truth)
 
 
-def _hidden(
+def hidden_numbers(
     causes: tuple[str, ...], torque: float, position: np.ndarray, dt: float, reach: float, rng: np.random.Generator
 ) -> dict[str, float]:
     """Numbers of what is hidden, so that each acts with about this torque."""

@@ -204,7 +204,7 @@ def is_possible(fitted: Fit) -> bool:
 
     It ended where that ends, other than at nothing, or is less than what is read can tell.
     """
-    measured = measured_columns(fitted.model, fitted.trials)
+    measured = measured_columns(fitted.model, fitted.trials) if fitted.model.effects else {}
     for effect in fitted.model.effects:
         info, smallest = effect.parameters(), effect.smallest(measured)
         for n in effect.amplitudes():
