@@ -9,15 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from fes_pin.data.study import write_study
-from fuzz_inputs.check import Answer, call
+from fes_pin.data.study import Study, write_study
+from fuzz_inputs.check import READING_SECONDS, SECONDS, Answer, call
 from fuzz_inputs.oddities import odd_study
+from fuzz_inputs.recordings import coordinates, ground_reaction, instrument
 from fuzz_inputs.spoil import spoilt
 from fuzz_inputs.studies import RIGS, small_study
 
 KINDS = ("study", "study", "csv", "toml", "urdf", "model", "trial")
 """Odd studies are the slowest and find most: two of seven. The others are spoilt files: of a study to diagnose, or of a
 model and a trial to predict."""
+READING_KINDS = (*KINDS[2:], "recording", "walk")
+"""Spoilt files alone; of what `fes-pin new-study` reads as well: an instrument's recording, a walk in two `.mot`."""
 
 
 @dataclass(frozen=True)
@@ -32,41 +35,74 @@ class Result:
         return f"{self.name}: {'; '.join(self.faults)}"
 
 
-def run_case(number: int, seed: int, work: Path, cache: Path) -> Result:
+@dataclass(frozen=True)
+class Call:
+    """What is asked of `fes-pin`, the file that is spoilt before (None: none), and where it may write."""
+
+    given: list[str]
+    target: Path | None
+    out: Path
+
+
+def run_case(number: int, seed: int, work: Path, cache: Path, reading: bool = False) -> Result:
     """Make one case in an empty folder, call the command line, and check its answer.
 
     Parameters
     ----------
     cache
         Where compiled models are kept; the only other place that may be written.
+    reading
+        Ask only what reads and fits nothing: `fes-pin check` instead of `diagnose`, and `READING_KINDS`.
     """
     rng = np.random.default_rng([seed, number])
-    kind, rig = KINDS[number % len(KINDS)], str(rng.choice(RIGS))
+    kinds = READING_KINDS if reading else KINDS
+    kind, rig = kinds[number % len(kinds)], str(rng.choice(RIGS))
     shutil.rmtree(work, ignore_errors=True)
-    study, out, scratch = work / "study", work / "out", work / "scratch"
+    scratch = work / "scratch"
     scratch.mkdir(parents=True)
-    made, told = small_study(rng, rig), ""
-    if kind == "study":
-        told, made = odd_study(made, rng)
-    write_study(made, study)
-    if kind in ("model", "trial"):
-        (study / "model.toml").write_text(_model(rig), encoding="utf-8")
-        target = study / "model.toml" if kind == "model" else study / f"trials/{made.trials[0].name}.csv"
-        settings = [f"--set={n}={v:g}" for n, v in made.trials[0].conditions.items()]
-        out = work / "predicted.csv"
-        given = ["predict", str(study / "model.toml"), str(study / f"trials/{made.trials[0].name}.csv"), *settings]
+    told = ""
+    if kind in ("recording", "walk"):
+        asked = _new_study(kind, work, rng)
     else:
-        names = {"csv": f"trials/{made.trials[-1].name}.csv", "toml": "study.toml", "urdf": "rig.urdf"}
-        target = study / names.get(kind, "study.toml")
-        if kind == "urdf" and (found := sorted(study.glob("*.urdf"))):
-            target = found[0]
-        elif kind == "urdf":
-            target = study / "study.toml"
-        given = ["diagnose", str(study)]
-    if kind != "study":
-        target.write_bytes(spoilt(target.read_bytes(), rng))
-    answer = call([*given, "--out", str(out)], [out, cache], scratch)
-    return Result(f"{number} {kind} {rig} {told}".strip(), answer, answer.faults(out.exists()))
+        made = small_study(rng, rig)
+        if kind == "study":
+            told, made = odd_study(made, rng)
+        write_study(made, work / "study")
+        predicts = kind in ("model", "trial")
+        asked = _predict(kind, rig, made, work) if predicts else _diagnose(kind, made, work, reading)
+    if asked.target is not None:
+        asked.target.write_bytes(spoilt(asked.target.read_bytes(), rng))
+    answer = call(asked.given, [asked.out, cache], scratch, READING_SECONDS if reading else SECONDS)
+    return Result(f"{number} {kind} {rig} {told}".strip(), answer, answer.faults(asked.out.exists()))
+
+
+def _diagnose(kind: str, made: Study, work: Path, reading: bool) -> Call:
+    study, out = work / "study", work / "out"
+    urdf = next(iter(sorted(study.glob("*.urdf"))), study / "study.toml")
+    targets = {"study": None, "csv": study / f"trials/{made.trials[-1].name}.csv", "urdf": urdf}
+    given = ["check", str(study)] if reading else ["diagnose", str(study), "--out", str(out)]
+    return Call(given, targets.get(kind, study / "study.toml"), out)
+
+
+def _predict(kind: str, rig: str, made: Study, work: Path) -> Call:
+    model, trial = work / "study/model.toml", made.trials[0]
+    model.write_text(_model(rig), encoding="utf-8")
+    recorded, out = work / f"study/trials/{trial.name}.csv", work / "predicted.csv"
+    settings = [f"--set={n}={v:g}" for n, v in trial.conditions.items()]
+    given = ["predict", str(model), str(recorded), *settings, "--out", str(out)]
+    return Call(given, model if kind == "model" else recorded, out)
+
+
+def _new_study(kind: str, work: Path, rng: np.random.Generator) -> Call:
+    if kind == "recording":
+        recording, out = work / "a.csv", work / "made"
+        recording.write_text(instrument(rng), encoding="utf-8")
+        return Call(["new-study", str(recording), "--pendulum", "0.3", "1", "--out", str(out)], recording, out)
+    files, out = (work / "coordinates.mot", work / "forces.mot"), work / "made"
+    for path, text in zip(files, (coordinates(rng), ground_reaction(rng)), strict=True):
+        path.write_text(text, encoding="utf-8")
+    given = ["new-study", *map(str, files), "--rig", "body", "--set", "mass_kg=70", "--set", "height_m=1.8"]
+    return Call([*given, "--out", str(out)], files[int(rng.integers(2))], out)
 
 
 @functools.cache

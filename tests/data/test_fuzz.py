@@ -65,7 +65,7 @@ EDITS = st.lists(
 )
 
 
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=600, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(
     which=st.sampled_from(FILES),
     edits=EDITS,
@@ -77,7 +77,7 @@ def test_spoilt_studies(tmp_path_factory, which, edits):
     one_line_or_none(lambda: read_study(folder))
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=400, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(edits=EDITS)
 def test_any_recording_is_proposed_or_refused(tmp_path, edits):
     path = tmp_path / "a.csv"
@@ -129,7 +129,7 @@ def with_number(text, pattern, number, at):
     return text[: one.start()] + number + text[one.end() :]
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=120, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(content=st.text(max_size=200), suffix=st.sampled_from([".mot", ".sto", ".csv"]), head=st.booleans())
 def test_any_text_as_motion(tmp_path, content, suffix, head):
     path = tmp_path / f"a{suffix}"

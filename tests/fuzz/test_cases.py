@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from fuzz_inputs.cases import KINDS, run_case
+from fuzz_inputs.cases import KINDS, READING_KINDS, run_case
 from fuzz_inputs.check import Answer, call
 from fuzz_inputs.oddities import ODDITIES
 from fuzz_inputs.studies import RIGS, small_study
@@ -20,6 +20,12 @@ FILES = [n for n in range(14) if KINDS[n % len(KINDS)] in {"csv", "model", "tria
 @pytest.mark.parametrize("number", FILES)
 def test_spoilt_files(tmp_path, number):
     result = run_case(number, 3, tmp_path / "case", cache_folder())
+    assert not result.faults, str(result)
+
+
+@pytest.mark.parametrize("number", range(2 * len(READING_KINDS)))
+def test_reading_alone(tmp_path, number):
+    result = run_case(number, 3, tmp_path / "case", cache_folder(), reading=True)
     assert not result.faults, str(result)
 
 
