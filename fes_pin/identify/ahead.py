@@ -166,10 +166,13 @@ def foretell(model: Model, trial: Trial, random: Random, horizon_s: float) -> di
 
 
 def one_step(model: Model, trial: Trial, doubt: Doubt) -> dict[str, np.ndarray]:
-    """Measured minus foretold one sample ahead, shape (n,), by output column; 0 where nothing was measured."""
+    """Measured minus foretold one sample ahead, shape (n,), by output column.
+
+    It is 0 where nothing was measured, and at the first sample, before which nothing was.
+    """
     problem = LikelihoodProblem(model, [trial], doubt, ())
     (foretold,) = problem.foretold(model.parameters())
-    judged = model.rig.follows(trial)
+    judged = model.rig.follows(trial) & (np.arange(len(trial)) > 0)
     return {n: np.where(judged & np.isfinite(trial[n]), trial[n] - values, 0.0) for n, values in foretold.items()}
 
 

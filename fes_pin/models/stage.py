@@ -112,8 +112,14 @@ class Effect:
         """Variance of what is random in each state when a trial begins, from the constants `random`."""
         return {}
 
-    def start_variances(self) -> Mapping[str, Any]:
-        """How uncertain a memory that states go into is when a trial begins, beside what they are: unit squared."""
+    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
+        """How uncertain states, and memories that states go into, are when a trial begins, beside `rest`: unit squared.
+
+        Parameters
+        ----------
+        reach, speed
+            How far and how fast what is read moves in the trial; 0 for a rig that begins at rest.
+        """
         return {}
 
     @classmethod
@@ -234,10 +240,12 @@ class Signals(SimpleNamespace):
     """The signals of one instant, by name: what a rig's equations and the effects read.
 
     `own` holds the states and memories of the effect that is being evaluated; `v_std` is the standard deviation of the
-    velocity, in its unit, where a predictor estimates it and asks for rates; else it is 0.
+    velocity, in its unit, where a predictor estimates it and asks for rates; else it is 0. `sensed_rate` is how fast
+    what is read moves when a trial begins: 0 unless the rig says otherwise in `set_rest`.
     """
 
     v_std: Any = 0.0
+    sensed_rate: Any = 0.0
 
     def __init__(self, effects: Sequence[Effect], **signals: Any) -> None:
         super().__init__(effects=tuple(effects), own=SimpleNamespace(), owned={}, **signals)
@@ -292,9 +300,13 @@ def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, An
     out, rate
         The lagged signal and the time derivative of `state`.
     """
+    rate = (target - state) / lag_time(time_constant, step)
+    return target - time_constant * rate, rate
+
+
+def lag_time(time_constant: Any, step: Any) -> Any:
+    """By how much the state of `lag` is late: e, s."""
     shortest = 0.5 * step
     ratio = time_constant / shortest
     fourth = ratio * ratio * ratio * ratio
-    e = shortest * sqrt(sqrt(sqrt(1.0 + fourth * fourth)))
-    rate = (target - state) / e
-    return target - time_constant * rate, rate
+    return shortest * sqrt(sqrt(sqrt(1.0 + fourth * fourth)))

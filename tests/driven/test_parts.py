@@ -57,3 +57,12 @@ def test_a_single_trial_bears_out_its_cause(tmp_path):
     assert found.held_out_by == CROSS_VALIDATED
     assert found.causes[0].evidence.low > 0.0
     assert [t.name for t in found.study.trials] == [longest.name]
+
+
+def test_a_part_that_begins_in_motion_is_read_late_from_its_first_sample(tmp_path):
+    """What is slow to follow had been at rest where a part began: its error there hid the lag."""
+    study = read_study(draw(("sensor_lag",), 0.3, 33, tmp_path, recorded=True).study)
+    longest = max(study.trials, key=len)
+    assert longest.duration > 2.0 * SHORTEST_S
+    found = diagnose_joint(replace(study, trials=(longest,)))
+    assert [c.name for c in found.causes] == ["sensor_lag"], str(found)

@@ -190,7 +190,9 @@ class Joint(_Moving):
     def rest(self):
         q, v = self.start
         values = dict.fromkeys(self.names, 0.0) | {"q": q, "v": v}
-        values |= {n: q for n in ("relaxed", "relaxed_too", "read") if n in values}
+        values |= {n: q for n in ("relaxed", "relaxed_too") if n in values}
+        if "read" in values:
+            values["read"] = q - self.causes["sensor_lag"]["lag_s"] * v  # it moved as fast before
         return [values[n] for n in self.names]
 
     def rates(self, t, vector, held):

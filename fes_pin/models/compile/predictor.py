@@ -33,6 +33,7 @@ Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -86,9 +87,13 @@ class _Doubt:
             for state, variance in e.stationary_variances(c).items():
                 k = at[f"{e.name}.{state}"]
                 out[k, k] = out[k, k] + variance
-        for k, variance in d.start_variances():
+        for k, variance in d.start_variances(*(self._moves(unknowns, fast) for fast in (False, True))):
             out[k, k] = out[k, k] + variance
         return out
+
+    def _moves(self, unknowns: Sequence[str], fast: bool) -> Any:
+        """How far, or how fast, a trial moves whose start is unknown; 0 where it is known."""
+        return next((self.d.sym.c[f"prior.{n}"] for n in unknowns if ("velocity" in n) == fast), 0.0)
 
     def _read_slopes(self, moved: Any) -> list[Any]:
         """Slope of what is read of each unknown of the start: of its own reading, or the first one's if it has none."""
@@ -130,11 +135,12 @@ class Carried(Tangents):
         self.rates = column([*ca.vertsplit(self.rates), *[0.0] * len(places)])
         self.m, self.m0, self.after = (column([v[k] for k in others]) for v in (self.m, self.m0, self.after))
 
-    def start_variances(self) -> list[tuple[int, Any]]:
-        """Places among the states, and how uncertain a carried memory is there when a trial begins."""
+    def start_variances(self, reach: Any, speed: Any) -> list[tuple[int, Any]]:
+        """Places among the states, and how uncertain a state or a carried memory is there when a trial begins."""
         effects = self.sym.signals(self.sym.x, self.sym.m).effects
-        known = {f"{e.name}.{n}": variance for e in effects for n, variance in e.start_variances().items()}
-        return [(k, known[n]) for k, n in zip(self.carried, self._names, strict=True) if n in known]
+        known = {f"{e.name}.{n}": variance for e in effects for n, variance in e.start_variances(reach, speed).items()}
+        places = [*enumerate(self.sym.states), *zip(self.carried, self._names, strict=True)]
+        return [(k, known[n]) for k, n in places if n in known]
 
 
 def derive_predictor(model: Model, layout: Layout) -> Equations:

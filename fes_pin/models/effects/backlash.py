@@ -63,7 +63,7 @@ class Backlash(Effect):
     def rest(self, s: Any) -> Mapping[str, Any]:
         return {"followed": s.sensed}
 
-    def start_variances(self) -> Mapping[str, Any]:
+    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
         """Where in the slack a trial begins nobody knows: evenly spread over 2 half_width."""
         return {"followed": self.half_width**2 / 3.0}
 

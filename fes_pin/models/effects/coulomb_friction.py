@@ -159,7 +159,7 @@ class CoulombFriction(Effect):
     def rest(self, s: Any) -> Mapping[str, Any]:
         return {"anchor": s.q} if hasattr(s.own, "anchor") else {}
 
-    def start_variances(self) -> Mapping[str, Any]:
+    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
         """How far the contact is stretched when a trial begins nobody knows."""
         return {"anchor": self.stretch**2 / 3.0}
 

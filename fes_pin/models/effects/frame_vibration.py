@@ -41,6 +41,11 @@ class FrameVibration(Effect):
         # the joint's own acceleration is torque / J = q'' + phi'', solved for it
         return {"angle": s.own.rate, "rate": self._swing(s, s.driving)}
 
+    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
+        """Where a trial begins in motion, the frame swings already."""
+        swings = (self.coupling * speed) ** 2
+        return {"angle": swings / (TURN * self.frequency_hz) ** 2, "rate": swings}
+
     def _swing(self, s: Any, driving: Any) -> Any:
         omega = TURN * self.frequency_hz
         spring = omega * omega * s.own.angle + 2.0 * self.damping_ratio * omega * s.own.rate

@@ -9,6 +9,9 @@ from typing import Any
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 
+NOTHING = 1e-30
+"""Below any square of a motion: a rig that begins at rest has 0 / 0."""
+
 
 @dataclass(frozen=True)
 class PassiveRelaxation(Effect):
@@ -36,3 +39,8 @@ class PassiveRelaxation(Effect):
 
     def rest(self, s: Any) -> Mapping[str, Any]:
         return {"relaxed": s.q}
+
+    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
+        """Where a trial begins in motion, how it moved before nobody knows: the damper is late, within what it does."""
+        late = self.relaxation_s * speed
+        return {"relaxed": late * late * reach * reach / (late * late + reach * reach + NOTHING)}

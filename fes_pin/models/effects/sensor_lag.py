@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage, lag
+from fes_pin.models.stage import Effect, Stage, lag, lag_time
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,14 @@ class SensorLag(Effect):
         return {"filtered": self._lagged(s)[1]}
 
     def rest(self, s: Any) -> Mapping[str, Any]:
-        return {"filtered": s.sensed}
+        return {"filtered": s.sensed - lag_time(self._lag(), s.step) * s.sensed_rate}
+
+    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
+        """Where a trial begins in motion, how it moved before nobody knows."""
+        return {"filtered": (self._lag() * speed) ** 2}
 
     def _lagged(self, s: Any) -> tuple[Any, Any]:
-        return lag(s.sensed, s.own.filtered, self.lag_s / (1.0 + self.shift), s.step)
+        return lag(s.sensed, s.own.filtered, self._lag(), s.step)
+
+    def _lag(self) -> Any:
+        return self.lag_s / (1.0 + self.shift)

@@ -194,6 +194,7 @@ class Joint(Rig):
             return
         s.x.q, s.x.v, s.m.rest = s.initial.initial_position, s.initial.initial_velocity, s.initial.initial_position
         s.q = s.sensed = s.x.q
+        s.sensed_rate = s.x.v
 
     def rest_residual(self, s: Signals, z: Any) -> Any:
         return z
