@@ -88,7 +88,7 @@ def contrast(
             return made, ContrastSearch(made, seed, tell).run()
 
         searched = contrast_with_conditions(nominal, trials, run)
-        if (late_s := late_in_groups(searched.fits, searched.found.best)) is not None:
+        if (late_s := late_in_groups(searched)) is not None:
             moved = {g: [Log(effort_late_s=late_s).applied(t) for t in many] for g, many in trials.items()}
             timed = contrast_with_conditions(nominal, moved, run)
             if is_cheaper(timed, searched):

@@ -14,16 +14,26 @@ from fes_pin.models.predictor import Doubt
 from fes_pin.workers import in_parallel
 
 
-def late_in_groups(fits: Fits, best: Grouped) -> float | None:
-    """How late the efforts of a driven rig were written down, s, in the mean over groups; None where one is in time."""
+def late_in_groups(searched: ContrastSearched) -> float | None:
+    """How late the efforts of a driven rig were written down, s, in the mean over groups; None where one is in time.
+
+    What was found in all groups may stand for it: then the nominal model is asked.
+    """
+    fits, found = searched.fits, searched.found
     every = [t for many in fits.trials.values() for t in many]
     if not fits.driven or not all("effort" in fits.nominal.rig.input_columns(t) for t in every):
         return None
+    asked = [found.best, found.nominal] if len(found.best.items) > len(found.best.changes) else [found.best]
+    return next((late for one in asked if (late := _late_beside(fits, one)) is not None), None)
+
+
+def _late_beside(fits: Fits, one: Grouped) -> float | None:
+    """How late efforts are beside a set; None where those of a group are in time."""
     try:
-        late = in_parallel(lambda group: _late_in(fits, best, group), list(fits.trials))
+        late = in_parallel(lambda group: _late_in(fits, one, group), list(fits.trials))
     except (ArithmeticError, np.linalg.LinAlgError):
         return None
-    known = [one for one in late if one is not None]
+    known = [s for s in late if s is not None]
     return float(np.mean(known)) if len(known) == len(late) else None
 
 
