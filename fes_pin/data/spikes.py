@@ -83,7 +83,8 @@ def _spikes(x: np.ndarray, length: int) -> np.ndarray:
             sample - sum(w * s for w, s in zip(ws, part, strict=True))
             for ws, part in zip(weights, (sides[middle], sides[:LINE], sides[LINE:]), strict=True)
         )
-        hit &= (here * before > 0) & (here * after > 0)
+        hit &= np.sign(here) * np.sign(before) > 0
+        hit &= np.sign(here) * np.sign(after) > 0
         off.append(np.abs(here))
         beside.append(np.minimum(np.abs(before), np.abs(after)))
         if inside == LINE:
