@@ -1,5 +1,6 @@
 """What is left beside a play that was found: slopes of the filter promise what its likelihood does not keep."""
 
+import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
@@ -17,6 +18,7 @@ class Promised(driven._Featured):
         self.can_keep = False
 
 
+@pytest.mark.rounding
 def test_a_promise_counts_as_far_as_the_likelihood_keeps_it(tmp_path, monkeypatch):
     """A rig of `scripts/driven --count 60 --seed 1118000 --recorded` where something was "left"."""
     study = read_study(draw(("backlash",), 0.3, 1118025, tmp_path, recorded=True).study)

@@ -22,6 +22,7 @@ from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import DRIVEN_LEVEL, EXTEND_LEVEL
+from fes_pin.identify.roughness import roughness, uncertain_gain
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
 MOST_IMPOSED = 8
@@ -74,6 +75,7 @@ class LikelihoodSearch:
         self.sets, self.seed, self.progress = sets, seed, progress
         self.was_stopped, self._end = False, math.inf
         self._formed: set[Names] = set()
+        self._roughness: dict[int, tuple[Fit, float]] = {}
 
     def run(self) -> Found:
         """Search, as long as the limit of time lets it; the nominal model is fitted and scored anyway."""
@@ -111,8 +113,17 @@ class LikelihoodSearch:
         return self.settle(self._backward(best))
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
-        """Family-wise p-value of what a larger set adds."""
-        return self.family.p_value(smaller.sse - larger.sse, max(larger.degrees - smaller.degrees, 1))
+        """Family-wise p-value of what a larger set adds beyond what rough likelihoods differ by."""
+        gained = smaller.sse - larger.sse
+        if gained > 0.0:
+            gained = max(0.0, gained - uncertain_gain(self._rough(larger), self._rough(smaller)))
+        return self.family.p_value(gained, max(larger.degrees - smaller.degrees, 1))
+
+    def _rough(self, fitted: Fit) -> float:
+        """How rough the likelihood is about a fit."""
+        if self._roughness.get(id(fitted), (None,))[0] is not fitted:
+            self._roughness[id(fitted)] = (fitted, roughness(fitted))
+        return self._roughness[id(fitted)][1]
 
     def _worth_extending(self, names: Names) -> bool:
         """True where the score of a further cause beside a set is not what chance brings."""

@@ -1,0 +1,50 @@
+"""How rough the likelihood is about a fit: what its cost differs by between points that the data cannot tell apart.
+
+The likelihood of a model that bends sharply, as a play does where its slack is taken up, is that of an approximate
+filter, and jumps by far more than what a parameter's deviation is worth. Where a fit ends there is chance, and of two
+fits nothing is said by less than that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fes_pin.identify.distributions import normal_quantile
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import LikelihoodProblem
+
+NEAR = 0.5
+"""Deviations of a parameter that points are away from the fit: its square is what a smooth cost rises by."""
+SURE = normal_quantile(0.95)
+"""Deviations of a difference that chance exceeds once in twenty."""
+
+
+def roughness(fitted: Fit) -> float:
+    """Root mean square of what the cost rises by other than a parabola, a step to either side of each axis of the covariance."""
+    assert fitted.doubt is not None
+    known = np.isfinite(np.diag(fitted.covariance)) & (np.diag(fitted.covariance) > 0.0)
+    if not known.any() or not np.isfinite(fitted.sse):
+        return 0.0
+    sizes, axes = np.linalg.eigh(fitted.covariance[np.ix_(known, known)])
+    names = [n for n, k in zip(fitted.free, known, strict=True) if k]
+    steps = NEAR * (axes * np.sqrt(np.maximum(sizes, 0.0))).T
+    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt, fitted.free)
+    moved = [
+        {
+            **fitted.values,
+            **{n: _within(fitted.values[n] + s, problem.limits[n]) for n, s in zip(names, step, strict=True)},
+        }
+        for step in np.concatenate([steps, -steps])
+    ]
+    costs = np.array(problem.bounds([(values, fitted.unknowns) for values in moved]))
+    rises = costs[np.isfinite(costs)] - fitted.sse - NEAR**2
+    return float(np.sqrt(np.mean(rises**2))) if len(rises) else 0.0
+
+
+def uncertain_gain(*rough: float) -> float:
+    """What fits as rough may differ by in twice the log-likelihood, each half way down what it jumps by, by chance."""
+    return SURE * float(np.sqrt(0.5 * np.sum(np.square(rough))))
+
+
+def _within(value: float, limits: tuple[float, float]) -> float:
+    return float(np.clip(value, *limits))
