@@ -20,23 +20,19 @@ SURE = normal_quantile(0.95)
 
 
 def roughness(fitted: Fit) -> float:
-    """Root mean square of what the cost rises by other than a parabola, a step to either side of each axis of the covariance."""
+    """Root mean square of what the cost rises by other than a parabola, half a deviation along the covariance's axes."""
     assert fitted.doubt is not None
     known = np.isfinite(np.diag(fitted.covariance)) & (np.diag(fitted.covariance) > 0.0)
     if not known.any() or not np.isfinite(fitted.sse):
         return 0.0
     sizes, axes = np.linalg.eigh(fitted.covariance[np.ix_(known, known)])
-    names = [n for n, k in zip(fitted.free, known, strict=True) if k]
     steps = NEAR * (axes * np.sqrt(np.maximum(sizes, 0.0))).T
+    names = [n for n, k in zip(fitted.free, known, strict=True) if k]
+    here = np.array([fitted.values[n] for n in names])
     problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt, fitted.free)
-    moved = [
-        {
-            **fitted.values,
-            **{n: _within(fitted.values[n] + s, problem.limits[n]) for n, s in zip(names, step, strict=True)},
-        }
-        for step in np.concatenate([steps, -steps])
-    ]
-    costs = np.array(problem.bounds([(values, fitted.unknowns) for values in moved]))
+    moved = np.clip(here + np.concatenate([steps, -steps]), *np.transpose([problem.limits[n] for n in names]))
+    points = [({**fitted.values, **dict(zip(names, map(float, one), strict=True))}, fitted.unknowns) for one in moved]
+    costs = np.array(problem.bounds(points))
     rises = costs[np.isfinite(costs)] - fitted.sse - NEAR**2
     return float(np.sqrt(np.mean(rises**2))) if len(rises) else 0.0
 
@@ -44,7 +40,3 @@ def roughness(fitted: Fit) -> float:
 def uncertain_gain(*rough: float) -> float:
     """What fits as rough may differ by in twice the log-likelihood, each half way down what it jumps by, by chance."""
     return SURE * float(np.sqrt(0.5 * np.sum(np.square(rough))))
-
-
-def _within(value: float, limits: tuple[float, float]) -> float:
-    return float(np.clip(value, *limits))

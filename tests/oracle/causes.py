@@ -202,7 +202,5 @@ def reading(value, rate, time, rest, causes):
 
 def _later(value, rate, since, lag):
     """A sampled signal some time later, by cubic Hermite interpolation; before the first sample it moved as fast."""
-    past = since - lag
-    return np.where(
-        past < 0.0, value[0] + rate[0] * past, CubicHermiteSpline(since, value, rate)(np.maximum(past, 0.0))
-    )
+    past, known = since - lag, CubicHermiteSpline(since, value, rate)
+    return np.where(past < 0.0, value[0] + rate[0] * past, known(np.maximum(past, 0.0)))
