@@ -7,6 +7,8 @@ within its time, and nothing written outside the folder or file that it was give
 from __future__ import annotations
 
 import contextlib
+import functools
+import importlib
 import io
 import os
 import resource
@@ -33,6 +35,8 @@ NO_FOLDER = -1
 """Stands for the descriptor of the folder that a removed path is relative to, where none was given."""
 PARTIAL = ".fes_pin-"
 """What is not whole yet has a name that begins so, beside its destination."""
+IMPORTED = ("scipy.signal", "fes_pin.data.new_study", "fes_pin.data.new_body_study", "fes_pin.diagnose.testable")
+"""What commands import once they are asked."""
 SPARE = 97
 """Exit code for an exception that the command let through."""
 
@@ -101,9 +105,14 @@ def call(arguments: Sequence[str], allowed: Sequence[Path], scratch: Path, secon
 
 
 def warm_up(folder: Path) -> None:
-    """Ask once in this process, of a study that is not there: a fork then has what a call imports."""
+    """Ask once in this process, of a study that is not there: a fork then has what a call imports and is made of."""
+    import typer.main  # noqa: PLC0415
+
     from fes_pin.cli.main import main  # noqa: PLC0415
 
+    for name in IMPORTED:
+        importlib.import_module(name)
+    typer.main.get_command = functools.cache(typer.main.get_command)  # type: ignore[assignment]
     sys.argv = ["fes-pin", "check", str(folder / "missing")]
     with contextlib.redirect_stderr(io.StringIO()), contextlib.suppress(SystemExit):
         main()
