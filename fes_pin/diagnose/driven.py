@@ -141,7 +141,7 @@ def judge_driven(
         folds = make_folds(found, train, test, again)
         evidence = evidence_of(folds, found, alike) if folds else {}
         gains = gains_of(folds or [Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon, seed)
-        seen = driven_remainder(found.best, seed)
+        seen = _remainder(search, found.best, seed)
         names = frozenset(found.without)
         if weak := unsupported(evidence, gains, seen):
             weakest = min(weak, key=lambda n: gains[n].low)
@@ -171,6 +171,14 @@ def judge_driven(
         random=random,
         ceiling_percent=_ceiling(found.best),
     )
+
+
+def _remainder(search: LikelihoodSearch, fitted: Fit, seed: int) -> Remainder:
+    """What is left of a fit; of readings in counts what is left of them as intervals, if less is."""
+    left, counts = driven_remainder(fitted, seed), search.sets.counts
+    if left.unexplained and counts.are_there:
+        left = max(left, driven_remainder(counts.of(fitted), seed), key=lambda one: one.p_value)
+    return left
 
 
 def unsupported(evidence: dict[str, Evidence], gains: dict[str, Gain], left: Remainder) -> list[str]:

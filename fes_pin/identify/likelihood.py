@@ -79,7 +79,7 @@ class LikelihoodProblem:
         """The compiled predictor, with sensitivities to `free` and to the effects' unknowns."""
         if self._predictor is None:
             columns = (*self.free, *self.unknown_names)
-            own = (self.doubt.processes, self.priors, self.doubt.lasts_s)
+            own = (self.doubt.processes, self.priors, self.doubt.lasts_s, self.doubt.in_counts)
             self._predictor = Predictor(self.model, self.trials, columns, *own)
         return self._predictor
 
@@ -112,7 +112,7 @@ class LikelihoodProblem:
         """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
         count, trials = self.abreast, len(self.trials)
         if self._abreast is None:
-            own = (self.doubt.processes, self.priors * count, self.doubt.lasts_s)
+            own = (self.doubt.processes, self.priors * count, self.doubt.lasts_s, self.doubt.in_counts)
             self._abreast = Predictor(self.model, self.trials * count, (), *own)
         predictor = self._abreast
 
@@ -206,13 +206,11 @@ class LikelihoodProblem:
     def _whitened(self, one: ForetoldTrial) -> Linearized:
         """A trial's innovations over their deviations; its sensitivities are scaled where they are."""
         with np.errstate(all="ignore"):
-            scale = 1.0 / np.sqrt(one.of_seen(one.variances))
-            residual = one.of_seen(one.values) * scale
+            residual, scale, logs = one.whitened()
             moved = one.of_seen(one.sensitivities)
             moved *= -scale[:, None]
-            logs = -2.0 * float(np.sum(np.log(scale)))
         split = len(self.free)
-        return Linearized(residual, moved[:, :split], moved[:, split:], logs)
+        return Linearized(residual, moved[:, :split], moved[:, split:], float(np.sum(logs)))
 
     def cost(self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None) -> float:
         """Twice the negative log-likelihood."""
@@ -242,4 +240,5 @@ def _joined(run: Sequence[ForetoldTrial]) -> Told:
         float(sum(one.cost() for one in run)),
         np.concatenate([one.values[one.seen] for one in run]),
         np.concatenate([one.variances[one.seen] for one in run]),
+        np.concatenate([one.costs() for one in run]) if any(one.half_counts is not None for one in run) else None,
     )

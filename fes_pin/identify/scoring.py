@@ -4,6 +4,9 @@ On logarithms, with r_k and V_k the innovations and their variances, r_i and V_i
 
     g_i = sum r r_i / V + (1 - r^2 / V) V_i / (2 V),    I_ij = sum r_i r_j / V + V_i V_j / (2 V^2)
 
+Of counts that stand for intervals the slopes s_k of half the cost of each reading say both: g = sum s, I = sum s s'
+(Berndt, Hall, Hall and Hausman, Annals of Economic and Social Measurement 3, 1974).
+
 Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
 
@@ -33,11 +36,12 @@ LONGEST_MOVE = 1.5
 
 @dataclass(frozen=True)
 class Told:
-    """Innovations that were seen, of all trials end to end, with their variances; and their cost."""
+    """Innovations that were seen, all trials end to end, with their variances; their cost, of counts one by one too."""
 
     cost: float
     innovations: np.ndarray
     variances: np.ndarray
+    costs: np.ndarray | None = None
 
 
 class Foretelling(Protocol):
@@ -110,6 +114,9 @@ def _first_below(
 
 def _scored(now: Told, moved: Sequence[Told], width: float) -> tuple[np.ndarray, np.ndarray]:
     """Gradient and expected information of half the cost, of logarithms, from differences; see the module."""
+    if now.costs is not None:
+        slopes = np.stack([0.5 * (m.costs - now.costs) / width for m in moved], axis=1)
+        return slopes.sum(axis=0), slopes.T @ slopes
     r, v = now.innovations, now.variances
     dr = np.stack([(m.innovations - r) / width for m in moved], axis=1)
     dv = np.stack([(m.variances - v) / width for m in moved], axis=1) / v[:, None]

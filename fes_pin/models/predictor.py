@@ -8,12 +8,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fes_pin.data.counts import count_of
 from fes_pin.data.trial import Trial
-from fes_pin.models.compile.layout import WIDTH, doubt_constants
+from fes_pin.models.compile.layout import WIDTH, doubt_constants, half_counts
 from fes_pin.models.compile.program import compiled_program
+from fes_pin.models.counted import count_told
 from fes_pin.models.disturbance import disturbed
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import is_delayed, lane_inputs, lane_values, max_step, substeps, timing, total_delay
+
+SMALLEST = 1e-12
+"""Share of what a reading tells that a residual is divided by at least: a count far wider than what was foretold tells
+nothing."""
 
 
 @dataclass(frozen=True)
@@ -30,12 +36,16 @@ class Doubt:
     lasts_s
         How long the noise of a reading lasts, s: what is read within that time says nothing new, see
         `identify.lasting`. 0 where the noise of every sample is its own.
+    in_counts
+        Whether readings that are whole counts are taken for the intervals that these stand for, and not for numbers
+        with an error.
     """
 
     white: Mapping[str, float]
     std: Mapping[str, float] = field(default_factory=dict)
     time: Mapping[str, float] = field(default_factory=dict)
     lasts_s: float = 0.0
+    in_counts: bool = False
 
     @property
     def processes(self) -> tuple[str, ...]:
@@ -48,7 +58,7 @@ class Doubt:
         for name, value in values.items():
             part, _, which = name.partition(".")
             parts[part][which] = value
-        return Doubt(**parts, lasts_s=self.lasts_s)
+        return Doubt(**parts, lasts_s=self.lasts_s, in_counts=self.in_counts)
 
     def values(self) -> dict[str, float]:
         """Every value by name: white.position, std.effort, time.effort."""
@@ -71,6 +81,8 @@ class ForetoldTrial:
         Shape (n, outputs): True where something was measured.
     sensitivities
         Shape (n, outputs, columns): derivatives of `values`, for gains as they are.
+    half_counts
+        Shape (outputs,), where readings are taken for the intervals that their counts stand for.
     """
 
     outputs: tuple[str, ...]
@@ -78,6 +90,7 @@ class ForetoldTrial:
     variances: np.ndarray
     seen: np.ndarray
     sensitivities: np.ndarray
+    half_counts: np.ndarray | None = None
 
     def of_seen(self, array: np.ndarray) -> np.ndarray:
         """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
@@ -85,10 +98,34 @@ class ForetoldTrial:
 
     def cost(self) -> float:
         """Twice the negative log-likelihood, but for n log(2 pi); infinite where the prediction runs away."""
-        v, variance = self.of_seen(self.values), self.of_seen(self.variances)
         with np.errstate(all="ignore"):
-            total = float(np.sum(v * v / variance + np.log(variance)))
-        return total if math.isfinite(total) and bool((variance > 0).all()) else math.inf
+            total = float(np.sum(self.costs()))
+        return total if math.isfinite(total) and bool((self.of_seen(self.variances) > 0).all()) else math.inf
+
+    def costs(self) -> np.ndarray:
+        """The cost of every reading that was seen, shape (m,)."""
+        v, variance = self.of_seen(self.values), self.of_seen(self.variances)
+        return self._in_counts()[0] if self.half_counts is not None else v * v / variance + np.log(variance)
+
+    def whitened(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of what was seen: residuals over deviations, what `values` are scaled with in them, logarithms of variances.
+
+        Costs are squares of the first and the last; half their slopes by `values` the products of the first two.
+        """
+        if self.half_counts is None:
+            scale = 1.0 / np.sqrt(self.of_seen(self.variances))
+            return self.of_seen(self.values) * scale, scale, -2.0 * np.log(scale)
+        costs, mean, left, std = self._in_counts()
+        known = np.sqrt(np.maximum(1.0 - left, SMALLEST))
+        return mean / known, known / std, costs - (mean / known) ** 2
+
+    def _in_counts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Costs, m and v of `models.counted`, and standard deviations of what was foretold."""
+        assert self.half_counts is not None
+        std = np.sqrt(self.of_seen(self.variances))
+        half = self.of_seen(np.broadcast_to(self.half_counts, self.seen.shape))
+        costs, mean, left = count_told(self.of_seen(self.values) / std, half / std)
+        return costs - np.log(2.0 * np.pi) + 2.0 * np.log(std), mean, left, std
 
 
 class Predictor:
@@ -108,6 +145,8 @@ class Predictor:
         Of each trial, standard deviation of each unknown of its start about what its first samples say.
     lasts_s
         How long the noise of a reading lasts; see `Doubt`.
+    in_counts
+        Whether counts are taken for intervals; see `Doubt`.
     """
 
     def __init__(
@@ -118,12 +157,13 @@ class Predictor:
         processes: tuple[str, ...],
         priors: Sequence[Mapping[str, float]],
         lasts_s: float = 0.0,
+        in_counts: bool = False,
     ) -> None:
         self.model, self.trials, self.columns = model, tuple(trials), columns
         self.max_step_s = min([max_step(model), *(e.foretold_step_s for e in model.effects)])
         self._delayed = is_delayed(model)
         self._blocks = [
-            _Block(model, self.trials, lanes, columns, processes, priors, self.max_step_s, lasts_s)
+            _Block(model, self.trials, lanes, columns, processes, priors, self.max_step_s, lasts_s, in_counts)
             for lanes in self._groups()
         ]
 
@@ -200,6 +240,7 @@ class _Block:
         priors: Sequence[Mapping[str, float]],
         max_step_s: float,
         lasts_s: float,
+        in_counts: bool,
     ) -> None:
         first, self.lanes = trials[lanes[0]], lanes
         self.rig = rig = model.rig
@@ -208,17 +249,21 @@ class _Block:
         model = disturbed(model.acting(first.kind, rig.input_columns(first)), first.kind, processes)
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         chosen = tuple(c for c in columns if c in available)
-        self.program = compiled_program(model, first.kind, self.inputs, chosen, self.outputs)
+        self.program = compiled_program(model, first.kind, self.inputs, chosen, self.outputs, in_counts)
         self.layout = self.program.layout
         self.places = [columns.index(n) for n in self.layout.columns]
         self.substeps = substeps(model, first.dt, max_step_s)
         self.trials = [trials[i] for i in lanes]
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
+        halves = [[0.5 * count_of(t[n]) for n in self.outputs] for t in self.trials] if in_counts else None
+        self.half_counts = halves
         known = [{**rig.constants_of(t), **timing(t, self.substeps)} for t in padded]
         own = [priors[i] for i in lanes] + [priors[lanes[-1]]] * (WIDTH - len(lanes))
         for constants, prior in zip(known, own, strict=True):
             constants.update({f"prior.{n}": prior[n] for n in rig.unknowns(first.kind)})
+        for constants, half in zip(known, halves or (), strict=False):
+            constants.update(zip(half_counts(self.outputs), half, strict=True))
         self.doubtful = [n for n in doubt_constants(model, first.kind, self.outputs) if not n.startswith("prior.")]
         self.constants = np.array([[c.get(n, 0.0) for c in known] for n in self.layout.constants], dtype=float).reshape(
             -1, WIDTH
@@ -274,9 +319,9 @@ class _Block:
             else:
                 sensitivities = np.zeros((n, k, width))
                 sensitivities[..., self.places] = own
-            yield ForetoldTrial(
-                self.outputs, np.where(seen, y[:n, :k, lane], 0.0), y[:n, k:, lane], seen, sensitivities
-            )
+            half = np.array(self.half_counts[lane]) if self.half_counts else None
+            values = np.where(seen, y[:n, :k, lane], 0.0)
+            yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities, half)
 
     def foretold(self, y: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         """What is foretold in each lane, by output: what was given as measured less the innovation."""

@@ -96,7 +96,7 @@ class _Featured:
         self._problem = LikelihoodProblem(self._model, fitted.trials, fitted.doubt, free)
         self.can_keep = not self._problem.is_final
         run = self._problem.innovations(self._model.parameters(), fitted.unknowns)
-        columns = [-i.sensitivities[i.seen][:, : len(free)] / np.sqrt(i.variances[i.seen])[:, None] for i in run]
+        columns = [-i.sensitivities[i.seen][:, : len(free)] * i.whitened()[1][:, None] for i in run]
         self.columns = np.nan_to_num(np.concatenate(columns))
 
     def gained(self, amplitudes: np.ndarray) -> float:

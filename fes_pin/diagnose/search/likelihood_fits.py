@@ -9,6 +9,7 @@ from dataclasses import replace
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.cause_sets import Names, names_of
 from fes_pin.diagnose.search.library import Library
+from fes_pin.diagnose.search.likelihood_counts import LikelihoodCounts
 from fes_pin.diagnose.search.likelihood_forms import LikelihoodForms
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnose.search.likelihood_screen import LikelihoodScreen
@@ -57,6 +58,8 @@ class LikelihoodFits:
         What every cause promises beside a fit.
     forms
         Other forms of a set that is fitted.
+    counts
+        The same fits with counts as intervals.
     """
 
     def __init__(self, model: Model, trials: Sequence[Trial], effects: Sequence[type[Effect]] | None = None) -> None:
@@ -68,6 +71,7 @@ class LikelihoodFits:
         self._maxima = LikelihoodMaxima(trials)
         self.screen = LikelihoodScreen(self.library)
         self.forms = LikelihoodForms(self._maxima, self.library.measured)
+        self.counts = LikelihoodCounts(self._maxima, model.rig, self.trials)
 
     def nominal(self) -> Fit:
         """Fit the nominal model, from several sizes of what is random."""

@@ -113,11 +113,17 @@ class LikelihoodSearch:
         return self.settle(self._backward(best))
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
-        """Family-wise p-value of what a larger set adds beyond what rough likelihoods differ by."""
-        gained = smaller.sse - larger.sse
+        """Family-wise p-value of what a larger set adds beyond what rough likelihoods differ by.
+
+        Of readings in counts it is judged as intervals too: what is one gain is both.
+        """
+        gained, degrees = smaller.sse - larger.sse, max(larger.degrees - smaller.degrees, 1)
         if gained > 0.0:
             gained = max(0.0, gained - uncertain_gain(self._rough(larger), self._rough(smaller)))
-        return self.family.p_value(gained, max(larger.degrees - smaller.degrees, 1))
+        p = self.family.p_value(gained, degrees)
+        if p < DRIVEN_LEVEL and self.sets.counts.are_there:
+            p = max(p, self.family.p_value(max(0.0, self.sets.counts.gained(larger, smaller)), degrees))
+        return p
 
     def _rough(self, fitted: Fit) -> float:
         """How rough the likelihood is about a fit."""

@@ -1,0 +1,37 @@
+"""Pendulums that are held on top before encoders of 4096 counts a turn: counts that stand or hunt are no friction."""
+
+import pytest
+from driven_rigs.swing_up import draw_swing_up
+
+from fes_pin.data.study import read_study
+from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.models.effects import CoulombFriction
+from fes_pin.models.nominal import nominal_model
+
+HELD = (1810006, 1810010)
+"""Of `scripts/driven --swing-up --seed 1810000`: those that hide nothing and were told dry friction."""
+
+
+@pytest.mark.parametrize("seed", HELD)
+def test_a_count_that_hunts_is_no_friction(seed, tmp_path):
+    found = diagnose_joint(read_study(draw_swing_up((), seed, tmp_path).study))
+    assert found.verdict == "adequate", str(found)
+
+
+@pytest.mark.parametrize("seed", HELD)
+def test_as_intervals_counts_tell_nothing_of_friction_that_is_not_there(seed, tmp_path):
+    """As numbers with an error they do, by 38 and 44 in twice the log-likelihood; friction that is there both tell."""
+    study = read_study(draw_swing_up((), seed, tmp_path).study)
+    sets = LikelihoodFits(nominal_model(study), study.trials, [CoulombFriction])
+    none = sets.nominal()
+    sets.extend_all(())
+    friction = sets.fits["coulomb_friction",]
+    assert none.sse - friction.sse > 30.0
+    assert sets.counts.gained(friction, none) < 4.0
+
+
+def test_friction_that_is_there_is_found_in_counts(tmp_path):
+    study = read_study(draw_swing_up(("coulomb_friction",), HELD[0], tmp_path).study)
+    found = diagnose_joint(study)
+    assert [c.name for c in found.causes][:1] == ["coulomb_friction"], str(found)
