@@ -29,6 +29,7 @@ class Sets:
     def __init__(self):
         self.fits, self.trials = {(): self.fit(())}, ()
         self.library = SimpleNamespace(silent=lambda: ())
+        self.counts = SimpleNamespace(are_there=False)
         self.screen = SimpleNamespace(scores=lambda base: Scores([], np.zeros((0, 0)), np.zeros(0), []))
         self.forms = SimpleNamespace(
             refined=lambda base: None, simplified=lambda base: None, reformed=lambda base: None
@@ -38,6 +39,9 @@ class Sets:
         sse = PRICE[names]
         model = SimpleNamespace(effects=())
         return SimpleNamespace(names=names, sse=sse, price=sse + 5.0 * len(names), degrees=len(names), model=model)
+
+    def gained(self, larger, smaller):
+        return smaller.sse - larger.sse
 
     def extend_all(self, base, most=None):
         for name in ("lag", "tendon", "velocity"):

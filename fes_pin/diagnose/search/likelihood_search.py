@@ -22,7 +22,6 @@ from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import DRIVEN_LEVEL, EXTEND_LEVEL
-from fes_pin.identify.roughness import roughness, uncertain_gain
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
 MOST_IMPOSED = 8
@@ -75,7 +74,6 @@ class LikelihoodSearch:
         self.sets, self.seed, self.progress = sets, seed, progress
         self.was_stopped, self._end = False, math.inf
         self._formed: set[Names] = set()
-        self._roughness: dict[int, tuple[Fit, float]] = {}
 
     def run(self) -> Found:
         """Search, as long as the limit of time lets it; the nominal model is fitted and scored anyway."""
@@ -113,23 +111,12 @@ class LikelihoodSearch:
         return self.settle(self._backward(best))
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
-        """Family-wise p-value of what a larger set adds beyond what rough likelihoods differ by.
-
-        Of readings in counts it is judged as intervals too: what is one gain is both.
-        """
-        gained, degrees = smaller.sse - larger.sse, max(larger.degrees - smaller.degrees, 1)
-        if gained > 0.0:
-            gained = max(0.0, gained - uncertain_gain(self._rough(larger), self._rough(smaller)))
-        p = self.family.p_value(gained, degrees)
+        """Family-wise p-value of what a larger set adds; of readings in counts also where these are intervals."""
+        degrees = max(larger.degrees - smaller.degrees, 1)
+        p = self.family.p_value(self.sets.gained(larger, smaller), degrees)
         if p < DRIVEN_LEVEL and self.sets.counts.are_there:
-            p = max(p, self.family.p_value(max(0.0, self.sets.counts.gained(larger, smaller)), degrees))
+            p = max(p, self.family.p_value(self.sets.counts.gained(larger, smaller), degrees))
         return p
-
-    def _rough(self, fitted: Fit) -> float:
-        """How rough the likelihood is about a fit."""
-        if self._roughness.get(id(fitted), (None,))[0] is not fitted:
-            self._roughness[id(fitted)] = (fitted, roughness(fitted))
-        return self._roughness[id(fitted)][1]
 
     def _worth_extending(self, names: Names) -> bool:
         """True where the score of a further cause beside a set is not what chance brings."""
