@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from fes_pin.data.counts import count_of
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -78,9 +79,15 @@ __all__ = ["with_new_noise"]
 
 
 def words_of_smoothing(doubt: Doubt | None, rig: Rig, trial: Trial) -> tuple[str, ...]:
-    """What is to be said of a reading whose noise lasts over samples, if it does."""
+    """What is to be said of a reading whose noise lasts over samples, if it does.
+
+    Neighbours that stand on one count err alike; else a record was smoothed.
+    """
     if doubt is None or not doubt.lasts_s:
         return ()
     step = round(doubt.lasts_s / trial.dt)
-    said = f"{rig.output(trial.kind)} was smoothed or interpolated before it was stored: its noise lasts"
-    return (f"{said} {doubt.lasts_s:.2g} s, and one sample in {step} counts as a reading",)
+    name = rig.output(trial.kind)
+    count = count_of(trial[name]) if name in trial.columns else 0.0
+    said = f"is read in counts of {count:.2g}" if count else "was smoothed or interpolated before it was stored"
+    lasts = f"its noise lasts {doubt.lasts_s:.2g} s, and one sample in {step} counts as a reading"
+    return (f"{name} {said}: {lasts}",)

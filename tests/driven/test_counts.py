@@ -17,6 +17,7 @@ HELD = (1810006, 1810010)
 def test_a_count_that_hunts_is_no_friction(seed, tmp_path):
     found = diagnose_joint(read_study(draw_swing_up((), seed, tmp_path).study))
     assert found.verdict == "adequate", str(found)
+    assert not any("smoothed or interpolated" in said for said in found.warnings)
 
 
 @pytest.mark.parametrize("seed", HELD)
