@@ -27,7 +27,7 @@ from fes_pin.identify.scoring import Told, score_doubt
 from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, ForetoldTrial, Predictor
-from fes_pin.workers import in_parallel
+from fes_pin.workers import check_limit, in_parallel
 
 FOLLOWED_STEP = 0.01
 """Step of a difference of the cost by a parameter of the reading, in its standard deviations."""
@@ -95,7 +95,8 @@ class LikelihoodProblem:
     def innovations(
         self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None
     ) -> list[ForetoldTrial]:
-        """Every trial as foretold, with sensitivities to `free` and to the effects' unknowns."""
+        """Every trial as foretold, with sensitivities to `free` and to the effects' unknowns; see `linearize`."""
+        check_limit()
         own = [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)]
         with np.errstate(all="ignore"):
             return self.predictor.run(values, doubt or self.doubt, own)
@@ -117,6 +118,7 @@ class LikelihoodProblem:
         predictor = self._abreast
 
         def abreast(some: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[Told]:
+            check_limit()
             filled = [*some, *[some[-1]] * (count - len(some))]
             values, doubts = ([one[j] for one in filled for _ in range(trials)] for j in (0, 2))
             own = [{**begin, **u} for one in filled for begin, u in zip(self.begins, one[1], strict=True)]
@@ -139,7 +141,7 @@ class LikelihoodProblem:
             return self.predictor.foretell(values, self.doubt, own)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """Innovations over their deviations, and sensitivities, at a parameter value."""
+        """Innovations over their deviations, and sensitivities, at a parameter value; see `check_limit`."""
         parts = [self._whitened(one) for one in self.innovations(values, unknowns)]
         return self._followed(parts, values, unknowns) if self.followed else parts
 
