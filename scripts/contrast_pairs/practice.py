@@ -37,5 +37,6 @@ def _with(trial: Trial, change: str) -> Trial:
     width = trial["pulse_width_us"]
     if change == "threshold_shift":
         return trial.with_columns(pulse_width_us=np.where(width > 0.0, width + 25.0, 0.0))
-    early = round(0.02 / trial.dt)  # the stimulus is recorded 20 ms before it acts
-    return trial.with_columns(pulse_width_us=np.concatenate([width[early:], np.repeat(width[-1:], early)]))
+    late = round(0.02 / trial.dt)  # it answers 20 ms later; before it rests, where a stimulus may already act
+    read = {n: v for n, v in trial.columns.items() if n in ("angle_rad", "force_n")}
+    return trial.with_columns(**{n: np.concatenate([np.repeat(v[:1], late), v[:-late]]) for n, v in read.items()})
