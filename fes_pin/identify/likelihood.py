@@ -25,8 +25,9 @@ from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Linearized, Unknowns, limits_of, whitened_sse
 from fes_pin.identify.scoring import Told, score_doubt
 from fes_pin.models.compile.layout import WIDTH
+from fes_pin.models.foretold import ForetoldTrial
 from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt, ForetoldTrial, Predictor
+from fes_pin.models.predictor import Doubt, Predictor
 from fes_pin.workers import check_limit, in_parallel
 
 FOLLOWED_STEP = 0.01

@@ -20,7 +20,10 @@ SURE = normal_quantile(0.95)
 
 
 def roughness(fitted: Fit) -> float:
-    """Root mean square of what the cost rises by other than a parabola, half a deviation along its axes."""
+    """Root mean square of what the cost rises by other than a parabola, half a deviation along its axes.
+
+    In twice the log-likelihood, of a fit by it; 0 where no parameter is known, or the cost is no number.
+    """
     assert fitted.doubt is not None
     known = np.isfinite(np.diag(fitted.covariance)) & (np.diag(fitted.covariance) > 0.0)
     if not known.any() or not np.isfinite(fitted.sse):

@@ -12,14 +12,10 @@ from fes_pin.data.counts import count_of
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile.layout import WIDTH, doubt_constants, half_counts
 from fes_pin.models.compile.program import compiled_program
-from fes_pin.models.counted import count_told
 from fes_pin.models.disturbance import disturbed
+from fes_pin.models.foretold import ForetoldTrial
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import is_delayed, lane_inputs, lane_values, max_step, substeps, timing, total_delay
-
-SMALLEST = 1e-12
-"""Share of what a reading tells that a residual is divided by at least: a count far wider than what was foretold tells
-nothing."""
 
 
 @dataclass(frozen=True)
@@ -63,69 +59,6 @@ class Doubt:
     def values(self) -> dict[str, float]:
         """Every value by name: white.position, std.effort, time.effort."""
         return {f"{part}.{n}": v for part in ("white", "std", "time") for n, v in getattr(self, part).items()}
-
-
-@dataclass(frozen=True)
-class ForetoldTrial:
-    """One trial as it was foretold, sample by sample.
-
-    Attributes
-    ----------
-    outputs
-        The measured columns, in the order of the arrays.
-    values
-        Shape (n, outputs): measured minus foretold one sample ahead; 0 where nothing was measured.
-    variances
-        Shape (n, outputs).
-    seen
-        Shape (n, outputs): True where something was measured.
-    sensitivities
-        Shape (n, outputs, columns): derivatives of `values`, for gains as they are.
-    half_counts
-        Shape (outputs,), where readings are taken for the intervals that their counts stand for.
-    """
-
-    outputs: tuple[str, ...]
-    values: np.ndarray
-    variances: np.ndarray
-    seen: np.ndarray
-    sensitivities: np.ndarray
-    half_counts: np.ndarray | None = None
-
-    def of_seen(self, array: np.ndarray) -> np.ndarray:
-        """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
-        return array.reshape(-1, *array.shape[2:]) if self.seen.all() else array[self.seen]
-
-    def cost(self) -> float:
-        """Twice the negative log-likelihood, but for n log(2 pi); infinite where the prediction runs away."""
-        with np.errstate(all="ignore"):
-            total = float(np.sum(self.costs()))
-        return total if math.isfinite(total) and bool((self.of_seen(self.variances) > 0).all()) else math.inf
-
-    def costs(self) -> np.ndarray:
-        """The cost of every reading that was seen, shape (m,)."""
-        v, variance = self.of_seen(self.values), self.of_seen(self.variances)
-        return self._in_counts()[0] if self.half_counts is not None else v * v / variance + np.log(variance)
-
-    def whitened(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of what was seen: residuals over deviations, what `values` are scaled with in them, logarithms of variances.
-
-        Costs are squares of the first and the last; half their slopes by `values` the products of the first two.
-        """
-        if self.half_counts is None:
-            scale = 1.0 / np.sqrt(self.of_seen(self.variances))
-            return self.of_seen(self.values) * scale, scale, -2.0 * np.log(scale)
-        costs, mean, left, std = self._in_counts()
-        known = np.sqrt(np.maximum(1.0 - left, SMALLEST))
-        return mean / known, known / std, costs - (mean / known) ** 2
-
-    def _in_counts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Costs, m and v of `models.counted`, and standard deviations of what was foretold."""
-        assert self.half_counts is not None
-        std = np.sqrt(self.of_seen(self.variances))
-        half = self.of_seen(np.broadcast_to(self.half_counts, self.seen.shape))
-        costs, mean, left = count_told(self.of_seen(self.values) / std, half / std)
-        return costs - np.log(2.0 * np.pi) + 2.0 * np.log(std), mean, left, std
 
 
 class Predictor:

@@ -69,6 +69,11 @@ def test_a_count_is_found_in_what_was_read():
     assert count_of(1e-6 * np.round(rng.normal(size=4000) / 1e-6)) == 0.0  # far below its noise
 
 
+@pytest.mark.parametrize("values", [(0.0, 1e-300, 1e300), (-1e308, 1e308, 1e308), (0.0, 1e-17, 1.0)], ids=str)
+def test_what_no_encoder_reads_is_in_no_counts(values):
+    assert count_of(np.repeat(values, 5)) == 0.0
+
+
 def recorded(seed, n=300):
     """A slide that a slow torque moves by a few counts, read with little noise."""
     rng = np.random.default_rng(seed)
