@@ -1,4 +1,4 @@
-"""How a log differs from what acted and from what was read: when it was written down, and what it was smoothed by."""
+"""How a log differs from what acted and from what was read: how late, with what noise, and smoothed by what it is."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fes_pin.data.answered import Answer, answer_of
 from fes_pin.data.trial import Trial
 
-LATE_COLUMN = "effort"
-"""What a controller's log may write down after it acted."""
+EFFORT = "effort"
+"""What a controller's log may write down after it acted, or with noise."""
 
 
 @dataclass(frozen=True)
@@ -20,18 +21,33 @@ class Log:
     ----------
     effort_late_s
         How long after it acted the effort is written down, s.
+    effort_noise
+        Standard deviation of the white noise that the effort is recorded with, in its unit.
     low_pass_hz
         Cut-off of the low pass, without delay, that readings go through before they are stored, Hz; None of none.
     """
 
     effort_late_s: float = 0.0
+    effort_noise: float = 0.0
     low_pass_hz: float | None = None
 
     def applied(self, trial: Trial) -> Trial:
-        """The trial with its effort where it acted, and with what is simulated of it low-passed as its readings are."""
-        late = self.effort_late_s and LATE_COLUMN in trial
-        timed = advanced(trial, LATE_COLUMN, self.effort_late_s) if late else trial
-        return replace(timed, low_pass_hz=self.low_pass_hz) if self.low_pass_hz else timed
+        """The trial with its effort as and when it acted, and what is simulated of it low-passed as readings are."""
+        if EFFORT in trial and self.effort_noise:
+            trial = quiet(trial, answered(trial), self.effort_noise)
+        if EFFORT in trial and self.effort_late_s:
+            trial = advanced(trial, EFFORT, self.effort_late_s)
+        return replace(trial, low_pass_hz=self.low_pass_hz) if self.low_pass_hz else trial
+
+
+def answered(trial: Trial) -> Answer:
+    """What the trial's effort answers to all else that was recorded of it."""
+    return answer_of(trial[EFFORT], [values for n, values in trial.columns.items() if n != EFFORT])
+
+
+def quiet(trial: Trial, answer: Answer, noise: float) -> Trial:
+    """The trial without so much noise of its effort as its answer tells; see `Answer.quieted`."""
+    return trial.with_columns(**{EFFORT: answer.quieted(trial[EFFORT], noise)})
 
 
 def advanced(trial: Trial, column: str, by_s: float) -> Trial:

@@ -19,9 +19,10 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.driven import driven_diagnosis
 from fes_pin.diagnose.free import judge_free, unfitted
-from fes_pin.diagnose.late_effort import better_timed, in_time, late_by
+from fes_pin.diagnose.logged import LogFaults, likelier, with_words
 from fes_pin.diagnose.long_records import searched_part, thinned
 from fes_pin.diagnose.misread import NAME as MISREAD
+from fes_pin.diagnose.parts import in_parts
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.restate import restated_study, search_with_conditions, with_misread
 from fes_pin.diagnose.result import Diagnosis
@@ -77,11 +78,7 @@ def diagnose_joint(
     warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
     work = _Work(catalogue, seed, tell, math.inf if limit is None else began + limit)
     with one_thread_each():
-        diagnosis = work.diagnosis(measured.study)
-        if not work.was_stopped and (passed := _low_passed(diagnosis, work.end)) is not None:
-            diagnosis = _likelier(work.diagnosis(passed), diagnosis)
-        if not work.was_stopped and (late_s := late_by(diagnosis, work.end)) is not None:
-            diagnosis = better_timed(work.diagnosis(in_time(measured.study, late_s)), diagnosis, late_s)
+        diagnosis = work.diagnosis_of_log(measured.study)
     tell(1.0, "done")
     warnings += diagnosis.warnings
     if work.was_stopped:
@@ -108,6 +105,28 @@ class _Work:
 
     def __init__(self, catalogue: Catalogue, seed: int, tell: Progress, end: float) -> None:
         self.catalogue, self.seed, self.tell, self.end, self.was_stopped = catalogue, seed, tell, end, False
+
+    def diagnosis_of_log(self, study: Study) -> Diagnosis:
+        """The diagnosis of a study as its log wrote it down, with what that did to its trials undone if it can be."""
+        nominal, (train, _) = nominal_model(study), split(study)
+        driven = is_fed_back(nominal.rig, train)
+        faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
+        log = Log(effort_noise=faults.noise_beside_nominal(nominal)) if driven else Log()
+        found = self._logged(study, log)
+        if not self.was_stopped and (passed := _low_passed(found, self.end)) is not None:
+            found = _likelier(self.diagnosis(passed), found)
+        if found.extended.doubt is None or not all("effort" in nominal.rig.input_columns(t) for t in study.trials):
+            return found
+        if not self.was_stopped and (noise := faults.noise_beside(found)) != found.log.effort_noise:
+            found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
+        if not self.was_stopped and (late_s := faults.late_by(found)):
+            found = likelier(self._logged(study, replace(found.log, effort_late_s=late_s)), found)
+        return with_words(found)
+
+    def _logged(self, study: Study, log: Log) -> Diagnosis:
+        """The diagnosis of a study with what a log did to its trials undone."""
+        found = self.diagnosis(replace(study, trials=tuple(log.applied(t) for t in study.trials)))
+        return replace(found, log=log)
 
     def diagnosis(self, study: Study) -> Diagnosis:
         """Search the causes of one study, and judge what is found."""
@@ -143,6 +162,12 @@ class _Work:
                 search, searched = searches.by_likelihood(train)
             diagnosis = _judged(whole, search, searched, (train, test), self.seed)
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
+
+
+def _searched(study: Study, trials: Sequence[Trial], driven: bool) -> list[Trial]:
+    """What a search by the likelihood fits of the trials of a study."""
+    train, _ = split(replace(study, trials=tuple(trials)))
+    return in_parts(nominal_model(study).rig, searched_part(train, study.schema, driven)[0])
 
 
 def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:

@@ -1,0 +1,128 @@
+"""What a controller answers, foretold by what it read: what is left is the noise that its effort was recorded with.
+
+A controller asks for an effort by what it reads, now and lately. While it keeps its ways, that is a linear function of
+each reading y, of its last difference, and of its distance from low passes P_i of it, with time constants of 1, 2, 4,
+8 ... samples, of which filtered rates and integrals are made; what is wanted comes in as a constant and a trend:
+
+    u_k = a + b k + c y_k + d (y_k - y_(k-1)) + sum e_i (y_k - P_i y_k)
+
+A trial is cut into short stretches, and neighbours are joined while they answer alike (Chow's test). Noise that the
+effort was recorded with is in no reading of the rig, and stays outside: over a long stretch the answer is the effort
+that acted.
+
+Source: Chow, Tests of equality between sets of coefficients in two linear regressions, Econometrica 28 (1960).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.special import fdtrc
+
+LOW_PASSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+"""Time constants of the low passes, in samples: between two of them a filter is nearly a mean of both."""
+SHORTEST = 4
+"""Samples of a stretch at least, for each coefficient: as few as tell how much is left within a tenth or two."""
+APART_LEVEL = 0.01
+"""At which two stretches answer differently: one too many costs a few samples, one too few mixes two ways."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a controller answers.
+
+    Attributes
+    ----------
+    values
+        Shape (n,), the effort as it is foretold from the readings.
+    left_std
+        Shape (n,), standard deviation of what is left of the effort, over the stretch about each sample.
+    """
+
+    values: np.ndarray
+    left_std: np.ndarray
+
+    def quieted(self, effort: np.ndarray, noise: float) -> np.ndarray:
+        """The effort that acted, shape (n,), as far as a recorded one with noise of this standard deviation tells.
+
+        What is left of it, of variance s^2, is noise and what the answer does not foretell, a share 1 - noise^2 / s^2
+        of it, as Wiener's filter has it.
+        """
+        share = np.maximum(0.0, 1.0 - (noise / np.maximum(self.left_std, 1e-300)) ** 2)
+        return np.asarray(self.values + share * (effort - self.values))
+
+
+def answer_of(effort: np.ndarray, readings: Sequence[np.ndarray]) -> Answer:
+    """The answer to some readings that an effort is.
+
+    Parameters
+    ----------
+    effort
+        Shape (n,).
+    readings
+        Each of shape (n,); NaN where nothing was read.
+    """
+    columns = _columns(readings, len(effort))
+    values, left = effort.copy(), np.zeros(len(effort))
+    for begin, end, triangle in _stretches(np.column_stack([columns, effort])):
+        solved = np.linalg.lstsq(triangle[:-1, :-1], triangle[:-1, -1], rcond=1e-9)[0]
+        values[begin:end] = columns[begin:end] @ solved
+        left[begin:end] = np.sqrt(_missed(triangle) / max(end - begin - columns.shape[1], 1))
+    return Answer(values, left)
+
+
+def _columns(readings: Sequence[np.ndarray], n: int) -> np.ndarray:
+    """What an answer is a linear function of, each scaled to a deviation of 1, shape (n, coefficients)."""
+    from scipy.signal import lfilter  # noqa: PLC0415 - half a second, for rigs that a controller drives
+
+    out = [np.ones(n), np.linspace(-1.0, 1.0, n)]
+    for reading in readings:
+        seen = np.isfinite(reading)
+        if not seen.any():
+            continue
+        y = np.interp(np.arange(n), np.flatnonzero(seen), reading[seen])
+        y = y - y.mean()
+        apart = [y, np.diff(y, prepend=y[0])]
+        for samples in LOW_PASSES:
+            kept = np.exp(-1.0 / samples)
+            apart.append(y - lfilter([1.0 - kept], [1.0, -kept], y, zi=[kept * y[0]])[0])
+        out += [one / max(float(one.std()), 1e-300) for one in apart]
+    return np.stack(out, axis=1)
+
+
+def _stretches(rows: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
+    """Stretches that answer alike, first and behind the last sample of each, and the triangle R of its rows' QR."""
+    width = rows.shape[1] - 1
+    ends = np.linspace(0, len(rows), max(1, len(rows) // (SHORTEST * width)) + 1).astype(int)
+    begin, now = 0, _triangle(rows[: ends[1]])
+    for first, last in pairwise(ends[1:]):
+        following = _triangle(rows[first:last])
+        both = _triangle(np.vstack([now, following]))
+        if _differ(_missed(now) + _missed(following), _missed(both), width, int(last) - begin):
+            yield begin, int(first), now
+            begin, now = int(first), following
+        else:
+            now = both
+    yield begin, len(rows), now
+
+
+def _triangle(rows: np.ndarray) -> np.ndarray:
+    """R of the QR of rows, square: with rows of zeros where they are fewer than columns."""
+    missing = np.zeros((max(0, rows.shape[1] - len(rows)), rows.shape[1]))
+    return np.asarray(np.linalg.qr(np.vstack([rows, missing]), mode="r"))
+
+
+def _missed(triangle: np.ndarray) -> float:
+    """Sum of squares that the last column's regression on the others leaves."""
+    return float(triangle[-1, -1] ** 2)
+
+
+def _differ(apart: float, together: float, width: int, n: int) -> bool:
+    """Chow's test of what two stretches leave apart and together."""
+    under = n - 2 * width
+    if under < 1 or not together > apart:
+        return False
+    return bool(fdtrc(width, under, (together - apart) / width / max(apart / under, 1e-300)) < APART_LEVEL)

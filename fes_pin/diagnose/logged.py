@@ -1,0 +1,109 @@
+"""Efforts that were recorded late, or with noise: faults of the log, not of the rig."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from fes_pin.data.answered import Answer
+from fes_pin.data.log import answered
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.result import Diagnosis
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.identify.effort_noise import Prepared, cost_beside, effort_noise_of, words_of_noise
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.lateness import lateness_of, words_of_lateness
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.turns import maximise
+from fes_pin.models.model import Model
+from fes_pin.workers import OutOfTime, in_parallel, time_limit
+
+
+class LogFaults:
+    """What the log of a rig that a recorded effort drives did to that effort.
+
+    Parameters
+    ----------
+    trials
+        As recorded, those that are held out among them.
+    prepared
+        What a search makes of them before it fits them.
+    end
+        When searches must have ended, of `time.perf_counter`.
+    """
+
+    def __init__(self, trials: Sequence[Trial], prepared: Prepared, end: float) -> None:
+        self.trials, self.prepared, self._end = tuple(trials), prepared, end
+
+    @cached_property
+    def answers(self) -> list[Answer]:
+        """What the effort of each trial answers."""
+        return in_parallel(answered, self.trials)
+
+    def noise_beside_nominal(self, nominal: Model) -> float:
+        """Noise of the efforts, in their unit, beside a model without causes; 0 where nothing speaks for it."""
+        return self._told(lambda: self._noise(LikelihoodFits(nominal, self.prepared(self.trials), ()).nominal()))
+
+    def noise_beside(self, diagnosis: Diagnosis) -> float:
+        """The same beside a diagnosis; what was taken out for it is put back where efforts are likelier with it."""
+        fitted, known = diagnosis.extended, diagnosis.log.effort_noise
+        if known:
+            return known * self._told(lambda: float(fitted.sse < cost_beside(fitted, self.prepared(self.trials))), 1.0)
+        return self._told(lambda: self._noise(fitted)) if diagnosis.verdict != "adequate" else 0.0
+
+    def _noise(self, fitted: Fit) -> float:
+        return effort_noise_of(fitted, self.trials, self.answers, self.prepared)
+
+    def late_by(self, diagnosis: Diagnosis) -> float:
+        """How late the efforts were written down, s; 0 where they were not, or there is no time to tell.
+
+        Where something is left beside the causes that were found, they may stand for it: then the nominal model is
+        asked.
+        """
+        row_s = min(t.dt for t in diagnosis.extended.trials)
+        late = self._told(lambda: lateness_of(diagnosis.extended, row_s) or 0.0)
+        if not late and diagnosis.causes and diagnosis.remainder.unexplained:
+            late = self._told(lambda: lateness_of(diagnosis.nominal, row_s) or 0.0)
+        return late
+
+    def _told(self, ask: Callable[[], float], otherwise: float = 0.0) -> float:
+        """What is told in the time that is left."""
+        try:
+            with time_limit(self._end - time.perf_counter()):
+                return ask()
+        except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
+            return otherwise
+
+
+def likelier(other: Diagnosis, one: Diagnosis) -> Diagnosis:
+    """Another diagnosis of the same readings, by other efforts, if it is likelier; else the one."""
+    return other if _is_likelier(other.extended, one.extended) else one
+
+
+def with_words(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis with what is to be said of efforts that are not as they were recorded."""
+    log, said = diagnosis.log, []
+    if log.effort_late_s:
+        said.append(words_of_lateness(log.effort_late_s))
+    if log.effort_noise:
+        said.append(words_of_noise(log.effort_noise, diagnosis.model.rig.units()["effort"]))
+    return replace(diagnosis, warnings=(*said, *diagnosis.warnings))
+
+
+def _is_likelier(one: Fit, other: Fit) -> bool:
+    """True if the same readings are foretold better for as many parameters: those that are news to both."""
+    lasts_s = max(f.doubt.lasts_s for f in (one, other) if f.doubt is not None)
+    first, second = (_with_noise_that_lasts(f, lasts_s) for f in (one, other))
+    return first.price < second.price
+
+
+def _with_noise_that_lasts(fitted: Fit, lasts_s: float) -> Fit:
+    """The fit to readings so far apart."""
+    if fitted.doubt is None or fitted.doubt.lasts_s == lasts_s:
+        return fitted
+    problem = LikelihoodProblem(fitted.model, fitted.trials, replace(fitted.doubt, lasts_s=lasts_s))
+    return maximise(problem, fitted.values, fitted.unknowns)

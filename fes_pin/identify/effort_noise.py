@@ -1,0 +1,63 @@
+"""With how much noise an effort was recorded.
+
+A measured current has noise of its own, which moves nothing. A filter takes it for effort: a rig that a controller
+holds seems to be moved less than by what is recorded, as dry friction would have it. What a controller answers tells
+the noise from what acted (`data.answered`); how much of it there is the likelihood says, beside a model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from fes_pin.data.answered import Answer
+from fes_pin.data.log import quiet
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.lateness import LEAST_GAIN
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.turns import maximise
+from fes_pin.workers import in_parallel
+
+SHARES = (0.1, 0.25, 0.5, 0.75)
+"""Shares of the samples whose answer leaves less than a noise that is tried: noise is the same everywhere, and what it
+is not foretold by is not, so that where an answer is known at all it leaves little else."""
+
+Prepared = Callable[[Sequence[Trial]], Sequence[Trial]]
+"""What a search makes of recorded trials before it fits them."""
+
+
+def effort_noise_of(fitted: Fit, trials: Sequence[Trial], answers: Sequence[Answer], prepared: Prepared) -> float:
+    """Standard deviation of the noise of an effort, in its unit; 0 where nothing speaks for one.
+
+    Parameters
+    ----------
+    fitted
+        By the likelihood, to what `prepared` makes of the trials.
+    trials, answers
+        As recorded, and what their efforts answer.
+    """
+    left = np.concatenate([a.left_std for a in answers])
+    tried = [float(v) for v in np.unique(np.quantile(left, SHARES)) if v > 0.0]
+    costs = in_parallel(lambda noise: cost_beside(fitted, prepared(quieted(trials, answers, noise))), tried)
+    best = int(np.argmin(costs)) if tried else 0
+    return tried[best] if tried and costs[best] < fitted.sse - LEAST_GAIN else 0.0
+
+
+def quieted(trials: Sequence[Trial], answers: Sequence[Answer], noise: float) -> list[Trial]:
+    """The trials without so much noise of their efforts."""
+    return [quiet(t, a, noise) for t, a in zip(trials, answers, strict=True)]
+
+
+def cost_beside(fitted: Fit, trials: Sequence[Trial]) -> float:
+    """Twice the negative log-likelihood of trials in place of those of a fit, at its maximum for the same model."""
+    assert fitted.doubt is not None
+    return maximise(LikelihoodProblem(fitted.model, trials, fitted.doubt), fitted.values, fitted.unknowns).sse
+
+
+def words_of_noise(noise: float, unit: str) -> str:
+    """What is to be said of efforts whose noise was taken out."""
+    return (
+        f"the effort was recorded with noise of {noise:.2g} {unit}, which was taken out where the readings foretell it"
+    )
