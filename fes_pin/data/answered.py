@@ -51,8 +51,9 @@ class Answer:
         What is left of it, of variance s^2, is noise and what the answer does not foretell, a share 1 - noise^2 / s^2
         of it, as Wiener's filter has it.
         """
-        share = np.maximum(0.0, 1.0 - (noise / np.maximum(self.left_std, 1e-300)) ** 2)
-        return np.asarray(self.values + share * (effort - self.values))
+        all_noise = np.ones_like(self.left_std)
+        of_left = np.divide(noise, self.left_std, out=all_noise, where=self.left_std > noise)
+        return np.asarray(self.values + (1.0 - of_left**2) * (effort - self.values))
 
 
 def answer_of(effort: np.ndarray, readings: Sequence[np.ndarray]) -> Answer:

@@ -20,7 +20,7 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
 from fes_pin.workers import in_parallel
 
-SHARES = (0.1, 0.25, 0.5, 0.75)
+TRIED = (0.1, 0.25, 0.5, 0.75)
 """Shares of the samples whose answer leaves less than a noise that is tried: noise is the same everywhere, and what it
 is not foretold by is not, so that where an answer is known at all it leaves little else."""
 
@@ -39,10 +39,10 @@ def effort_noise_of(fitted: Fit, trials: Sequence[Trial], answers: Sequence[Answ
         As recorded, and what their efforts answer.
     """
     left = np.concatenate([a.left_std for a in answers])
-    tried = [float(v) for v in np.unique(np.quantile(left, SHARES)) if v > 0.0]
+    tried = [0.0, *(float(v) for v in np.unique(np.quantile(left, TRIED)))]
     costs = in_parallel(lambda noise: cost_beside(fitted, prepared(quieted(trials, answers, noise))), tried)
-    best = int(np.argmin(costs)) if tried else 0
-    return tried[best] if tried and costs[best] < fitted.sse - LEAST_GAIN else 0.0
+    best = int(np.argmin(costs))
+    return tried[best] if costs[best] < costs[0] - LEAST_GAIN else 0.0
 
 
 def quieted(trials: Sequence[Trial], answers: Sequence[Answer], noise: float) -> list[Trial]:
