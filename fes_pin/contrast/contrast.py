@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,9 +21,11 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.diagnosis import measured_study, split
+from fes_pin.diagnose.logged import LogFaults
 from fes_pin.diagnose.long_records import searched_part
 from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.open_set import Remainder
+from fes_pin.identify.effort_noise import words_of_noise
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.lasting import words_of_smoothing
 from fes_pin.identify.lateness import words_of_lateness
@@ -78,10 +81,12 @@ def contrast(
     measured = measured_study(grouped_study(study, after, by, groups))
     joined, nominal = measured.study, nominal_model(measured.study)
     names = tuple(dict.fromkeys(t.group for t in joined.trials if t.group is not None))
-    trials, driven, said = _by_group(joined, names, nominal)
-    said = [*measured.warnings, *check_study(joined, nominal), *said]
+    noted = [*measured.warnings, *check_study(joined, nominal)]
     with one_thread_each():
         effects = catalogue.effects_for(nominal.rig)
+        joined, words = _quieted(joined, names, nominal)
+        trials, driven, said = _by_group(joined, names, nominal)
+        said = [*noted, *words, *said]
 
         def run(those: Trials) -> tuple[Fits, ContrastFound]:
             made = Fits(nominal, those, effects, driven)
@@ -141,6 +146,24 @@ def _by_group(study: Study, names: Sequence[str], nominal: Model) -> tuple[dict[
     if any(len(many) < 2 for many in trials.values()):
         warnings.append("a group has one trial only: how much repeats differ is judged from its parts")
     return trials, fed_back or any(t.kind == IMPOSED for t in train), warnings
+
+
+def _quieted(study: Study, names: Sequence[str], nominal: Model) -> tuple[Study, list[str]]:
+    """The study without noise that the efforts of all groups were recorded with, and what is to be said of it."""
+    train, _ = split(study)
+    if not is_fed_back(nominal.rig, train):
+        return study, []
+
+    def prepared(trials: Sequence[Trial]) -> list[Trial]:
+        by_group, _, _ = _by_group(replace(study, trials=tuple(trials)), names, nominal)
+        return [t for many in by_group.values() for t in many]
+
+    noise = LogFaults(study.trials, prepared, math.inf).noise_beside_nominal(nominal)
+    if not noise:
+        return study, []
+    log = Log(effort_noise=noise)
+    quiet = replace(study, trials=tuple(log.applied(t) for t in study.trials))
+    return quiet, [words_of_noise(noise, nominal.rig.units()["effort"])]
 
 
 def _smoothed(best: Grouped, trials: Trials) -> tuple[str, ...]:

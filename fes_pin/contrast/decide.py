@@ -59,15 +59,22 @@ def p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> fl
     the spread between trials. A repeat that differs by more than its noise is no change.
     """
     degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
-    noise = family.p_value(smaller.fit.sse - larger.fit.sse, degrees)
+    noise = noise_p_value(fits, family, larger, smaller)
     if not noise < CLAIM_LEVEL:
         return noise
     return max(noise, family.adjusted(between_trials(fits, larger, fits.weighed_as(smaller, larger), degrees)))
 
 
-def noise_p_value(family: Family, larger: Grouped, smaller: Grouped) -> float:
-    """Family-wise p-value against the noise alone: of a cause of all groups, which claims no change."""
-    return family.p_value(smaller.fit.sse - larger.fit.sse, max(len(larger.fit.free) - len(smaller.fit.free), 1))
+def noise_p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> float:
+    """Family-wise p-value against the noise alone: of a cause of all groups, which claims no change.
+
+    Of readings in counts also where these are intervals: how counts stand or hunt is no cause of all groups either.
+    """
+    degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
+    p = family.p_value(smaller.fit.sse - larger.fit.sse, degrees)
+    if p < CLAIM_LEVEL and fits.counts.are_there:
+        p = max(p, family.p_value(fits.counts.gained(larger, smaller), degrees))
+    return p
 
 
 def between_trials(fits: Fits, larger: Grouped, smaller: Grouped, degrees: int) -> float:

@@ -6,36 +6,49 @@ count that stands or hunts is no noise, and causes that hold a rig explain it. A
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Generic, TypeVar
 
 from fes_pin.data.counts import count_of
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit
+from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs.base import Rig
 
+Set = TypeVar("Set")
+"""A set of causes that is fitted: a `Fit`, or one of several groups."""
 
-class LikelihoodCounts:
-    """The same fits with counts as intervals.
+
+class LikelihoodCounts(Generic[Set]):
+    """The same sets with counts as intervals.
 
     Parameters
     ----------
-    maxima
-        Fits of single models.
     rig
         Whose readings are in counts, or not.
     trials
         What was measured.
+    fit_of
+        The fit of a set.
+    maximum
+        The maximum of a set from values by path and what is random in another; its own where that is None. Counts are
+        intervals there.
     """
 
-    def __init__(self, maxima: LikelihoodMaxima, rig: Rig, trials: Sequence[Trial]) -> None:
-        self._maxima = maxima
+    def __init__(
+        self,
+        rig: Rig,
+        trials: Sequence[Trial],
+        fit_of: Callable[[Set], Fit],
+        maximum: Callable[[Set, Mapping[str, float], Set | None], Set],
+    ) -> None:
+        self._fit_of, self._maximum = fit_of, maximum
         self.are_there = any(count_of(t[n]) for t in trials for n in rig.outputs(t.kind) if n in t.columns)
-        self._known: dict[int, tuple[Fit, Fit]] = {}
+        self._known: dict[int, tuple[Set, Set]] = {}
         self._gains: dict[tuple[int, int], float] = {}
 
-    def gained(self, larger: Fit, smaller: Fit) -> float:
+    def gained(self, larger: Set, smaller: Set) -> float:
         """By how much a larger set lowers the cost of intervals.
 
         Each begins also where the other ends: the larger one with nothing of what it has besides, so that it is no
@@ -43,33 +56,45 @@ class LikelihoodCounts:
         """
         pair = (id(larger), id(smaller))
         if pair not in self._gains:
-            less, more = self.of(smaller), self.of(larger)
+            less, more = self._fit_of(self.of(smaller)), self._fit_of(self.of(larger))
             if more.sse > less.sse:
-                more = self._better(larger, {**_nothing(larger), **less.values}, less)
+                more = self._better(larger, beside(self._fit_of(larger), less.values), smaller)
             elif less.sse - more.sse > PARAMETER_PRICE:
-                less = self._better(smaller, more.values, more)
+                less = self._better(smaller, more.values, larger)
             self._gains[pair] = less.sse - more.sse
         return self._gains[pair]
 
-    def of(self, fitted: Fit) -> Fit:
-        """The maximum from where a fit has ended, or from elsewhere if that was better."""
-        if self._known.get(id(fitted), (None,))[0] is not fitted:
-            assert fitted.doubt is not None
-            doubt = replace(fitted.doubt, in_counts=True, lasts_s=0.0)
-            self._known[id(fitted)] = (fitted, self._maxima.from_start(fitted.model, doubt, fitted.unknowns))
-        return self._known[id(fitted)][1]
+    def of(self, one: Set) -> Set:
+        """The maximum from where a set has ended, or from elsewhere if that was better."""
+        if self._known.get(id(one), (None,))[0] is not one:
+            self._known[id(one)] = (one, self._maximum(one, {}, None))
+        return self._known[id(one)][1]
 
-    def _better(self, fitted: Fit, values: Mapping[str, float], other: Fit) -> Fit:
-        """The maximum also from given values, beside what is random in another fit."""
-        assert other.doubt is not None
-        model = fitted.model.with_parameters({n: v for n, v in values.items() if n in fitted.values})
-        begun = self._maxima.from_start(model, other.doubt, other.unknowns)
-        self._known[id(fitted)] = (fitted, min((self.of(fitted), begun), key=lambda f: f.sse))
-        return self.of(fitted)
+    def _better(self, one: Set, values: Mapping[str, float], other: Set) -> Fit:
+        """The maximum of a set also from given values, beside what is random in another."""
+        begun = self._maximum(one, values, self.of(other))
+        self._known[id(one)] = (one, min((self.of(one), begun), key=lambda s: self._fit_of(s).sse))
+        return self._fit_of(self.of(one))
 
 
-def _nothing(fitted: Fit) -> dict[str, float]:
-    """The amplitudes of the causes of a fit at their nulls."""
-    info = fitted.model.parameter_info()
-    names = [f"{e.name}.{n}" for e in fitted.model.effects for n in e.amplitudes()]
-    return {n: float(null) for n in names if n in info and (null := info[n].null) is not None}
+def in_counts(doubt: Doubt) -> Doubt:
+    """The same doubt of readings whose counts stand for intervals."""
+    return replace(doubt, in_counts=True, lasts_s=0.0)
+
+
+def beside(larger: Fit, values: Mapping[str, float]) -> dict[str, float]:
+    """Values of a smaller set as those of a larger one, with nothing of what that has besides.
+
+    What differs in a group alone (path@group) is there as it is in all.
+    """
+    info, out = larger.model.parameter_info(), dict(values)
+    for path in larger.values:
+        common, one = path.partition("@")[0], info[path]
+        if path not in values and common in values:
+            out[path] = values[common]
+        elif path not in values and one.null is not None and not one.optional:
+            out[path] = float(one.null)
+    return out
+
+
+__all__ = ["LikelihoodCounts", "beside", "in_counts"]

@@ -9,7 +9,7 @@ from dataclasses import replace
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.cause_sets import Names, names_of
 from fes_pin.diagnose.search.library import Library
-from fes_pin.diagnose.search.likelihood_counts import LikelihoodCounts
+from fes_pin.diagnose.search.likelihood_counts import LikelihoodCounts, in_counts
 from fes_pin.diagnose.search.likelihood_forms import LikelihoodForms
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnose.search.likelihood_screen import LikelihoodScreen
@@ -73,7 +73,14 @@ class LikelihoodFits:
         self._maxima = LikelihoodMaxima(trials)
         self.screen = LikelihoodScreen(self.library)
         self.forms = LikelihoodForms(self._maxima, self.library.measured)
-        self.counts = LikelihoodCounts(self._maxima, model.rig, self.trials)
+        self.counts = LikelihoodCounts(model.rig, self.trials, lambda f: f, self._in_counts)
+
+    def _in_counts(self, fitted: Fit, values: Mapping[str, float], other: Fit | None) -> Fit:
+        """The maximum of a fit's set where counts are intervals; see `LikelihoodCounts`."""
+        begun = other or fitted
+        assert begun.doubt is not None
+        model = fitted.model.with_parameters({n: v for n, v in values.items() if n in fitted.values})
+        return self._maxima.from_start(model, in_counts(begun.doubt), begun.unknowns)
 
     def nominal(self) -> Fit:
         """Fit the nominal model, from several sizes of what is random."""
