@@ -20,6 +20,9 @@ class ParameterEstimate:
 class Cause:
     """One named cause; see contract: `equivalents` cannot be told from it by these data.
 
+    `chosen_again` says in how many folds it, or an equivalent, was chosen without the trials that were held out there,
+    and of how many; None where the study itself holds trials out, or nothing could be.
+
     `trial` is the only trial that it concerns, if it is not the rig's; `words` then say what happened.
     """
 
@@ -31,6 +34,7 @@ class Cause:
     gain_fit: float
     gain_held_out: Gain
     evidence: Evidence | None = None
+    chosen_again: tuple[int, int] | None = None
     trial: str | None = None
     words: str = ""
 

@@ -15,8 +15,9 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
+from fes_pin.diagnose.decide.chosen_again import ChosenAgain, share_of
 from fes_pin.diagnose.decide.claims import FORM_SHARE
-from fes_pin.diagnose.decide.held_out import MATERIAL_PERCENT, Evidence, Gain, speaks_for
+from fes_pin.diagnose.decide.held_out import MATERIAL_PERCENT, Evidence, Gain, folds_of, speaks_for
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
 from fes_pin.diagnose.driven_held_out import (
     Again,
@@ -27,6 +28,7 @@ from fes_pin.diagnose.driven_held_out import (
     gains_of,
     held_errors_ahead,
     make_folds,
+    with_choices,
 )
 from fes_pin.diagnose.errors_ahead import (
     Ahead,
@@ -38,6 +40,7 @@ from fes_pin.diagnose.errors_ahead import (
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosis
+from fes_pin.diagnose.search.cause_sets import names_of
 from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
@@ -45,6 +48,7 @@ from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_smoothing
 from fes_pin.identify.levels import CERTAIN_LEVEL
 from fes_pin.identify.turns import with_honest_intervals
+from fes_pin.models.stage import Effect
 
 LARGE_SHARE = 0.1
 """Random effort, as a share of what drives the rig, from which something acts that no cause explains."""
@@ -90,6 +94,8 @@ class Judged:
         Errors of the nominal and of the extended model on the trials that were fitted.
     held_out_ahead
         The same on trials held out; None where none could be.
+    chosen
+        For each fold, the fit to all trials of the set that is chosen without its own.
     """
 
     found: Found
@@ -102,6 +108,7 @@ class Judged:
     horizon_s: float
     random: tuple[RandomPart, ...]
     ceiling_percent: float
+    chosen: tuple[Fit, ...]
 
     def gain_fit(self, name: str) -> float:
         """Share, in percent, of what the extended model adds to the log-likelihood that is lost without a cause."""
@@ -158,7 +165,11 @@ def judge_driven(
         formed.add(names)
         refused, found = {}, search.settle(tuple(sorted(names)))  # what was refused was so beside another form
         settled = frozenset(found.without)
-    falling = falls(found.best.model, train)
+    falling, chosen = falls(found.best.model, train), []
+    if folds and folds[0].within:
+        choose = ChosenAgain({**search.possible(), names_of(found.best): found.best}, search.earns)
+        chosen = [choose.without(out) for out in folds_of(train)]
+        folds = with_choices(folds, chosen, again)
     return Judged(
         found=found,
         left=left,
@@ -170,6 +181,7 @@ def judge_driven(
         horizon_s=horizon,
         random=random,
         ceiling_percent=_ceiling(found.best),
+        chosen=tuple(chosen),
     )
 
 
@@ -248,19 +260,7 @@ def driven_diagnosis(
         scored=found.scored,
         floor=best.noise,
     )
-    causes = [
-        Cause(
-            name=one.name,
-            stage=str(one.stage),
-            parameters=estimates(best, one.name),
-            equivalents=alternatives(best, found.rivals[one.name], one.name),
-            p_value=found.p_values[one.name],
-            gain_fit=judged.gain_fit(one.name),
-            gain_held_out=judged.gains[one.name],
-            evidence=judged.evidence.get(one.name),
-        )
-        for one in best.model.effects
-    ]
+    causes = [_cause(judged, one, best) for one in best.model.effects]
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     fitted, held = judged.ahead, judged.held_out_ahead
     return Diagnosis(
@@ -282,4 +282,21 @@ def driven_diagnosis(
         warnings=words_of_smoothing(best.doubt, best.model.rig, trials[0][0]),
         random=judged.random,
         ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
+    )
+
+
+def _cause(judged: Judged, one: Effect, best: Fit) -> Cause:
+    """What is told of one cause; `best` has intervals as wide as its scores scatter."""
+    found, name = judged.found, one.name
+    alike = alternatives(best, found.rivals[name], name)
+    return Cause(
+        name=name,
+        stage=str(one.stage),
+        parameters=estimates(best, name),
+        equivalents=alike,
+        p_value=found.p_values[name],
+        gain_fit=judged.gain_fit(name),
+        gain_held_out=judged.gains[name],
+        evidence=judged.evidence.get(name),
+        chosen_again=share_of(judged.chosen, (name, *alike)),
     )

@@ -31,6 +31,8 @@ class Fold:
     test: tuple[Trial, ...]
     within: bool = True
     """False if the trials were held out by the study itself, and are in no fit."""
+    chosen: Fit | None = None
+    """What is chosen anew without the trials, fitted to the others; None where `best` is not to be doubted."""
 
 
 class Again:
@@ -69,6 +71,18 @@ def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refi
         Fold(again[k, ""], again[k, "+"], {n: again[k, n] for n in found.without}, tuple(train[i] for i in out))
         for k, out in enumerate(held)
     ]
+
+
+def with_choices(folds: Sequence[Fold], chosen: Sequence[Fit], refitted: Again) -> list[Fold]:
+    """The folds with what each chooses anew.
+
+    Parameters
+    ----------
+    chosen
+        For each fold, the fit to all trials of the set that is chosen without its own.
+    """
+    again = refitted([(one, fold.best.trials) for one, fold in zip(chosen, folds, strict=True)])
+    return [replace(fold, chosen=one) for fold, one in zip(folds, again, strict=True)]
 
 
 def afresh(fitted: Fit, trials: Sequence[Trial]) -> Fit:
@@ -128,12 +142,12 @@ def _weight(fitted: Fit) -> float:
 
 
 def held_errors_ahead(folds: Sequence[Fold], horizon_s: float, falling: bool) -> tuple[Ahead, Ahead] | None:
-    """Errors ahead of the nominal and of the extended model on trials held out; None where none are."""
+    """Errors ahead of the nominal model and of what each fold chooses, on trials held out; None where none are."""
     if not folds:
         return None
     return (
         errors_ahead([(f.nominal, f.test) for f in folds], horizon_s, falling),
-        errors_ahead([(f.best, f.test) for f in folds], horizon_s, falling),
+        errors_ahead([(f.chosen or f.best, f.test) for f in folds], horizon_s, falling),
     )
 
 

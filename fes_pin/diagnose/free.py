@@ -9,12 +9,14 @@ from dataclasses import replace
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
+from fes_pin.diagnose.decide.chosen_again import ChosenAgain, share_of
 from fes_pin.diagnose.decide.doubts import doubts, with_error
 from fes_pin.diagnose.decide.held_out import HeldOut, cross_validate, errors_of, held_out_gain, separate
 from fes_pin.diagnose.decide.rivals import absorbed, equivalents, estimates, experiment, ranking
 from fes_pin.diagnose.errors_ahead import free_errors
 from fes_pin.diagnose.remainder.open_set import Remainder, unexplained_remainder
 from fes_pin.diagnose.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosis
+from fes_pin.diagnose.search.cause_sets import names_of
 from fes_pin.diagnose.search.misspecified import under_one_noise
 from fes_pin.diagnose.search.simulation_search import Searched, SimulationSearch
 from fes_pin.identify.ahead import default_horizon
@@ -27,7 +29,7 @@ OF_THE_MEAN = 100.0
 """E in percent of a prediction that is nothing but the mean of what was measured, by eq. (2): a set of causes that
 predicts worse than that, on the very trials it was fitted to, explains nothing."""
 CONTENDERS = 4
-"""Sets that each fold chooses among anew."""
+"""Rivals that are fitted again, for least error, where no set leaves only noise; folds choose among them."""
 
 
 def judge_free(
@@ -36,7 +38,7 @@ def judge_free(
     """The verdict on what a search found: causes that trials held out bear out, and what is left."""
     horizon = study.horizon_s or default_horizon(searched.nominal.trials)
     left = unexplained_remainder(searched.best, seed)
-    causes, held = _causes(searched, left, test, seed, horizon)
+    causes, held = _causes(search, searched, left, test, seed, horizon)
     refused: list[Cause] = []
     if searched.stopped and not all(c.helps(False, True) for c in causes):
         searched = search.stopped(())
@@ -47,11 +49,11 @@ def judge_free(
         refused.append(weakest)
         searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
         left = unexplained_remainder(searched.best, seed)
-        causes, held = _causes(searched, left, test, seed, horizon)
+        causes, held = _causes(search, searched, left, test, seed, horizon)
     worthless = bool(causes) and _error(searched.best, searched.floor) > OF_THE_MEAN
     if worthless:
         searched, causes = search.stopped(()) if searched.stopped else search.settle(()), []
-        left, held = unexplained_remainder(searched.best, seed), _held_out(searched, test, horizon)
+        left, held = unexplained_remainder(searched.best, seed), _held_out(search, searched, test, horizon)
     causes.sort(key=lambda c: -c.gain_held_out.percent)
     left, reason = with_error(with_refused(left, refused), searched)
     if worthless:
@@ -60,7 +62,7 @@ def judge_free(
         left, reason = replace(left, unexplained=True), "the search was stopped before a cause earned its place"
     if not causes and not searched.complete and not searched.stopped:
         searched = search.for_prediction(searched)
-        held = _held_out(searched, test, horizon)
+        held = _held_out(search, searched, test, horizon)
     nominal, best = searched.nominal, searched.best
     verdict = "causes_found" if causes else ("unexplained" if left.unexplained else "adequate")
     in_sample = errors_of(best.model, best.trials, searched.floor)
@@ -124,39 +126,45 @@ def _error(fitted: Fit, floor: NoiseModel) -> float:
     return errors_of(fitted.model, fitted.trials, floor).error_percent()
 
 
-def _held_out(searched: Searched, test: Sequence[Trial], horizon_s: float) -> HeldOut | None:
+def _held_out(search: SimulationSearch, searched: Searched, test: Sequence[Trial], horizon_s: float) -> HeldOut | None:
+    nominal, best, without, floor = searched.nominal, searched.best, searched.without, searched.floor
     if test:
-        return separate(searched.nominal, searched.best, searched.without, test, searched.floor, horizon_s)
-    if len(searched.nominal.trials) < 2 or searched.stopped:
+        return separate(nominal, best, without, test, floor, horizon_s)
+    if len(nominal.trials) < 2 or searched.stopped:
         return None
-    contenders = sorted((f for fits in searched.rivals.values() for f in fits), key=lambda f: f.sse)[:CONTENDERS]
+    fits = search.sets.fits
     if not searched.complete:
-        contenders = under_one_noise(contenders, searched.best.trials, searched.best.noise)
-    return cross_validate(searched.nominal, searched.best, searched.without, contenders, searched.floor, horizon_s)
+        near = sorted((f for fits in searched.rivals.values() for f in fits), key=lambda f: f.sse)[:CONTENDERS]
+        others = under_one_noise(near, best.trials, best.noise)
+        fits = {names_of(f): f for f in (*others, *without.values(), nominal)}
+    again = ChosenAgain({**fits, names_of(best): best}, search.claims.earns)
+    return cross_validate(nominal, best, without, again.without, floor, horizon_s)
 
 
 def _causes(
-    searched: Searched, left: Remainder, test: Sequence[Trial], seed: int, horizon_s: float
+    search: SimulationSearch, searched: Searched, left: Remainder, test: Sequence[Trial], seed: int, horizon_s: float
 ) -> tuple[list[Cause], HeldOut | None]:
     best, nominal = searched.best, searched.nominal
-    held = _held_out(searched, test, horizon_s)
+    held = _held_out(search, searched, test, horizon_s)
     inside = {n: errors_of(f.model, f.trials, searched.floor) for n, f in searched.without.items()}
     inside_nominal = errors_of(nominal.model, nominal.trials, searched.floor)
     inside_best = errors_of(best.model, best.trials, searched.floor)
     out = []
     for one in best.model.effects:
         name = one.name
+        alike = equivalents(searched, name, left)
         measured = held or HeldOut(inside_nominal, inside_best, inside, {}, inside_best)
         out.append(
             Cause(
                 name=name,
                 stage=str(one.stage),
                 parameters=estimates(best, name),
-                equivalents=equivalents(searched, name, left),
+                equivalents=alike,
                 p_value=searched.p_values[name],
                 gain_fit=held_out_gain(inside_nominal, inside[name], inside_best, seed).percent,
                 gain_held_out=held_out_gain(measured.nominal, measured.without[name], measured.extended, seed),
                 evidence=measured.evidence.get(name),
+                chosen_again=share_of(measured.folds, (name, *alike)),
             )
         )
     return out, held

@@ -159,7 +159,7 @@ def with_misread(
     held = (
         separate(before, before, {}, test, floor, horizon)
         if test
-        else cross_validate(before, before, {}, [], floor, horizon)
+        else cross_validate(before, before, {}, lambda _: before, floor, horizon)
     )
     assert held.ahead is not None
     inside = Ahead.of(forecast_errors(before.model, trials, own_noise(before), floor, horizon))

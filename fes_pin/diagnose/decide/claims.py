@@ -75,6 +75,10 @@ class Claims:
             return False
         return self.p_value(self.sets.fits[names], self.sets.fits[best]) < CLAIM_LEVEL
 
+    def earns(self, gain: float, explained: float, degrees: int) -> bool:
+        """The same of a gain in likelihood alone, of what all causes explain."""
+        return gain >= FORM_SHARE * explained and self.family.p_value(gain, degrees) < CLAIM_LEVEL
+
     def share(self, names: Names, best: Names) -> float:
         """Share of what a larger set explains that a smaller one does not, of the likelihood or of the plain errors.
 

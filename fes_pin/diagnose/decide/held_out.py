@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -186,8 +186,9 @@ class HeldOut:
     """On held-out trials: errors of the nominal model, of the extension, and of it without each of its causes.
 
     A cause's gain and its `evidence` are what it adds to the other causes of one model, the extension as it was chosen
-    on all trials: from `without` to `extended`. `chosen` are the errors of what each fold itself would have chosen,
-    which may be another set. `ahead` are the errors of the nominal model and of the extension over time.
+    on all trials: from `without` to `extended`. `chosen` are the errors of what each fold itself chooses, which may be
+    another set, and `folds` the fits, to all trials, of those sets; none where the study itself holds trials out.
+    `ahead` are the errors of the nominal model and of the extension over time.
     """
 
     nominal: Errors
@@ -196,32 +197,36 @@ class HeldOut:
     evidence: dict[str, Evidence]
     chosen: Errors
     ahead: tuple[SquaredErrors, SquaredErrors] | None = None
+    folds: tuple[Fit, ...] = ()
 
 
 def cross_validate(
     nominal: Fit,
     best: Fit,
     without: dict[str, Fit],
-    contenders: Sequence[Fit],
+    choose: Callable[[Sequence[int]], Fit],
     floor: NoiseModel,
     horizon_s: float | None = None,
 ) -> HeldOut:
-    """Leave trials out in turn, choose among the contenders again on the others, fit, and predict.
+    """Leave trials out in turn, choose again on the others, fit, and predict.
 
     Parameters
     ----------
-    contenders
-        Fits of all sets of causes that came near on the whole; each fold chooses anew among them and `best`.
+    choose
+        The fit, to all trials, of the set that is chosen without those in some places.
     horizon_s
         How far ahead errors over a horizon look; `default_horizon` of the trials by default.
     """
     horizon_s = horizon_s or default_horizon(nominal.trials)
     folds = [f for f in folds_of(nominal.trials) if len(f) < len(nominal.trials)]
-    many = [nominal, best, *without.values(), *contenders]
-    again = iter(in_parallel(lambda pair: _left_out(*pair), [(held, one) for held in folds for one in many]))
+    chosen = [choose(held) for held in folds]
+    many = [(held, [nominal, best, *without.values(), one]) for held, one in zip(folds, chosen, strict=True)]
+    wanted = list({(k, id(f)): (held, f) for k, (held, fits) in enumerate(many) for f in fits}.items())
+    made = in_parallel(lambda item: _left_out(*item[1]), wanted)
+    again = {key: one for (key, _), one in zip(wanted, made, strict=True)}
     results = in_parallel(
         lambda pair: _fold(*pair, nominal.trials, list(without), floor, horizon_s),
-        [(held, [next(again) for _ in many]) for held in folds],
+        [(held, [again[k, id(f)] for f in fits]) for k, (held, fits) in enumerate(many)],
     )
     return HeldOut(
         _joined([r.nominal for r in results]),
@@ -230,6 +235,7 @@ def cross_validate(
         {n: sum((r.evidence[n] for r in results), Evidence(0.0, 0.0)) for n in without},
         _joined([r.chosen for r in results]),
         tuple(sum((r.ahead[k] for r in results if r.ahead), SquaredErrors()) for k in (0, 1)),  # type: ignore[arg-type]
+        tuple(chosen),
     )
 
 
@@ -247,11 +253,10 @@ def _fold(
     floor: NoiseModel,
     horizon_s: float,
 ) -> HeldOut:
-    """What fits of the nominal model, the best, it without each of `names` and the contenders say of held trials."""
-    nominal, best, *rest = fits
-    without, contenders = dict(zip(names, rest, strict=False)), rest[len(names) :]
+    """What fits of the nominal model, the best, it without each of `names` and what was chosen say of held trials."""
+    nominal, best, *rest, chosen = fits
+    without = dict(zip(names, rest, strict=True))
     test = [trials[i] for i in held]
-    chosen = min((best, *contenders), key=lambda f: f.price)
     told = separate(nominal, best, without, test, floor, horizon_s)
     return told if chosen is best else replace(told, chosen=errors_of(chosen.model, test, floor))
 

@@ -118,6 +118,14 @@ class LikelihoodSearch:
             p = max(p, self.family.p_value(self.sets.counts.gained(larger, smaller), degrees))
         return p
 
+    def earns(self, gain: float, _explained: float, degrees: int) -> bool:
+        """Whether a gain in twice the log-likelihood is worth so many degrees of freedom."""
+        return self.family.p_value(gain, degrees) < DRIVEN_LEVEL
+
+    def possible(self) -> dict[Names, Fit]:
+        """All sets that are fitted, but for those that cannot be."""
+        return {n: f for n, f in self.sets.fits.items() if is_possible(f)}
+
     def _worth_extending(self, names: Names) -> bool:
         """True where the score of a further cause beside a set is not what chance brings."""
         scored = [s for s in self.sets.screen.scores(self.sets.fits[names]).scored if s.gain > 0.0]

@@ -1,0 +1,97 @@
+"""Which set of causes would have been chosen without some of the trials, of all that were fitted to all.
+
+Of each set that was fitted the cost of the other trials is known to second order about its fit. With g and H the slope
+and the curvature of half that cost, each trial's own unknowns eliminated,
+
+    cost(others) = |r|^2 - g' H^-1 g
+
+is where one Gauss-Newton step ends. Sets are compared by the rule that the search goes by: the cheapest of a size takes
+the place of the best smaller one if what it adds earns its place. No trial that is held out has a say in it.
+
+Source: Stone, Cross-validatory choice and assessment of statistical predictions, J. R. Stat. Soc. B 36 (1974);
+Giordano, Stephenson, Liu, Jordan and Broderick, A Swiss army infinitesimal jackknife, AISTATS 2019.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.diagnose.search.cause_sets import Names
+from fes_pin.identify.fit import PARAMETER_PRICE, Fit
+from fes_pin.identify.problem import normal_equations
+
+Earns = Callable[[float, float, int], bool]
+"""Whether a gain in twice the log-likelihood, of so much that all causes together gain, is worth so many degrees."""
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """What one trial adds to the cost of a fit, to half its slope and to half its curvature."""
+
+    cost: float
+    slope: np.ndarray
+    curvature: np.ndarray
+
+
+class ChosenAgain:
+    """Sets to choose among, each fitted to the same trials.
+
+    Parameters
+    ----------
+    fits
+        By names; the nominal model by none.
+    earns
+        The rule of the search.
+    """
+
+    def __init__(self, fits: Mapping[Names, Fit], earns: Earns) -> None:
+        self._fits = {n: f for n, f in fits.items() if math.isfinite(f.sse)}
+        self._earns = earns
+        self._trials = {n: _by_trial(f) for n, f in self._fits.items()}
+
+    def without(self, held: Sequence[int]) -> Fit:
+        """The fit, to all trials, of the set that is chosen without some of them."""
+        costs = {n: self._cost(n, held) for n in self._fits}
+        best: Names = ()
+        for size in range(1, 1 + max(map(len, costs))):
+            of_size = [n for n in costs if len(n) == size]
+            if not of_size:
+                break
+            first = min(of_size, key=lambda n: (costs[n] + PARAMETER_PRICE * self._fits[n].degrees, n))
+            degrees = max(self._fits[first].degrees - self._fits[best].degrees, 1)
+            if not self._earns(costs[best] - costs[first], costs[()] - costs[first], degrees):
+                break
+            best = first
+        return self._fits[best]
+
+    def _cost(self, names: Names, held: Sequence[int]) -> float:
+        """The cost of the other trials at the end of one step."""
+        others = [t for i, t in enumerate(self._trials[names]) if i not in held]
+        slope, curvature = sum(t.slope for t in others), sum(t.curvature for t in others)
+        step = np.linalg.lstsq(curvature, slope, rcond=1e-12)[0]
+        return sum(t.cost for t in others) - float(slope @ step)
+
+
+def _by_trial(fitted: Fit) -> list[_Trial]:
+    """Each trial's part; of parameters that do not lie at a bound, which would not move, scaled to the size of each."""
+    moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
+    each = [(p, normal_equations([p])) for p in fitted.parts]
+    size = np.sqrt(np.maximum(sum(np.diag(e.hessian)[moving] for _, e in each), 1e-300))
+    return [
+        _Trial(
+            e.sse - e.local_gain + p.log_determinant,
+            e.gradient[moving] / size,
+            e.hessian[np.ix_(moving, moving)] / np.outer(size, size),
+        )
+        for p, e in each
+    ]
+
+
+def share_of(chosen: Sequence[Fit], names: Sequence[str]) -> tuple[int, int] | None:
+    """In how many folds a cause was chosen, or what cannot be told from it, and of how many; None without folds."""
+    found = sum(any(e.name in names for e in fitted.model.effects) for fitted in chosen)
+    return (found, len(chosen)) if chosen else None
