@@ -44,8 +44,8 @@ def test_a_causes_gain_is_not_that_of_another_set_which_the_folds_prefer():
         fit(nominal.model + effect_named(name)(), study.trials, nominal.noise)
         for name in ("effort_offset", "coulomb_friction")
     )
-    alone = cross_validate(nominal, offset, {"effort_offset": nominal}, [], nominal.noise)
-    beside = cross_validate(nominal, offset, {"effort_offset": nominal}, [friction], nominal.noise)
+    alone = cross_validate(nominal, offset, {"effort_offset": nominal}, lambda _: offset, nominal.noise)
+    beside = cross_validate(nominal, offset, {"effort_offset": nominal}, lambda _: friction, nominal.noise)
     own, found = (held_out_gain(h.nominal, h.without["effort_offset"], h.extended, 0) for h in (alone, beside))
     assert own.high < 50.0 < held_out_gain(beside.nominal, beside.nominal, beside.chosen, 0).low
     assert found == own
