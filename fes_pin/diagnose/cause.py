@@ -39,11 +39,16 @@ class Cause:
     words: str = ""
 
     def helps(self, complete: bool, alone: bool) -> bool:
-        """True if trials that took no part speak for it.
+        """True if trials that took no part speak for it, and it is chosen without them as well.
 
         See `decide.held_out.speaks_for`.
         """
-        return speaks_for(self.evidence if complete else None, self.gain_held_out, alone)
+        return self.is_chosen_again and speaks_for(self.evidence if complete else None, self.gain_held_out, alone)
+
+    @property
+    def is_chosen_again(self) -> bool:
+        """False if most folds choose something else without their trials (Meinshausen and Buehlmann 2010)."""
+        return self.chosen_again is None or 2 * self.chosen_again[0] >= self.chosen_again[1]
 
 
 @dataclass(frozen=True)

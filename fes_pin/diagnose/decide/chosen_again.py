@@ -57,10 +57,8 @@ class ChosenAgain:
         """The fit, to all trials, of the set that is chosen without some of them."""
         costs = {n: self._cost(n, held) for n in self._fits}
         best: Names = ()
-        for size in range(1, 1 + max(map(len, costs))):
+        for size in sorted({len(n) for n in costs} - {0}):
             of_size = [n for n in costs if len(n) == size]
-            if not of_size:
-                break
             first = min(of_size, key=lambda n: (costs[n] + PARAMETER_PRICE * self._fits[n].degrees, n))
             degrees = max(self._fits[first].degrees - self._fits[best].degrees, 1)
             if not self._earns(costs[best] - costs[first], costs[()] - costs[first], degrees):

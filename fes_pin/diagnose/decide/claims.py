@@ -70,8 +70,8 @@ class Claims:
         return smooth_remainder(best, self.seed).p_value < EXTEND_LEVEL
 
     def better(self, names: Names, best: Names) -> bool:
-        """True if a larger set earns its place beside the best smaller one."""
-        if self.share(names, best) < FORM_SHARE:
+        """True if a larger set can be, and earns its place beside the best smaller one."""
+        if self.sets.is_absurd(self.sets.fits[names]) or self.share(names, best) < FORM_SHARE:
             return False
         return self.p_value(self.sets.fits[names], self.sets.fits[best]) < CLAIM_LEVEL
 

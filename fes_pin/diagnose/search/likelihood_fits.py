@@ -13,12 +13,12 @@ from fes_pin.diagnose.search.likelihood_counts import LikelihoodCounts, in_count
 from fes_pin.diagnose.search.likelihood_forms import LikelihoodForms
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnose.search.likelihood_screen import LikelihoodScreen
+from fes_pin.diagnose.search.possible import is_possible
 from fes_pin.diagnose.search.score import Scored, best_by_effect
 from fes_pin.diagnose.search.starts import STARTS, from_afar, started
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import with_new_noise
-from fes_pin.identify.problem import measured_columns
 from fes_pin.identify.roughness import roughness, uncertain_gain
 from fes_pin.identify.scoring import WORTH
 from fes_pin.models.model import Model
@@ -223,20 +223,3 @@ class LikelihoodFits:
         """Sets of a size, cheapest first; those that have converged to what cannot be come last."""
         absurd = {n for n in self._converged if not is_possible(self.fits[n])}
         return sorted((n for n in self.fits if len(n) == size), key=lambda n: (n in absurd, self.fits[n].price, n))
-
-
-def is_possible(fitted: Fit) -> bool:
-    """False if the size of a cause is nothing that it can be: it stands for another.
-
-    It ended where that ends, other than at nothing, or is less than what is read can tell.
-    """
-    measured = measured_columns(fitted.model, fitted.trials) if fitted.model.effects else {}
-    for effect in fitted.model.effects:
-        info, smallest = effect.parameters(), effect.smallest(measured)
-        for n in effect.amplitudes():
-            size = getattr(effect, n)
-            if f"{effect.name}.{n}" in fitted.at_bound and size != info[n].null:
-                return False
-            if 0.0 < abs(size) < smallest.get(n, 0.0):
-                return False
-    return True

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.search.cause_sets import MOST_CAUSES
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names, is_possible
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names
+from fes_pin.diagnose.search.possible import is_possible
 from fes_pin.diagnose.search.score import Scored, best_pairs
 from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.distributions import chi2_tail

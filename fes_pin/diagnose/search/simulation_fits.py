@@ -10,6 +10,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.cause_sets import Names, names_of, subsets
 from fes_pin.diagnose.search.library import Library
 from fes_pin.diagnose.search.model_fitter import FIRST_ITERATIONS, ModelFitter
+from fes_pin.diagnose.search.possible import is_possible
 from fes_pin.diagnose.search.refined_forms import RefinedForms
 from fes_pin.diagnose.search.score import Projection, Scores
 from fes_pin.identify.fit import MAX_ITERATIONS, Fit, noise_of
@@ -42,6 +43,7 @@ class SimulationFits:
         self.fitter = ModelFitter(self.model, self.trials)
         self.fits: dict[Names, Fit] = {}
         self._rounds: dict[Names, int] = {}
+        self._absurd: dict[int, tuple[Fit, bool]] = {}
         self._scores: dict[int, tuple[Fit, Scores]] = {}
         self._forms = RefinedForms(self.fitter)
 
@@ -66,8 +68,15 @@ class SimulationFits:
         return self._scores[id(base)][1]
 
     def ranked(self, size: int) -> list[Names]:
-        """Sets of a size, cheapest first."""
-        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (self.fits[n].price, n))
+        """Sets of a size, cheapest first; those that have converged to what cannot be come last."""
+        of_size = [n for n in self.fits if len(n) == size]
+        return sorted(of_size, key=lambda n: (self.is_absurd(self.fits[n]), self.fits[n].price, n))
+
+    def is_absurd(self, fitted: Fit) -> bool:
+        """True of a fit that has converged to what cannot be; see `is_possible`."""
+        if self._absurd.get(id(fitted), (None,))[0] is not fitted:
+            self._absurd[id(fitted)] = (fitted, fitted.converged and not is_possible(fitted))
+        return self._absurd[id(fitted)][1]
 
     def add(self, made: dict[Names, Callable[[], Fit]]) -> None:
         """Fit sets side by side, and pursue the best of their size."""

@@ -317,7 +317,8 @@ class SimulationSearch:
             if len(names) == 1:
                 restart_beside(sets, names)
             keys = [*replaced, *self._siblings(names, name)]
-            rivals[name] = sorted((sets.fits[k] for k in dict.fromkeys(keys) if k != names), key=lambda f: f.sse)
+            others = (sets.fits[k] for k in dict.fromkeys(keys) if k != names)
+            rivals[name] = sorted((f for f in others if not sets.is_absurd(f)), key=lambda f: f.sse)
             p_values[name] = self.claims.p_value(sets.fits[names], without[name])
         none, best = sets.fits[()], sets.fits[names]
         scored = sets.scores(none).scored + (sets.scores(best).scored if names else [])
