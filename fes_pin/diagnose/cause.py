@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fes_pin.diagnose.decide.chosen_again import is_chosen
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, speaks_for
 
 
@@ -43,12 +44,8 @@ class Cause:
 
         See `decide.held_out.speaks_for`.
         """
-        return self.is_chosen_again and speaks_for(self.evidence if complete else None, self.gain_held_out, alone)
-
-    @property
-    def is_chosen_again(self) -> bool:
-        """False if most folds choose something else without their trials (Meinshausen and Buehlmann 2010)."""
-        return self.chosen_again is None or 2 * self.chosen_again[0] >= self.chosen_again[1]
+        spoken_for = speaks_for(self.evidence if complete else None, self.gain_held_out, alone)
+        return spoken_for and is_chosen(self.chosen_again)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
-from fes_pin.diagnose.decide.chosen_again import ChosenAgain, share_of
+from fes_pin.diagnose.decide.chosen_again import ChosenAgain, is_chosen, share_of
 from fes_pin.diagnose.decide.claims import FORM_SHARE
 from fes_pin.diagnose.decide.held_out import MATERIAL_PERCENT, Evidence, Gain, folds_of, speaks_for
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
@@ -158,6 +158,12 @@ def judge_driven(
         if names != settled:
             found, settled = search.settle(tuple(sorted(names)), {n: r.p_value for n, r in refused.items()}), names
             continue
+        chosen = _chosen(search, found, train) if folds and folds[0].within else []
+        if rare := [n for n in names if not is_chosen(share_of(chosen, _alike(found, n)))]:
+            rarest = min(rare, key=lambda n: gains[n].low)
+            refused[rarest] = _refused(found, rarest, gains[rarest].percent)
+            found = search.told(tuple(sorted(names - {rarest})))
+            continue
         random = random_parts(found.best)
         left = with_refused_causes(seen, random, refused)
         if not left.unexplained or names in formed or not search.form_otherwise(tuple(sorted(names))):
@@ -165,11 +171,8 @@ def judge_driven(
         formed.add(names)
         refused, found = {}, search.settle(tuple(sorted(names)))  # what was refused was so beside another form
         settled = frozenset(found.without)
-    falling, chosen = falls(found.best.model, train), []
-    if folds and folds[0].within:
-        choose = ChosenAgain({**search.possible(), names_of(found.best): found.best}, search.earns)
-        chosen = [choose.without(out) for out in folds_of(train)]
-        folds = with_choices(folds, chosen, again)
+    falling = falls(found.best.model, train)
+    folds = with_choices(folds, chosen, again) if chosen else folds
     return Judged(
         found=found,
         left=left,
@@ -183,6 +186,17 @@ def judge_driven(
         ceiling_percent=_ceiling(found.best),
         chosen=tuple(chosen),
     )
+
+
+def _chosen(search: LikelihoodSearch, found: Found, train: Sequence[Trial]) -> list[Fit]:
+    """What each fold would have chosen without its trials, fitted to all."""
+    choose = ChosenAgain({**search.possible(), names_of(found.best): found.best}, search.earns)
+    return [choose.without(out) for out in folds_of(train)]
+
+
+def _alike(found: Found, name: str) -> tuple[str, ...]:
+    """A cause, and what cannot be told from it."""
+    return (name, *alternatives(found.best, found.rivals[name], name))
 
 
 def _remainder(search: LikelihoodSearch, fitted: Fit, seed: int) -> Remainder:
@@ -288,15 +302,15 @@ def driven_diagnosis(
 def _cause(judged: Judged, one: Effect, best: Fit) -> Cause:
     """What is told of one cause; `best` has intervals as wide as its scores scatter."""
     found, name = judged.found, one.name
-    alike = alternatives(best, found.rivals[name], name)
+    alike = _alike(found, name)
     return Cause(
         name=name,
         stage=str(one.stage),
         parameters=estimates(best, name),
-        equivalents=alike,
+        equivalents=alike[1:],
         p_value=found.p_values[name],
         gain_fit=judged.gain_fit(name),
         gain_held_out=judged.gains[name],
         evidence=judged.evidence.get(name),
-        chosen_again=share_of(judged.chosen, (name, *alike)),
+        chosen_again=share_of(judged.chosen, alike),
     )

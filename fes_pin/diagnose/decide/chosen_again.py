@@ -93,3 +93,11 @@ def share_of(chosen: Sequence[Fit], names: Sequence[str]) -> tuple[int, int] | N
     """In how many folds a cause was chosen, or what cannot be told from it, and of how many; None without folds."""
     found = sum(any(e.name in names for e in fitted.model.effects) for fitted in chosen)
     return (found, len(chosen)) if chosen else None
+
+
+def is_chosen(share: tuple[int, int] | None) -> bool:
+    """False if most folds choose something else: what is chosen is then an accident of a few trials.
+
+    Source: Meinshausen and Buehlmann, Stability selection, J. R. Stat. Soc. B 72 (2010).
+    """
+    return share is None or 2 * share[0] >= share[1]
