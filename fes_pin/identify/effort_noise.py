@@ -24,6 +24,9 @@ TRIED = (0.1, 0.25, 0.5, 0.75)
 """Shares of the samples whose answer leaves less than a noise that is tried: noise is the same everywhere, and what it
 is not foretold by is not, so that where an answer is known at all it leaves little else."""
 
+LEAST_SHARE = 1e-3
+"""Of the random effort's spectrum at rest, 2 std^2 time, from which that of a noise, noise^2 dt, is any beside it."""
+
 Prepared = Callable[[Sequence[Trial]], Sequence[Trial]]
 """What a search makes of recorded trials before it fits them."""
 
@@ -39,10 +42,19 @@ def effort_noise_of(fitted: Fit, trials: Sequence[Trial], answers: Sequence[Answ
         As recorded, and what their efforts answer.
     """
     left = np.concatenate([a.left_std for a in answers])
-    tried = [0.0, *(float(v) for v in np.unique(np.quantile(left, TRIED)))]
+    tried = [0.0, *(float(v) for v in np.unique(np.quantile(left, TRIED)) if v > _least(fitted, trials))]
+    if len(tried) == 1:
+        return 0.0
     costs = in_parallel(lambda noise: cost_beside(fitted, prepared(quieted(trials, answers, noise))), tried)
     best = int(np.argmin(costs))
     return tried[best] if costs[best] < costs[0] - LEAST_GAIN else 0.0
+
+
+def _least(fitted: Fit, trials: Sequence[Trial]) -> float:
+    """The least noise that is anything beside the random effort of a fit, in the effort's unit."""
+    assert fitted.doubt is not None
+    std, time = (part.get("effort", 0.0) for part in (fitted.doubt.std, fitted.doubt.time))
+    return float(np.sqrt(LEAST_SHARE * 2.0 * std**2 * time / min(t.dt for t in trials)))
 
 
 def quieted(trials: Sequence[Trial], answers: Sequence[Answer], noise: float) -> list[Trial]:

@@ -1,7 +1,7 @@
 """Efforts that were recorded with noise, as measured currents are: noise moves nothing, and is no friction."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -46,9 +46,17 @@ def test_the_noise_of_an_effort_is_no_friction(seed, acted, tmp_path):
 
 
 def test_friction_beside_the_noise_is_found(tmp_path):
-    found = diagnose_joint(read_study(draw_swing_up(("coulomb_friction",), 1830011, tmp_path).study))
-    assert [c.name for c in found.causes] == ["coulomb_friction"], str(found)
-    assert found.log.effort_noise > 0.0
+    """With noise of a fiftieth of the effort, which the test adds; friction's size is as it is without."""
+    study = read_study(draw_swing_up(("coulomb_friction",), NOISY[0], tmp_path).study)
+    noise, rng = 0.02 * float(np.std(study.trials[0]["effort"])), np.random.default_rng(0)
+    noisy = [t.with_columns(effort=t["effort"] + noise * rng.standard_normal(len(t))) for t in study.trials]
+    plain, found = (diagnose_joint(s) for s in (study, replace(study, trials=tuple(noisy))))
+    assert plain.log.effort_noise == 0.0
+    assert found.log.effort_noise == pytest.approx(noise, rel=0.1)
+    for one in (plain, found):
+        assert [c.name for c in one.causes][:1] == ["coulomb_friction"], str(one)
+    sizes = [one.causes[0].parameters["torque_nm"] for one in (plain, found)]
+    assert sizes[1].value == pytest.approx(sizes[0].value, abs=3.0 * sizes[1].std)
 
 
 @dataclass
