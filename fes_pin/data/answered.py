@@ -31,7 +31,7 @@ APART_LEVEL = 0.01
 
 
 @dataclass(frozen=True)
-class Answer:
+class ControllerAnswer:
     """What a controller answers.
 
     Attributes
@@ -56,7 +56,7 @@ class Answer:
         return np.asarray(self.values + (1.0 - of_left**2) * (effort - self.values))
 
 
-def answer_of(effort: np.ndarray, readings: Sequence[np.ndarray]) -> Answer:
+def answer_of(effort: np.ndarray, readings: Sequence[np.ndarray]) -> ControllerAnswer:
     """The answer to some readings that an effort is.
 
     Parameters
@@ -72,7 +72,7 @@ def answer_of(effort: np.ndarray, readings: Sequence[np.ndarray]) -> Answer:
         solved = np.linalg.lstsq(triangle[:-1, :-1], triangle[:-1, -1], rcond=1e-9)[0]
         values[begin:end] = columns[begin:end] @ solved
         left[begin:end] = np.sqrt(_missed(triangle) / max(end - begin - columns.shape[1], 1))
-    return Answer(values, left)
+    return ControllerAnswer(values, left)
 
 
 def _columns(readings: Sequence[np.ndarray], n: int) -> np.ndarray:

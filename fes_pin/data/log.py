@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fes_pin.data.answered import Answer, answer_of
+from fes_pin.data.answered import ControllerAnswer, answer_of
 from fes_pin.data.trial import Trial
 
 EFFORT = "effort"
@@ -40,13 +40,13 @@ class Log:
         return replace(trial, low_pass_hz=self.low_pass_hz) if self.low_pass_hz else trial
 
 
-def answered(trial: Trial) -> Answer:
+def answered(trial: Trial) -> ControllerAnswer:
     """What the trial's effort answers to all else that was recorded of it."""
     return answer_of(trial[EFFORT], [values for n, values in trial.columns.items() if n != EFFORT])
 
 
-def quiet(trial: Trial, answer: Answer, noise: float) -> Trial:
-    """The trial without so much noise of its effort as its answer tells; see `Answer.quieted`."""
+def quiet(trial: Trial, answer: ControllerAnswer, noise: float) -> Trial:
+    """The trial without so much noise of its effort as its answer tells; see `ControllerAnswer.quieted`."""
     return trial.with_columns(**{EFFORT: answer.quieted(trial[EFFORT], noise)})
 
 

@@ -8,7 +8,7 @@ of causes is judged by the likelihood of its one-step-ahead predictions, with a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.decide.chosen_again import ChosenAgain, is_chosen, share_of
-from fes_pin.diagnose.decide.claims import FORM_SHARE
-from fes_pin.diagnose.decide.held_out import MATERIAL_PERCENT, Evidence, Gain, folds_of, speaks_for
+from fes_pin.diagnose.decide.held_out import Evidence, Gain, folds_of
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
 from fes_pin.diagnose.driven_held_out import (
     Again,
@@ -30,6 +29,7 @@ from fes_pin.diagnose.driven_held_out import (
     make_folds,
     with_choices,
 )
+from fes_pin.diagnose.driven_refused import Refused, refused_from, share_in, unsupported, with_refused_causes
 from fes_pin.diagnose.errors_ahead import (
     Ahead,
     AheadErrors,
@@ -46,32 +46,8 @@ from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_smoothing
-from fes_pin.identify.levels import CERTAIN_LEVEL
 from fes_pin.identify.turns import with_honest_intervals
 from fes_pin.models.stage import Effect
-
-LARGE_SHARE = 0.1
-"""Random effort, as a share of what drives the rig, from which something acts that no cause explains."""
-
-
-@dataclass(frozen=True)
-class Refused:
-    """A cause that held-out trials did not bear out.
-
-    Attributes
-    ----------
-    stage, p_value
-        Where it acts, and how certain it was.
-    share
-        Of what all causes explained.
-    percent
-        What it gains over the horizon.
-    """
-
-    stage: str
-    p_value: float
-    share: float
-    percent: float
 
 
 @dataclass(frozen=True)
@@ -112,7 +88,7 @@ class Judged:
 
     def gain_fit(self, name: str) -> float:
         """Share, in percent, of what the extended model adds to the log-likelihood that is lost without a cause."""
-        return 100.0 * _share(self.found, name)
+        return 100.0 * share_in(self.found, name)
 
 
 def judge_driven(
@@ -152,7 +128,7 @@ def judge_driven(
         names = frozenset(found.without)
         if weak := unsupported(evidence, gains, seen):
             weakest = min(weak, key=lambda n: gains[n].low)
-            refused[weakest] = _refused(found, weakest, gains[weakest].percent)
+            refused[weakest] = refused_from(found, weakest, gains[weakest].percent)
             found = search.told(tuple(sorted(names - {weakest})))
             continue
         if names != settled:
@@ -161,7 +137,7 @@ def judge_driven(
         chosen = _chosen(search, found, train) if folds and folds[0].within else []
         if rare := [n for n in names if not is_chosen(share_of(chosen, _alike(found, n)))]:
             rarest = min(rare, key=lambda n: gains[n].low)
-            refused[rarest] = _refused(found, rarest, gains[rarest].percent)
+            refused[rarest] = refused_from(found, rarest, gains[rarest].percent)
             found = search.told(tuple(sorted(names - {rarest})))
             continue
         random = random_parts(found.best)
@@ -207,28 +183,6 @@ def _remainder(search: LikelihoodSearch, fitted: Fit, seed: int) -> Remainder:
     return left
 
 
-def unsupported(evidence: dict[str, Evidence], gains: dict[str, Gain], left: Remainder) -> list[str]:
-    """Causes that trials which took no part do not speak for.
-
-    Where none could be held out, a cause beside others must still gain something over the horizon.
-    """
-    if not evidence:
-        return [n for n, gain in gains.items() if len(gains) > 1 and not gain.is_material]
-    known = {n: None if left.unexplained else e for n, e in evidence.items()}
-    return [n for n, e in known.items() if not speaks_for(e, gains[n], alone=len(known) == 1)]
-
-
-def _refused(found: Found, name: str, percent: float) -> Refused:
-    stage = next(str(e.stage) for e in found.best.model.effects if e.name == name)
-    return Refused(stage, found.p_values[name], _share(found, name), percent)
-
-
-def _share(found: Found, name: str) -> float:
-    """Share of a cause in what all that were found add to the log-likelihood."""
-    whole = found.nominal.sse - found.best.sse
-    return (found.without[name].sse - found.best.sse) / max(whole, 1e-9)
-
-
 def _ceiling(fitted: Fit) -> float:
     """E of the reading noise alone, percent."""
     assert fitted.doubt is not None
@@ -236,25 +190,6 @@ def _ceiling(fitted: Fit) -> float:
     columns = [(t[rig.output(t.kind)], fitted.doubt.white[rig.output(t.kind)]) for t in fitted.trials]
     noise = sum(float(np.isfinite(y).sum()) * std**2 for y, std in columns)
     return 100.0 * noise / max(sum(float(np.nansum((y - np.nanmean(y)) ** 2)) for y, _ in columns), 1e-300)
-
-
-def with_refused_causes(left: Remainder, random: Sequence[RandomPart], refused: dict[str, Refused]) -> Remainder:
-    """What is left: by the features, or a random effort that is too large, or a cause that was refused.
-
-    A cause that explains less than another's error of form leaves to whatever comes near stands for that error; one
-    that gains nothing over the horizon stands for noise that is not white, as that of an encoder's counts.
-    """
-    if left.unexplained:
-        return left
-    large = [r for r in random if r.share > LARGE_SHARE]
-    if large:
-        return replace(left, unexplained=True, where="effort")
-    certain = [r for r in refused.values() if r.p_value < CERTAIN_LEVEL and r.share >= FORM_SHARE]
-    certain = [r for r in certain if r.percent > MATERIAL_PERCENT]
-    if certain:
-        surest = min(certain, key=lambda r: r.p_value)
-        return replace(left, unexplained=True, p_value=surest.p_value, where=surest.stage)
-    return left
 
 
 def driven_diagnosis(

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fes_pin.data.answered import Answer
+from fes_pin.data.answered import ControllerAnswer
 from fes_pin.data.log import answered
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.result import Diagnosis
@@ -40,7 +40,7 @@ class LogFaults:
         self.trials, self.prepared, self._end = tuple(trials), prepared, end
 
     @cached_property
-    def answers(self) -> list[Answer]:
+    def answers(self) -> list[ControllerAnswer]:
         """What the effort of each trial answers."""
         return in_parallel(answered, self.trials)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from fes_pin.data.answered import Answer
+from fes_pin.data.answered import ControllerAnswer
 from fes_pin.data.log import quiet
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
@@ -31,7 +31,9 @@ Prepared = Callable[[Sequence[Trial]], Sequence[Trial]]
 """What a search makes of recorded trials before it fits them."""
 
 
-def effort_noise_of(fitted: Fit, trials: Sequence[Trial], answers: Sequence[Answer], prepared: Prepared) -> float:
+def effort_noise_of(
+    fitted: Fit, trials: Sequence[Trial], answers: Sequence[ControllerAnswer], prepared: Prepared
+) -> float:
     """Standard deviation of the noise of an effort, in its unit; 0 where nothing speaks for one.
 
     Parameters
@@ -57,7 +59,7 @@ def _least(fitted: Fit, trials: Sequence[Trial]) -> float:
     return float(np.sqrt(LEAST_SHARE * 2.0 * std**2 * time / min(t.dt for t in trials)))
 
 
-def quieted(trials: Sequence[Trial], answers: Sequence[Answer], noise: float) -> list[Trial]:
+def quieted(trials: Sequence[Trial], answers: Sequence[ControllerAnswer], noise: float) -> list[Trial]:
     """The trials without so much noise of their efforts."""
     return [quiet(t, a, noise) for t, a in zip(trials, answers, strict=True)]
 

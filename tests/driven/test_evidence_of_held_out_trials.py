@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.decide.held_out import Evidence, Gain
 from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.driven import Refused, unsupported, with_refused_causes
+from fes_pin.diagnose.driven_refused import Refused, unsupported, with_refused_causes
 from fes_pin.diagnose.errors_ahead import RandomPart
 from fes_pin.diagnose.remainder.open_set import Remainder
 

@@ -24,7 +24,7 @@ from fes_pin.diagnose.search.cause_sets import Names
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.identify.problem import normal_equations
 
-Earns = Callable[[float, float, int], bool]
+Worthwhile = Callable[[float, float, int], bool]
 """Whether a gain in twice the log-likelihood, of so much that all causes together gain, is worth so many degrees."""
 
 
@@ -48,7 +48,7 @@ class ChosenAgain:
         The rule of the search.
     """
 
-    def __init__(self, fits: Mapping[Names, Fit], earns: Earns) -> None:
+    def __init__(self, fits: Mapping[Names, Fit], earns: Worthwhile) -> None:
         self._fits = {n: f for n, f in fits.items() if math.isfinite(f.sse)}
         self._earns = earns
         self._trials = {n: _by_trial(f) for n, f in self._fits.items()}

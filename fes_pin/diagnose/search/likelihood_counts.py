@@ -16,11 +16,11 @@ from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs.base import Rig
 
-Set = TypeVar("Set")
+CauseSet = TypeVar("CauseSet")
 """A set of causes that is fitted: a `Fit`, or one of several groups."""
 
 
-class LikelihoodCounts(Generic[Set]):
+class LikelihoodCounts(Generic[CauseSet]):
     """The same sets with counts as intervals.
 
     Parameters
@@ -40,15 +40,15 @@ class LikelihoodCounts(Generic[Set]):
         self,
         rig: Rig,
         trials: Sequence[Trial],
-        fit_of: Callable[[Set], Fit],
-        maximum: Callable[[Set, Mapping[str, float], Set | None], Set],
+        fit_of: Callable[[CauseSet], Fit],
+        maximum: Callable[[CauseSet, Mapping[str, float], CauseSet | None], CauseSet],
     ) -> None:
         self._fit_of, self._maximum = fit_of, maximum
         self.are_there = any(count_of(t[n]) for t in trials for n in rig.outputs(t.kind) if n in t.columns)
-        self._known: dict[int, tuple[Set, Set]] = {}
+        self._known: dict[int, tuple[CauseSet, CauseSet]] = {}
         self._gains: dict[tuple[int, int], float] = {}
 
-    def gained(self, larger: Set, smaller: Set) -> float:
+    def gained(self, larger: CauseSet, smaller: CauseSet) -> float:
         """By how much a larger set lowers the cost of intervals.
 
         Each begins also where the other ends: the larger one with nothing of what it has besides, so that it is no
@@ -64,13 +64,13 @@ class LikelihoodCounts(Generic[Set]):
             self._gains[pair] = less.sse - more.sse
         return self._gains[pair]
 
-    def of(self, one: Set) -> Set:
+    def of(self, one: CauseSet) -> CauseSet:
         """The maximum from where a set has ended, or from elsewhere if that was better."""
         if self._known.get(id(one), (None,))[0] is not one:
             self._known[id(one)] = (one, self._maximum(one, {}, None))
         return self._known[id(one)][1]
 
-    def _better(self, one: Set, values: Mapping[str, float], other: Set) -> Fit:
+    def _better(self, one: CauseSet, values: Mapping[str, float], other: CauseSet) -> Fit:
         """The maximum of a set also from given values, beside what is random in another."""
         begun = self._maximum(one, values, self.of(other))
         self._known[id(one)] = (one, min((self.of(one), begun), key=lambda s: self._fit_of(s).sse))
