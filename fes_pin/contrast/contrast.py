@@ -16,7 +16,7 @@ from fes_pin.contrast.late import is_cheaper, late_in_groups
 from fes_pin.contrast.left import left_in_groups
 from fes_pin.contrast.result import Contrast
 from fes_pin.contrast.search import ContrastFound, ContrastSearch
-from fes_pin.data.log import Log
+from fes_pin.data.log import EFFORT, Log
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -151,7 +151,8 @@ def _by_group(study: Study, names: Sequence[str], nominal: Model) -> tuple[dict[
 def _quieted(study: Study, names: Sequence[str], nominal: Model) -> tuple[Study, list[str]]:
     """The study without noise that the efforts of all groups were recorded with, and what is to be said of it."""
     train, _ = split(study)
-    if not is_fed_back(nominal.rig, train):
+    logged = all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
+    if not logged or not is_fed_back(nominal.rig, train):
         return study, []
 
     def prepared(trials: Sequence[Trial]) -> list[Trial]:

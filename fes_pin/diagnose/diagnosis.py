@@ -11,7 +11,7 @@ import numpy as np
 
 from fes_pin.data.derived import without_derived
 from fes_pin.data.errors import InputError
-from fes_pin.data.log import Log
+from fes_pin.data.log import EFFORT, Log
 from fes_pin.data.provenance import provenance_now
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.stuck import without_stuck
@@ -110,12 +110,13 @@ class _Work:
         """The diagnosis of a study as its log wrote it down, with what that did to its trials undone if it can be."""
         nominal, (train, _) = nominal_model(study), split(study)
         driven = is_fed_back(nominal.rig, train)
+        logged = all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
         faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
-        log = Log(effort_noise=faults.noise_beside_nominal(nominal)) if driven else Log()
+        log = Log(effort_noise=faults.noise_beside_nominal(nominal)) if driven and logged else Log()
         found = self._logged(study, log)
         if not self.was_stopped and (passed := _low_passed(found, self.end)) is not None:
             found = _likelier(self.diagnosis(passed), found)
-        if found.extended.doubt is None or not all("effort" in nominal.rig.input_columns(t) for t in study.trials):
+        if found.extended.doubt is None or not logged:
             return found
         if not self.was_stopped and (noise := faults.noise_beside(found)) != found.log.effort_noise:
             found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)

@@ -74,3 +74,11 @@ def test_what_acted_is_not_taken_for_noise(monkeypatch, tmp_path):
     found = diagnose_joint(study)
     assert found.log.effort_noise == 0.0
     assert found.verdict == "adequate", str(found)
+
+
+def test_trials_without_an_effort_beside_others_are_no_error(tmp_path):
+    """A swing that was let go stands beside trials that a controller drove: nothing is asked of its effort."""
+    study = read_study(draw_swing_up((), 1800005, tmp_path).study)
+    let_go = replace(study.trials[0].without("effort"), name="let go").first(400)
+    found = diagnose_joint(replace(study, trials=(*study.trials, let_go)), limit=20.0)
+    assert found.log.effort_noise == 0.0
