@@ -39,6 +39,12 @@ class Cause:
     trial: str | None = None
     words: str = ""
 
+    @property
+    def chosen_in_some(self) -> tuple[int, int] | None:
+        """`chosen_again` where some folds choose something else; None where none does."""
+        again = self.chosen_again
+        return again if again is not None and again[0] < again[1] else None
+
     def helps(self, complete: bool, alone: bool) -> bool:
         """True if trials that took no part speak for it, and it is chosen without them as well.
 

@@ -92,7 +92,7 @@ def _cause(cause: Cause, held_out: bool) -> dict[str, Any]:
         "parameters": {n: {"value": shown(p.value), "std": shown(p.std)} for n, p in cause.parameters.items()},
         "equivalents": list(cause.equivalents),
         "p_value": _p_shown(cause.p_value),
-        **({"chosen_again": list(cause.chosen_again)} if cause.chosen_again is not None else {}),
+        **({"chosen_again": list(some)} if (some := cause.chosen_in_some) else {}),
         "gain_percent": {
             "fit": shown(cause.gain_fit),
             "held_out": shown(held.percent) if held_out else None,

@@ -168,11 +168,8 @@ class Diagnosis:
             lines.append(f"something is left unexplained: {self.reason}")
         if self.left_out:
             lines.append(f"left out as spikes: {left_out_text(self.left_out, self.study.trials)}")
-        for c in self.causes:
-            if c.chosen_again is not None and c.chosen_again[0] < c.chosen_again[1]:
-                lines.append(
-                    "{} is chosen in {} of {} folds without the trials held out there".format(c.name, *c.chosen_again)
-                )
+        some = {c.name: c.chosen_in_some for c in self.causes}
+        lines += [f"{n} is chosen in {k[0]} of {k[1]} folds without their trials" for n, k in some.items() if k]
         own = [e.name for e in self.model.effects if e.each_trial]
         if own:
             lines.append(f"{', '.join(own)}: {EACH_TRIAL}")

@@ -1,6 +1,5 @@
 """A joint whose motion is imposed: the effort that it takes, its noise, and what hides in it."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from imposed_rigs.motion import drawn
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
-from fes_pin.diagnose import late_effort
+from fes_pin.diagnose import logged
 from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -140,10 +139,9 @@ def test_a_hidden_cause_is_named_and_predicted(tmp_path, cause):
 def test_nothing_hidden_is_adequate(tmp_path, monkeypatch):
     """And the effort, which is what is read here, is never moved."""
     made = joint.study((), 0.0, np.random.default_rng(11), tmp_path)
-    found = diagnose_joint(made)
-    assert found.verdict == "adequate"
-    monkeypatch.setattr(late_effort, "lateness_of", lambda *_: pytest.fail("the effort of an imposed motion was moved"))
-    assert late_effort.late_by(found, math.inf) is None
+    for asked in ("lateness_of", "effort_noise_of"):
+        monkeypatch.setattr(logged, asked, lambda *_: pytest.fail("the effort of an imposed motion was doubted"))
+    assert diagnose_joint(made).verdict == "adequate"
 
 
 def test_a_spring_and_damper_in_series_begin_relaxed(tmp_path):
