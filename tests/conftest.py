@@ -30,6 +30,7 @@ LONG = {
         *("test_a_misread_trial_is_told_as_such[changes1]", "test_a_common_cause_is_no_change"),
         "test_strokes_that_are_repeated",
     ),
+    "contrast/test_counted_groups.py": ("test_counts_are_no_common_cause",),
     "control/test_control.py": ("test_five_minutes",),
     "control/test_tuning.py": ("test_the_delay_margin_that_is_stated",),
     "data/test_spikes.py": ("test_a_clean_study_is_left_alone[ankle]",),
@@ -49,6 +50,7 @@ LONG = {
     "diagnose/test_gaps.py": ("[joint-names2", "[ankle-names", "lack[without"),
     "diagnose/test_misread.py": ("test_a_cause_that_shows_at_one_load",),
     "diagnose/test_one_trial.py": ("test_a_real_swing", "test_friction_is_found_beneath"),
+    "diagnose/test_outside.py": ("for_a_detent[32]",),
     "diagnose/test_per_trial_phase.py": (
         "[ankle-breath-process]",
         "[joint-breath-white]",
@@ -56,6 +58,7 @@ LONG = {
         "kept[ankle",
     ),
     "driven/test_driven.py": ("test_play_before", "test_what_no_cause", "adequate[12]", "no_cause[14"),
+    "driven/test_noisy_effort.py": ("test_friction_beside", "test_trials_without_an_effort"),
     "fuzz/test_cases.py": ("a trial of milliseconds",),
     "imposed/test_imposed_ankle.py": ("predicted[force_velocity]", "predicted[passive_relaxation]", "adequate[8]"),
     "imposed/test_imposed_joint.py": (
