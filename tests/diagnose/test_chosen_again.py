@@ -1,5 +1,7 @@
 """What each fold would have chosen without its trials, of all sets that were fitted."""
 
+from dataclasses import replace
+
 import pytest
 from diagnose.hidden import study_of
 
@@ -45,8 +47,6 @@ def test_the_true_cause_is_chosen_without_any_of_the_trials(fits):
 
 def test_what_one_trial_alone_speaks_for_is_not_chosen_without_it(fits):
     """The innovations of one trial are moved along what an offset would do to it, and to no other."""
-    import dataclasses
-
     nominal, offset = fits[()], fits["effort_offset",]
     odd = 0
 
@@ -55,8 +55,8 @@ def test_what_one_trial_alone_speaks_for_is_not_chosen_without_it(fits):
         push = 8.0 * offset.std("effort_offset.offset") * len(offset.parts) ** 0.5
         along = offset.parts[odd].jacobian[:, offset.free.index("effort_offset.offset")]
         parts = [*fitted.parts]
-        parts[odd] = dataclasses.replace(part, residual=part.residual + push * along)
-        return dataclasses.replace(fitted, parts=tuple(parts), sse=sum(float(p.residual @ p.residual) for p in parts))
+        parts[odd] = replace(part, residual=part.residual + push * along)
+        return replace(fitted, parts=tuple(parts), sse=sum(float(p.residual @ p.residual) for p in parts))
 
     again = ChosenAgain({(): moved(nominal), ("effort_offset",): moved(offset)}, earns)
     others = [i for i in range(len(nominal.trials)) if i != odd]
