@@ -46,7 +46,7 @@ from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_smoothing
-from fes_pin.identify.turns import with_honest_intervals
+from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.models.stage import Effect
 
 

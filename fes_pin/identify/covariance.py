@@ -82,9 +82,23 @@ def widened(covariance: np.ndarray, scores: np.ndarray) -> np.ndarray:
     if len(scores) < 2:
         return covariance
     known = np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0)
-    own, pieces = covariance[np.ix_(known, known)], len(scores)
-    spread = scores[:, known] @ own
-    variances = pieces / (pieces - 1.0) * np.sum(spread * spread, axis=0)
     wider = np.ones(len(covariance))
-    wider[known] = np.sqrt(np.maximum(1.0, variances / np.diag(own)))
+    wider[known] = np.sqrt(np.maximum(1.0, np.diag(scattered(covariance, scores))[known] / np.diag(covariance)[known]))
     return covariance * np.outer(wider, wider)
+
+
+def scattered(covariance: np.ndarray, scores: np.ndarray) -> np.ndarray:
+    """The sandwich of `widened`, shape (n, n); 0 of parameters that nothing is known of, or that do not move.
+
+    Parameters
+    ----------
+    covariance
+        Inverse information, shape (n, n).
+    scores
+        Of at least two pieces, shape (m, n).
+    """
+    known, pieces = np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0), len(scores)
+    spread = scores[:, known] @ covariance[np.ix_(known, known)]
+    out = np.zeros_like(covariance)
+    out[np.ix_(known, known)] = pieces / (pieces - 1.0) * spread.T @ spread
+    return out

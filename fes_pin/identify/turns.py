@@ -10,23 +10,17 @@ wrong.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Protocol
 
-import numpy as np
-
-from fes_pin.identify.covariance import covariance_of, widened
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import Linearized, Unknowns, normal_equations
+from fes_pin.identify.problem import Unknowns
 from fes_pin.identify.scoring import LITTLE, WORTH
 
 ROUNDS = 12
 """Turns of parameters and randomness, at most."""
-PIECES = 40
-"""Pieces of the data by whose scores a model's errors of form show: as many as tell a deviation within a tenth, and so
-as long as they can be."""
 
 
 class TurnsProblem(Protocol):
@@ -78,31 +72,3 @@ def maximise(
 ) -> Fit:
     """The likelihood's maximum; see `by_turns`. The fit's `doubt` is what is random there."""
     return replace(by_turns(problem, start, unknowns, rounds), doubt=problem.doubt)
-
-
-def with_honest_intervals(fitted: Fit) -> Fit:
-    """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter."""
-    parts = _at_rest(fitted.parts)
-    free = np.array([n not in fitted.at_bound for n in fitted.free])
-    covariance = covariance_of(normal_equations(parts).hessian, free)
-    lengths = [len(p.residual) for p in parts]
-    shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
-    scores = [
-        piece
-        for part, count in zip(parts, shares, strict=True)
-        for piece in np.add.reduceat(
-            part.jacobian * part.residual[:, None], np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
-        )
-    ]
-    return replace(fitted, covariance=widened(covariance, np.array(scores)))
-
-
-def _at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
-    """The trials of a fit that has ended, without what its sensitivities have along the residual as a whole.
-
-    A slope that is left where no step keeps what it promises is roughness of the cost, as beside friction that jumps:
-    it tells nothing of a parameter.
-    """
-    power = sum(float(p.residual @ p.residual) for p in parts)
-    along = sum(p.residual @ p.jacobian for p in parts) / max(power, 1e-300)
-    return [replace(p, jacobian=p.jacobian - np.outer(p.residual, along)) for p in parts]

@@ -218,7 +218,10 @@ class Effect:
         return {}
 
     def smallest(self, measured: Mapping[str, np.ndarray]) -> dict[str, float]:
-        """Sizes of amplitudes below which readings as coarse as these do not tell them; `measured` as in `grids`."""
+        """Sizes of amplitudes below which readings as coarse as these do not tell them.
+
+        `measured` is as in `grids`, with `answer` the effort of a controller that answers what is read.
+        """
         return {}
 
     @classmethod

@@ -16,8 +16,8 @@ from fes_pin.models.nominal import nominal_model
 NAMES = ("coulomb_friction", "effort_offset", "quadratic_damping")
 
 
-def earns(gain, _explained, degrees):
-    return len(NAMES) * float(chi2_tail(max(gain, 0.0), degrees)) < 0.01
+def earns(larger, smaller, gain, _explained):
+    return len(NAMES) * float(chi2_tail(max(gain, 0.0), larger.degrees - smaller.degrees)) < 0.01
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from fes_pin.data.study import read_study
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem, for_gains_as_they_are
-from fes_pin.identify.turns import with_honest_intervals
+from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.models.effects import CoulombFriction, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
 

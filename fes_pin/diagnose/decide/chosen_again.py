@@ -24,8 +24,9 @@ from fes_pin.diagnose.search.cause_sets import Names
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.identify.problem import normal_equations
 
-Worthwhile = Callable[[float, float, int], bool]
-"""Whether a gain in twice the log-likelihood, of so much that all causes together gain, is worth so many degrees."""
+Worthwhile = Callable[[Fit, Fit, float, float], bool]
+"""Whether a set is worth more than a smaller one where it gains so much in twice the log-likelihood, and all its causes
+together so much."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +61,8 @@ class ChosenAgain:
         for size in sorted({len(n) for n in costs} - {0}):
             of_size = [n for n in costs if len(n) == size]
             first = min(of_size, key=lambda n: (costs[n] + PARAMETER_PRICE * self._fits[n].degrees, n))
-            degrees = max(self._fits[first].degrees - self._fits[best].degrees, 1)
-            if not self._earns(costs[best] - costs[first], costs[()] - costs[first], degrees):
+            sets = self._fits[first], self._fits[best]
+            if not self._earns(*sets, costs[best] - costs[first], costs[()] - costs[first]):
                 break
             best = first
         return self._fits[best]

@@ -75,8 +75,9 @@ class Claims:
             return False
         return self.p_value(self.sets.fits[names], self.sets.fits[best]) < CLAIM_LEVEL
 
-    def earns(self, gain: float, explained: float, degrees: int) -> bool:
+    def earns(self, larger: Fit, smaller: Fit, gain: float, explained: float) -> bool:
         """The same of a gain in likelihood alone, of what all causes explain."""
+        degrees = max(larger.degrees - smaller.degrees, 1)
         return gain >= FORM_SHARE * explained and self.family.p_value(gain, degrees) < CLAIM_LEVEL
 
     def share(self, names: Names, best: Names) -> float:

@@ -23,6 +23,7 @@ from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import DRIVEN_LEVEL, EXTEND_LEVEL
+from fes_pin.identify.scatter import excess_scatter
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
 MOST_IMPOSED = 8
@@ -112,16 +113,22 @@ class LikelihoodSearch:
         return self.settle(self._backward(best))
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
-        """Family-wise p-value of what a larger set adds; of readings in counts also where these are intervals."""
-        degrees = max(larger.degrees - smaller.degrees, 1)
-        p = self.family.p_value(self.sets.gained(larger, smaller), degrees)
+        """Family-wise p-value of what a larger set adds, as far as pieces of the data agree on it.
+
+        Of readings in counts also where these are intervals.
+        """
+        p = self._p_value(larger, smaller, self.sets.gained(larger, smaller))
         if p < DRIVEN_LEVEL and self.sets.counts.are_there:
-            p = max(p, self.family.p_value(self.sets.counts.gained(larger, smaller), degrees))
+            p = max(p, self._p_value(larger, smaller, self.sets.counts.gained(larger, smaller)))
         return p
 
-    def earns(self, gain: float, _explained: float, degrees: int) -> bool:
-        """Whether a gain in twice the log-likelihood is worth so many degrees of freedom."""
-        return self.family.p_value(gain, degrees) < DRIVEN_LEVEL
+    def _p_value(self, larger: Fit, smaller: Fit, gain: float) -> float:
+        degrees = max(larger.degrees - smaller.degrees, 1)
+        return self.family.p_value(gain / excess_scatter(larger, smaller), degrees)
+
+    def earns(self, larger: Fit, smaller: Fit, gain: float, _explained: float) -> bool:
+        """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood."""
+        return self._p_value(larger, smaller, gain) < DRIVEN_LEVEL
 
     def possible(self) -> dict[Names, Fit]:
         """All sets that are fitted, but for those that cannot be."""

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage, lag, lag_time
 
@@ -32,6 +34,13 @@ class SensorLag(Effect):
     name, stage, signal, rigs = "sensor_lag", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
     states = ("filtered",)
     max_step_s = 1.25e-3
+
+    def smallest(self, measured: Mapping[str, np.ndarray]) -> dict[str, float]:
+        """Half a row of a controller's log, which does not say when in it the effort answered the reading."""
+        if "answer" not in measured:
+            return {}
+        steps = np.diff(measured["time"])
+        return {"lag_s": 0.5 * float(np.min(steps, where=steps > 0.0, initial=np.inf))}
 
     def apply(self, value: Any, s: Any) -> Any:
         return value + (1.0 + self.shift) * (self._lagged(s)[0] - s.sensed)

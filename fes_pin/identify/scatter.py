@@ -1,0 +1,68 @@
+"""How much more the scores of pieces of the data scatter than a right model's would: errors of form are no white noise.
+
+Where a model is right, twice the gain in log-likelihood of k more parameters is a chi-square of k degrees of freedom.
+Where it is not, it is a sum of k of one degree each, times the eigenvalues of V C^-1, with C what the information says
+of the parameters' covariance and V how they scatter (`covariance.widened`). Gains are divided by their mean, if that is
+above 1.
+
+Source: Kent, Robust properties of likelihood ratio tests, Biometrika 69 (1982); Satorra and Bentler, A scaled
+difference chi-square test statistic for moment structure analysis, Psychometrika 66 (2001).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.identify.covariance import covariance_of, scattered, widened
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.problem import Linearized, normal_equations
+
+PIECES = 40
+"""Pieces of the data by whose scores a model's errors of form show: as many as tell a deviation within a tenth, and so
+as long as they can be."""
+
+
+def with_honest_intervals(fitted: Fit) -> Fit:
+    """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter."""
+    return replace(fitted, covariance=widened(*_told(fitted)))
+
+
+def excess_scatter(larger: Fit, smaller: Fit) -> float:
+    """How many times wider than of a right model that is scattered what a larger fit has besides; at least 1."""
+    covariance, scores = _told(larger)
+    felt = np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0)
+    more = [k for k, n in enumerate(larger.free) if n not in smaller.free and felt[k]]
+    if not more or len(scores) < 2:
+        return 1.0
+    own, wide = (c[np.ix_(more, more)] for c in (covariance, scattered(covariance, scores)))
+    return max(1.0, float(np.trace(np.linalg.pinv(own, hermitian=True) @ wide)) / len(more))
+
+
+def _told(fitted: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """The inverse information of a fit that has ended, and the slopes of the log-likelihood of its pieces."""
+    parts = _at_rest(fitted.parts)
+    free = np.array([n not in fitted.at_bound for n in fitted.free])
+    lengths = [len(p.residual) for p in parts]
+    shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
+    scores = [
+        piece
+        for part, count in zip(parts, shares, strict=True)
+        for piece in np.add.reduceat(
+            part.jacobian * part.residual[:, None], np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
+        )
+    ]
+    return covariance_of(normal_equations(parts).hessian, free), np.array(scores)
+
+
+def _at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
+    """The trials of a fit that has ended, without what its sensitivities have along the residual as a whole.
+
+    A slope that is left where no step keeps what it promises is roughness of the cost, as beside friction that jumps:
+    it tells nothing of a parameter.
+    """
+    power = sum(float(p.residual @ p.residual) for p in parts)
+    along = sum(p.residual @ p.jacobian for p in parts) / max(power, 1e-300)
+    return [replace(p, jacobian=p.jacobian - np.outer(p.residual, along)) for p in parts]
