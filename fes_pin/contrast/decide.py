@@ -31,6 +31,7 @@ from fes_pin.contrast.repeats import Repeats
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.identify.distributions import f_tail
 from fes_pin.identify.levels import CLAIM_LEVEL
+from fes_pin.identify.scatter import excess_scatter
 
 UNUSUAL = 0.05
 """p-value below which a spread is larger than what is usual, as repeats may differ in just this: the usual one counts
@@ -68,12 +69,14 @@ def p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> fl
 def noise_p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> float:
     """Family-wise p-value against the noise alone: of a cause of all groups, which claims no change.
 
-    Of readings in counts also where these are intervals: how counts stand or hunt is no cause of all groups either.
+    Gains count as far as pieces of the data agree on them. Of readings in counts also where these are intervals: how
+    counts stand or hunt is no cause of all groups either.
     """
     degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
-    p = family.p_value(smaller.fit.sse - larger.fit.sse, degrees)
+    scatter = excess_scatter(larger.fit, smaller.fit)
+    p = family.p_value((smaller.fit.sse - larger.fit.sse) / scatter, degrees)
     if p < CLAIM_LEVEL and fits.counts.are_there:
-        p = max(p, family.p_value(fits.counts.gained(larger, smaller), degrees))
+        p = max(p, family.p_value(fits.counts.gained(larger, smaller) / scatter, degrees))
     return p
 
 

@@ -117,18 +117,16 @@ class LikelihoodSearch:
 
         Of readings in counts also where these are intervals.
         """
-        p = self._p_value(larger, smaller, self.sets.gained(larger, smaller))
+        degrees, scatter = max(larger.degrees - smaller.degrees, 1), excess_scatter(larger, smaller)
+        p = self.family.p_value(self.sets.gained(larger, smaller) / scatter, degrees)
         if p < DRIVEN_LEVEL and self.sets.counts.are_there:
-            p = max(p, self._p_value(larger, smaller, self.sets.counts.gained(larger, smaller)))
+            p = max(p, self.family.p_value(self.sets.counts.gained(larger, smaller) / scatter, degrees))
         return p
-
-    def _p_value(self, larger: Fit, smaller: Fit, gain: float) -> float:
-        degrees = max(larger.degrees - smaller.degrees, 1)
-        return self.family.p_value(gain / excess_scatter(larger, smaller), degrees)
 
     def earns(self, larger: Fit, smaller: Fit, gain: float, _explained: float) -> bool:
         """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood."""
-        return self._p_value(larger, smaller, gain) < DRIVEN_LEVEL
+        degrees = max(larger.degrees - smaller.degrees, 1)
+        return self.family.p_value(gain / excess_scatter(larger, smaller), degrees) < DRIVEN_LEVEL
 
     def possible(self) -> dict[Names, Fit]:
         """All sets that are fitted, but for those that cannot be."""
