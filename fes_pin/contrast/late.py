@@ -42,7 +42,8 @@ def _late_in(fits: Fits, best: Grouped, group: str) -> float | None:
     part = fits.part(best, group)
     assert part.doubt is not None
     own = maximise(LikelihoodProblem(part.model, part.trials, part.doubt), part.values, part.unknowns)
-    return lateness_of(own, min(t.dt for t in part.trials))
+    late = lateness_of(own, min(t.dt for t in part.trials))
+    return late.late_s if late is not None else None
 
 
 def is_cheaper(timed: ContrastSearched, recorded: ContrastSearched) -> bool:

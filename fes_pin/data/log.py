@@ -20,7 +20,7 @@ class Log:
     Attributes
     ----------
     effort_late_s
-        How long after it acted the effort is written down, s.
+        How long after it acted the effort is written down, s; negative of one that acts later within its row.
     effort_noise
         Standard deviation of the white noise that the effort is recorded with, in its unit.
     low_pass_hz
@@ -53,10 +53,12 @@ def quiet(trial: Trial, answer: ControllerAnswer, noise: float) -> Trial:
 def advanced(trial: Trial, column: str, by_s: float) -> Trial:
     """The trial with a column that is held between samples as it is `by_s` later, averaged over each sample.
 
-    With u(t) the held column: u'_k = 1/dt integral of u(t + by_s) from t_k to t_(k+1). The last sample goes on.
+    With u(t) the held column: u'_k = 1/dt integral of u(t + by_s) from t_k to t_(k+1). The last sample goes on, and the
+    first was there before.
     """
-    time, dt = trial.time - trial.time[0], trial.dt
-    whole = np.concatenate([[0.0], np.cumsum(trial[column] * dt)])
+    time, dt, held = trial.time - trial.time[0], trial.dt, trial[column]
     ends = np.append(time, time[-1] + dt)
-    beyond = np.interp(ends + by_s, ends, whole) + trial[column][-1] * np.maximum(ends + by_s - ends[-1], 0.0)
-    return trial.with_columns(**{column: np.diff(beyond) / dt})
+    at = ends + by_s
+    whole = np.interp(at, ends, np.concatenate([[0.0], np.cumsum(held * dt)]))
+    whole += held[-1] * np.maximum(at - ends[-1], 0.0) + held[0] * np.minimum(at, 0.0)
+    return trial.with_columns(**{column: np.diff(whole) / dt})

@@ -15,7 +15,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.effort_noise import Prepared, cost_beside, effort_noise_of, words_of_noise
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.identify.lateness import lateness_of, words_of_lateness
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
@@ -61,14 +61,21 @@ class LogFaults:
     def late_by(self, diagnosis: Diagnosis) -> float:
         """How late the efforts were written down, s; 0 where they were not, or there is no time to tell.
 
-        Where something is left beside the causes that were found, they may stand for it: then the nominal model is
-        asked.
+        What was found may stand for it: the nominal model is asked where something is left beside, or where it is
+        cheaper with efforts in time than all that was found.
         """
-        row_s = min(t.dt for t in diagnosis.extended.trials)
-        late = self._told(lambda: lateness_of(diagnosis.extended, row_s) or 0.0)
-        if not late and diagnosis.causes and diagnosis.remainder.unexplained:
-            late = self._told(lambda: lateness_of(diagnosis.nominal, row_s) or 0.0)
-        return late
+        return self._told(lambda: self._late_by(diagnosis))
+
+    def _late_by(self, diagnosis: Diagnosis) -> float:
+        nominal, extended = diagnosis.nominal, diagnosis.extended
+        row_s = min(t.dt for t in extended.trials)
+        late = lateness_of(extended, row_s)
+        if late is None and diagnosis.causes:
+            late = lateness_of(nominal, row_s)
+            if late is not None and not diagnosis.remainder.unexplained:
+                price = late.cost + PARAMETER_PRICE * (nominal.degrees + 1)
+                late = late if price < extended.price else None
+        return late.late_s if late is not None else 0.0
 
     def _told(self, ask: Callable[[], float], otherwise: float = 0.0) -> float:
         """What is told in the time that is left."""

@@ -1,11 +1,14 @@
-"""By how much an effort was written down after it acted.
+"""By how much an effort was written down after it acted, or before.
 
 A log that asks a controller less often than it works holds an effort for as long as a row lasts, and the rig seems to
-answer before it is driven: by half a row where rows are regular, by one and more where they are not. How late an effort
-is the likelihood says, beside the model that was found.
+answer before it is driven: by half a row where rows are regular, by one and more where they are not. When within its
+row an effort that answers the reading begins to act no log says; it is at most half a row later than the reading, for
+what is later is a lag. How late an effort is the likelihood says, beside the model that was found.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from scipy.optimize import minimize_scalar
 
@@ -15,6 +18,7 @@ from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import CERTAIN_LEVEL
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
+from fes_pin.workers import in_parallel
 
 LEAST_GAIN = chi2_quantile(1.0 - CERTAIN_LEVEL, 1)
 """Twice the log-likelihood that moving the effort must bring: whatever it stands for, it must be there."""
@@ -22,10 +26,20 @@ LEAST_ROWS = 0.25
 """The least: of a log that asks in every second sample of a controller, which holds for half a row."""
 MOST_ROWS = 2.0
 """Rows of a log by which an effort may be late: one that it is held when it is written down, and one until the next."""
+MOST_EARLY_ROWS = 0.5
+"""Rows by which it may act later than written: what is more is a lag, see `SensorLag.smallest`."""
 
 
-def lateness_of(fitted: Fit, row_s: float) -> float | None:
-    """How late the efforts of a fit's trials are, s; None where they are in time.
+@dataclass(frozen=True)
+class Lateness:
+    """How late efforts are, s, negative where they act after they are written; and the cost of trials so moved."""
+
+    late_s: float
+    cost: float
+
+
+def lateness_of(fitted: Fit, row_s: float) -> Lateness | None:
+    """How late the efforts of a fit's trials are; None where they are in time.
 
     Parameters
     ----------
@@ -45,12 +59,16 @@ def lateness_of(fitted: Fit, row_s: float) -> float | None:
             tried[late] = maximise(problem, fitted.values, fitted.unknowns).sse
         return tried[late]
 
-    if cost(LEAST_ROWS * row_s) > fitted.sse - LEAST_GAIN:
+    least = (LEAST_ROWS * row_s, -LEAST_ROWS * row_s)
+    lowest, first = min(zip(in_parallel(cost, least), least, strict=True))
+    if lowest > fitted.sse - LEAST_GAIN:
         return None
-    most = {"bounds": (0.0, MOST_ROWS * row_s), "method": "bounded", "options": {"xatol": 0.02 * row_s}}
-    return float(minimize_scalar(cost, **most).x)
+    bounds = (0.0, MOST_ROWS * row_s) if first > 0.0 else (-MOST_EARLY_ROWS * row_s, 0.0)
+    found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 0.02 * row_s})
+    return Lateness(float(found.x), float(found.fun))
 
 
 def words_of_lateness(late_s: float) -> str:
     """What is to be said of efforts that were moved."""
-    return f"the effort was written down {1e3 * late_s:.2g} ms after it acted, and was moved to when it did"
+    when = "after" if late_s > 0.0 else "before"
+    return f"the effort was written down {1e3 * abs(late_s):.2g} ms {when} it acted, and was moved to when it did"

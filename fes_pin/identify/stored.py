@@ -22,11 +22,11 @@ KEY = "random"
 LOG_KEY = "log"
 _PARTS = ("white", "std", "time")
 _LOG = {
-    "effort_late_s": NumberKey("s", lower=0.0, required=False),
+    "effort_late_s": NumberKey("s", required=False),
     "effort_noise": NumberKey("N m or N", lower=0.0, required=False),
     "low_pass_hz": NumberKey("Hz", lower=0.0, required=False),
 }
-"""What `Log` holds, as a file may: no log is ahead of what acts, no cut-off is below 0."""
+"""What `Log` holds, as a file may."""
 _NOISE = {"std": NumberKey(""), "innovation_std": NumberKey(""), "step_s": NumberKey("s")}
 
 

@@ -39,7 +39,14 @@ def drawn(count: int, distance: int, seed: int) -> list[Item]:
     causes = [f.cause for f in FORMS if f.name == "same" and "ankle" in f.rigs]
     hidden = [(causes[k % len(causes)],) if k % NULLS else () for k in range(count)]
     return [
-        Item("ankle", names, "same" if names else "null", distance, FAMILIES[k % len(FAMILIES)], 1000 * seed + k)
+        Item(
+            "ankle",
+            names,
+            "same" if names else "null",
+            distance,
+            FAMILIES[(k + k // NULLS) % len(FAMILIES)],
+            1000 * seed + k,
+        )
         for k, names in enumerate(hidden)
     ]
 

@@ -72,6 +72,21 @@ def test_a_log_of_every_fifth_sample_is_read_between_its_rows(tmp_path):
     assert diagnosis.verdict == "adequate", str(diagnosis)
 
 
+def test_an_effort_that_acts_later_within_its_row_is_no_cause(tmp_path):
+    """What is read of the slide is as old as it is in a row that the controller writes before its effort acts.
+
+    Before, a spring that relaxes was named, and the inertia was wrong by seven deviations.
+    """
+    study, late_s = read_study(draw((), 0.3, 1151002, tmp_path, recorded=True).study), 0.0008
+    older = tuple(t.with_columns(position=np.interp(t.time - late_s, t.time, t["position"])) for t in study.trials)
+    diagnosis = diagnose_joint(replace(study, trials=older))
+    assert diagnosis.verdict == "adequate", str(diagnosis)
+    assert diagnosis.log.effort_late_s == pytest.approx(-late_s, rel=0.2)
+    assert any("ms before it acted, and was moved" in said for said in diagnosis.warnings)
+    fitted = diagnosis.extended
+    assert abs(fitted.values["inertia_scale"] - 1.0) < 3.0 * fitted.std("inertia_scale")
+
+
 def test_a_reading_that_is_late_stays_so(tmp_path):
     drawn = draw(("sensor_lag",), 0.3, 1151004, tmp_path, recorded=True)
     diagnosis = diagnose_joint(read_study(drawn.study))
@@ -86,3 +101,6 @@ def test_what_is_held_is_moved_by_parts_of_a_sample():
     assert np.allclose(advanced(trial, "effort", 0.0)["effort"], trial["effort"])
     assert np.allclose(advanced(trial, "effort", 0.0025)["effort"], [0.0, 1.0, 4.0, 3.0, 2.0, 8.0])
     assert np.allclose(advanced(trial, "effort", 0.02)["effort"], [4.0, 4.0, 0.0, 8.0, 8.0, 8.0])
+    assert np.allclose(advanced(trial, "effort", -0.0025)["effort"], [0.0, 0.0, 3.0, 4.0, 1.0, 6.0])
+    begun = trial.with_columns(effort=trial["effort"] + 2.0)
+    assert np.allclose(advanced(begun, "effort", -0.0025)["effort"], [2.0, 2.0, 5.0, 6.0, 3.0, 8.0])

@@ -12,7 +12,7 @@ from fes_pin.diagnose.search.possible import is_possible
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.models.effects import Backlash, CoulombFriction, SensorGain
+from fes_pin.models.effects import Backlash, CoulombFriction, SensorGain, SensorLag
 from fes_pin.models.nominal import nominal_model
 
 KNEE = next(k for k in range(99) if BASES[np.random.default_rng(k).integers(len(BASES))].name == "knee")
@@ -54,3 +54,14 @@ def test_a_play_of_less_than_a_count_is_the_counts(half_width, possible, tmp_pat
     model = nominal_model(study) + Backlash(half_width=half_width * count)
     problem = LikelihoodProblem(model, trials, first_guess(model, trials), free=("damping",))
     assert is_possible(fit_problem(problem, model.parameters())) == possible
+
+
+@pytest.mark.parametrize(("rows", "possible"), [(0.4, False), (0.6, True), (0.0, True)])
+def test_a_lag_of_less_than_half_a_row_is_the_logs(rows, possible, tmp_path):
+    """When in its row an effort answers the reading no log says; an effort that answers nothing is when it is."""
+    study = in_another_unit(tmp_path, 1.0)
+    model = nominal_model(study) + SensorLag(lag_s=rows * study.trials[0].dt)
+    problem = LikelihoodProblem(model, study.trials, first_guess(model, study.trials), free=("damping",))
+    fitted = replace(fit_problem(problem, model.parameters()), doubt=problem.doubt)
+    assert is_possible(fitted) == possible
+    assert is_possible(replace(fitted, doubt=None))
