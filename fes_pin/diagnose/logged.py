@@ -10,17 +10,22 @@ from functools import cached_property
 import numpy as np
 
 from fes_pin.data.answered import ControllerAnswer
-from fes_pin.data.log import answered
+from fes_pin.data.log import Log, answered
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.decide.rivals import estimates
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.effort_noise import Prepared, cost_beside, effort_noise_of, words_of_noise
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.identify.lateness import lateness_of, words_of_lateness
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.identify.turns import maximise
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
+
+LATENESS_STEP = 0.05
+"""Step of the slope by lateness, in rows: efforts are held over them, and what is moved by less is in proportion."""
 
 
 class LogFaults:
@@ -89,6 +94,23 @@ class LogFaults:
 def likelier(other: Diagnosis, one: Diagnosis) -> Diagnosis:
     """Another diagnosis of the same readings, by other efforts, if it is likelier; else the one."""
     return other if _is_likelier(other.extended, one.extended) else one
+
+
+def with_doubt_of_lateness(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis with intervals that hold what is not known of how late its efforts were written down."""
+    fitted = diagnosis.extended
+    if not diagnosis.log.effort_late_s or fitted.doubt is None:
+        return diagnosis
+    step_s = LATENESS_STEP * min(t.dt for t in fitted.trials)
+    left = [
+        LikelihoodProblem(fitted.model, [Log(effort_late_s=late_s).applied(t) for t in fitted.trials], fitted.doubt)
+        for late_s in (step_s, -step_s)
+    ]
+    later, earlier = ([p.residual for p in one.linearize(fitted.values, fitted.unknowns)] for one in left)
+    slopes = [(b - a) / (2.0 * step_s) for a, b in zip(later, earlier, strict=True)]
+    wide = with_honest_intervals(fitted, slopes)
+    causes = tuple(replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)
+    return replace(diagnosis, extended=wide, causes=causes)
 
 
 def with_words(diagnosis: Diagnosis) -> Diagnosis:

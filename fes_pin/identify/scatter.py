@@ -25,9 +25,17 @@ PIECES = 40
 as long as they can be."""
 
 
-def with_honest_intervals(fitted: Fit) -> Fit:
-    """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter."""
-    return replace(fitted, covariance=widened(*_told(fitted)))
+def with_honest_intervals(fitted: Fit, beside: Sequence[np.ndarray] | None = None) -> Fit:
+    """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter.
+
+    Parameters
+    ----------
+    beside
+        Of each trial, the sensitivity of its predictions to something else that was found from them, shape (m,) as the
+        residual: its doubt is theirs as well.
+    """
+    size = len(fitted.free)
+    return replace(fitted, covariance=widened(*_told(fitted, beside))[:size, :size])
 
 
 def excess_scatter(larger: Fit, smaller: Fit) -> float:
@@ -41,10 +49,16 @@ def excess_scatter(larger: Fit, smaller: Fit) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(own, hermitian=True) @ wide)) / len(more))
 
 
-def _told(fitted: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """The inverse information of a fit that has ended, and the slopes of the log-likelihood of its pieces."""
-    parts = _at_rest(fitted.parts)
-    free = np.array([n not in fitted.at_bound for n in fitted.free])
+def _told(fitted: Fit, beside: Sequence[np.ndarray] | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """The inverse information of a fit that has ended, and the slopes of the log-likelihood of its pieces.
+
+    What is beside its parameters comes last.
+    """
+    parts, free = list(fitted.parts), np.array([n not in fitted.at_bound for n in fitted.free])
+    if beside is not None:
+        both = zip(parts, beside, strict=True)
+        parts, free = [replace(p, jacobian=np.column_stack([p.jacobian, c])) for p, c in both], np.append(free, True)
+    parts = _at_rest(parts)
     lengths = [len(p.residual) for p in parts]
     shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
     scores = [
