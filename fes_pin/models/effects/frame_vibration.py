@@ -24,7 +24,8 @@ class FrameVibration(Effect):
     What is damped more than any joined frame, which is a fifth of critical at most, does not ring: it stood for efforts
     that a log writes down late.
     Source: Dombre, Fournier and Coiffet, section II-3-2: mechanical vibrations of the metallic frame. coupling = J
-    / J_frame. Damping: Newmark and Hall, Earthquake Spectra and Design, EERI 1982: up to 0.2, of nailed wood near yield.
+    / J_frame. Damping: Newmark and Hall, Earthquake Spectra and Design, EERI 1982, up to 0.2, of nailed wood near
+    yield.
     """
 
     coupling: float = parameter(0.1, null=0.0, lower=0.0, upper=5.0, scale=0.05)
