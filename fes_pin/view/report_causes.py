@@ -87,7 +87,7 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
             element("p", sentence(kind)),
             equations_mathml(equation(kind)),
             _estimates(diagnosis.extended, cause),
-            element("p", gain, " ", told, *_own_note(diagnosis, cause)),
+            element("p", gain, " ", told, *_notes(diagnosis, cause)),
             element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}", class_="soft"),
             _rivals(diagnosis, cause),
         ),
@@ -95,10 +95,13 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
     )
 
 
-def _own_note(diagnosis: Diagnosis, cause: Cause) -> list[str]:
-    """What is to be said where the amplitudes are each trial's own."""
+def _notes(diagnosis: Diagnosis, cause: Cause) -> list[str]:
+    """What is to be said where the amplitudes are each trial's own, or where some folds choose another cause."""
     own = any(e.each_trial for e in diagnosis.model.effects if e.name == cause.name)
-    return [f" {EACH_TRIAL[0].upper()}{EACH_TRIAL[1:]}."] if own else []
+    notes = [f" {EACH_TRIAL[0].upper()}{EACH_TRIAL[1:]}."] if own else []
+    if some := cause.chosen_in_some:
+        notes.append(f" It is chosen again in {some[0]} of {some[1]} folds, each without the trials it foretells.")
+    return notes
 
 
 def _estimates(fitted: Fit, cause: Cause) -> Markup:

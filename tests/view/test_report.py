@@ -107,6 +107,14 @@ def test_a_report_says_what_the_diagnosis_found():
     assert "next_trial.csv" in text
 
 
+def test_folds_that_choose_something_else_are_told_and_no_others():
+    diagnosis = ankle_diagnosis()
+    words = "It is chosen again in 3 of 5 folds, each without the trials it foretells."
+    for share, told in (((3, 5), True), ((5, 5), False), (None, False)):
+        causes = tuple(replace(c, chosen_again=share) for c in diagnosis.causes)
+        assert (words in checked(replace(diagnosis, causes=causes))) == told
+
+
 def test_text_of_the_study_cannot_become_markup():
     page = ankle_page()
     assert page.count("<script") == 1
