@@ -6,7 +6,9 @@ and the curvature of half that cost, each trial's own unknowns eliminated,
     cost(others) = |r|^2 - g' H^-1 g
 
 is where one Gauss-Newton step ends. Sets are compared by the rule that the search goes by: the cheapest of a size takes
-the place of the best smaller one if what it adds earns its place. No trial that is held out has a say in it.
+the place of the best smaller one if what it adds earns its place. No trial that is held out has a say in it. What the
+others tell counts as if there were as many of them as of all: asked is whether they say the same, not whether fewer say
+as much.
 
 Source: Stone, Cross-validatory choice and assessment of statistical predictions, J. R. Stat. Soc. B 36 (1974);
 Giordano, Stephenson, Liu, Jordan and Broderick, A Swiss army infinitesimal jackknife, AISTATS 2019.
@@ -31,8 +33,9 @@ together so much."""
 
 @dataclass(frozen=True)
 class _Trial:
-    """What one trial adds to the cost of a fit, to half its slope and to half its curvature."""
+    """What one trial adds to the cost of a fit, to half its slope and to half its curvature; how many readings it has."""
 
+    readings: int
     cost: float
     slope: np.ndarray
     curvature: np.ndarray
@@ -68,11 +71,13 @@ class ChosenAgain:
         return self._fits[best]
 
     def _cost(self, names: Names, held: Sequence[int]) -> float:
-        """The cost of the other trials at the end of one step."""
-        others = [t for i, t in enumerate(self._trials[names]) if i not in held]
+        """The cost of the other trials at the end of one step, as if there were as many of them as of all."""
+        every = self._trials[names]
+        others = [t for i, t in enumerate(every) if i not in held]
         slope, curvature = sum(t.slope for t in others), sum(t.curvature for t in others)
         step = np.linalg.lstsq(curvature, slope, rcond=1e-12)[0]
-        return sum(t.cost for t in others) - float(slope @ step)
+        many = sum(t.readings for t in every) / sum(t.readings for t in others)
+        return many * (sum(t.cost for t in others) - float(slope @ step))
 
 
 def _by_trial(fitted: Fit) -> list[_Trial]:
@@ -82,6 +87,7 @@ def _by_trial(fitted: Fit) -> list[_Trial]:
     size = np.sqrt(np.maximum(sum(np.diag(e.hessian)[moving] for _, e in each), 1e-300))
     return [
         _Trial(
+            len(p.residual),
             e.sse - e.local_gain + p.log_determinant,
             e.gradient[moving] / size,
             e.hessian[np.ix_(moving, moving)] / np.outer(size, size),
