@@ -33,7 +33,7 @@ together so much."""
 
 @dataclass(frozen=True)
 class _Trial:
-    """What one trial adds to the cost of a fit, to half its slope and to half its curvature; how many readings it has."""
+    """How many readings a trial has, and what it adds to the cost of a fit, to half its slope and half its curvature."""
 
     readings: int
     cost: float
