@@ -33,7 +33,7 @@ together so much."""
 
 @dataclass(frozen=True)
 class _Trial:
-    """How many readings a trial has, and what it adds to the cost of a fit, to half its slope and half its curvature."""
+    """How many readings a trial has, and what it adds to a fit's cost, to half its slope and to half its curvature."""
 
     readings: int
     cost: float
