@@ -40,9 +40,11 @@ def with_honest_intervals(fitted: Fit, beside: Sequence[np.ndarray] | None = Non
 
 def excess_scatter(larger: Fit, smaller: Fit) -> float:
     """How many times wider than of a right model that is scattered what a larger fit has besides; at least 1."""
+    more = [k for k, n in enumerate(larger.free) if n not in smaller.free]
+    if not more:
+        return 1.0
     covariance, scores = _told(larger)
-    felt = np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0)
-    more = [k for k, n in enumerate(larger.free) if n not in smaller.free and felt[k]]
+    more = [k for k in more if np.isfinite(covariance[k, k]) and covariance[k, k] > 0.0]
     if not more or len(scores) < 2:
         return 1.0
     own, wide = (c[np.ix_(more, more)] for c in (covariance, scattered(covariance, scores)))

@@ -37,8 +37,8 @@ class Sets:
 
     def fit(self, names):
         sse = PRICE[names]
-        model = SimpleNamespace(effects=())
-        return SimpleNamespace(names=names, sse=sse, price=sse + 5.0 * len(names), degrees=len(names), model=model)
+        known = {"degrees": len(names), "model": SimpleNamespace(effects=()), "free": ()}
+        return SimpleNamespace(names=names, sse=sse, price=sse + 5.0 * len(names), **known)
 
     def gained(self, larger, smaller):
         return smaller.sse - larger.sse
