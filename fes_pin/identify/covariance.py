@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fes_pin.identify.descent import UNIDENTIFIED
+from fes_pin.identify.problem import NormalEquations
 
 
 def covariance_of(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
@@ -31,6 +34,17 @@ def promised_gain(hessian: np.ndarray, gradient: np.ndarray, free: np.ndarray) -
     diagonal = np.diag(hessian)
     good = free & (diagonal > 0) & np.isfinite(gradient)
     return float(np.max(gradient[good] ** 2 / diagonal[good], initial=0.0))
+
+
+def step_gain(system: NormalEquations, free: Sequence[bool]) -> float:
+    """Gain in twice the log-likelihood that a Gauss-Newton step of all parameters that may move promises."""
+    moving = np.flatnonzero(free)
+    slope, curvature = system.gradient[moving], system.hessian[np.ix_(moving, moving)]
+    if not (np.isfinite(slope).all() and np.isfinite(curvature).all()):
+        return 0.0
+    size = np.sqrt(np.maximum(np.diag(curvature), np.finfo(float).tiny))
+    step = np.linalg.lstsq(curvature / np.outer(size, size), slope / size, rcond=1e-12)[0]
+    return float(slope / size @ step)
 
 
 def moved_with(covariance: np.ndarray, at: list[int], change: np.ndarray) -> np.ndarray:

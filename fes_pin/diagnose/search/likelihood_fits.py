@@ -16,9 +16,11 @@ from fes_pin.diagnose.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnose.search.possible import is_possible
 from fes_pin.diagnose.search.score import Scored, best_by_effect
 from fes_pin.diagnose.search.starts import STARTS, from_afar, started
+from fes_pin.identify.covariance import step_gain
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import with_new_noise
+from fes_pin.identify.problem import normal_equations
 from fes_pin.identify.roughness import roughness, uncertain_gain
 from fes_pin.identify.scoring import WORTH
 from fes_pin.models.model import Model
@@ -153,9 +155,17 @@ class LikelihoodFits:
             self._converged.update(slow)
 
     def _hopeful(self, size: int) -> list[Names]:
-        """The best sets of a size, and those that come near the best."""
-        near = set(self.near(size))
-        return [n for k, n in enumerate(self.ranked(size)) if k < CONVERGED_SETS or n in near]
+        """The sets of a size that promise to be the best, and those that come near the best."""
+        near, ranked = self.near(size), self.ranked(size)
+        first = sorted(ranked, key=lambda n: self.fits[n].price - self._promised(n))[:CONVERGED_SETS]
+        return [n for n in ranked if n in first or n in near]
+
+    def _promised(self, names: Names) -> float:
+        """What a further step from where a fit of a set has come to promises; 0 where it has converged."""
+        fitted = self.fits[names]
+        if names in self._converged or not math.isfinite(fitted.sse):
+            return 0.0
+        return step_gain(normal_equations(fitted.parts), [n not in fitted.at_bound for n in fitted.free])
 
     def near(self, size: int) -> list[Names]:
         """Sets of a size that gain half of what the best does beside the best smaller one, best first; the best."""

@@ -76,6 +76,7 @@ class LikelihoodSearch:
         self.sets, self.seed, self.progress = sets, seed, progress
         self.was_stopped, self._end = False, math.inf
         self._formed: set[Names] = set()
+        self._unearned: set[Names] = set()
 
     def run(self) -> Found:
         """Search, as long as the limit of time lets it; the nominal model is fitted and scored anyway."""
@@ -106,10 +107,10 @@ class LikelihoodSearch:
             if best and not self._worth_extending(best):
                 break
             self._extend(size)
-            first = self._refine_first(size)
-            if not (self.p_value(sets.fits[first], sets.fits[best]) < DRIVEN_LEVEL and is_possible(sets.fits[first])):
+            earned = next((n for n in self._refined(size) if self._earns_beside(n, best)), None)
+            if earned is None:
                 break
-            best = self._fallback = first
+            best = self._fallback = earned
         return self.settle(self._backward(best))
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
@@ -129,8 +130,8 @@ class LikelihoodSearch:
         return self.family.p_value(gain / excess_scatter(larger, smaller), degrees) < DRIVEN_LEVEL
 
     def possible(self) -> dict[Names, Fit]:
-        """All sets that are fitted, but for those that cannot be."""
-        return {n: f for n, f in self.sets.fits.items() if is_possible(f)}
+        """All sets that are fitted, but for those that cannot be, or that were found not to earn their place."""
+        return {n: f for n, f in self.sets.fits.items() if n not in self._unearned and is_possible(f)}
 
     def _worth_extending(self, names: Names) -> bool:
         """True where the score of a further cause beside a set is not what chance brings."""
@@ -153,11 +154,21 @@ class LikelihoodSearch:
             begun = {k: lambda v=v: sets.extend_with_both(base, v) for k, v in missing.items()}
             sets.add(base, begun)
 
-    def _refine_first(self, size: int) -> Names:
-        """The best set of a size, once each of the best has the form that the data demand."""
+    def _refined(self, size: int) -> list[Names]:
+        """The best sets of a size, cheapest first, once each has the form that the data demand."""
         while rough := [n for n in self.sets.near(size)[:BEAM] if n not in self._formed]:
             self._refine(rough[0])
-        return self.sets.ranked(size)[0]
+        return self.sets.near(size)[:BEAM]
+
+    def _earns_beside(self, names: Names, best: Names) -> bool:
+        """Whether a set can be, and is worth more than the best smaller one."""
+        fits = self.sets.fits
+        return self._kept(names, self.p_value(fits[names], fits[best]) < DRIVEN_LEVEL) and is_possible(fits[names])
+
+    def _kept(self, names: Names, earned: bool) -> bool:
+        """Whether a set earns its place, and keep in mind that it does not."""
+        (self._unearned.discard if earned else self._unearned.add)(names)
+        return earned
 
     def _refine(self, names: Names) -> None:
         """Give a set, once, the form that the data demand."""
@@ -197,8 +208,8 @@ class LikelihoodSearch:
     def settle(self, names: Names, refused: Iterable[str] = ()) -> Found:
         """Everything that is to be said of a set of causes: its rivals, and each cause's part in it.
 
-        Where a rival turns out to be the better set, it is the answer: sets were extended one cause at a time, and what
-        was best beside fewer need not be best beside all. Each exchange lowers the price, or drops a cause.
+        Where a rival turns out to be the better set, and each of its causes earns its place, it is the answer: sets
+        were extended one cause at a time, and what was best beside fewer need not be best beside all.
 
         Parameters
         ----------
@@ -214,11 +225,17 @@ class LikelihoodSearch:
                 rest = tuple(n for n in names if n != name)
                 self.sets.without(names, name)
                 self.sets.extend_all(rest, None if len(names) == 1 else JOINT_FITS)
-            better = next(n for n in self.sets.ranked(len(names)) if not set(n) & set(refused))
+            better = next(n for n in self.sets.ranked(len(names)) if n == names or self._may_be(n, refused))
             if better == names:
                 return self.told(names)
-            self._refine(better)
-            names = self._backward(better)
+            names = better
+
+    def _may_be(self, names: Names, refused: Iterable[str]) -> bool:
+        """Whether a set can be the answer: it holds nothing refused, and each of its causes earns its place."""
+        if set(names) & set(refused):
+            return False
+        self._refine(names)
+        return self._kept(names, self._backward(names) == names)
 
     def told(self, names: Names) -> Found:
         """What the sets that are fitted say of one of them, which no further rivals are sought for."""
