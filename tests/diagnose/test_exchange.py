@@ -85,6 +85,17 @@ def test_an_answer_is_the_cheapest_of_its_size(search):
             assert best.price == min(f.price for n, f in search.sets.fits.items() if len(n) == len(best.names))
 
 
+def test_a_cheaper_set_whose_cause_does_not_earn_its_place_is_no_answer(search, monkeypatch):
+    """As a hum that is the counts' own: cheapest as numbers, and nothing as intervals."""
+    cheapest = ("tendon", "velocity")
+    monkeypatch.setattr(search, "p_value", lambda more, less: 0.5 if more.names == cheapest else 1e-6)
+    found = search.settle(("lag", "velocity"))
+    assert search.sets.fits[cheapest].price < found.best.price
+    assert found.best.names == ("lag", "velocity")
+    assert cheapest not in search.possible()
+    assert ("lag", "velocity") in search.possible()
+
+
 def test_no_other_form_is_tried_past_the_limit_of_the_search(search):
     better = search.sets.fits[()]
     search.sets.nominal, search.sets.forms.otherwise = lambda: better, lambda base: check_limit() or better
