@@ -61,7 +61,7 @@ LONG = {
         "[ankle-hum-white]",
         "kept[ankle",
     ),
-    "driven/test_counts.py": ("[1810010]", "test_friction_that_is_there"),
+    "driven/test_counts.py": ("[1810010]", "[2230006]", "test_friction_that_is_there", "test_a_hum"),
     "driven/test_driven.py": ("test_play_before", "test_what_no_cause", "adequate[12]", "no_cause[14"),
     "driven/test_evidence_of_held_out_trials.py": ("test_one_trial_unlike_the_others",),
     "driven/test_forms_again.py": ("test_a_form_that_led_nowhere",),

@@ -11,9 +11,13 @@ from fes_pin.models.nominal import nominal_model
 
 HELD = (1810006, 1810010)
 """Of `scripts/driven --swing-up --seed 1810000`: those that hide nothing and were told dry friction."""
+HUNTING = 2230006
+"""That hides nothing, and as intervals was told friction too, by 33: its scores scatter 2.4 times too wide along it."""
+HUMMING = 2270008
+"""That hides an offset beside friction, and whose counts are cheapest explained by a hum."""
 
 
-@pytest.mark.parametrize("seed", HELD)
+@pytest.mark.parametrize("seed", [*HELD, HUNTING])
 def test_a_count_that_hunts_is_no_friction(seed, tmp_path):
     found = diagnose_joint(read_study(draw_swing_up((), seed, tmp_path).study))
     assert found.verdict == "adequate", str(found)
@@ -36,3 +40,9 @@ def test_friction_that_is_there_is_found_in_counts(tmp_path):
     study = read_study(draw_swing_up(("coulomb_friction",), HELD[0], tmp_path).study)
     found = diagnose_joint(study)
     assert [c.name for c in found.causes][:1] == ["coulomb_friction"], str(found)
+
+
+def test_a_hum_of_the_counts_hides_no_offset(tmp_path):
+    causes = ("coulomb_friction", "effort_offset")
+    found = diagnose_joint(read_study(draw_swing_up(causes, HUMMING, tmp_path).study))
+    assert sorted(c.name for c in found.causes) == sorted(causes), str(found)
