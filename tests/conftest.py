@@ -54,7 +54,7 @@ LONG = {
     "diagnose/test_low_passed.py": ("test_nothing_hidden_is_adequate",),
     "diagnose/test_misread.py": ("test_a_cause_that_shows_at_one_load",),
     "diagnose/test_one_trial.py": ("test_a_real_swing", "test_friction_is_found_beneath"),
-    "diagnose/test_outside.py": ("for_a_detent[32]",),
+    "diagnose/test_outside.py": ("for_a_detent[31]", "for_a_detent[32]"),
     "diagnose/test_per_trial_phase.py": (
         "[ankle-breath-process]",
         "[joint-breath-white]",
@@ -70,11 +70,13 @@ LONG = {
         "test_a_seed_makes",
     ),
     "driven/test_lasting.py": ("is_no_motion[5", "is_no_motion[40", "misses[('joint_stop'"),
-    "driven/test_late_effort.py": ("test_a_reading_that_is_late",),
+    "driven/test_late_effort.py": ("test_a_reading_that_is_late", "is_moved[friction]"),
     "driven/test_long_record.py": ("every_second_sample[1152001]", "every_second_sample[1152002]"),
     "driven/test_noisy_effort.py": (
         *("test_friction_beside", "test_trials_without_an_effort", "test_what_acted", "no_friction[1830006]"),
     ),
+    "driven/test_products.py": ("[2]",),
+    "driven/test_rough_cost.py": ("test_a_torque_is_found",),
     "driven/test_rough_play.py": ("test_nothing_is_named_or_left",),
     "driven/test_smoothed.py": ("test_dry_friction_is_named_alone", "adequate[40"),
     "driven/test_swing_up.py": (
