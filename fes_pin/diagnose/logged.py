@@ -74,9 +74,10 @@ class LogFaults:
     def _late_by(self, diagnosis: Diagnosis) -> float:
         nominal, extended = diagnosis.nominal, diagnosis.extended
         row_s = min(t.dt for t in extended.trials)
-        late = lateness_of(extended, row_s)
+        as_logged = row_s < 1.5 * min(t.dt for t in self.trials)
+        late = lateness_of(extended, row_s, as_logged)
         if late is None and diagnosis.causes:
-            late = lateness_of(nominal, row_s)
+            late = lateness_of(nominal, row_s, as_logged)
             if late is not None and not diagnosis.remainder.unexplained:
                 price = late.cost + PARAMETER_PRICE * (nominal.degrees + 1)
                 late = late if price < extended.price else None

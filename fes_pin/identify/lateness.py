@@ -38,7 +38,7 @@ class Lateness:
     cost: float
 
 
-def lateness_of(fitted: Fit, row_s: float) -> Lateness | None:
+def lateness_of(fitted: Fit, row_s: float, or_early: bool = False) -> Lateness | None:
     """How late the efforts of a fit's trials are; None where they are in time.
 
     Parameters
@@ -47,6 +47,8 @@ def lateness_of(fitted: Fit, row_s: float) -> Lateness | None:
         By the likelihood, of a rig that an effort drives.
     row_s
         Time step of the log.
+    or_early
+        Whether they may act later than written as well: asked of rows as they were logged, not of their averages.
     """
     doubt = fitted.doubt
     assert doubt is not None
@@ -59,7 +61,7 @@ def lateness_of(fitted: Fit, row_s: float) -> Lateness | None:
             tried[late] = maximise(problem, fitted.values, fitted.unknowns).sse
         return tried[late]
 
-    least = (LEAST_ROWS * row_s, -LEAST_ROWS * row_s)
+    least = (LEAST_ROWS * row_s, -LEAST_ROWS * row_s)[: 1 + or_early]
     lowest, first = min(zip(in_parallel(cost, least), least, strict=True))
     if lowest > fitted.sse - LEAST_GAIN:
         return None
