@@ -16,6 +16,7 @@ from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Linearized, Problem, Unknowns
+from fes_pin.identify.scoring import Point, Told
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.predictor import Doubt
@@ -215,13 +216,28 @@ class GroupedProblem:
         return out
 
     @property
-    def is_sharp(self) -> bool:
-        """True where slopes of a group are differences of the cost. Of driven rigs alone."""
-        return any(p.is_sharp for p in self.parts.values())
+    def randomness(self) -> dict[str, float]:
+        """What is random, by name and group. Of driven rigs, as all that has to do with it."""
+        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.randomness.items()}
 
-    def sharpen(self) -> bool:
-        """Let slopes be differences of the cost; False where those of all groups are. Of driven rigs alone."""
-        return sum(p.sharpen() for p in self.parts.values()) > 0
+    @property
+    def randomness_limits(self) -> dict[str, tuple[float, float]]:
+        """How small and how large that may become."""
+        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.randomness_limits.items()}
+
+    def become(self, randomness: Mapping[str, float]) -> None:
+        """Change what is random, in place."""
+        for g, p in self.parts.items():
+            p.become(_of_group(randomness, g))
+
+    def told(self, points: Sequence[Point]) -> list[Told]:
+        """Every trial as foretold at each of several points, group after group."""
+        cut = [self.by_group(unknowns) for _, unknowns, _ in points]
+        each = [
+            p.told([(self.model.of(g, v), own[g], _of_group(r, g)) for (v, _, r), own in zip(points, cut, strict=True)])
+            for g, p in self.parts.items()
+        ]
+        return [Told.joined(one) for one in zip(*each, strict=True)]
 
     def score(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
         """Improve what is random in each group, in place; returns by how much that lowers the cost. Of driven rigs."""
@@ -230,7 +246,7 @@ class GroupedProblem:
 
     @property
     def is_final(self) -> bool:
-        """True where slopes are as sharp as they will be."""
+        """True where no other slopes lead on from the end of a descent."""
         return all(p.is_final for p in self.parts.values())
 
     @property
@@ -260,6 +276,12 @@ class GroupedProblem:
                 jacobian[:, at], local[:, own] = one.jacobian, one.local
                 out.append(dataclasses.replace(one, jacobian=jacobian, local=local))
         return out
+
+
+def _of_group(randomness: Mapping[str, float], group: str) -> dict[str, float]:
+    """What is random in a group, by name."""
+    split = ((name.rpartition("@"), v) for name, v in randomness.items())
+    return {name: v for (name, _, g), v in split if g == group}
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ class Bench:
 
 def promises(bench: Bench, base: Grouped) -> tuple[list[Promise], Scores]:
     """Every item that a set does not have, scored; and the Gram matrix of what is left of all columns."""
-    projection = Projection(_plain_parts(bench, base))
+    projection = Projection(base.fit.parts)
     before: list[np.ndarray] = []
     made: list[tuple[Item, Effect | None, tuple[str, ...], np.ndarray]] = []
     for item, effect, names, columns in _candidates(bench, base):
@@ -98,13 +98,6 @@ def promises(bench: Bench, base: Grouped) -> tuple[list[Promise], Scores]:
         )
     tested = [b for m, b in zip(made, blocks, strict=True) if m[0].group is not None]
     return out, Scores([], gram, along, tested)
-
-
-def _plain_parts(bench: Bench, base: Grouped) -> Sequence[Linearized]:
-    """The trials of a fit; of a driven rig for gains as they are, see `identify.likelihood.for_gains_as_they_are`."""
-    if not base.is_driven:
-        return base.fit.parts
-    return GroupedProblem(base.model, bench.trials, base.weights).linearize(base.fit.values, base.fit.unknowns)
 
 
 def _candidates(bench: Bench, base: Grouped) -> Iterator[tuple[Item, Effect | None, tuple[str, ...], np.ndarray]]:

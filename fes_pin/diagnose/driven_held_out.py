@@ -11,10 +11,10 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import Errors, Evidence, Gain, folds_of, held_out_gain
 from fes_pin.diagnose.errors_ahead import Ahead, errors_ahead, errors_over_horizon
 from fes_pin.diagnose.search.likelihood_search import Found
-from fes_pin.identify.fit import Fit, fit_problem
+from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Unknowns, normal_equations
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.turns import maximise, together
 from fes_pin.workers import in_parallel
 
 WIDE = 10.0
@@ -88,13 +88,13 @@ def with_choices(folds: Sequence[Fold], chosen: Sequence[Fit], refitted: Again) 
 def afresh(fitted: Fit, trials: Sequence[Trial]) -> Fit:
     """A fit again, to other trials, with what is random in these."""
     problem, unknowns = _problem(fitted, trials)
-    return maximise(problem, fitted.values, unknowns)
+    return maximise(problem, fitted.values, unknowns, near=True)
 
 
 def as_random_as_in_all(fitted: Fit, trials: Sequence[Trial]) -> Fit:
     """A fit again, to other trials, at what was random in its own."""
     problem, unknowns = _problem(fitted, trials)
-    found = fit_problem(problem, fitted.values, unknowns)  # type: ignore[arg-type]
+    found = together(problem, fitted.values, unknowns, random=False)
     return replace(found, doubt=fitted.doubt)
 
 
@@ -103,7 +103,6 @@ def _problem(fitted: Fit, trials: Sequence[Trial]) -> tuple[LikelihoodProblem, U
     assert fitted.doubt is not None
     known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
     problem = LikelihoodProblem(fitted.model, trials, fitted.doubt)
-    problem.sharpen()  # it begins near its end
     return problem, [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
 
 

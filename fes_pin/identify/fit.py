@@ -69,6 +69,8 @@ class Fit:
         Whitened residuals and sensitivities at the optimum, by trial.
     doubt
         What is random, of a fit by `identify.turns`: its `sse` holds the log-determinant.
+    together
+        True where slopes for gains as they are lead no further: parameters and what is random move together from there.
     """
 
     model: Model
@@ -84,6 +86,7 @@ class Fit:
     at_bound: tuple[str, ...]
     parts: tuple[Linearized, ...] = field(repr=False)
     doubt: Doubt | None = None
+    together: bool = False
 
     @property
     def values(self) -> dict[str, float]:

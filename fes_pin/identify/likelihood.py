@@ -19,11 +19,10 @@ import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.doubts import first_doubt
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.doubts import doubt_limits, first_doubt
 from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Linearized, Unknowns, limits_of, whitened_sse
-from fes_pin.identify.scoring import Told, score_doubt
+from fes_pin.identify.scoring import TURN, Point, Told, climb
 from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.foretold import ForetoldTrial
 from fes_pin.models.model import Model
@@ -65,8 +64,6 @@ class LikelihoodProblem:
         self.unknown_names = model.own_unknowns()
         self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
         self.priors = [first_doubt(model, t) for t in starts or self.trials]
-        self.is_sharp = False
-        self._missed: np.ndarray | None = None
         self._predictor: Predictor | None = None
         self._abreast: Predictor | None = None
 
@@ -102,9 +99,19 @@ class LikelihoodProblem:
         with np.errstate(all="ignore"):
             return self.predictor.run(values, doubt or self.doubt, own)
 
-    def told(self, values: Mapping[str, float], unknowns: Unknowns, doubts: Sequence[Doubt]) -> list[Told]:
-        """Every trial as foretold by each of several doubts."""
-        return self._told([(values, unknowns, d) for d in doubts])
+    @property
+    def randomness(self) -> dict[str, float]:
+        """What is random, by name."""
+        return self.doubt.values()
+
+    @property
+    def randomness_limits(self) -> dict[str, tuple[float, float]]:
+        """How small and how large that may become."""
+        return doubt_limits(self.model, self.trials, self.doubt.lasts_s)
+
+    def told(self, points: Sequence[Point]) -> list[Told]:
+        """Every trial as foretold at each of several points."""
+        return self._told([(values, unknowns, self.doubt.with_values(random)) for values, unknowns, random in points])
 
     def bounds(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
         """The cost at several parameter values, without sensitivities: less work than linearizing at one of them."""
@@ -144,32 +151,25 @@ class LikelihoodProblem:
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Innovations over their deviations, and sensitivities, at a parameter value; see `check_limit`."""
         parts = [self._whitened(one) for one in self.innovations(values, unknowns)]
-        return self._followed(parts, values, unknowns) if self.followed else parts
-
-    def sharpen(self) -> bool:
-        """Let the slopes of all parameters be differences of the cost; False where they are, or effort itself is read.
-
-        There a lag would take up how smooth a random effort is, which no process of first order is.
-        """
-        if self.is_final:
-            return False
-        self.is_sharp = True
-        return True
+        return self._followed(parts, values, unknowns) if self._scales else parts
 
     @property
     def is_final(self) -> bool:
-        """True where slopes are as sharp as they will be."""
-        return self.is_sharp or not all(self.model.rig.unknowns(t.kind) for t in self.trials)
+        """True where no other slopes lead on from the end of a descent, as effort itself is read.
+
+        There a lag would take up how smooth a random effort is, which no process of first order is.
+        """
+        return not all(self.model.rig.unknowns(t.kind) for t in self.trials)
 
     def score(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
         """Improve what is random, in place; returns by how much that lowers the cost."""
-        self._missed = None
-        return score_doubt(self, values, unknowns)
+        reached = climb(self, values, unknowns, {}, TURN)
+        self.become(reached.randomness)
+        return reached.gained
 
-    @property
-    def followed(self) -> tuple[str, ...]:
-        """Free parameters whose slopes are differences of the cost."""
-        return self.free if self.is_sharp else self._scales
+    def become(self, randomness: Mapping[str, float]) -> None:
+        """Change what is random, in place."""
+        self.doubt = self.doubt.with_values(randomness)
 
     @cached_property
     def _scales(self) -> tuple[str, ...]:
@@ -180,18 +180,16 @@ class LikelihoodProblem:
         return tuple(n for n in names if n in self.free)
 
     def _followed(self, parts: list[Linearized], values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
-        """Sensitivities to `followed` without what gains that stay as they are add along the innovations.
+        """Sensitivities to `_scales` without what gains that stay as they are add along the innovations.
 
         Where a filter takes up nearly all of what it reads, a scale of the reading seems to shrink the innovations as a
-        whole, as long as the gains do not go with it. The true slope of the cost is its difference. Of a sharp problem
-        what is missed is taken once a turn: it bends little.
+        whole, as long as the gains do not go with it. The true slope of the cost is its difference.
         """
-        at, squares = [self.free.index(n) for n in self.followed], sum(float(p.residual @ p.residual) for p in parts)
-        if self._missed is None or not self.is_sharp:
-            self._missed = self._missed_slopes(parts, at, values, unknowns)
+        at, squares = [self.free.index(n) for n in self._scales], sum(float(p.residual @ p.residual) for p in parts)
         if not (np.isfinite(squares) and squares > 0.0):
             return parts
-        return [_added(p, at, self._missed / squares) for p in parts]
+        missed = self._missed_slopes(parts, at, values, unknowns)
+        return [_added(p, at, missed / squares) for p in parts]
 
     def _missed_slopes(
         self, parts: Sequence[Linearized], at: Sequence[int], values: Mapping[str, float], unknowns: Unknowns
@@ -199,8 +197,8 @@ class LikelihoodProblem:
         """What slopes for gains as they are miss of those of half the cost, by parameter; 0 where that is no number."""
         now, out = whitened_sse(parts), np.zeros(len(at))
         sizes = np.sqrt(sum(np.sum(p.jacobian[:, at] ** 2, axis=0) for p in parts))
-        felt = np.flatnonzero(sizes) if np.isfinite(now) else np.empty(0, dtype=int)
-        names, steps = [self.followed[k] for k in felt], FOLLOWED_STEP / sizes[felt]
+        felt = np.flatnonzero(sizes)
+        names, steps = [self._scales[k] for k in felt], FOLLOWED_STEP / sizes[felt]
         moved = [{**values, n: values[n] + float(h)} for n, h in zip(names, steps, strict=True)]
         slopes = 0.5 * (np.array(self.bounds([(m, unknowns) for m in moved])) - now) / steps
         out[felt] = -slopes - sum(p.residual @ p.jacobian[:, at] for p in parts)[felt]
@@ -218,17 +216,6 @@ class LikelihoodProblem:
     def cost(self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None) -> float:
         """Twice the negative log-likelihood."""
         return sum(one.cost() for one in self.innovations(values, unknowns, doubt))
-
-
-def for_gains_as_they_are(fitted: Fit) -> list[Linearized]:
-    """The trials of a fit with sensitivities for gains as they are, as those of causes and features beside it are.
-
-    Where slopes were differences of the cost, a column has a multiple of the residual; and where the cost is rough, as
-    beside friction that jumps, it is little else, and would take the residual from everything that is looked for.
-    """
-    assert fitted.doubt is not None
-    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt, fitted.free)
-    return problem.linearize(fitted.values, fitted.unknowns)
 
 
 def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Linearized:

@@ -60,7 +60,7 @@ def _told(fitted: Fit, beside: Sequence[np.ndarray] | None = None) -> tuple[np.n
     if beside is not None:
         both = zip(parts, beside, strict=True)
         parts, free = [replace(p, jacobian=np.column_stack([p.jacobian, c])) for p, c in both], np.append(free, True)
-    parts = _at_rest(parts)
+    parts = at_rest(parts)
     lengths = [len(p.residual) for p in parts]
     shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
     scores = [
@@ -73,7 +73,7 @@ def _told(fitted: Fit, beside: Sequence[np.ndarray] | None = None) -> tuple[np.n
     return covariance_of(normal_equations(parts).hessian, free), np.array(scores)
 
 
-def _at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
+def at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
     """The trials of a fit that has ended, without what its sensitivities have along the residual as a whole.
 
     A slope that is left where no step keeps what it promises is roughness of the cost, as beside friction that jumps:

@@ -1,6 +1,7 @@
-"""What is random about a model and its readings, made more likely by Fisher scoring.
+"""Parameters of a model and what is random about it, made more likely by Fisher scoring.
 
-On logarithms, with r_k and V_k the innovations and their variances, r_i and V_i their derivatives by differences:
+In parameters and in logarithms of what is random, with r_k and V_k the innovations and their variances, r_i and V_i
+their derivatives by differences, in which the filter's gains go with the parameters:
 
     g_i = sum r r_i / V + (1 - r^2 / V) V_i / (2 V),    I_ij = sum r_i r_j / V + V_i V_j / (2 V^2)
 
@@ -19,19 +20,24 @@ from typing import Protocol
 
 import numpy as np
 
-from fes_pin.data.trial import Trial
-from fes_pin.identify.doubts import doubt_limits
 from fes_pin.identify.problem import WORTH, Unknowns
-from fes_pin.models.model import Model
-from fes_pin.models.predictor import Doubt
 
 LITTLE = 0.1
 """Fall of twice the log-likelihood with which turns end: a third of a standard deviation of one parameter."""
-LOG_STEPS = (1e-3, 0.03)
+STEPS = (1e-3, 0.03)
 """Steps of the differences in logarithms: the second where the first promises what no step keeps, as where the cost is
 rough: that of a play jumps where an estimate crosses its slack."""
+DEVIATIONS = 10.0
+"""How many deviations of a parameter, as far as it is known with gains as they are, count as one of a logarithm: a
+difference is then 0.01 of them, or 0.3."""
 LONGEST_MOVE = 1.5
 """Longest step of a logarithm: randomness changes by a factor of 4.5 at most before parameters move again."""
+TURN = 2
+"""Steps of what is random before parameters move again."""
+
+
+Point = tuple[Mapping[str, float], Unknowns, Mapping[str, float]]
+"""Values of parameters, unknowns of each trial, and what is random by name."""
 
 
 @dataclass(frozen=True)
@@ -43,61 +49,192 @@ class Told:
     variances: np.ndarray
     costs: np.ndarray | None = None
 
+    @classmethod
+    def joined(cls, parts: Sequence[Told]) -> Told:
+        """What several sets of trials tell, end to end."""
+        costs = [p.costs for p in parts if p.costs is not None]
+        return cls(
+            float(sum(p.cost for p in parts)),
+            np.concatenate([p.innovations for p in parts]),
+            np.concatenate([p.variances for p in parts]),
+            np.concatenate(costs) if costs else None,
+        )
+
 
 class Foretelling(Protocol):
-    """A problem that foretells its trials by any doubt."""
+    """A problem that foretells its trials at any point."""
 
-    model: Model
-    trials: tuple[Trial, ...]
-    doubt: Doubt
+    @property
+    def limits(self) -> Mapping[str, tuple[float, float]]:
+        """Of its parameters."""
+
+    @property
+    def randomness(self) -> Mapping[str, float]:
+        """What is random, by name."""
+
+    @property
+    def randomness_limits(self) -> Mapping[str, tuple[float, float]]:
+        """How small and how large that may become."""
 
     @property
     def abreast(self) -> int:
-        """How many doubts are tried in one run."""
+        """How many points are tried in one run."""
 
-    def told(self, values: Mapping[str, float], unknowns: Unknowns, doubts: Sequence[Doubt]) -> list[Told]:
-        """Every trial as foretold by each of several doubts."""
+    def told(self, points: Sequence[Point]) -> list[Told]:
+        """Every trial as foretold at each of several points."""
 
 
-def score_doubt(problem: Foretelling, values: Mapping[str, float], unknowns: Unknowns, steps: int = 2) -> float:
-    """Improve what is random about a problem by Fisher scoring, in place; returns by how much that lowers the cost.
+@dataclass(frozen=True)
+class Reached:
+    """Where steps have led to.
 
-    Where no step promises `LITTLE` it stays.
+    Attributes
+    ----------
+    values, randomness
+        Those that moved.
+    gained
+        By how much the cost has fallen.
+    held
+        Parameters that a bound holds there.
+    left
+        What a further step would gain.
+    converged
+        False where steps ran out.
     """
-    limits = doubt_limits(problem.model, problem.trials, problem.doubt.lasts_s)
-    names = tuple(problem.doubt.values())
-    low, high = (np.log([limits[n][k] for n in names]) for k in (0, 1))
-    z = np.clip(np.log([problem.doubt.values()[n] for n in names]), low, high)
 
-    def at(z: np.ndarray) -> Doubt:
-        return problem.doubt.with_values(dict(zip(names, (float(v) for v in np.exp(z)), strict=True)))
+    values: dict[str, float]
+    randomness: dict[str, float]
+    gained: float
+    held: tuple[str, ...]
+    left: float
+    converged: bool
+
+
+@dataclass(frozen=True)
+class _Slopes:
+    """Gradient and expected information of half the cost at a point, with what is held by a bound there."""
+
+    gradient: np.ndarray
+    information: np.ndarray
+    held: np.ndarray
+
+    def step(self, damping: float) -> np.ndarray:
+        """What to take away."""
+        return _damped_step(self.information, self.gradient, ~self.held, damping)
+
+    def promised(self, step: np.ndarray) -> float:
+        """By how much a step lowers the cost, if it is the parabola that it seems to be."""
+        return float(2.0 * self.gradient @ step - step @ self.information @ step)
+
+
+class _Scale:
+    """Where parameters and randomness are on an axis each: in `DEVIATIONS` of them, and in logarithms."""
+
+    def __init__(
+        self, problem: Foretelling, values: Mapping[str, float], sizes: Mapping[str, float], random: bool
+    ) -> None:
+        self.units = {n: DEVIATIONS / size for n, size in sizes.items() if 0.0 < size < math.inf}
+        self.random = dict(problem.randomness) if random else {}
+        limits = problem.randomness_limits if random else {}
+        ends = [[problem.limits[n][k] / u for n, u in self.units.items()] for k in (0, 1)]
+        self.low, self.high = (
+            np.array([*e, *(math.log(limits[n][k]) for n in self.random)]) for k, e in enumerate(ends)
+        )
+        here = [*(values[n] / u for n, u in self.units.items()), *(math.log(v) for v in self.random.values())]
+        self.here = np.clip(here, self.low, self.high)
+
+    def values(self, z: np.ndarray) -> dict[str, float]:
+        """The parameters at a point."""
+        return {n: float(v * u) for (n, u), v in zip(self.units.items(), z, strict=False)}
+
+    def randomness(self, z: np.ndarray) -> dict[str, float]:
+        """What is random there."""
+        return {n: float(np.exp(v)) for n, v in zip(self.random, z[len(self.units) :], strict=True)}
+
+    def held(self, z: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+        """What a bound holds where the cost has a gradient."""
+        return np.asarray(((z <= self.low) & (gradient > 0)) | ((z >= self.high) & (gradient < 0)))
+
+    def end(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Where a step leads, no longer than `LONGEST_MOVE` of what is random."""
+        longest = float(np.abs(step[len(self.units) :]).max(initial=0.0))
+        return np.asarray(np.clip(z - step * min(1.0, LONGEST_MOVE / max(longest, 1e-300)), self.low, self.high))
+
+
+def climb(
+    problem: Foretelling,
+    values: Mapping[str, float],
+    unknowns: Unknowns,
+    sizes: Mapping[str, float],
+    steps: int,
+    random: bool = True,
+) -> Reached:
+    """Go down the cost, until what a step has missed of its promise is `LITTLE`: no further one gains more.
+
+    Parameters
+    ----------
+    problem, values, unknowns
+        Where to begin.
+    sizes
+        Of each parameter that moves, one over its deviation as far as it is known with gains as they are.
+    steps
+        At most.
+    random
+        Whether what is random moves.
+    """
+    scale = _Scale(problem, values, sizes, random)
 
     def at_all(many: np.ndarray) -> list[Told]:
-        return problem.told(values, unknowns, [at(z) for z in many])
+        return problem.told([({**values, **scale.values(z)}, unknowns, scale.randomness(z)) for z in many])
 
-    now, *moved = at_all(z + LOG_STEPS[0] * np.eye(1 + len(z), len(z), -1))
-    damping, widths, begin = 1e-3, list(LOG_STEPS), now.cost
-    while math.isfinite(now.cost):
-        gradient, information = _scored(now, moved, widths[0])
-        held = ((z <= low) & (gradient > 0)) | ((z >= high) & (gradient < 0))
-        dampings = damping * 10.0 ** np.arange(1 + len(z))
-        moves = [_damped_step(information, gradient, ~held, d) for d in dampings]
-        if float(gradient @ moves[0]) < LITTLE:
-            break
-        found = _first_below(now, np.clip(z - np.array(moves), low, high), at_all, problem.abreast)
+    return _Climb(scale, at_all, problem.abreast).run(steps)
+
+
+class _Climb:
+    """A way down the cost, from where a scale begins."""
+
+    def __init__(self, scale: _Scale, at_all: Callable[[np.ndarray], list[Told]], abreast: int) -> None:
+        self.scale, self.at_all, self.abreast = scale, at_all, abreast
+        self.z, self.widths, self.damping = scale.here, list(STEPS), 1e-3
+        count = len(self.z)
+        self.now, *self.moved = at_all(self.z + self.widths[0] * np.eye(1 + count, count, -1))
+        self.held, self.left = np.zeros(count, dtype=bool), 0.0
+
+    def run(self, steps: int) -> Reached:
+        """Take so many steps at most."""
+        begin, scale = self.now.cost, self.scale
+        done = not math.isfinite(begin)
+        while not done and steps > 0:
+            before = self.now.cost
+            done = self._step()
+            steps -= self.now.cost < before
+            if not done and steps > 0:
+                self.moved = self.at_all(self.z + self.widths[0] * np.eye(len(self.z)))
+        held = tuple(n for n, h in zip(scale.units, self.held, strict=False) if h)
+        fallen = begin - self.now.cost if math.isfinite(begin) else 0.0
+        return Reached(scale.values(self.z), scale.randomness(self.z), fallen, held, self.left, done)
+
+    def _step(self) -> bool:
+        """Go down once, or look at longer differences; True where there is nothing left to gain."""
+        gradient, information = _scored(self.now, self.moved, self.widths[0])
+        self.held = self.scale.held(self.z, gradient)
+        slopes = _Slopes(gradient, information, self.held)
+        self.left = slopes.promised(slopes.step(0.0))
+        if self.left < LITTLE:
+            return True
+        dampings = self.damping * 10.0 ** np.arange(1 + len(self.z))
+        ends = np.array([self.scale.end(self.z, slopes.step(d)) for d in dampings])
+        found = _first_below(self.now, ends, self.at_all, self.abreast)
         if found is None:
-            if 2.0 * float(gradient @ moves[0]) < WORTH or len(widths) == 1:
-                break
-            widths.pop(0)
-        else:
-            k, end, after = found
-            gained, steps = now.cost - after.cost, steps - 1
-            z, now, damping = end, after, max(0.3 * float(dampings[k]), 1e-6)
-            if gained < LITTLE or not steps:
-                break
-        moved = at_all(z + widths[0] * np.eye(len(z)))
-    problem.doubt = at(z)
-    return begin - now.cost if math.isfinite(begin) else 0.0
+            done = self.left < WORTH or len(self.widths) == 1
+            self.widths = self.widths[1:] or self.widths
+            return done
+        k, end, after = found
+        step, gained = self.z - end, self.now.cost - after.cost
+        self.left = abs(gained - slopes.promised(step))
+        self.held = self.scale.held(end, gradient - information @ step)
+        self.z, self.now, self.damping = end, after, max(0.3 * float(dampings[k]), 1e-6)
+        return min(gained, self.left) < LITTLE
 
 
 def _first_below(
@@ -125,7 +262,7 @@ def _scored(now: Told, moved: Sequence[Told], width: float) -> tuple[np.ndarray,
 
 
 def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray, damping: float) -> np.ndarray:
-    """A step of the logarithms, no longer than `LONGEST_MOVE`.
+    """A step of what is free.
 
     Raises
     ------
@@ -139,5 +276,4 @@ def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray
             raise np.linalg.LinAlgError("the likelihood has no finite slope by what is random")
         inner = inner + np.diag(damping * np.diag(inner) + 1e-9)
         step[free] = np.linalg.lstsq(inner, gradient[free], rcond=1e-12)[0]
-    longest = float(np.abs(step).max(initial=0.0))
-    return step * min(1.0, LONGEST_MOVE / max(longest, 1e-300))
+    return step

@@ -2,31 +2,34 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
-from fes_pin.identify.likelihood import LikelihoodProblem, for_gains_as_they_are
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.models.effects import CoulombFriction, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
 
 
-def test_slopes_for_gains_as_they_are_are_those_that_turns_begin_with(tmp_path):
-    study = read_study(draw((), 0.3, 3, tmp_path).study)
-    fitted = LikelihoodFits(nominal_model(study), study.trials, []).nominal()
+def test_what_has_moved_together_is_where_no_single_step_leads_down(tmp_path):
+    """Slopes for gains as they are end 20 above it beside this rig's friction; the maximum is the cost's own."""
+    study = read_study(draw(("coulomb_friction",), 0.3, 7, tmp_path).study)
+    sets = LikelihoodFits(nominal_model(study), study.trials, [CoulombFriction])
+    sets.nominal()
+    sets.extend_all(())
+    fitted = sets.fits["coulomb_friction",]
+    assert fitted.together
     problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt)
-    assert problem.sharpen()
-    sharp = problem.linearize(fitted.values, fitted.unknowns)
-    for plain, other in zip(for_gains_as_they_are(fitted), sharp, strict=True):
-        assert np.array_equal(plain.residual, other.residual)
-        beyond = other.jacobian - plain.jacobian
-        assert np.linalg.matrix_rank(beyond, tol=1e-9 * np.abs(other.jacobian).max()) == 1
-        along = np.outer(plain.residual, plain.residual @ beyond) / (plain.residual @ plain.residual)
-        assert beyond == pytest.approx(along, abs=1e-9 * np.abs(beyond).max())
+    points = [
+        ({**fitted.values, n: fitted.values[n] + side * 0.3 * fitted.std(n)}, fitted.unknowns)
+        for n in fitted.free
+        if n not in fitted.at_bound
+        for side in (-1.0, 1.0)
+    ]
+    assert min(problem.bounds(points)) > fitted.sse - 0.2
 
 
 def test_a_torque_is_found_beside_friction_whose_cost_is_rough(tmp_path):

@@ -19,7 +19,7 @@ from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import DRIVEN_LEVEL
-from fes_pin.identify.likelihood import LikelihoodProblem, for_gains_as_they_are
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import limits_of
 from fes_pin.identify.roughness import roughness, uncertain_gain
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
@@ -40,7 +40,7 @@ def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     play. Not where effort is read: there fits follow such slopes to their end, and leave promises that none keeps.
     """
     featured = _Featured(fitted)
-    projection = Projection(for_gains_as_they_are(fitted))
+    projection = Projection(fitted.parts)
     left = projection(featured.columns)
     before, after = np.linalg.norm(featured.columns, axis=0), np.linalg.norm(left, axis=0)
     good = np.flatnonzero(after > KEPT * np.where(before > 0, before, 1.0))

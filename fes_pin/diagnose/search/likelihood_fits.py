@@ -22,7 +22,7 @@ from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.problem import normal_equations
 from fes_pin.identify.roughness import roughness, uncertain_gain
-from fes_pin.identify.scoring import WORTH
+from fes_pin.identify.scoring import LITTLE, WORTH
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
@@ -163,7 +163,7 @@ class LikelihoodFits:
     def _promised(self, names: Names) -> float:
         """What a further step from where a fit of a set has come to promises; 0 where it has converged."""
         fitted = self.fits[names]
-        if names in self._converged or not math.isfinite(fitted.sse):
+        if names in self._converged or fitted.gradient_norm < LITTLE or not math.isfinite(fitted.sse):
             return 0.0
         return step_gain(normal_equations(fitted.parts), [n not in fitted.at_bound for n in fitted.free])
 

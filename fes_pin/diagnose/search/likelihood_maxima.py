@@ -30,22 +30,27 @@ class LikelihoodMaxima:
         self.trials = tuple(trials)
 
     def from_start(
-        self, model: Model, doubt: Doubt, unknowns: list[dict[str, float]] | None = None, rounds: int = ROUNDS
+        self,
+        model: Model,
+        doubt: Doubt,
+        unknowns: list[dict[str, float]] | None = None,
+        rounds: int = ROUNDS,
+        near: bool = False,
     ) -> Fit:
-        """The maximum from a model's own values and from what is taken for random."""
-        return maximise(LikelihoodProblem(model, self.trials, doubt), model.parameters(), unknowns, rounds)
+        """The maximum from a model's own values and from what is taken for random; see `maximise`."""
+        return maximise(LikelihoodProblem(model, self.trials, doubt), model.parameters(), unknowns, rounds, near)
 
     def go_on(self, fitted: Fit, rounds: int = ROUNDS) -> Fit:
         """The maximum from where a fit has come to."""
         assert fitted.doubt is not None
-        return self.from_start(fitted.model, fitted.doubt, fitted.unknowns, rounds)
+        return self.from_start(fitted.model, fitted.doubt, fitted.unknowns, rounds, fitted.together)
 
     def look(self, start: Model, base: Fit) -> Fit:
         """A few steps from a start, at what is random in another fit."""
         assert base.doubt is not None
         problem = LikelihoodProblem(start, self.trials, base.doubt)
         found = fit_problem(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)  # type: ignore[arg-type]
-        return replace(found, doubt=base.doubt)
+        return replace(found, doubt=base.doubt, together=base.together)
 
     def cheaper(self, starts: Sequence[Model], base: Fit, price: float) -> Fit | None:
         """The best fit from some starts; None where none is below a price.

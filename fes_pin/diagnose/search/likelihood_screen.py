@@ -10,7 +10,7 @@ from fes_pin.diagnose.search.cause_sets import names_of
 from fes_pin.diagnose.search.library import Library, Probe
 from fes_pin.diagnose.search.score import Projection, Scores
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood import LikelihoodProblem, for_gains_as_they_are
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
@@ -33,7 +33,7 @@ class LikelihoodScreen:
             groups = in_parallel(lambda e: self._probes(e, base), wanted)
             self._scores[id(base)] = (
                 base,
-                Projection(for_gains_as_they_are(base)).score([p for g in groups for p in g]),
+                Projection(base.parts).score([p for g in groups for p in g]),
             )
         return self._scores[id(base)][1]
 
