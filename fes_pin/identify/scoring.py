@@ -136,7 +136,8 @@ class _Scale:
         self.units = {n: DEVIATIONS / size for n, size in sizes.items() if 0.0 < size < math.inf}
         self.random = dict(problem.randomness) if random else {}
         limits = problem.randomness_limits if random else {}
-        ends = [[problem.limits[n][k] / u for n, u in self.units.items()] for k in (0, 1)]
+        self.limits = problem.limits
+        ends = [[self.limits[n][k] / u for n, u in self.units.items()] for k in (0, 1)]
         self.low, self.high = (
             np.array([*e, *(math.log(limits[n][k]) for n in self.random)]) for k, e in enumerate(ends)
         )
@@ -144,8 +145,12 @@ class _Scale:
         self.here = np.clip(here, self.low, self.high)
 
     def values(self, z: np.ndarray) -> dict[str, float]:
-        """The parameters at a point."""
-        return {n: float(v * u) for (n, u), v in zip(self.units.items(), z, strict=False)}
+        """The parameters at a point: exactly at a bound that one has come to."""
+        out = {}
+        for (name, unit), v, low, high in zip(self.units.items(), z, self.low, self.high, strict=False):
+            ends = self.limits[name]
+            out[name] = ends[0] if v <= low else ends[1] if v >= high else float(v * unit)
+        return out
 
     def randomness(self, z: np.ndarray) -> dict[str, float]:
         """What is random there."""
@@ -195,10 +200,17 @@ class _Climb:
 
     def __init__(self, scale: _Scale, at_all: Callable[[np.ndarray], list[Told]], abreast: int) -> None:
         self.scale, self.at_all, self.abreast = scale, at_all, abreast
-        self.z, self.widths, self.damping = scale.here, list(STEPS), 1e-3
-        count = len(self.z)
-        self.now, *self.moved = at_all(self.z + self.widths[0] * np.eye(1 + count, count, -1))
-        self.held, self.left = np.zeros(count, dtype=bool), 0.0
+        self.z, self.lengths, self.damping = scale.here, list(STEPS), 1e-3
+        self.now, *self.moved = at_all(np.vstack([self.z, self._beside()]))
+        self.held, self.left = np.zeros(len(self.z), dtype=bool), 0.0
+
+    def _widths(self) -> np.ndarray:
+        """Of differences along each axis: away from a bound."""
+        return np.where(self.z + self.lengths[0] > self.scale.high, -self.lengths[0], self.lengths[0])
+
+    def _beside(self) -> np.ndarray:
+        """The points of differences, one a row."""
+        return np.asarray(self.z + np.diag(self._widths()))
 
     def run(self, steps: int) -> Reached:
         """Take so many steps at most."""
@@ -209,14 +221,14 @@ class _Climb:
             done = self._step()
             steps -= self.now.cost < before
             if not done and steps > 0:
-                self.moved = self.at_all(self.z + self.widths[0] * np.eye(len(self.z)))
+                self.moved = self.at_all(self._beside())
         held = tuple(n for n, h in zip(scale.units, self.held, strict=False) if h)
         fallen = begin - self.now.cost if math.isfinite(begin) else 0.0
         return Reached(scale.values(self.z), scale.randomness(self.z), fallen, held, self.left, done)
 
     def _step(self) -> bool:
         """Go down once, or look at longer differences; True where there is nothing left to gain."""
-        gradient, information = _scored(self.now, self.moved, self.widths[0])
+        gradient, information = _scored(self.now, self.moved, self._widths())
         self.held = self.scale.held(self.z, gradient)
         slopes = _Slopes(gradient, information, self.held)
         self.left = slopes.promised(slopes.step(0.0))
@@ -226,8 +238,8 @@ class _Climb:
         ends = np.array([self.scale.end(self.z, slopes.step(d)) for d in dampings])
         found = _first_below(self.now, ends, self.at_all, self.abreast)
         if found is None:
-            done = self.left < WORTH or len(self.widths) == 1
-            self.widths = self.widths[1:] or self.widths
+            done = self.left < WORTH or len(self.lengths) == 1
+            self.lengths = self.lengths[1:] or self.lengths
             return done
         k, end, after = found
         step, gained = self.z - end, self.now.cost - after.cost
@@ -249,14 +261,14 @@ def _first_below(
     return None
 
 
-def _scored(now: Told, moved: Sequence[Told], width: float) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient and expected information of half the cost, of logarithms, from differences; see the module."""
+def _scored(now: Told, moved: Sequence[Told], widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient and expected information of half the cost, from differences of such widths; see the module."""
     if now.costs is not None:
-        slopes = np.stack([0.5 * (m.costs - now.costs) / width for m in moved], axis=1)
+        slopes = np.stack([0.5 * (m.costs - now.costs) for m in moved], axis=1) / widths
         return slopes.sum(axis=0), slopes.T @ slopes
     r, v = now.innovations, now.variances
-    dr = np.stack([(m.innovations - r) / width for m in moved], axis=1)
-    dv = np.stack([(m.variances - v) / width for m in moved], axis=1) / v[:, None]
+    dr = np.stack([m.innovations - r for m in moved], axis=1) / widths
+    dv = np.stack([m.variances - v for m in moved], axis=1) / widths / v[:, None]
     gradient = (r / v) @ dr + 0.5 * (1.0 - r * r / v) @ dv
     return gradient, (dr / v[:, None]).T @ dr + 0.5 * dv.T @ dv
 

@@ -132,7 +132,7 @@ class LikelihoodFits:
             if names not in self.fits or best.price < self.fits[names].price:
                 self.fits[names] = best
         for size in sorted({len(n) for n in made}):
-            self._converge(size)
+            self.converge(size)
 
     def _afresh(self, starts: Mapping[Names, Model], base: Fit) -> dict[Names, list[Fit]]:
         """Fits that begin with little that is random, where another's random effort takes what a model should.
@@ -148,15 +148,21 @@ class LikelihoodFits:
         gone_on = in_parallel(lambda one: self._maxima.go_on(one[1], AFRESH_ROUNDS - 1), lowest)
         return {names: [fitted] for (names, _), fitted in zip(lowest, gone_on, strict=True)}
 
-    def _converge(self, size: int) -> None:
-        """Let the best of a size converge, and what is half way there: equivalents of one cause are no others."""
-        while slow := [n for n in self._hopeful(size) if n not in self._converged]:
+    def converge(self, size: int, without: Sequence[Names] = ()) -> None:
+        """Let the best of a size converge, and what is half way there: equivalents of one cause are no others.
+
+        Parameters
+        ----------
+        without
+            Sets that are not asked for.
+        """
+        while slow := [n for n in self._hopeful(size, without) if n not in self._converged]:
             self.fits.update(zip(slow, in_parallel(lambda n: self._maxima.go_on(self.fits[n]), slow), strict=True))
             self._converged.update(slow)
 
-    def _hopeful(self, size: int) -> list[Names]:
+    def _hopeful(self, size: int, without: Sequence[Names]) -> list[Names]:
         """The sets of a size that promise to be the best, and those that come near the best."""
-        near, ranked = self.near(size), self.ranked(size)
+        near, ranked = self.near(size, without), [n for n in self.ranked(size) if n not in without]
         first = sorted(ranked, key=lambda n: self.fits[n].price - self._promised(n))[:CONVERGED_SETS]
         return [n for n in ranked if n in first or n in near]
 
@@ -167,9 +173,11 @@ class LikelihoodFits:
             return 0.0
         return step_gain(normal_equations(fitted.parts), [n not in fitted.at_bound for n in fitted.free])
 
-    def near(self, size: int) -> list[Names]:
+    def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
         """Sets of a size that gain half of what the best does beside the best smaller one, best first; the best."""
-        ranked = self.ranked(size)
+        ranked = [n for n in self.ranked(size) if n not in without]
+        if not ranked:
+            return []
         smaller = self.fits[self.ranked(size - 1)[0]].price if size else math.inf
         half = 0.5 * (smaller + self.fits[ranked[0]].price)
         return [n for n in ranked if n == ranked[0] or self.fits[n].price < half]

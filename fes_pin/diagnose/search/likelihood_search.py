@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from fes_pin.data.schema import IMPOSED
@@ -107,7 +107,7 @@ class LikelihoodSearch:
             if best and not self._worth_extending(best):
                 break
             self._extend(size)
-            earned = next((n for n in self._refined(size) if self._earns_beside(n, best)), None)
+            earned = self._first_that_earns(size, best)
             if earned is None:
                 break
             best = self._fallback = earned
@@ -154,11 +154,21 @@ class LikelihoodSearch:
             begun = {k: lambda v=v: sets.extend_with_both(base, v) for k, v in missing.items()}
             sets.add(base, begun)
 
-    def _refined(self, size: int) -> list[Names]:
-        """The best sets of a size, cheapest first, once each has the form that the data demand."""
-        while rough := [n for n in self.sets.near(size)[:BEAM] if n not in self._formed]:
+    def _first_that_earns(self, size: int, best: Names) -> Names | None:
+        """The cheapest set of a size that earns its place; what comes near it is judged without those that do not."""
+        tried: list[Names] = []
+        while len(tried) < BEAM and (rest := self._refined(size, tried)):
+            if self._earns_beside(rest[0], best):
+                return rest[0]
+            tried.append(rest[0])
+            self.sets.converge(size, tried)
+        return None
+
+    def _refined(self, size: int, without: Sequence[Names]) -> list[Names]:
+        """The best sets of a size but for some, cheapest first, once each has the form that the data demand."""
+        while rough := [n for n in self.sets.near(size, without)[:BEAM] if n not in self._formed]:
             self._refine(rough[0])
-        return self.sets.near(size)[:BEAM]
+        return self.sets.near(size, without)[:BEAM]
 
     def _earns_beside(self, names: Names, best: Names) -> bool:
         """Whether a set can be, and is worth more than the best smaller one."""
@@ -198,9 +208,10 @@ class LikelihoodSearch:
     def _backward(self, names: Names) -> Names:
         """Drop causes that the others have made superfluous."""
         while names:
-            fits = {n: self.sets.without(names, n) for n in names}
-            weakest = min(names, key=lambda n: fits[n].sse)
-            if self.p_value(self.sets.fits[names], fits[weakest]) < DRIVEN_LEVEL:
+            less = {n: self.sets.without(names, n) for n in names}
+            p_values = {n: self.p_value(self.sets.fits[names], less[n]) for n in names}
+            weakest = max(names, key=lambda n: (p_values[n], -less[n].sse))
+            if p_values[weakest] < DRIVEN_LEVEL:
                 break
             names = tuple(n for n in names if n != weakest)
         return names

@@ -1,0 +1,88 @@
+"""Parameters and what is random, moved together: a regression whose maximum is known in closed form."""
+
+import numpy as np
+import pytest
+
+from fes_pin.identify.scoring import Told, climb
+
+X = np.linspace(-1.0, 2.0, 400)
+SLOPE, OFFSET, STD = 3.0, -1.0, 0.2
+
+
+class Line:
+    """y = slope x + offset, with white noise."""
+
+    abreast = 1
+
+    def __init__(self, slope=(-1e3, 1e3)):
+        self.y = SLOPE * X + OFFSET + STD * np.random.default_rng(0).standard_normal(len(X))
+        self.limits = {"slope": slope, "offset": (-1e3, 1e3)}
+        self.randomness, self.randomness_limits = {"std": 1.7}, {"std": (1e-3, 10.0)}
+        self.asked = 0
+
+    def told(self, points):
+        self.asked += len(points)
+        return [self.one(values, random) for values, _, random in points]
+
+    def one(self, values, random):
+        left = self.y - values["slope"] * X - values["offset"]
+        variance = np.full(len(X), random.get("std", self.randomness["std"]) ** 2)
+        return Told(float(np.sum(left**2 / variance + np.log(variance))), left, variance)
+
+    def sizes(self):
+        return {"slope": float(np.linalg.norm(X)) / STD, "offset": len(X) ** 0.5 / STD}
+
+
+def climbed(line, steps=12, **how):
+    return climb(line, {"slope": 0.5, "offset": 4.0}, [], line.sizes(), steps, **how)
+
+
+def test_the_maximum_is_that_of_least_squares_and_the_residual_is_the_noise():
+    line = Line()
+    found = climbed(line)
+    (slope, offset), left, *_ = np.linalg.lstsq(np.stack([X, np.ones_like(X)], 1), line.y, rcond=None)
+    std = float(np.sqrt(left[0] / len(X)))
+    begin, end, best = (
+        line.one(values, {"std": s}).cost
+        for values, s in (
+            ({"slope": 0.5, "offset": 4.0}, 1.7),
+            (found.values, found.randomness["std"]),
+            ({"slope": slope, "offset": offset}, std),
+        )
+    )
+    assert found.converged
+    assert best <= end < best + 0.1
+    assert found.values == pytest.approx({"slope": slope, "offset": offset}, rel=1e-3)
+    assert found.randomness["std"] == pytest.approx(std, rel=0.02)
+    assert found.gained == pytest.approx(begin - end)
+    assert found.left < 0.1
+
+
+def test_what_is_not_asked_for_does_not_move():
+    line = Line()
+    found = climbed(line, random=False)
+    assert found.randomness == {}
+    assert found.values["slope"] == pytest.approx(SLOPE, abs=0.05)
+
+
+def test_a_bound_holds_a_parameter_and_the_others_move_beside_it():
+    line = Line(slope=(-1e3, 1.0))
+    found = climbed(line)
+    assert found.held == ("slope",)
+    assert found.values["slope"] == 1.0
+    assert found.values["offset"] == pytest.approx(float(np.mean(line.y - X)), abs=0.03)
+
+
+def test_steps_that_run_out_are_no_maximum():
+    assert not climbed(Line(), steps=1).converged
+
+
+def test_near_the_maximum_one_step_that_keeps_its_promise_is_the_last():
+    """Nothing is asked once more about a slope that the step has just used up."""
+    line = Line()
+    best = climbed(line)
+    line.randomness, line.asked = best.randomness, 0
+    near = {n: v + 0.1 / s for (n, v), s in zip(best.values.items(), line.sizes().values(), strict=True)}
+    found = climb(line, near, [], line.sizes(), 12)
+    assert found.converged
+    assert line.asked <= 2 * (1 + 3)
