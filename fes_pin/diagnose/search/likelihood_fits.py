@@ -95,10 +95,18 @@ class LikelihoodFits:
         starts = [replace(guess, std={n: k * v for n, v in guess.std.items()}) for k in FIRST_DOUBTS]
         return min(in_parallel(lambda d: self._maxima.from_start(self.model, d), starts), key=lambda f: f.sse)
 
+    def take_counts_for_intervals(self) -> Fit:
+        """Begin anew from the nominal model where counts are intervals, in every fit from now on; returns its fit."""
+        nominal = self.counts.of(self.fits[()])
+        self.fits, self._converged = {(): nominal}, set()
+        self.counts = LikelihoodCounts(self.model.rig, (), lambda f: f, self._in_counts)
+        return nominal
+
     def _guess(self) -> Doubt:
-        """Little that is random, with noise that lasts as it does."""
+        """Little that is random, with noise that lasts as it does, and counts as they are taken."""
         known = self.fits[()].doubt
-        return first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
+        guess = first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
+        return in_counts(guess) if known and known.in_counts else guess
 
     def extend(self, base: Fit, scored: Sequence[Scored]) -> tuple[Model, list[Fit]]:
         """Begin a base with one more effect, from its shapes of largest score: the start, and first fits from there."""

@@ -108,26 +108,48 @@ class LikelihoodSearch:
                 break
             self._extend(size)
             earned = self._first_that_earns(size, best)
+            if size == 1 and self._numbers_mislead():
+                return self._search_intervals()
             if earned is None:
                 break
             best = self._fallback = earned
         return self.settle(self._backward(best))
+
+    def _numbers_mislead(self) -> bool:
+        """True where a cause by itself is certain if counts are numbers, and nothing if they are intervals."""
+        fits, counts = self.sets.fits, self.sets.counts
+        alone = [n for n in self._unearned if len(n) == 1] if counts.are_there else []
+        return any(self._by_numbers(fits[n], fits[()]) < DRIVEN_LEVEL for n in alone)
+
+    def _search_intervals(self) -> Found:
+        """Search anew with counts as the intervals that they stand for: as numbers they lead elsewhere."""
+        with time_limit(math.inf):
+            nominal = self.sets.take_counts_for_intervals()
+            self.family = Family(self.sets.screen.scores(nominal), self.seed)
+        self._formed, self._unearned = set(), set()
+        return self._search()
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
         """Family-wise p-value of what a larger set adds, as far as pieces of the data agree on it.
 
         Of readings in counts also where these are intervals.
         """
-        degrees, scatter = max(larger.degrees - smaller.degrees, 1), excess_scatter(larger, smaller)
-        p = self.family.p_value(self.sets.gained(larger, smaller) / scatter, degrees)
+        p = self._by_numbers(larger, smaller)
         if p < DRIVEN_LEVEL and self.sets.counts.are_there:
-            p = max(p, self.family.p_value(self.sets.counts.gained(larger, smaller) / scatter, degrees))
+            p = max(p, self._p_value(self.sets.counts.gained(larger, smaller), larger, smaller))
         return p
+
+    def _by_numbers(self, larger: Fit, smaller: Fit) -> float:
+        return self._p_value(self.sets.gained(larger, smaller), larger, smaller)
+
+    def _p_value(self, gain: float, larger: Fit, smaller: Fit) -> float:
+        """Family-wise p-value of a gain in twice the log-likelihood."""
+        degrees = max(larger.degrees - smaller.degrees, 1)
+        return self.family.p_value(gain / excess_scatter(larger, smaller), degrees)
 
     def earns(self, larger: Fit, smaller: Fit, gain: float, _explained: float) -> bool:
         """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood."""
-        degrees = max(larger.degrees - smaller.degrees, 1)
-        return self.family.p_value(gain / excess_scatter(larger, smaller), degrees) < DRIVEN_LEVEL
+        return self._p_value(gain, larger, smaller) < DRIVEN_LEVEL
 
     def possible(self) -> dict[Names, Fit]:
         """All sets that are fitted, but for those that cannot be, or that were found not to earn their place."""
