@@ -107,19 +107,26 @@ class LikelihoodSearch:
             if best and not self._worth_extending(best):
                 break
             self._extend(size)
-            earned = self._first_that_earns(size, best)
-            if size == 1 and self._numbers_mislead():
+            if size == 1 and sets.counts.are_there and self._numbers_mislead():
                 return self._search_intervals()
+            earned = self._first_that_earns(size, best)
             if earned is None:
                 break
             best = self._fallback = earned
         return self.settle(self._backward(best))
 
     def _numbers_mislead(self) -> bool:
-        """True where a cause by itself is certain if counts are numbers, and nothing if they are intervals."""
-        fits, counts = self.sets.fits, self.sets.counts
-        alone = [n for n in self._unearned if len(n) == 1] if counts.are_there else []
-        return any(self._by_numbers(fits[n], fits[()]) < DRIVEN_LEVEL for n in alone)
+        """True where less than half of what the best cause by itself gains, with counts as numbers, is left of it with
+        counts as the intervals that they stand for.
+
+        Where neighbours are many counts apart both say the same, and where they are few intervals say more; but the
+        error of a count that stands or hunts is no noise, and what holds a rig explains it.
+        """
+        fits, first = self.sets.fits, self._refined(1, ())
+        if not first or self._by_numbers(fits[first[0]], fits[()]) >= DRIVEN_LEVEL:
+            return False
+        kept = self.sets.counts.gained(fits[first[0]], fits[()])
+        return kept < 0.5 * self.sets.gained(fits[first[0]], fits[()])
 
     def _search_intervals(self) -> Found:
         """Search anew with counts as the intervals that they stand for: as numbers they lead elsewhere."""
