@@ -187,8 +187,8 @@ def _ceiling(fitted: Fit) -> float:
     """E of the reading noise alone, percent."""
     assert fitted.doubt is not None
     rig = fitted.model.rig
-    columns = [(t[rig.output(t.kind)], fitted.doubt.white[rig.output(t.kind)]) for t in fitted.trials]
-    noise = sum(float(np.isfinite(y).sum()) * std**2 for y, std in columns)
+    columns = [(t[rig.output(t.kind)], fitted.doubt.variance(t, rig.output(t.kind))) for t in fitted.trials]
+    noise = sum(float(np.isfinite(y).sum()) * variance for y, variance in columns)
     return 100.0 * noise / max(sum(float(np.nansum((y - np.nanmean(y)) ** 2)) for y, _ in columns), 1e-300)
 
 

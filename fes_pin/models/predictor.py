@@ -48,6 +48,14 @@ class Doubt:
         """The random processes that act."""
         return tuple(self.std)
 
+    def variance(self, trial: Trial, output: str) -> float:
+        """Of the noise of a reading, in its unit squared, and of rounding, count^2 / 12, where counts are intervals.
+
+        Source: Sheppard, On the calculation of the most probable values of frequency-constants, Proc. London Math. Soc.
+        29 (1898).
+        """
+        return self.white[output] ** 2 + (count_of(trial[output]) ** 2 / 12.0 if self.in_counts else 0.0)
+
     def with_values(self, values: Mapping[str, float]) -> Doubt:
         """The same with other values, by name as in `values`."""
         parts = {part: dict(getattr(self, part)) for part in ("white", "std", "time")}

@@ -149,3 +149,15 @@ def test_slopes_of_the_cost_are_differences():
     slope = float(np.sum(residual * scale * run(at).sensitivities[:, 0, 0]))
     above, below = (run({**at, "damping": 4.0 + s}).cost() for s in (0.05, -0.05))
     assert slope == pytest.approx((above - below) / 0.1 / 2.0, rel=0.35, abs=0.02)
+
+
+def test_the_noise_of_what_is_read_in_counts_is_that_of_rounding_too():
+    """An independent sum: the variance of many roundings of numbers anywhere within a count."""
+    count, white = 0.1, 0.02
+    rng = np.random.default_rng(3)
+    true = rng.uniform(0.0, 50.0, 200_000)
+    read = np.round((true + white * rng.standard_normal(len(true))) / count) * count
+    trial = Trial("t", "free", {"position": np.repeat(read, 2)}, 1e-3 * np.arange(2 * len(read)))
+    doubt = Doubt({"position": white}, in_counts=True)
+    assert doubt.variance(trial, "position") == pytest.approx(float(np.var(read - true)), rel=0.02)
+    assert replace(doubt, in_counts=False).variance(trial, "position") == white**2
