@@ -14,6 +14,7 @@ from fes_pin.diagnose.search.likelihood_search import Found
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Unknowns, normal_equations
+from fes_pin.identify.scatter import at_rest
 from fes_pin.identify.turns import maximise, together
 from fes_pin.workers import in_parallel
 
@@ -133,7 +134,7 @@ def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, 
 @np.errstate(all="ignore")
 def _weight(fitted: Fit) -> float:
     """Twice the negative log of the probability of a fit's trials; see `evidence_of`."""
-    system = normal_equations(fitted.parts)
+    system = normal_equations(at_rest(fitted.parts))
     info = fitted.model.parameter_info()
     widths = [WIDE * max(abs(fitted.values[n]), info[n].scale) for n in fitted.free]
     scaled = system.hessian * np.outer(widths, widths)

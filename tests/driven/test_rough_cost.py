@@ -6,8 +6,12 @@ import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
+from fes_pin.diagnose.decide.chosen_again import ChosenAgain
+from fes_pin.diagnose.decide.held_out import folds_of
+from fes_pin.diagnose.driven_held_out import as_random_as_in_all
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
+from fes_pin.identify.fit import PARAMETER_PRICE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.models.effects import CoulombFriction, PeriodicTorque
@@ -55,3 +59,18 @@ def test_a_slope_that_no_step_keeps_narrows_no_interval(tmp_path):
     for name in fitted.free:
         assert same.std(name) == pytest.approx(honest.std(name), rel=1e-6)
         assert honest.std(name) >= 0.99 * fitted.std(name)
+
+
+def test_folds_take_the_end_of_what_moved_together_for_an_end(tmp_path):
+    """Slopes for gains as they are still lead on there: by 15 to 56 below where fits to the other trials end."""
+    study = read_study(draw(("coulomb_friction",), 0.3, 7, tmp_path).study)
+    sets = LikelihoodFits(nominal_model(study), study.trials, [CoulombFriction])
+    sets.nominal()
+    sets.extend_all(())
+    fitted = sets.fits["coulomb_friction",]
+    every = sum(len(p.residual) for p in fitted.parts)
+    for held in folds_of(fitted.trials):
+        others = as_random_as_in_all(fitted, [t for i, t in enumerate(fitted.trials) if i not in held])
+        many = every / sum(len(p.residual) for p in others.parts)
+        cost = ChosenAgain({(): fitted}, lambda *_: True)._cost((), held)
+        assert cost == pytest.approx(many * others.sse, abs=PARAMETER_PRICE)
