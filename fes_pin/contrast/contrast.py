@@ -27,7 +27,7 @@ from fes_pin.diagnose.plausibility import check_study
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.identify.effort_noise import words_of_noise
 from fes_pin.identify.feedback import is_fed_back
-from fes_pin.identify.lasting import words_of_smoothing
+from fes_pin.identify.lasting import words_of_reading
 from fes_pin.identify.lateness import words_of_lateness
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
@@ -170,7 +170,7 @@ def _quieted(study: Study, names: Sequence[str], nominal: Model) -> tuple[Study,
 def _smoothed(best: Grouped, trials: Trials) -> tuple[str, ...]:
     """What is to be said of readings of a driven rig that were smoothed: their noise lasts as long in all groups."""
     group, doubt = next(iter(best.weights.items()))
-    return words_of_smoothing(doubt if isinstance(doubt, Doubt) else None, best.model.rig, trials[group][0])
+    return words_of_reading(doubt if isinstance(doubt, Doubt) else None, best.model.rig, trials[group][0])
 
 
 def _common(best: Grouped) -> tuple[str, ...]:

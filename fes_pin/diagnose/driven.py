@@ -45,7 +45,7 @@ from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import default_horizon, falls
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.lasting import words_of_smoothing
+from fes_pin.identify.lasting import words_of_reading
 from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.models.stage import Effect
 
@@ -228,7 +228,7 @@ def driven_diagnosis(
         held_out_by=SEPARATE if trials[1] else CROSS_VALIDATED if held else NOTHING,
         left_out={},
         wall_s=0.0,
-        warnings=words_of_smoothing(best.doubt, best.model.rig, trials[0][0]),
+        warnings=words_of_reading(best.doubt, best.model.rig, trials[0][0]),
         random=judged.random,
         ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
     )

@@ -78,16 +78,18 @@ def _other(fitted: Fit, sparser: Fit) -> float:
 __all__ = ["with_new_noise"]
 
 
-def words_of_smoothing(doubt: Doubt | None, rig: Rig, trial: Trial) -> tuple[str, ...]:
-    """What is to be said of a reading whose noise lasts over samples, if it does.
+def words_of_reading(doubt: Doubt | None, rig: Rig, trial: Trial) -> tuple[str, ...]:
+    """What is to be said of a reading whose noise lasts over samples, or whose counts are intervals.
 
     Neighbours that stand on one count err alike; else a record was smoothed.
     """
+    name = rig.output(trial.kind)
+    count = count_of(trial[name]) if name in trial.columns else 0.0
+    if doubt is not None and doubt.in_counts and count:
+        return (f"{name} is read in counts of {count:.2g}, and each was taken for the interval that it stands for",)
     if doubt is None or not doubt.lasts_s:
         return ()
     step = round(doubt.lasts_s / trial.dt)
-    name = rig.output(trial.kind)
-    count = count_of(trial[name]) if name in trial.columns else 0.0
     said = f"is read in counts of {count:.2g}" if count else "was smoothed or interpolated before it was stored"
     lasts = f"its noise lasts {doubt.lasts_s:.2g} s, and one sample in {step} counts as a reading"
     return (f"{name} {said}: {lasts}",)

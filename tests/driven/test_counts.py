@@ -7,6 +7,7 @@ from fes_pin.data.study import read_study
 from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
+from fes_pin.identify.lasting import words_of_reading
 from fes_pin.models.effects import Cogging, CoulombFriction, EffortOffset
 from fes_pin.models.nominal import nominal_model
 
@@ -63,6 +64,9 @@ def test_a_search_that_numbers_mislead_begins_anew_with_intervals(tmp_path):
     assert best.doubt.in_counts
     assert abs(best.values["inertia_scale"] - 1.0) < 3.0 * best.std("inertia_scale")
     assert best.std("inertia_scale") < 2e-3
+    (said,) = words_of_reading(best.doubt, best.model.rig, best.trials[0])
+    assert "in counts of 0.0015" in said
+    assert "interval" in said
 
 
 def test_a_search_goes_by_numbers_where_intervals_say_the_same(tmp_path):
