@@ -15,12 +15,12 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.rivals import estimates
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
-from fes_pin.identify.effort_noise import Prepared, cost_beside, effort_noise_of, words_of_noise
+from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_noise
 from fes_pin.identify.fit import PARAMETER_PRICE, Fit
 from fes_pin.identify.lateness import lateness_of, words_of_lateness
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.scatter import with_honest_intervals
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.turns import maximum_from
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 
@@ -57,8 +57,13 @@ class LogFaults:
         """The same beside a diagnosis; what was taken out for it is put back where efforts are likelier with it."""
         fitted, known = diagnosis.extended, diagnosis.log.effort_noise
         if known:
-            return known * self._told(lambda: float(fitted.sse < cost_beside(fitted, self.prepared(self.trials))), 1.0)
+            return known * self._told(
+                lambda: float(fitted.sse < maximum_from(fitted, self.prepared(self.trials)).sse), 1.0
+            )
         return self._told(lambda: self._noise(fitted)) if diagnosis.verdict != "adequate" else 0.0
+
+    def _as_recorded(self, fitted: Fit) -> Fit:
+        return maximum_from(fitted, self.prepared(self.trials))
 
     def _noise(self, fitted: Fit) -> float:
         return effort_noise_of(fitted, self.trials, self.answers, self.prepared)
@@ -135,5 +140,4 @@ def _with_noise_that_lasts(fitted: Fit, lasts_s: float) -> Fit:
     """The fit to readings so far apart."""
     if fitted.doubt is None or fitted.doubt.lasts_s == lasts_s:
         return fitted
-    problem = LikelihoodProblem(fitted.model, fitted.trials, replace(fitted.doubt, lasts_s=lasts_s))
-    return maximise(problem, fitted.values, fitted.unknowns)
+    return maximum_from(fitted, fitted.trials, replace(fitted.doubt, lasts_s=lasts_s))

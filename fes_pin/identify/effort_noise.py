@@ -16,8 +16,7 @@ from fes_pin.data.log import quiet
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lateness import LEAST_GAIN
-from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.turns import maximum_from
 from fes_pin.workers import in_parallel
 
 TRIED = (0.1, 0.25, 0.5, 0.75)
@@ -47,7 +46,7 @@ def effort_noise_of(
     tried = [0.0, *(float(v) for v in np.unique(np.quantile(left, TRIED)) if v > _least(fitted, trials))]
     if len(tried) == 1:
         return 0.0
-    costs = in_parallel(lambda noise: cost_beside(fitted, prepared(quieted(trials, answers, noise))), tried)
+    costs = in_parallel(lambda noise: maximum_from(fitted, prepared(quieted(trials, answers, noise))).sse, tried)
     best = int(np.argmin(costs))
     return tried[best] if costs[best] < costs[0] - LEAST_GAIN else 0.0
 
@@ -62,12 +61,6 @@ def _least(fitted: Fit, trials: Sequence[Trial]) -> float:
 def quieted(trials: Sequence[Trial], answers: Sequence[ControllerAnswer], noise: float) -> list[Trial]:
     """The trials without so much noise of their efforts."""
     return [quiet(t, a, noise) for t, a in zip(trials, answers, strict=True)]
-
-
-def cost_beside(fitted: Fit, trials: Sequence[Trial]) -> float:
-    """Twice the negative log-likelihood of trials in place of those of a fit, at its maximum for the same model."""
-    assert fitted.doubt is not None
-    return maximise(LikelihoodProblem(fitted.model, trials, fitted.doubt), fitted.values, fitted.unknowns).sse
 
 
 def words_of_noise(noise: float, unit: str) -> str:

@@ -16,8 +16,7 @@ from fes_pin.data.log import Log
 from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import CERTAIN_LEVEL
-from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.turns import maximum_from
 from fes_pin.workers import in_parallel
 
 LEAST_GAIN = chi2_quantile(1.0 - CERTAIN_LEVEL, 1)
@@ -50,15 +49,12 @@ def lateness_of(fitted: Fit, row_s: float, or_early: bool = False) -> Lateness |
     or_early
         Whether they may act later than written as well: asked of rows as they were logged, not of their averages.
     """
-    doubt = fitted.doubt
-    assert doubt is not None
     tried: dict[float, float] = {}
 
     def cost(late: float) -> float:
         if late not in tried:
             moved = [Log(effort_late_s=late).applied(t) for t in fitted.trials]
-            problem = LikelihoodProblem(fitted.model, moved, doubt)
-            tried[late] = maximise(problem, fitted.values, fitted.unknowns).sse
+            tried[late] = maximum_from(fitted, moved).sse
         return tried[late]
 
     least = (LEAST_ROWS * row_s, -LEAST_ROWS * row_s)[: 1 + or_early]

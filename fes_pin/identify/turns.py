@@ -9,18 +9,20 @@ begun large it takes all that the model gets wrong.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
+from fes_pin.data.trial import Trial
 from fes_pin.identify.covariance import covariance_of
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Unknowns, normal_equations
 from fes_pin.identify.scatter import at_rest
 from fes_pin.identify.scoring import LITTLE, WORTH, Foretelling, climb
+from fes_pin.models.predictor import Doubt
 
 ROUNDS = 12
 """Turns of parameters and randomness, at most; and steps of both together."""
@@ -111,3 +113,17 @@ def maximise(
     if near and not problem.is_final:
         return replace(together(problem, start, unknowns), doubt=problem.doubt)
     return replace(by_turns(problem, start, unknowns, rounds), doubt=problem.doubt)
+
+
+def maximum_from(fitted: Fit, trials: Sequence[Trial], doubt: Doubt | None = None) -> Fit:
+    """The likelihood's maximum of a fit's model on trials much like its own, from where it ended.
+
+    Parameters
+    ----------
+    doubt
+        What is taken for random at first; by default what was random in the fit.
+    """
+    begun = doubt or fitted.doubt
+    assert begun is not None
+    problem = LikelihoodProblem(fitted.model, trials, begun)
+    return maximise(problem, fitted.values, fitted.unknowns, near=fitted.together)
