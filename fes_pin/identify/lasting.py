@@ -40,8 +40,8 @@ def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], Fit]) -> 
     Returns
     -------
     Fit
-        Its `doubt.lasts_s` says how long; 0 where noise is new in every sample. Where it is nowhere new, the fit that
-        comes nearest to it.
+        Its `doubt.lasts_s` says how long; 0 where noise is new in every sample. Where it is nowhere new, the fit whose
+        innovations have least in common with the next.
     """
     now = nominal(0.0)
     if not all(now.model.rig.unknowns(t.kind) for t in trials):  # a force may be as smooth as its reading
@@ -50,9 +50,9 @@ def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], Fit]) -> 
     while 2 * step * FEWEST <= min(map(len, trials)):
         step *= 2
         sparser = nominal(step * max(t.dt for t in trials))
-        tried.append((max(_shared(now) / SHARED, _other(now, sparser) / OTHER), now))
-        if tried[-1][0] < 1.0:
-            break
+        tried.append((_shared(now), now))
+        if tried[-1][0] < SHARED and _other(now, sparser) < OTHER:
+            return now
         now = sparser
     return min(tried, key=lambda one: one[0])[1]
 

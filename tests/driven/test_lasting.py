@@ -1,14 +1,19 @@
 """How long the noise of a reading lasts: nothing of it where each sample has its own, whatever the model misses."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from driven_rigs.draw import draw
 from scipy.ndimage import uniform_filter1d
+from scipy.signal import lfilter
 
 from fes_pin.data.log import Log
 from fes_pin.data.smooth import low_pass
 from fes_pin.data.study import read_study
+from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.identify.lasting import FEWEST, with_new_noise
 from fes_pin.identify.stored import load_random, stored_tables
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predictor import are_news
@@ -61,3 +66,17 @@ def test_it_is_kept_with_a_model(tmp_path):
     found = nominal(study, lambda x: uniform_filter1d(x, 5))
     (tmp_path / "model.toml").write_text(model_toml(found.model, stored_tables(found, Log())))
     assert load_random(tmp_path / "model.toml").lasts_s == pytest.approx(found.doubt.lasts_s, rel=1e-5)
+
+
+def test_where_noise_is_nowhere_new_innovations_have_least_in_common():
+    """Fits whose innovations are correlated by as much as is given for each distance of readings."""
+    rng, dt, n = np.random.default_rng(5), 0.01, 60_000
+    shared = {0: 0.25, 2: 0.4, 4: 0.15, 8: 0.3}
+
+    def fitted(lasts_s):
+        rows = round(lasts_s / dt)
+        residual = lfilter([1.0], [1.0, -shared[rows]], rng.standard_normal(n))
+        model = SimpleNamespace(rig=SimpleNamespace(unknowns=lambda kind: ("initial_position",)))
+        return SimpleNamespace(rows=rows, model=model, parts=[SimpleNamespace(residual=residual)])
+
+    assert with_new_noise([Trial("a", "motion", {}, dt * np.arange(8 * FEWEST))], fitted).rows == 4
