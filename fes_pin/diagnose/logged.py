@@ -57,12 +57,11 @@ class LogFaults:
         """The same beside a diagnosis; what was taken out for it is put back where efforts are likelier with it."""
         fitted, known = diagnosis.extended, diagnosis.log.effort_noise
         if known:
-            return known * self._told(
-                lambda: float(fitted.sse < maximum_from(fitted, self.prepared(self.trials)).sse), 1.0
-            )
+            return known * self._told(lambda: float(fitted.sse < self._as_recorded(fitted).sse), 1.0)
         return self._told(lambda: self._noise(fitted)) if diagnosis.verdict != "adequate" else 0.0
 
     def _as_recorded(self, fitted: Fit) -> Fit:
+        """The same model on trials with all the noise that their efforts were recorded with."""
         return maximum_from(fitted, self.prepared(self.trials))
 
     def _noise(self, fitted: Fit) -> float:

@@ -197,7 +197,7 @@ class LikelihoodProblem:
         """What slopes for gains as they are miss of those of half the cost, by parameter; 0 where that is no number."""
         now, out = whitened_sse(parts), np.zeros(len(at))
         sizes = np.sqrt(sum(np.sum(p.jacobian[:, at] ** 2, axis=0) for p in parts))
-        felt = np.flatnonzero(sizes)
+        felt = np.flatnonzero(sizes) if np.isfinite(now) else np.empty(0, dtype=int)
         names, steps = [self._scales[k] for k in felt], FOLLOWED_STEP / sizes[felt]
         moved = [{**values, n: values[n] + float(h)} for n, h in zip(names, steps, strict=True)]
         slopes = 0.5 * (np.array(self.bounds([(m, unknowns) for m in moved])) - now) / steps

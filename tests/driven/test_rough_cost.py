@@ -18,13 +18,18 @@ from fes_pin.models.effects import CoulombFriction, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
 
 
-def test_what_has_moved_together_is_where_no_single_step_leads_down(tmp_path):
-    """Slopes for gains as they are end 20 above it beside this rig's friction; the maximum is the cost's own."""
-    study = read_study(draw(("coulomb_friction",), 0.3, 7, tmp_path).study)
+def friction_fitted(folder):
+    """A rig that hides friction, fitted with it."""
+    study = read_study(draw(("coulomb_friction",), 0.3, 7, folder).study)
     sets = LikelihoodFits(nominal_model(study), study.trials, [CoulombFriction])
     sets.nominal()
     sets.extend_all(())
-    fitted = sets.fits["coulomb_friction",]
+    return sets.fits["coulomb_friction",]
+
+
+def test_what_has_moved_together_is_where_no_single_step_leads_down(tmp_path):
+    """Slopes for gains as they are end 20 above it beside this rig's friction; the maximum is the cost's own."""
+    fitted = friction_fitted(tmp_path)
     assert fitted.together
     problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt)
     points = [
@@ -63,11 +68,7 @@ def test_a_slope_that_no_step_keeps_narrows_no_interval(tmp_path):
 
 def test_folds_take_the_end_of_what_moved_together_for_an_end(tmp_path):
     """Slopes for gains as they are still lead on there: by 15 to 56 below where fits to the other trials end."""
-    study = read_study(draw(("coulomb_friction",), 0.3, 7, tmp_path).study)
-    sets = LikelihoodFits(nominal_model(study), study.trials, [CoulombFriction])
-    sets.nominal()
-    sets.extend_all(())
-    fitted = sets.fits["coulomb_friction",]
+    fitted = friction_fitted(tmp_path)
     every = sum(len(p.residual) for p in fitted.parts)
     for held in folds_of(fitted.trials):
         others = as_random_as_in_all(fitted, [t for i, t in enumerate(fitted.trials) if i not in held])

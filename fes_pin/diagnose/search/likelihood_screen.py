@@ -31,10 +31,7 @@ class LikelihoodScreen:
         if id(base) not in self._scores:
             wanted = [e for e in self._library.effects if e.name not in names_of(base) and self._library.felt(e)]
             groups = in_parallel(lambda e: self._probes(e, base), wanted)
-            self._scores[id(base)] = (
-                base,
-                Projection(base.parts).score([p for g in groups for p in g]),
-            )
+            self._scores[id(base)] = (base, Projection(base.parts).score([p for g in groups for p in g]))
         return self._scores[id(base)][1]
 
     def _probes(self, effect: type[Effect], base: Fit) -> list[Probe]:

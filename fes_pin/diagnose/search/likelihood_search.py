@@ -116,8 +116,7 @@ class LikelihoodSearch:
         return self.settle(self._backward(best))
 
     def _numbers_mislead(self) -> bool:
-        """True where less than half of what the best cause by itself gains, with counts as numbers, is left of it with
-        counts as the intervals that they stand for.
+        """True where counts as intervals keep less than half of what the best cause alone gains by them as numbers.
 
         Where neighbours are many counts apart both say the same, and where they are few intervals say more; but the
         error of a count that stands or hunts is no noise, and what holds a rig explains it.
