@@ -229,8 +229,11 @@ class _Climb:
     def _step(self) -> bool:
         """Go down once, or look at longer differences; True where there is nothing left to gain."""
         gradient, information = _scored(self.now, self.moved, self._widths())
+        lost = np.arange(len(gradient)) < len(self.scale.units)  # a parameter beside which a prediction runs away stays
+        lost &= ~(np.isfinite(gradient) & np.isfinite(np.diag(information)))
+        gradient[lost], information[lost], information[:, lost] = 0.0, 0.0, 0.0
         self.held = self.scale.held(self.z, gradient)
-        slopes = _Slopes(gradient, information, self.held)
+        slopes = _Slopes(gradient, information, self.held | lost)
         self.left = slopes.promised(slopes.step(0.0))
         if self.left < LITTLE:
             return True

@@ -86,3 +86,16 @@ def test_near_the_maximum_one_step_that_keeps_its_promise_is_the_last():
     found = climb(line, near, [], line.sizes(), 12)
     assert found.converged
     assert line.asked <= 2 * (1 + 3)
+
+
+def test_a_parameter_beside_which_a_prediction_runs_away_stays_where_it_is():
+    class Runaway(Line):
+        def one(self, values, random):
+            told = super().one(values, random)
+            return told if abs(values["slope"] - 0.5) < 1e-9 else Told(np.inf, np.full(len(X), np.nan), told.variances)
+
+    line = Runaway()
+    found = climbed(line)
+    assert found.values["slope"] == pytest.approx(0.5)
+    assert found.held == ()
+    assert found.values["offset"] == pytest.approx(float(np.mean(line.y - 0.5 * X)), abs=0.05)
