@@ -13,10 +13,8 @@ from fes_pin.contrast.result import Change
 from fes_pin.contrast.search import ContrastFound
 from fes_pin.contrast.words import of_cause, of_nominal
 from fes_pin.diagnose.cause import ParameterEstimate
-from fes_pin.diagnose.decide.rivals import ABSORBED_BELOW
-from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.identify.distributions import normal_quantile
-from fes_pin.identify.levels import CLAIM_LEVEL
+from fes_pin.identify.levels import ABSORBED_BELOW, CLAIM_LEVEL, SEPARABLE
 from fes_pin.models.catalogue import Catalogue
 
 SEEN = 0.95

@@ -14,10 +14,8 @@ from fes_pin.contrast.result import Change
 from fes_pin.contrast.search import ContrastFound
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import ParameterEstimate
-from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated_trials
-from fes_pin.identify.fit import PARAMETER_PRICE
-from fes_pin.identify.levels import CLAIM_LEVEL
+from fes_pin.identify.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
 from fes_pin.models.model import Model
 
 ROUNDS = 3

@@ -30,12 +30,8 @@ from fes_pin.contrast.promises import UNFELT, Promise, units
 from fes_pin.contrast.repeats import Repeats
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.identify.distributions import f_tail
-from fes_pin.identify.levels import CLAIM_LEVEL
+from fes_pin.identify.levels import CLAIM_LEVEL, UNUSUAL_LEVEL
 from fes_pin.identify.scatter import excess_scatter
-
-UNUSUAL = 0.05
-"""p-value below which a spread is larger than what is usual, as repeats may differ in just this: the usual one counts
-the less, the smaller it is."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +45,7 @@ class Spread:
         """What this and the usual spread say together, as far as they agree."""
         if not usual.free > 0.0:
             return self
-        agree = min(1.0, f_tail(self.phi / usual.phi, self.free, usual.free) / UNUSUAL)
+        agree = min(1.0, f_tail(self.phi / usual.phi, self.free, usual.free) / UNUSUAL_LEVEL)
         more = agree * usual.free
         total = more + self.free
         return Spread(max(self.phi, (more * usual.phi + self.free * self.phi) / total), total)

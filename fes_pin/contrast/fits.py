@@ -16,12 +16,12 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library
 from fes_pin.diagnose.search.likelihood_counts import LikelihoodCounts, in_counts
 from fes_pin.diagnose.search.score import Scores
-from fes_pin.diagnose.search.starts import STARTS, refinements
+from fes_pin.diagnose.search.starts import STARTS, forms_beside, refinements
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.lasting import with_new_noise
-from fes_pin.identify.levels import REFINE_LEVEL
+from fes_pin.identify.levels import DRIVEN_LEVEL
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel, as_white
 from fes_pin.identify.noise_floor import rich_noise
@@ -196,13 +196,14 @@ class Fits:
         effect = next((e for e in model.effects if e.name == item.name), None)
         if effect is None or not self.driven:
             return one
-        demanded = chi2_quantile(1.0 - REFINE_LEVEL, 1)
+        level = DRIVEN_LEVEL / forms_beside(model, [effect])
+        demanded = chi2_quantile(1.0 - level, 1)
         starts = [_reformed(one.model, group, m) for m in refinements(model, effect, self.library.measured)]
         looks = sorted(in_parallel(lambda start: self._looked(start, one), starts), key=lambda f: f.price)
         worth = [f for f in looks[:STARTS] if one.fit.sse - f.fit.sse > 0.5 * demanded]
         best = min(in_parallel(self.go_on, worth), key=lambda f: f.price, default=one)
         degrees = max(len(best.fit.free) - len(one.fit.free), 1)
-        if not chi2_tail(max(one.fit.sse - best.fit.sse, 0.0), degrees) < REFINE_LEVEL:
+        if not chi2_tail(max(one.fit.sse - best.fit.sse, 0.0), degrees) < level:
             return one
         return self.refined(best)
 

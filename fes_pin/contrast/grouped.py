@@ -12,7 +12,8 @@ import numpy as np
 
 from fes_pin.contrast.repeats import RepeatedProblem, Repeats
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import PARAMETER_PRICE, Fit
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Linearized, Problem, Unknowns

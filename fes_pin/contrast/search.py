@@ -16,10 +16,8 @@ from fes_pin.contrast.fits import Fits
 from fes_pin.contrast.grouped import Grouped, Item
 from fes_pin.contrast.promises import Promise
 from fes_pin.diagnose.decide.significance import Family
-from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.diagnose.search.starts import STARTS
-from fes_pin.identify.fit import PARAMETER_PRICE
-from fes_pin.identify.levels import CLAIM_LEVEL
+from fes_pin.identify.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
 from fes_pin.workers import Progress, in_parallel
 
 MOST_ITEMS = 5

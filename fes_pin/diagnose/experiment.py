@@ -11,15 +11,12 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import SEPARABLE, SURE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Linearized, NormalEquations, Problem, measured_columns, normal_equations
 from fes_pin.models.nominal import rig_of
 from fes_pin.models.simulate import Simulator
 
-SEPARABLE = 2.71
-"""Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: 1.645 squared (DESIGN 6.5)."""
-SURE = 1.645
-"""Standard deviations of a likelihood ratio that 95 in 100 stay within, on one side."""
 MOST_REPEATS = 50
 """A proposal that must be run more often than this is none."""
 SECONDS = 8.0

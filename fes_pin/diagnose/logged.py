@@ -16,8 +16,9 @@ from fes_pin.diagnose.decide.rivals import estimates
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_noise
-from fes_pin.identify.fit import PARAMETER_PRICE, Fit
+from fes_pin.identify.fit import Fit
 from fes_pin.identify.lateness import lateness_of, words_of_lateness
+from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.identify.turns import maximum_from

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.decide.held_out import RUNAWAY, within
+from fes_pin.diagnose.decide.held_out import within
 from fes_pin.diagnose.errors_ahead import AheadErrors
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.identify.ahead import over_horizon
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import RUNAWAY
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
 
@@ -68,7 +69,7 @@ def _predicted(fitted: Fit, trials: Sequence[Trial], noise: NoiseModel, ahead: A
 
 
 def _shown(readings: np.ndarray, trial: Trial, name: str) -> np.ndarray:
-    """A prediction that runs away stays where it counts as lost; see `held_out.RUNAWAY`."""
+    """A prediction that runs away stays where it counts as lost; see `levels.RUNAWAY`."""
     most = RUNAWAY * float(np.abs(trial[name]).max()) if name in trial else np.inf
     return within(readings, most if most > 0.0 else 1.0)
 

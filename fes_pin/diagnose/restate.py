@@ -19,14 +19,14 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause, ParameterEstimate
 from fes_pin.diagnose.decide.held_out import Errors, cross_validate, errors_of, held_out_gain, separate
 from fes_pin.diagnose.errors_ahead import Ahead
-from fes_pin.diagnose.experiment import SEPARABLE
 from fes_pin.diagnose.misread import NAME, Misread, find_misread, restated_trials, takes_most
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.diagnose.searches import Result, Search
 from fes_pin.identify.ahead import forecast_errors, own_noise
-from fes_pin.identify.fit import PARAMETER_PRICE, Fit, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.levels import PARAMETER_PRICE, SEPARABLE
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model

@@ -15,11 +15,11 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.decide.rivals import ABSORBED_BELOW
 from fes_pin.diagnose.long_records import searched_part
 from fes_pin.diagnose.search.library import Library
 from fes_pin.diagnose.search.score import Projection, Scores
 from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
+from fes_pin.identify.levels import ABSORBED_BELOW
 from fes_pin.identify.problem import Problem
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model

@@ -21,6 +21,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, noise_of
+from fes_pin.identify.levels import RUNAWAY
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel, thin, thinning
 from fes_pin.identify.per_trial import predictions
@@ -38,8 +39,6 @@ STRIDE = 0.25
 SEEN_AGAIN = 3
 """A prediction goes on from all that was measured, but for what earlier ones along the same run were not shown: between
 two of them this many times as long is seen as is not. A filter that remembers less than that loses nothing."""
-FALLS_BY = 100.0
-"""Factor by which a free simulation may enlarge an error of its first sample before it says nothing of the model."""
 
 
 def default_horizon(trials: Sequence[Trial]) -> float:
@@ -212,7 +211,7 @@ def _abreast(ahead: int, stride: int) -> int:
 
 
 def falls(model: Model, trials: Sequence[Trial]) -> bool:
-    """True if a free simulation enlarges an error of its beginning by more than `FALLS_BY`: the rig falls by itself."""
+    """True if a free simulation enlarges an error of its beginning by more than `RUNAWAY`: the rig falls by itself."""
     unknowns = tuple(dict.fromkeys(n for t in trials for n in model.rig.unknowns(t.kind)))
     if not unknowns:
         return False
@@ -220,4 +219,4 @@ def falls(model: Model, trials: Sequence[Trial]) -> bool:
     with np.errstate(all="ignore"):
         run = simulator.run(model.parameters(), simulator.start(model.parameters()))
         largest = max(float(np.abs(one.sensitivities[:, 0, 0]).max()) for one in run)
-    return not largest < FALLS_BY
+    return not largest < RUNAWAY

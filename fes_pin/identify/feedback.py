@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.distributions import chi2_tail, f_tail
-from fes_pin.identify.levels import FEEDBACK_LEVEL
+from fes_pin.identify.levels import CERTAIN_LEVEL
 from fes_pin.models.rigs.base import Rig
 
 LAGS = 4
@@ -32,7 +32,7 @@ def is_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
     (1969); Fisher, Statistical Methods for Research Workers, 1932, section 21.1.
     """
     logs = [math.log(max(p, 1e-300)) for p in _p_values(rig, trials)]
-    return bool(logs) and float(chi2_tail(-2.0 * sum(logs), 2 * len(logs))) < FEEDBACK_LEVEL
+    return bool(logs) and float(chi2_tail(-2.0 * sum(logs), 2 * len(logs))) < CERTAIN_LEVEL
 
 
 def _p_values(rig: Rig, trials: Sequence[Trial]) -> Iterator[float]:

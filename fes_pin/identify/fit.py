@@ -15,7 +15,7 @@ from fes_pin.data.show import frame, table_html
 from fes_pin.data.trial import Trial
 from fes_pin.identify.covariance import covariance_of, promised_gain
 from fes_pin.identify.descent import Descent
-from fes_pin.identify.distributions import normal_quantile
+from fes_pin.identify.levels import CONFIDENCE_95, PARAMETER_PRICE
 from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
 from fes_pin.models.model import Model
@@ -27,11 +27,6 @@ if TYPE_CHECKING:
 
 MAX_ITERATIONS = 60
 """Steps of a fit, at most; what has not converged then says so."""
-CONFIDENCE_95 = normal_quantile(0.975)
-"""Half a 95 % interval of a normal variable, in standard deviations."""
-PARAMETER_PRICE = 3.84
-"""Twice the log-likelihood that one more parameter must earn: chi-square with one degree of freedom at 95 %."""
-
 
 GROWTH = (1 / 8, 1 / 4, 1 / 2)
 """Shares of every trial that a fit from afar begins with, one after another."""

@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+from fes_pin.identify.distributions import chi2_quantile, normal_quantile
+
+UNUSUAL_LEVEL = 0.05
+"""At which something is unusual by itself: a parameter or a coefficient earns its price there, an interval ends, a set
+is worth a round of joint fits more, and repeats are more apart than others."""
 CLAIM_LEVEL = 0.01
-"""Family-wise error of each round of claims, over all causes, all trials and conditions that may be misread, or all
-changes; with the tests of the remainder (0.02) a diagnosis stays below 5 %, with room for noise that is not quite
-autoregressive."""
+"""Family-wise error of each round of claims: over all causes, all trials and conditions that may be misread, all
+changes, all forms of a set that are tried, or all tests of what is left. A diagnosis stays below 5 %, with room for
+noise that is not quite autoregressive."""
 DRIVEN_LEVEL = 1e-3
 """The same of rigs that are judged by the likelihood. 54 driven rigs with nothing hidden brought p-values of 0.002 and
 0.004 (`scripts/driven --nulls`): as many as 0.01 allows, more than a person who is told a name would accept. What acts
 in a rig that is recorded for a minute is far beyond either."""
-REFINE_LEVEL = 1e-3
-"""At which a refinement of an effect's form is adopted: some ten forms are tried for a set."""
-EXTEND_LEVEL = 0.1
-"""At which a further cause, by its score or by smooth features of what is left, is worth a round of joint fits."""
 CERTAIN_LEVEL = 1e-6
-"""At which something is there, whatever it stands for: a cause whose name held-out trials refuse, or an effort that
-was written down late."""
-FEEDBACK_LEVEL = 1e-9
-"""At which an effort answers what is read: the noise of a reading comes back through a controller in thousands of
-samples."""
+"""At which something is there, whatever it stands for: a cause whose name held-out trials refuse, a further score, an
+effort that answers its reading or was written down late."""
+ABSORBED_BELOW = 0.04
+"""Share of its norm that an effect's sensitivity, or what a test looks for, must keep beside what the fit takes up to
+be testable."""
+RUNAWAY = 10.0
+"""A prediction is lost where it is so many times as far off as readings ever are, or enlarges an error of its beginning
+so many times: where it goes to says nothing, and it counts as no farther off."""
+
+CONFIDENCE_95 = normal_quantile(1.0 - 0.5 * UNUSUAL_LEVEL)
+"""Half a 95 % interval of a normal variable, in standard deviations."""
+PARAMETER_PRICE = float(chi2_quantile(1.0 - UNUSUAL_LEVEL, 1))
+"""Twice the log-likelihood that one more parameter must earn, or one more coefficient of a noise."""
+SURE = normal_quantile(1.0 - UNUSUAL_LEVEL)
+"""Deviations of a normal variable that 95 in 100 stay within, on one side."""
+SEPARABLE = SURE**2
+"""Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: a difference of so much between
+two rivals has a deviation of twice its root."""

@@ -11,13 +11,11 @@ import numpy as np
 import scipy.linalg
 from numpy.lib.stride_tricks import as_strided
 
+from fes_pin.identify.levels import PARAMETER_PRICE
+
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 """Orders tried. Sensor noise is whitened by a few; random torque under white sensor noise is slow and needs 24 to 48:
 on the ankle, order 12 leaves 2.2 times too much power below 0.5 Hz, order 24 none; a test would take it for a cause."""
-
-
-COEFFICIENT_PRICE = 4.0
-"""Twice the log-likelihood that one more coefficient must earn: two standard deviations; Akaike's 2 keeps too many."""
 
 WHITE_SHARE = 0.003
 """Share of the residual's variance that is taken for white on top of it. It keeps a filter from becoming a resonator
@@ -130,7 +128,7 @@ def estimate_noise(
         around = gram[1 : p + 1, 1 : p + 1] + _ridge(gram, p)
         power = (1.0 + WHITE_SHARE) * gram[0, 0]
         rss = max(float(power - 2.0 * gram[0, 1 : p + 1] @ ar + ar @ around @ ar), 1e-300)
-        criterion = count * np.log(rss / count) + COEFFICIENT_PRICE * p
+        criterion = count * np.log(rss / count) + PARAMETER_PRICE * p
         if best is None or criterion < best[0]:
             best = (criterion, p, ar, rss)
     assert best is not None

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import SURE
 from fes_pin.identify.likelihood import LikelihoodProblem
 
 NEAR = 0.5
 """Deviations of a parameter that points are away from the fit: its square is what a smooth cost rises by."""
-SURE = normal_quantile(0.95)
-"""Deviations of a difference that chance exceeds once in twenty."""
 
 
 def roughness(fitted: Fit) -> float:

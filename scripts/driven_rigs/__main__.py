@@ -19,7 +19,7 @@ from driven_rigs.draw import CAUSES, OUTSIDE, Drawn, draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.result import Diagnosis
-from fes_pin.identify.fit import CONFIDENCE_95
+from fes_pin.identify.levels import CONFIDENCE_95
 
 PAIRS = (
     ("coulomb_friction", "quadratic_damping"),

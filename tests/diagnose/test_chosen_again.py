@@ -8,7 +8,8 @@ from diagnose.hidden import study_of
 from fes_pin.diagnose.decide.chosen_again import ChosenAgain, share_of
 from fes_pin.diagnose.decide.held_out import folds_of
 from fes_pin.identify.distributions import chi2_tail
-from fes_pin.identify.fit import PARAMETER_PRICE, fit, fit_problem
+from fes_pin.identify.fit import fit, fit_problem
+from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.problem import Problem
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model

@@ -10,7 +10,7 @@ from oracle import TYPICAL, make_study
 import fes_pin as fp
 from fes_pin.diagnose.misread import find_misread
 from fes_pin.diagnose.record import diagnosis_record
-from fes_pin.identify.fit import CONFIDENCE_95
+from fes_pin.identify.levels import CONFIDENCE_95
 from fes_pin.view.report import report_html
 
 

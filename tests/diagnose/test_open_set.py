@@ -16,12 +16,13 @@ from fes_pin.diagnose.remainder.bursts import burst_p_value
 from fes_pin.diagnose.remainder.heteroscedastic import heteroscedastic_p_value
 from fes_pin.diagnose.remainder.innovations import Innovations, channels, under_own_noise
 from fes_pin.diagnose.remainder.lines import line_p_value
-from fes_pin.diagnose.remainder.open_set import FULL_NOISE, REMAINDER_LEVEL, unexplained_remainder
+from fes_pin.diagnose.remainder.open_set import FULL_NOISE, unexplained_remainder
 from fes_pin.diagnose.remainder.play import play_p_value
 from fes_pin.diagnose.remainder.repeated import repeated_p_value
 from fes_pin.diagnose.remainder.slips import slip_p_value
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.fit import fit
+from fes_pin.identify.levels import CLAIM_LEVEL
 from fes_pin.identify.noise import Noise, estimate_noise
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -54,18 +55,18 @@ def forces(rng, bend=lambda t, force: force, colour=0.0):
 def test_nothing_is_left_of_noise(rig, noise):
     left = left_in(study_of(rig, noise=noise, seed=40, n_motion=3, duration_s=4.0))
     assert not left.unexplained and left.where is None
-    assert REMAINDER_LEVEL <= left.p_value <= 1.0
+    assert CLAIM_LEVEL <= left.p_value <= 1.0
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.6, 0.9])
 def test_nothing_is_left_of_a_muscles_noise(colour):
-    """At a level of 2 %, 2 of 6 have a probability of 6e-3."""
+    """At a level of 1 %, 2 of 6 have a probability of 1.5e-3."""
     rng = np.random.default_rng(41)
     assert sum(unexplained_remainder(forces(rng, colour=colour)).unexplained for _ in range(6)) <= 1
 
 
 def test_eight_tests_together_keep_the_level(monkeypatch):
-    """Uniform p-values, of two channels where a test looks at each: 20 000 remainders, with a deviation of 0.1 %."""
+    """Uniform p-values, of two channels where a test looks at each: 20 000 remainders, with a deviation of 0.07 %."""
     rng = np.random.default_rng(43)
     one = (WHITE, [SimpleNamespace(values=None, dt=DT)])
     for name in ("burst", "detent", "repeated", "heteroscedastic", "slip", "play"):
@@ -78,11 +79,11 @@ def test_eight_tests_together_keep_the_level(monkeypatch):
 
     def smooth(*_):
         p_value = rng.uniform()
-        return open_set.Remainder(p_value < open_set.SMOOTH_LEVEL, p_value, "phase")
+        return open_set.Remainder(p_value < CLAIM_LEVEL, p_value, "phase")
 
     monkeypatch.setattr(open_set, "smooth_remainder", smooth)
     share = np.mean([unexplained_remainder(None).unexplained for _ in range(20_000)])
-    assert share == pytest.approx(REMAINDER_LEVEL, abs=0.003)
+    assert share == pytest.approx(CLAIM_LEVEL, abs=0.002)
 
 
 @pytest.mark.parametrize("noise", [WHITE, TREMBLING], ids=["white", "coloured"])

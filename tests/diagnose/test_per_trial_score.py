@@ -6,7 +6,7 @@ import scipy.stats
 
 from fes_pin.diagnose.search.library import Probe
 from fes_pin.diagnose.search.score import Projection
-from fes_pin.identify.fit import PARAMETER_PRICE
+from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.problem import Linearized
 from fes_pin.models.effects.mains_hum import MainsHum
 

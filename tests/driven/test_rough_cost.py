@@ -11,7 +11,7 @@ from fes_pin.diagnose.decide.held_out import folds_of
 from fes_pin.diagnose.driven_held_out import as_random_as_in_all
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
-from fes_pin.identify.fit import PARAMETER_PRICE
+from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.models.effects import CoulombFriction, PeriodicTorque

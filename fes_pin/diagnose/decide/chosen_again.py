@@ -23,7 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.diagnose.search.cause_sets import Names
-from fes_pin.identify.fit import PARAMETER_PRICE, Fit
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.problem import normal_equations
 from fes_pin.identify.scatter import at_rest
 from fes_pin.identify.scoring import LITTLE

@@ -7,9 +7,10 @@ from fes_pin.diagnose.remainder.open_set import smooth_remainder
 from fes_pin.diagnose.search.cause_sets import Names
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.diagnose.search.simulation_fits import SimulationFits
-from fes_pin.identify.distributions import chi2_tail
+from fes_pin.diagnose.search.starts import forms_beside
+from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
-from fes_pin.identify.levels import CLAIM_LEVEL, EXTEND_LEVEL, REFINE_LEVEL
+from fes_pin.identify.levels import CERTAIN_LEVEL, CLAIM_LEVEL, UNUSUAL_LEVEL
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
@@ -17,8 +18,6 @@ from fes_pin.workers import in_parallel
 FORM_SHARE = 0.0625
 """A further cause must explain at least this share of what all causes do: a real cause differs from its equation, and
 an error of a quarter in its form leaves a sixteenth of its likelihood to whatever else comes near."""
-COMPLETE_BELOW = 25.0
-"""Score of a further cause, in twice the log-likelihood, below which a set is complete: 5 sigma."""
 SLOWEST_NOISE = 10.0
 """Standard deviation of a residual over that of its sample-to-sample part beyond which it counts as misfit. First-order
 autoregressive noise has 3.8 at a coefficient of 0.9, 5.5 at 0.95, 12 at 0.99; 270 studies without
@@ -57,7 +56,7 @@ class Claims:
         if slow_misfit(fitted):
             return False
         score = max(s.gain for s in self.sets.scores(fitted).scored)
-        if score > max(COMPLETE_BELOW, FORM_SHARE * (self.sets.fits[()].sse - fitted.sse)):
+        if score > max(chi2_quantile(1.0 - CERTAIN_LEVEL, 1), FORM_SHARE * (self.sets.fits[()].sse - fitted.sse)):
             return False
         return not smooth_remainder(_again(fitted, fitted), self.seed).unexplained
 
@@ -65,9 +64,9 @@ class Claims:
         """True unless both the score of a further cause and the smooth features call the best smaller set complete."""
         best, none = self.sets.fits[self.sets.ranked(size - 1)[0]], self.sets.fits[()]
         gain = best.sse - left
-        if gain > 0.5 * FORM_SHARE * (none.sse - best.sse) and self.family.p_value(gain, 1) < EXTEND_LEVEL:
+        if gain > 0.5 * FORM_SHARE * (none.sse - best.sse) and self.family.p_value(gain, 1) < UNUSUAL_LEVEL:
             return True
-        return smooth_remainder(best, self.seed).p_value < EXTEND_LEVEL
+        return smooth_remainder(best, self.seed).p_value < UNUSUAL_LEVEL
 
     def better(self, names: Names, best: Names) -> bool:
         """True if a larger set can be, and earns its place beside the best smaller one."""
@@ -114,7 +113,8 @@ class Claims:
     def demanded(self, refined: Fit, base: Fit) -> bool:
         """True if the data demand a refinement of an effect's form."""
         degrees = max(refined.degrees - base.degrees, 1)
-        return bool(chi2_tail(base.sse - refined.sse, degrees) < REFINE_LEVEL)
+        p_value = float(chi2_tail(base.sse - refined.sse, degrees))
+        return p_value * forms_beside(base.model, base.model.effects) < CLAIM_LEVEL
 
 
 def slow_misfit(fitted: Fit) -> bool:

@@ -10,7 +10,8 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import SquaredErrors, default_horizon, forecast_errors, own_noise
-from fes_pin.identify.fit import CONFIDENCE_95, Fit, fit_problem, go_on
+from fes_pin.identify.fit import Fit, fit_problem, go_on
+from fes_pin.identify.levels import CONFIDENCE_95, RUNAWAY
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.problem import Problem
@@ -21,8 +22,6 @@ FOLDS = 5
 """Parts that trials are dealt to: each is foretold by the other four, which hold most of what is known."""
 RESAMPLES = 2000
 """Bootstrap draws of a gain: the standard error of its 95 % bounds is 1.5 % of their distance, of a normal gain."""
-RUNAWAY = 10.0
-"""A prediction that leaves the trials counts as this many times their largest reading: where it goes says nothing."""
 FAR = 1e6
 """The same for whitened residuals, in standard deviations."""
 MATERIAL_PERCENT = 0.1

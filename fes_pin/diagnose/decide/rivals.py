@@ -6,15 +6,13 @@ from collections.abc import Sequence
 
 from fes_pin.data.study import Study
 from fes_pin.diagnose.cause import Cause, ParameterEstimate, Ranked
-from fes_pin.diagnose.experiment import SEPARABLE, NextExperiment, next_experiment
+from fes_pin.diagnose.experiment import NextExperiment, next_experiment
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.search.score import best_by_effect
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import ABSORBED_BELOW, SEPARABLE
 from fes_pin.identify.per_trial import amplitude
-
-ABSORBED_BELOW = 0.04
-"""Share of its norm that an effect's sensitivity must keep beside the nominal parameters to be testable."""
 
 
 def estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:

@@ -9,7 +9,7 @@ turns. All but the first see what it is blind to, and what an autoregressive noi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,17 +25,12 @@ from fes_pin.diagnose.remainder.slips import slip_p_value
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import CERTAIN_LEVEL, CLAIM_LEVEL
 from fes_pin.identify.noise import Noise, NoiseModel, first_order_low_pass
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel
 
-REMAINDER_LEVEL = 0.02
-"""Level of all tests of the remainder together; see `identify.levels`."""
-OTHERS = ("burst", "line", "detent", "repeated", "heteroscedastic", "slip", "play")
-SHARES = {"smooth": 1 / 2, **dict.fromkeys(OTHERS, 1 / (2 * len(OTHERS)))}
-"""Of the level, for each test."""
-SMOOTH_LEVEL = REMAINDER_LEVEL * SHARES["smooth"]
 SHORT_NOISE = 2
 """Order of the noise that bursts, repeated and heteroscedastic deviations are looked for under: these tests hold for
 noise of any spectrum, and a longer autoregression learns slow deviations as noise."""
@@ -43,8 +38,6 @@ FULL_NOISE = 24
 """Order of the noise that slips and play are looked for under. It whitens a random torque down to the lowest
 frequencies, also where a criterion finds it too weak to be worth the coefficients, and reaches back too short a time,
 0.12 s, to learn a jump that lasts."""
-STRONG_LEVEL = 1e-12
-"""Level at which a remainder counts although it differs from trial to trial: a spasm, not noise."""
 SIGN_DRAWS = 400
 """Random signs of trials that a statistic's inflation is averaged over."""
 
@@ -171,19 +164,18 @@ def _low_pass(x: np.ndarray, time_constant: float, dt: float) -> np.ndarray:
 def unexplained_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     """Test whether a fit leaves anything but noise.
 
-    The p-value is that of the most significant of the eight tests, over its share of the level.
+    The p-value is that of the most significant of the tests, times their number.
     """
     smooth = smooth_remainder(fitted, seed)
-    found = [(smooth.p_value / SHARES["smooth"], smooth.where), *_others(fitted, seed)]
+    found = [(smooth.p_value, smooth.where), *_others(fitted, seed)]
     p_value, where = min(found, key=lambda f: f[0])
-    if smooth.unexplained:
-        return replace(smooth, p_value=min(1.0, p_value, smooth.p_value))
-    unexplained = p_value < REMAINDER_LEVEL
-    return Remainder(unexplained, min(1.0, p_value), where if unexplained else None, smooth.excess)
+    p_value = min(1.0, len(found) * p_value)
+    unexplained = p_value < CLAIM_LEVEL
+    return Remainder(unexplained, p_value, where if unexplained else None, smooth.excess)
 
 
 def _others(fitted: Fit, seed: int) -> list[tuple[float, str]]:
-    """p-values of all but the smooth features over their shares of the level, and what each depends on."""
+    """p-values of all tests but that of smooth features, and what each deviation depends on."""
     own = under_own_noise(fitted)
     full = under_own_noise(fitted, FULL_NOISE, FULL_NOISE)
     beside = Projection(full.parts)
@@ -198,13 +190,13 @@ def _others(fitted: Fit, seed: int) -> list[tuple[float, str]]:
         for _, pieces in short
     )
     return [
-        (count * bursts / SHARES["burst"], "time"),
-        (count * line / SHARES["line"], where),
-        (detents / SHARES["detent"], "angle"),
-        (count * repeated / SHARES["repeated"], "time"),
-        (count * heteroscedastic / SHARES["heteroscedastic"], "stimulus"),
-        (slip_p_value(full, beside, seed) / SHARES["slip"], "time"),
-        (play_p_value(full, beside) / SHARES["play"], "rate"),
+        (count * bursts, "time"),
+        (count * line, where),
+        (detents, "angle"),
+        (count * repeated, "time"),
+        (count * heteroscedastic, "stimulus"),
+        (slip_p_value(full, beside, seed), "time"),
+        (play_p_value(full, beside), "rate"),
     ]
 
 
@@ -228,15 +220,16 @@ def smooth_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
     plain = float(chi2_tail(statistic, rank))
     p_value = float(chi2_tail(statistic / _inflation(shares, rank, seed), rank))
-    unexplained = p_value < SMOOTH_LEVEL or plain < STRONG_LEVEL
+    strong = plain < CERTAIN_LEVEL <= p_value  # it differs from trial to trial: a spasm, not noise
+    p_value = plain if strong else p_value
+    unexplained = p_value < CLAIM_LEVEL
     scores: dict[str, float] = {}
     for name, z in zip(names, by_trial.sum(axis=0), strict=True):
         scores[name] = max(scores.get(name, 0.0), float(z**2))
     where = max(scores, key=lambda n: scores[n]) if unexplained else None
     inflation = _inflation(shares, rank, seed)
     excess = max(0.0, statistic / inflation - float(chi2_quantile(0.975, rank)))
-    shown = plain if unexplained and p_value >= SMOOTH_LEVEL else p_value
-    return Remainder(bool(unexplained), shown, where, excess)
+    return Remainder(unexplained, p_value, where, excess)
 
 
 def _trial_shares(columns: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.ndarray:

@@ -10,6 +10,7 @@ from fes_pin.diagnose.remainder.innovations import Stretch, stretches
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import f_tail
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import ABSORBED_BELOW
 from fes_pin.models.simulate import Simulator
 
 WIDTHS = (0.003, 0.01, 0.03, 0.1)
@@ -17,8 +18,6 @@ WIDTHS = (0.003, 0.01, 0.03, 0.1)
 only the direction of the last motion counts."""
 UNITS = 32
 """Pieces of trials that the spread of the evidence is judged on, at least."""
-FELT = 1e-3
-"""Share of a deviation's norm that must be left beside what the fit takes up."""
 
 
 def play_p_value(fitted: Fit, projection: Projection) -> float:
@@ -45,7 +44,7 @@ def play_p_value(fitted: Fit, projection: Projection) -> float:
         for one, deviation in zip(group, _deviations(readings), strict=True):
             columns[one.rows] = one.noise.whiten(deviation, one.trial.dt)
         left = projection(columns)
-        felt = np.linalg.norm(left, axis=0) > FELT * np.linalg.norm(columns, axis=0)
+        felt = np.linalg.norm(left, axis=0) > ABSORBED_BELOW * np.linalg.norm(columns, axis=0)
         found += [_one(c, projection, group) for c in left.T[felt]]
     return min([1.0, *(len(found) * p for p in found)])
 

@@ -11,6 +11,7 @@ from fes_pin.diagnose.remainder.innovations import CLIP, Stretch, stretches
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import pearson3_tail
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import ABSORBED_BELOW
 from fes_pin.identify.noise import Noise
 
 TRIM = 0.15
@@ -18,8 +19,6 @@ TRIM = 0.15
 change with unknown change point, Econometrica 61 (1993)."""
 DRAWS = 16
 """Simulated innovations of all trials; the scatter of their mean is allowed for."""
-FELT = 0.02
-"""Share of a step's squared norm that must be left beside what the fit takes up."""
 
 
 def slip_p_value(fitted: Fit, projection: Projection, seed: int = 0) -> float:
@@ -79,7 +78,7 @@ class _Scan:
         norms = np.cumsum(step**2)[::-1]
         taken = sum(np.sum(self._along(b) ** 2, axis=1) for b in projection.taken(one.rows))
         left = (norms - taken)[self.inside]
-        self.felt = left > FELT * norms[self.inside]
+        self.felt = left > ABSORBED_BELOW**2 * norms[self.inside]
         self.scale = np.where(self.felt, 1.0 / np.sqrt(np.where(self.felt, left, 1.0)), 0.0)
 
     def largest(self, columns: np.ndarray) -> np.ndarray:

@@ -12,7 +12,8 @@ from typing import Generic, TypeVar
 
 from fes_pin.data.counts import count_of
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import PARAMETER_PRICE, Fit
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs.base import Rig
 

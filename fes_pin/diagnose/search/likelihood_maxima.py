@@ -10,7 +10,8 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.starts import STARTS
 from fes_pin.identify.covariance import moved_with
-from fes_pin.identify.fit import PARAMETER_PRICE, Fit, fit_problem
+from fes_pin.identify.fit import Fit, fit_problem
+from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import limits_of
 from fes_pin.identify.turns import ROUNDS, maximise

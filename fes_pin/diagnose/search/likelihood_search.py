@@ -22,7 +22,7 @@ from fes_pin.diagnose.search.score import Scored, best_pairs
 from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import DRIVEN_LEVEL, EXTEND_LEVEL
+from fes_pin.identify.levels import DRIVEN_LEVEL, UNUSUAL_LEVEL
 from fes_pin.identify.scatter import excess_scatter
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
@@ -165,7 +165,7 @@ class LikelihoodSearch:
         """True where the score of a further cause beside a set is not what chance brings."""
         scored = [s for s in self.sets.screen.scores(self.sets.fits[names]).scored if s.gain > 0.0]
         single = min((float(chi2_tail(s.gain, max(len(s.amplitudes), 1))) for s in scored), default=1.0)
-        return self.family.adjusted(single) < EXTEND_LEVEL
+        return self.family.adjusted(single) < UNUSUAL_LEVEL
 
     def _extend(self, size: int) -> None:
         """Fit the sets of a size: the best smaller ones with further causes, and pairs that the screen proposes."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from fes_pin.diagnose.search.model_fitter import ModelFitter
 from fes_pin.diagnose.search.starts import fits_rig
-from fes_pin.identify.fit import CONFIDENCE_95, MAX_ITERATIONS, Fit
+from fes_pin.identify.fit import MAX_ITERATIONS, Fit
+from fes_pin.identify.levels import CONFIDENCE_95
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.diagnose.search.library import Probe
-from fes_pin.identify.fit import PARAMETER_PRICE
+from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.problem import Linearized
 from fes_pin.workers import in_parallel
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -73,6 +73,12 @@ def refinements(
         for values in itertools.product(*(grids[n] for n in names)):
             out.append(model.with_parameters(dict(zip(paths, values, strict=True))))
     return out
+
+
+def forms_beside(model: Model, effects: Sequence[Effect]) -> int:
+    """How many other forms of a model's effects are tried: the refinements that they have not adopted; at least 1."""
+    each = ((e, n) for e in effects for n, *_ in e.refinements() if n not in e.refined())
+    return max(1, sum(fits_rig(model, e.parameters()[n]) for e, n in each))
 
 
 def fits_rig(model: Model, refinement: ParameterInfo) -> bool:
