@@ -19,7 +19,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.driven import driven_diagnosis
 from fes_pin.diagnose.free import judge_free, unfitted
-from fes_pin.diagnose.logged import LogFaults, likelier, with_doubt_of_lateness, with_words
+from fes_pin.diagnose.logged import LogFaults, likelier, with_words
 from fes_pin.diagnose.long_records import searched_part, thinned
 from fes_pin.diagnose.misread import NAME as MISREAD
 from fes_pin.diagnose.parts import in_parts
@@ -122,7 +122,7 @@ class _Work:
             found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
         if not self.was_stopped and (late_s := faults.late_by(found)):
             found = likelier(self._logged(study, replace(found.log, effort_late_s=late_s)), found)
-        return with_words(with_doubt_of_lateness(found))
+        return with_words(faults.within_rows(found))
 
     def _logged(self, study: Study, log: Log) -> Diagnosis:
         """The diagnosis of a study with what a log did to its trials undone."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,10 +22,12 @@ from fes_pin.identify.fit import Fit
 from fes_pin.identify.lateness import lateness_of, words_of_lateness
 from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.scatter import with_honest_intervals
+from fes_pin.identify.scatter import step_beside, with_honest_intervals
 from fes_pin.identify.turns import maximum_from
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
+
+T = TypeVar("T")
 
 LATENESS_STEP = 0.05
 """Step of the slope by lateness, in rows: efforts are held over them, and what is moved by less is in proportion."""
@@ -52,14 +56,14 @@ class LogFaults:
 
     def noise_beside_nominal(self, nominal: Model) -> float:
         """Noise of the efforts, in their unit, beside a model without causes; 0 where nothing speaks for it."""
-        return self._told(lambda: self._noise(LikelihoodFits(nominal, self.prepared(self.trials), ()).nominal()))
+        return self._told(lambda: self._noise(LikelihoodFits(nominal, self.prepared(self.trials), ()).nominal()), 0.0)
 
     def noise_beside(self, diagnosis: Diagnosis) -> float:
         """The same beside a diagnosis; what was taken out for it is put back where efforts are likelier with it."""
         fitted, known = diagnosis.extended, diagnosis.log.effort_noise
         if known:
             return known * self._told(lambda: float(fitted.sse < self._as_recorded(fitted).sse), 1.0)
-        return self._told(lambda: self._noise(fitted)) if diagnosis.verdict != "adequate" else 0.0
+        return self._told(lambda: self._noise(fitted), 0.0) if diagnosis.verdict != "adequate" else 0.0
 
     def _as_recorded(self, fitted: Fit) -> Fit:
         """The same model on trials with all the noise that their efforts were recorded with."""
@@ -74,7 +78,7 @@ class LogFaults:
         What was found may stand for it: the nominal model is asked where something is left beside, or where it is
         cheaper with efforts in time than all that was found.
         """
-        return self._told(lambda: self._late_by(diagnosis))
+        return self._told(lambda: self._late_by(diagnosis), 0.0)
 
     def _late_by(self, diagnosis: Diagnosis) -> float:
         nominal, extended = diagnosis.nominal, diagnosis.extended
@@ -88,7 +92,24 @@ class LogFaults:
                 late = late if price < extended.price else None
         return late.late_s if late is not None else 0.0
 
-    def _told(self, ask: Callable[[], float], otherwise: float = 0.0) -> float:
+    def within_rows(self, diagnosis: Diagnosis) -> Diagnosis:
+        """The diagnosis with efforts at the likeliest instant of their rows, and intervals that hold the doubt of it.
+
+        When within a row an effort acts no log says; they are moved where that earns the price of a parameter.
+        """
+        row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
+        known, step_s = row_s / math.sqrt(12.0), LATENESS_STEP * row_s
+        slopes = _slopes_by_lateness(fitted, step_s)
+        found = Log(effort_late_s=step_beside(fitted, slopes, known))
+        moved = self._told(lambda: maximum_from(fitted, [found.applied(t) for t in fitted.trials]), fitted)
+        if moved.price + PARAMETER_PRICE < fitted.price:
+            log = replace(diagnosis.log, effort_late_s=diagnosis.log.effort_late_s + found.effort_late_s)
+            study = replace(diagnosis.study, trials=tuple(found.applied(t) for t in diagnosis.study.trials))
+            fitted, diagnosis = moved, replace(diagnosis, study=study, log=log)
+            slopes = _slopes_by_lateness(fitted, step_s)
+        return _with(diagnosis, with_honest_intervals(fitted, slopes, known))
+
+    def _told(self, ask: Callable[[], T], otherwise: T) -> T:
         """What is told in the time that is left."""
         try:
             with time_limit(self._end - time.perf_counter()):
@@ -102,21 +123,25 @@ def likelier(other: Diagnosis, one: Diagnosis) -> Diagnosis:
     return other if _is_likelier(other.extended, one.extended) else one
 
 
-def with_doubt_of_lateness(diagnosis: Diagnosis) -> Diagnosis:
-    """The diagnosis with intervals that hold what is not known of how late its efforts were written down."""
-    fitted = diagnosis.extended
-    if not diagnosis.log.effort_late_s or fitted.doubt is None:
-        return diagnosis
-    step_s = LATENESS_STEP * min(t.dt for t in fitted.trials)
-    left = [
-        LikelihoodProblem(fitted.model, [Log(effort_late_s=late_s).applied(t) for t in fitted.trials], fitted.doubt)
+def _with(diagnosis: Diagnosis, fitted: Fit) -> Diagnosis:
+    """The diagnosis with another fit of its model."""
+    causes = tuple(replace(c, parameters=estimates(fitted, c.name)) for c in diagnosis.causes)
+    return replace(diagnosis, extended=fitted, causes=causes)
+
+
+def _slopes_by_lateness(fitted: Fit, step_s: float) -> list[np.ndarray]:
+    """By how much the residual of each trial falls as efforts are moved, shape (m,), per second that they are late."""
+    assert fitted.doubt is not None
+    later, earlier = (
+        [
+            part.residual
+            for part in LikelihoodProblem(
+                fitted.model, [Log(effort_late_s=late_s).applied(t) for t in fitted.trials], fitted.doubt
+            ).linearize(fitted.values, fitted.unknowns)
+        ]
         for late_s in (step_s, -step_s)
-    ]
-    later, earlier = ([p.residual for p in one.linearize(fitted.values, fitted.unknowns)] for one in left)
-    slopes = [(b - a) / (2.0 * step_s) for a, b in zip(later, earlier, strict=True)]
-    wide = with_honest_intervals(fitted, slopes)
-    causes = tuple(replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)
-    return replace(diagnosis, extended=wide, causes=causes)
+    )
+    return [(b - a) / (2.0 * step_s) for a, b in zip(later, earlier, strict=True)]
 
 
 def with_words(diagnosis: Diagnosis) -> Diagnosis:

@@ -11,6 +11,7 @@ difference chi-square test statistic for moment structure analysis, Psychometrik
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -25,7 +26,7 @@ PIECES = 40
 as long as they can be."""
 
 
-def with_honest_intervals(fitted: Fit, beside: Sequence[np.ndarray] | None = None) -> Fit:
+def with_honest_intervals(fitted: Fit, beside: Sequence[np.ndarray] | None = None, known: float = math.inf) -> Fit:
     """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter.
 
     Parameters
@@ -33,9 +34,23 @@ def with_honest_intervals(fitted: Fit, beside: Sequence[np.ndarray] | None = Non
     beside
         Of each trial, the sensitivity of its predictions to something else that was found from them, shape (m,) as the
         residual: its doubt is theirs as well.
+    known
+        Standard deviation of that something, as known before.
     """
     size = len(fitted.free)
-    return replace(fitted, covariance=widened(*_told(fitted, beside))[:size, :size])
+    return replace(fitted, covariance=widened(*_told(fitted, beside, known))[:size, :size])
+
+
+def step_beside(fitted: Fit, beside: Sequence[np.ndarray], known: float) -> float:
+    """What else is likeliest beside a fit that has ended: a Gauss-Newton step of it and all parameters together.
+
+    Parameters
+    ----------
+    beside, known
+        As of `with_honest_intervals`.
+    """
+    covariance, scores = _told(fitted, beside, known)
+    return float(covariance[-1] @ scores.sum(axis=0))
 
 
 def excess_scatter(larger: Fit, smaller: Fit) -> float:
@@ -51,16 +66,17 @@ def excess_scatter(larger: Fit, smaller: Fit) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(own, hermitian=True) @ wide)) / len(more))
 
 
-def _told(fitted: Fit, beside: Sequence[np.ndarray] | None = None) -> tuple[np.ndarray, np.ndarray]:
+def _told(
+    fitted: Fit, beside: Sequence[np.ndarray] | None = None, known: float = math.inf
+) -> tuple[np.ndarray, np.ndarray]:
     """The inverse information of a fit that has ended, and the slopes of the log-likelihood of its pieces.
 
     What is beside its parameters comes last.
     """
-    parts, free = list(fitted.parts), np.array([n not in fitted.at_bound for n in fitted.free])
+    parts, free = at_rest(fitted.parts), np.array([n not in fitted.at_bound for n in fitted.free])
     if beside is not None:
         both = zip(parts, beside, strict=True)
         parts, free = [replace(p, jacobian=np.column_stack([p.jacobian, c])) for p, c in both], np.append(free, True)
-    parts = at_rest(parts)
     lengths = [len(p.residual) for p in parts]
     shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
     scores = [
@@ -70,7 +86,10 @@ def _told(fitted: Fit, beside: Sequence[np.ndarray] | None = None) -> tuple[np.n
             part.jacobian * part.residual[:, None], np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
         )
     ]
-    return covariance_of(normal_equations(parts).hessian, free), np.array(scores)
+    hessian = normal_equations(parts).hessian
+    if beside is not None:
+        hessian[-1, -1] += 1.0 / known**2
+    return covariance_of(hessian, free), np.array(scores)
 
 
 def at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
