@@ -19,18 +19,14 @@ from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_noise
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.lateness import lateness_of, words_of_lateness
+from fes_pin.identify.lateness import lateness_of, slopes_by_lateness, words_of_lateness
 from fes_pin.identify.levels import PARAMETER_PRICE
-from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.scatter import step_beside, with_honest_intervals
 from fes_pin.identify.turns import maximum_from
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 
 T = TypeVar("T")
-
-LATENESS_STEP = 0.05
-"""Step of the slope by lateness, in rows: efforts are held over them, and what is moved by less is in proportion."""
 
 
 class LogFaults:
@@ -97,16 +93,19 @@ class LogFaults:
 
         When within a row an effort acts no log says; they are moved where that earns the price of a parameter.
         """
+        return self._told(lambda: self._within_rows(diagnosis), diagnosis)
+
+    def _within_rows(self, diagnosis: Diagnosis) -> Diagnosis:
         row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
-        known, step_s = row_s / math.sqrt(12.0), LATENESS_STEP * row_s
-        slopes = _slopes_by_lateness(fitted, step_s)
+        known = row_s / math.sqrt(12.0)
+        slopes = slopes_by_lateness(fitted, row_s)
         found = Log(effort_late_s=step_beside(fitted, slopes, known))
-        moved = self._told(lambda: maximum_from(fitted, [found.applied(t) for t in fitted.trials]), fitted)
+        moved = maximum_from(fitted, [found.applied(t) for t in fitted.trials])
         if moved.price + PARAMETER_PRICE < fitted.price:
             log = replace(diagnosis.log, effort_late_s=diagnosis.log.effort_late_s + found.effort_late_s)
             study = replace(diagnosis.study, trials=tuple(found.applied(t) for t in diagnosis.study.trials))
             fitted, diagnosis = moved, replace(diagnosis, study=study, log=log)
-            slopes = _slopes_by_lateness(fitted, step_s)
+            slopes = slopes_by_lateness(fitted, row_s)
         return _with(diagnosis, with_honest_intervals(fitted, slopes, known))
 
     def _told(self, ask: Callable[[], T], otherwise: T) -> T:
@@ -127,21 +126,6 @@ def _with(diagnosis: Diagnosis, fitted: Fit) -> Diagnosis:
     """The diagnosis with another fit of its model."""
     causes = tuple(replace(c, parameters=estimates(fitted, c.name)) for c in diagnosis.causes)
     return replace(diagnosis, extended=fitted, causes=causes)
-
-
-def _slopes_by_lateness(fitted: Fit, step_s: float) -> list[np.ndarray]:
-    """By how much the residual of each trial falls as efforts are moved, shape (m,), per second that they are late."""
-    assert fitted.doubt is not None
-    later, earlier = (
-        [
-            part.residual
-            for part in LikelihoodProblem(
-                fitted.model, [Log(effort_late_s=late_s).applied(t) for t in fitted.trials], fitted.doubt
-            ).linearize(fitted.values, fitted.unknowns)
-        ]
-        for late_s in (step_s, -step_s)
-    )
-    return [(b - a) / (2.0 * step_s) for a, b in zip(later, earlier, strict=True)]
 
 
 def with_words(diagnosis: Diagnosis) -> Diagnosis:

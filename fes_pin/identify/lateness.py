@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fes_pin.data.log import Log
 from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import CERTAIN_LEVEL
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximum_from
 from fes_pin.workers import in_parallel
 
@@ -27,6 +29,9 @@ MOST_ROWS = 2.0
 """Rows of a log by which an effort may be late: one that it is held when it is written down, and one until the next."""
 MOST_EARLY_ROWS = 0.5
 """Rows by which it may act later than written: what is more is a lag, see `SensorLag.smallest`."""
+
+SLOPE_STEP = 0.05
+"""Step of the slope by lateness, in rows: efforts are held over them, and what is moved by less is in proportion."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,28 @@ def lateness_of(fitted: Fit, row_s: float, or_early: bool = False) -> Lateness |
     bounds = (0.0, MOST_ROWS * row_s) if first > 0.0 else (-MOST_EARLY_ROWS * row_s, 0.0)
     found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 0.02 * row_s})
     return Lateness(float(found.x), float(found.fun))
+
+
+def slopes_by_lateness(fitted: Fit, row_s: float) -> list[np.ndarray]:
+    """By how much the residual of each trial falls as efforts are moved, shape (m,), per second that they are late.
+
+    Parameters
+    ----------
+    fitted
+        By the likelihood, of a rig that an effort drives.
+    row_s
+        Time step of the log.
+    """
+    assert fitted.doubt is not None
+    step_s, doubt = SLOPE_STEP * row_s, fitted.doubt
+
+    def residuals(late_s: float) -> list[np.ndarray]:
+        moved = [Log(effort_late_s=late_s).applied(t) for t in fitted.trials]
+        parts = LikelihoodProblem(fitted.model, moved, doubt).linearize(fitted.values, fitted.unknowns)
+        return [p.residual for p in parts]
+
+    later, earlier = in_parallel(residuals, (step_s, -step_s))
+    return [(b - a) / (2.0 * step_s) for a, b in zip(later, earlier, strict=True)]
 
 
 def words_of_lateness(late_s: float) -> str:
