@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from fes_pin.data.answered import ControllerAnswer
-from fes_pin.data.log import Log, answered
+from fes_pin.data.log import answered
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.rivals import estimates
 from fes_pin.diagnose.result import Diagnosis
@@ -21,7 +21,7 @@ from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_no
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lateness import lateness_of, slopes_by_lateness, words_of_lateness
 from fes_pin.identify.levels import PARAMETER_PRICE
-from fes_pin.identify.scatter import step_beside, with_honest_intervals
+from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.identify.turns import maximum_from
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
@@ -88,25 +88,18 @@ class LogFaults:
                 late = late if price < extended.price else None
         return late.late_s if late is not None else 0.0
 
-    def within_rows(self, diagnosis: Diagnosis) -> Diagnosis:
-        """The diagnosis with efforts at the likeliest instant of their rows, and intervals that hold the doubt of it.
+    def with_doubt_of_lateness(self, diagnosis: Diagnosis) -> Diagnosis:
+        """The diagnosis with intervals that hold what is not known of when within a row an effort acts.
 
-        When within a row an effort acts no log says; they are moved where that earns the price of a parameter.
+        No log says it. Efforts are not moved: an error of form, as of friction by bristles, would take them along.
         """
-        return self._told(lambda: self._within_rows(diagnosis), diagnosis)
-
-    def _within_rows(self, diagnosis: Diagnosis) -> Diagnosis:
         row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
-        known = row_s / math.sqrt(12.0)
-        slopes = slopes_by_lateness(fitted, row_s)
-        found = Log(effort_late_s=step_beside(fitted, slopes, known))
-        moved = maximum_from(fitted, [found.applied(t) for t in fitted.trials])
-        if moved.price + PARAMETER_PRICE < fitted.price:
-            log = replace(diagnosis.log, effort_late_s=diagnosis.log.effort_late_s + found.effort_late_s)
-            study = replace(diagnosis.study, trials=tuple(found.applied(t) for t in diagnosis.study.trials))
-            fitted, diagnosis = moved, replace(diagnosis, study=study, log=log)
-            slopes = slopes_by_lateness(fitted, row_s)
-        return _with(diagnosis, with_honest_intervals(fitted, slopes, known))
+        slopes = self._told(lambda: slopes_by_lateness(fitted, row_s), None)
+        if slopes is None:
+            return diagnosis
+        wide = with_honest_intervals(fitted, slopes, row_s / math.sqrt(12.0))
+        causes = tuple(replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)
+        return replace(diagnosis, extended=wide, causes=causes)
 
     def _told(self, ask: Callable[[], T], otherwise: T) -> T:
         """What is told in the time that is left."""
@@ -120,12 +113,6 @@ class LogFaults:
 def likelier(other: Diagnosis, one: Diagnosis) -> Diagnosis:
     """Another diagnosis of the same readings, by other efforts, if it is likelier; else the one."""
     return other if _is_likelier(other.extended, one.extended) else one
-
-
-def _with(diagnosis: Diagnosis, fitted: Fit) -> Diagnosis:
-    """The diagnosis with another fit of its model."""
-    causes = tuple(replace(c, parameters=estimates(fitted, c.name)) for c in diagnosis.causes)
-    return replace(diagnosis, extended=fitted, causes=causes)
 
 
 def with_words(diagnosis: Diagnosis) -> Diagnosis:

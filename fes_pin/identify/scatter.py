@@ -41,18 +41,6 @@ def with_honest_intervals(fitted: Fit, beside: Sequence[np.ndarray] | None = Non
     return replace(fitted, covariance=widened(*_told(fitted, beside, known))[:size, :size])
 
 
-def step_beside(fitted: Fit, beside: Sequence[np.ndarray], known: float) -> float:
-    """What else is likeliest beside a fit that has ended: a Gauss-Newton step of it and all parameters together.
-
-    Parameters
-    ----------
-    beside, known
-        As of `with_honest_intervals`.
-    """
-    covariance, scores = _told(fitted, beside, known)
-    return float(covariance[-1] @ scores.sum(axis=0))
-
-
 def excess_scatter(larger: Fit, smaller: Fit) -> float:
     """How many times wider than of a right model that is scattered what a larger fit has besides; at least 1."""
     more = [k for k, n in enumerate(larger.free) if n not in smaller.free]

@@ -18,9 +18,9 @@ from fes_pin.diagnose.record import diagnosis_files
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.ahead import foretell
 from fes_pin.identify.lateness import slopes_by_lateness
-from fes_pin.identify.scatter import step_beside, with_honest_intervals
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.identify.stored import load_log
-from fes_pin.identify.turns import maximum_from
 from fes_pin.models.nominal import nominal_model
 
 ROWS = (2, 3, 4)
@@ -93,26 +93,22 @@ def test_an_effort_that_acts_later_within_its_row_is_no_cause(tmp_path):
     assert abs(fitted.values["inertia_scale"] - 1.0) < 3.0 * fitted.std("inertia_scale")
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1, -0.1])
-def test_when_within_its_row_an_effort_acts_is_told_with_its_doubt(share, tmp_path):
-    """No log says it, and of a tenth of a row damping is wrong by several deviations; the likelihood does."""
-    drawn = draw((), 0.3, 1151005, tmp_path)
-    study = read_study(drawn.study)
+def test_intervals_hold_the_doubt_of_when_within_its_row_an_effort_acts(tmp_path):
+    """No log says it, and the inertia and damping that are likeliest go with it."""
+    study = read_study(draw((), 0.3, 1151005, tmp_path).study)
     row_s = study.trials[0].dt
-    moved = [advanced(t, "effort", -share * row_s) for t in study.trials]
-    fitted = LikelihoodFits(nominal_model(study), moved, []).nominal()
+    fitted = LikelihoodFits(nominal_model(study), study.trials, []).nominal()
     slopes, known = slopes_by_lateness(fitted, row_s), row_s / math.sqrt(12.0)
-    plain, wide, blind = (with_honest_intervals(fitted, *more) for more in ((), (slopes, known), (slopes, 1e-12)))
+    plain, wide, sure = (with_honest_intervals(fitted, *more) for more in ((), (slopes, known), (slopes, 1e-12)))
     ratios = {n: wide.std(n) / plain.std(n) for n in fitted.free}
     assert min(ratios.values()) > 0.999 and max(ratios.values()) > 1.1, ratios
-    assert all(blind.std(n) == pytest.approx(plain.std(n), rel=1e-6) for n in fitted.free)
-    late_s = step_beside(fitted, slopes, known)
-    assert late_s == pytest.approx(share * row_s, abs=0.05 * row_s)
-    in_time = maximum_from(fitted, [advanced(t, "effort", late_s) for t in moved])
-    assert in_time.sse < fitted.sse + 1.0
-    told = with_honest_intervals(in_time, slopes_by_lateness(in_time, row_s), known)
-    for name in ("inertia_scale", "damping"):
-        assert abs(told.values[name] - drawn.truth[name]) < 3.0 * told.std(name)
+    assert all(sure.std(n) == pytest.approx(plain.std(n), rel=1e-6) for n in fitted.free)
+    told = -2.0 * sum(float(p.residual @ s) for p, s in zip(fitted.parts, slopes, strict=True))
+    late_s, costs = 0.05 * row_s, []
+    for sign in (1.0, -1.0):
+        moved = [advanced(t, "effort", sign * late_s) for t in study.trials]
+        costs.append(LikelihoodProblem(fitted.model, moved, fitted.doubt).cost(fitted.values, fitted.unknowns))
+    assert told == pytest.approx((costs[0] - costs[1]) / (2.0 * late_s), rel=0.02)
 
 
 def test_a_reading_that_is_late_stays_so(tmp_path):
