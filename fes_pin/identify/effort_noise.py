@@ -15,7 +15,7 @@ from fes_pin.data.answered import ControllerAnswer
 from fes_pin.data.log import quiet
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.lateness import LEAST_GAIN
+from fes_pin.identify.levels import CERTAIN_GAIN
 from fes_pin.identify.turns import maximum_from
 from fes_pin.workers import in_parallel
 
@@ -48,7 +48,7 @@ def effort_noise_of(
         return 0.0
     costs = in_parallel(lambda noise: maximum_from(fitted, prepared(quieted(trials, answers, noise))).sse, tried)
     best = int(np.argmin(costs))
-    return tried[best] if costs[best] < costs[0] - LEAST_GAIN else 0.0
+    return tried[best] if costs[best] < costs[0] - CERTAIN_GAIN else 0.0
 
 
 def _least(fitted: Fit, trials: Sequence[Trial]) -> float:

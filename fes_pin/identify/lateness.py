@@ -14,15 +14,12 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fes_pin.data.log import Log
-from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import CERTAIN_LEVEL
+from fes_pin.identify.levels import CERTAIN_GAIN
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximum_from
 from fes_pin.workers import in_parallel
 
-LEAST_GAIN = chi2_quantile(1.0 - CERTAIN_LEVEL, 1)
-"""Twice the log-likelihood that moving the effort must bring: whatever it stands for, it must be there."""
 LEAST_ROWS = 0.25
 """The least: of a log that asks in every second sample of a controller, which holds for half a row."""
 MOST_ROWS = 2.0
@@ -64,7 +61,7 @@ def lateness_of(fitted: Fit, row_s: float, or_early: bool = False) -> Lateness |
 
     least = (LEAST_ROWS * row_s, -LEAST_ROWS * row_s)[: 1 + or_early]
     lowest, first = min(zip(in_parallel(cost, least), least, strict=True))
-    if lowest > fitted.sse - LEAST_GAIN:
+    if lowest > fitted.sse - CERTAIN_GAIN:
         return None
     bounds = (0.0, MOST_ROWS * row_s) if first > 0.0 else (-MOST_EARLY_ROWS * row_s, 0.0)
     found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 0.02 * row_s})

@@ -32,5 +32,6 @@ PARAMETER_PRICE = float(chi2_quantile(1.0 - UNUSUAL_LEVEL, 1))
 SURE = normal_quantile(1.0 - UNUSUAL_LEVEL)
 """Deviations of a normal variable that 95 in 100 stay within, on one side."""
 SEPARABLE = SURE**2
-"""Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: a difference of so much between
-two rivals has a deviation of twice its root."""
+"""Twice the log-likelihood by which a rival must fall short to be told apart at 95 %: the square of `SURE`."""
+CERTAIN_GAIN = float(chi2_quantile(1.0 - CERTAIN_LEVEL, 1))
+"""Twice the log-likelihood that one parameter gains where it is certain that it stands for something."""

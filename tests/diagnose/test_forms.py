@@ -8,6 +8,7 @@ from identify.rigs import WHITE, measured
 from models.cases import RIGS, trial
 
 from fes_pin.diagnose.search.refined_forms import is_identified
+from fes_pin.diagnose.search.starts import forms_beside
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.models.effects import CoulombFriction, SensorNonlinearity
@@ -38,3 +39,20 @@ def test_a_form_that_ends_at_its_bound_is_not(fitted):
 def test_what_stood_at_its_bound_before_does_not_count(fitted):
     stuck = replace(fitted, at_bound=(BOUND,))
     assert is_identified(stuck, stuck)
+
+
+@pytest.mark.parametrize(
+    ("rig", "effects", "count"),
+    [
+        ("joint", (CoulombFriction(0.05),), 6),
+        ("ankle", (CoulombFriction(0.05),), 6),
+        ("joint", (CoulombFriction(0.05, stiction=0.8, stretch=1e-3),), 4),
+        ("joint", (), 1),
+    ],
+)
+def test_a_form_shares_its_level_with_all_that_are_tried(rig, effects, count):
+    """Of friction a joint has all but asymmetry, an ankle all but the stretch of a contact."""
+    model = Model(RIGS[rig])
+    for one in effects:
+        model = model + one
+    assert forms_beside(model, model.effects) == count

@@ -8,9 +8,9 @@ from fes_pin.diagnose.search.cause_sets import Names
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.diagnose.search.simulation_fits import SimulationFits
 from fes_pin.diagnose.search.starts import forms_beside
-from fes_pin.identify.distributions import chi2_quantile, chi2_tail
+from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
-from fes_pin.identify.levels import CERTAIN_LEVEL, CLAIM_LEVEL, UNUSUAL_LEVEL
+from fes_pin.identify.levels import CERTAIN_GAIN, CLAIM_LEVEL, UNUSUAL_LEVEL
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
@@ -56,7 +56,7 @@ class Claims:
         if slow_misfit(fitted):
             return False
         score = max(s.gain for s in self.sets.scores(fitted).scored)
-        if score > max(chi2_quantile(1.0 - CERTAIN_LEVEL, 1), FORM_SHARE * (self.sets.fits[()].sse - fitted.sse)):
+        if score > max(CERTAIN_GAIN, FORM_SHARE * (self.sets.fits[()].sse - fitted.sse)):
             return False
         return not smooth_remainder(_again(fitted, fitted), self.seed).unexplained
 
