@@ -77,16 +77,15 @@ LONG = {
     ),
     "driven/test_lasting.py": ("is_no_motion[5", "is_no_motion[40", "misses[('joint_stop'"),
     "driven/test_late_effort.py": (
-        "test_a_reading_that_is_late",
-        "moved[friction]",
-        "moved[nothing else]",
-        "test_a_log_of_every",
+        *("test_a_reading_that_is_late", "moved[friction]", "moved[nothing else]"),
+        *("test_a_log_of_every", "test_an_effort_that_acts_later"),
     ),
     "driven/test_long_record.py": ("every_second_sample[1152001]", "every_second_sample[1152002]"),
     "driven/test_noisy_effort.py": (
         *("test_friction_beside", "test_trials_without_an_effort", "test_what_acted", "no_friction[1830006]"),
     ),
     "driven/test_parts.py": ("test_a_part_that_begins_in_motion",),
+    "driven/test_presliding.py": ("test_a_contact_that_stretches_far",),
     "driven/test_products.py": ("[2]",),
     "driven/test_rough_cost.py": ("test_a_torque_is_found",),
     "driven/test_rough_play.py": ("test_nothing_is_named_or_left",),
@@ -95,6 +94,8 @@ LONG = {
         *("held[('quadratic", "held[('parallel", "held[('effort_offset", "held[('cogging"),
         *("held[('coulomb", "test_without_a_cause", "test_a_seed_makes"),
     ),
+    "driven/test_time_limit_of_likelihood.py": ("test_what_has_earned",),
+    "driven/test_without.py": ("test_less_one_cause",),
     "fuzz/test_cases.py": ("a trial of milliseconds",),
     "imposed/test_imposed_ankle.py": ("predicted[force_velocity]", "predicted[passive_relaxation]", "adequate[8]"),
     "imposed/test_imposed_joint.py": (
