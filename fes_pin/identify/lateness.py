@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fes_pin.data.log import Log
+from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import CERTAIN_GAIN
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -26,7 +27,6 @@ MOST_ROWS = 2.0
 """Rows of a log by which an effort may be late: one that it is held when it is written down, and one until the next."""
 MOST_EARLY_ROWS = 0.5
 """Rows by which it may act later than written: what is more is a lag, see `SensorLag.smallest`."""
-
 SLOPE_STEP = 0.05
 """Step of the slope by lateness, in rows: efforts are held over them, and what is moved by less is in proportion."""
 
@@ -55,8 +55,7 @@ def lateness_of(fitted: Fit, row_s: float, or_early: bool = False) -> Lateness |
 
     def cost(late: float) -> float:
         if late not in tried:
-            moved = [Log(effort_late_s=late).applied(t) for t in fitted.trials]
-            tried[late] = maximum_from(fitted, moved).sse
+            tried[late] = maximum_from(fitted, _moved(fitted, late)).sse
         return tried[late]
 
     least = (LEAST_ROWS * row_s, -LEAST_ROWS * row_s)[: 1 + or_early]
@@ -71,23 +70,22 @@ def lateness_of(fitted: Fit, row_s: float, or_early: bool = False) -> Lateness |
 def slopes_by_lateness(fitted: Fit, row_s: float) -> list[np.ndarray]:
     """By how much the residual of each trial falls as efforts are moved, shape (m,), per second that they are late.
 
-    Parameters
-    ----------
-    fitted
-        By the likelihood, of a rig that an effort drives.
-    row_s
-        Time step of the log.
+    `fitted` and `row_s` are those of `lateness_of`; parameters and what is random stay as they are.
     """
     assert fitted.doubt is not None
     step_s, doubt = SLOPE_STEP * row_s, fitted.doubt
 
     def residuals(late_s: float) -> list[np.ndarray]:
-        moved = [Log(effort_late_s=late_s).applied(t) for t in fitted.trials]
-        parts = LikelihoodProblem(fitted.model, moved, doubt).linearize(fitted.values, fitted.unknowns)
-        return [p.residual for p in parts]
+        problem = LikelihoodProblem(fitted.model, _moved(fitted, late_s), doubt)
+        return [p.residual for p in problem.linearize(fitted.values, fitted.unknowns)]
 
     later, earlier = in_parallel(residuals, (step_s, -step_s))
     return [(b - a) / (2.0 * step_s) for a, b in zip(later, earlier, strict=True)]
+
+
+def _moved(fitted: Fit, late_s: float) -> list[Trial]:
+    """The trials of a fit with efforts that were written down so late where they acted."""
+    return [Log(effort_late_s=late_s).applied(t) for t in fitted.trials]
 
 
 def words_of_lateness(late_s: float) -> str:

@@ -1,4 +1,7 @@
-"""Levels at which something is said: shares of rigs, with nothing to say of, of which it is said all the same."""
+"""Levels at which something is said, and the prices and shares that go with them.
+
+A level is the share of rigs, with nothing to say of, of which it is said all the same.
+"""
 
 from __future__ import annotations
 
