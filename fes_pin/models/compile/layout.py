@@ -56,17 +56,19 @@ class Layout:
 
 @dataclass(frozen=True)
 class Sizes:
-    """Lengths of the vectors that a program keeps, and of what is integrated: the first entries of the states."""
+    """Lengths of the vectors that a program keeps, of what is integrated: the first entries of the states, and of what
+    does not change in a run or a step (`kept`)."""
 
     state: int
     memory: int
     reading: int
     integrated: int
+    kept: int = 0
 
     @property
     def scratch(self) -> int:
-        """Vectors that a run works in: states four times, memories twice, each with one to spare."""
-        return 4 * (self.state + 1) + 2 * (self.memory + 1)
+        """Vectors that a run works in: states four times, memories twice, each with one to spare, and what is kept."""
+        return 4 * (self.state + 1) + 2 * (self.memory + 1) + self.kept
 
 
 def reading_inputs(measured: tuple[str, ...]) -> tuple[str, ...]:

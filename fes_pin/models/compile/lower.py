@@ -1,6 +1,14 @@
-"""CasADi SX functions as LLVM functions on lanes: one walk over the instruction list."""
+"""CasADi SX functions as LLVM functions on lanes: one walk over the instruction list.
+
+What depends on nothing that changes in a loop is worked out before it: an instruction says what it reads, and so at
+which stage all of that is known.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -9,6 +17,8 @@ from fes_pin.models.compile.straight import Lines, Value, splat
 
 ROUNDED = (*CONTRACT, "arcp")
 """Beside fused products: what is divided by the same number several times may be multiplied by its inverse."""
+KEPT = "%kept"
+"""Name of the pointer to what earlier parts of a function leave to later ones."""
 _BINARY = {ca.OP_ADD: "fadd", ca.OP_SUB: "fsub", ca.OP_MUL: "fmul", ca.OP_DIV: "fdiv"}
 _COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 _LANE_FUNCTIONS = {
@@ -42,42 +52,141 @@ _LANE_FUNCTIONS = {
 }
 
 
-def lowered(function: ca.Function, linkage: str = "internal") -> tuple[str, dict[str, str]]:
-    """An LLVM function with one pointer to lanes for each input and output of `function` (their nonzeros).
+@dataclass(frozen=True)
+class Lowered:
+    """A function as assembly: each part works out what it can of the inputs that are known by then.
 
-    Returns
-    -------
+    Attributes
+    ----------
+    parts
+        Names of the functions that are there, by stage; the last stage's is the function's own and always there.
+        Each takes a pointer to lanes for every input of the function and one to what is kept between the parts; the
+        last takes one for every output besides.
     text
-        Its assembly.
+        Their assembly.
     declared
-        Declarations of the functions that it calls, by name.
+        Declarations of the functions that they call, by name.
+    kept
+        How many vectors earlier parts leave to later ones.
     """
-    lines = Lines()
+
+    parts: Mapping[int, str]
+    text: str
+    declared: Mapping[str, str]
+    kept: int
+
+
+def lowered(function: ca.Function, linkage: str = "internal", known: Sequence[Container[int]] = ()) -> Lowered:
+    """`function` in LLVM assembly.
+
+    Parameters
+    ----------
+    known
+        For each earlier stage, the inputs that do not change between it and the stages that follow.
+    """
+    schedule, last = _Schedule(function, known), len(known)
+    parts, texts, declared = dict[int, str](), [], dict[str, str]()
     inputs, outputs = ([f"%{k}{i}" for i in range(n)] for k, n in (("i", function.n_in()), ("o", function.n_out())))
-    _Lowering(lines).emit(function, inputs, outputs)
-    return lines.function(function.name(), inputs, outputs, linkage), lines.declared
+    for stage in range(last + 1):
+        if stage < last and stage not in schedule.stages_kept:
+            continue
+        lines = Lines()
+        _Lowering(lines, schedule, stage).emit(inputs, outputs)
+        parts[stage] = function.name() if stage == last else f"{function.name()}.{stage}"
+        texts.append(lines.function(parts[stage], [*inputs, KEPT], outputs if stage == last else [], linkage))
+        declared |= lines.declared
+    return Lowered(parts, "\n".join(texts), declared, len(schedule.places))
+
+
+class _Node(NamedTuple):
+    """An instruction: what it does, the instructions that it reads, its place where it is an input or an output."""
+
+    op: int
+    arguments: tuple[int, ...]
+    place: tuple[int, int] = (0, 0)
+    value: float = 0.0
+
+
+class _Schedule:
+    """The instructions of a function, the stage at which each can be worked out, and what is kept for later ones.
+
+    What is divided by a number of an earlier stage is multiplied by its inverse.
+    """
+
+    def __init__(self, function: ca.Function, known: Sequence[Container[int]]) -> None:
+        self.nodes: list[_Node] = []
+        self.stages: list[int] = []
+        self.places: dict[int, int] = {}
+        self._inverses: dict[int, int] = {}
+        slots, last = dict[int, int](), len(known)
+        for k in range(function.n_instructions()):
+            op, out, given = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+            if op == ca.OP_INPUT:
+                stage = next((s for s, those in enumerate(known) if given[0] in those), last)
+                slots[out[0]] = self._add(_Node(op, (), (given[0], given[1])), stage)
+            elif op == ca.OP_CONST:
+                slots[out[0]] = self._add(_Node(op, (), value=function.instruction_constant(k)), 0)
+            elif op == ca.OP_OUTPUT:
+                self._add(_Node(op, (slots[given[0]],), (out[0], out[1])), last)
+            else:
+                slots[out[0]] = self._operation(op, tuple(slots[i] for i in given))
+
+    def _operation(self, op: int, arguments: tuple[int, ...]) -> int:
+        stage = max(self.stages[i] for i in arguments)
+        if op == ca.OP_DIV and self.stages[arguments[1]] < stage:
+            over, under = arguments
+            if under not in self._inverses:
+                self._inverses[under] = self._add(_Node(ca.OP_INV, (under,)), self.stages[under])
+            op, arguments = ca.OP_MUL, (over, self._inverses[under])
+        return self._add(_Node(op, arguments), stage)
+
+    def _add(self, node: _Node, stage: int) -> int:
+        """Number of a new instruction; what it reads of earlier stages, but for inputs and constants, is kept."""
+        for i in node.arguments:
+            if self.stages[i] < stage and self.nodes[i].op not in (ca.OP_INPUT, ca.OP_CONST):
+                self.places.setdefault(i, len(self.places))
+        self.nodes.append(node)
+        self.stages.append(stage)
+        return len(self.nodes) - 1
+
+    @property
+    def stages_kept(self) -> set[int]:
+        """Stages that something is kept of."""
+        return {self.stages[i] for i in self.places}
 
 
 class _Lowering:
-    """Lowers expressions into one function's lines."""
+    """Lowers what one stage works out into one function's lines."""
 
-    def __init__(self, lines: Lines) -> None:
-        self.lines, self.functions = lines, LaneFunctions(lines)
+    def __init__(self, lines: Lines, schedule: _Schedule, stage: int) -> None:
+        self.lines, self.schedule, self.stage = lines, schedule, stage
+        self.functions = LaneFunctions(lines)
+        self._made: dict[int, Value] = {}
 
-    def emit(self, function: ca.Function, inputs: list[str], outputs: list[str]) -> None:
-        """Write out every instruction."""
-        b, work = self.lines, dict[int, Value]()
-        for k in range(function.n_instructions()):
-            op, out = function.instruction_id(k), function.instruction_output(k)
-            arguments = function.instruction_input(k)
-            if op == ca.OP_INPUT:
-                work[out[0]] = b.load(inputs[arguments[0]], arguments[1])
-            elif op == ca.OP_OUTPUT:
-                b.store(work[arguments[0]], outputs[out[0]], out[1])
-            elif op == ca.OP_CONST:
-                work[out[0]] = splat(function.instruction_constant(k))
+    def emit(self, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+        """Write out every instruction of the stage."""
+        for k, node in enumerate(self.schedule.nodes):
+            if self.schedule.stages[k] != self.stage or node.op in (ca.OP_INPUT, ca.OP_CONST):
+                continue
+            arguments = [self._value(i, inputs) for i in node.arguments]
+            if node.op == ca.OP_OUTPUT:
+                self.lines.store(arguments[0], outputs[node.place[0]], node.place[1])
+                continue
+            self._made[k] = self._operation(node.op, arguments)
+            if k in self.schedule.places:
+                self.lines.store(self._made[k], KEPT, self.schedule.places[k])
+
+    def _value(self, k: int, inputs: Sequence[str]) -> Value:
+        """What an instruction gives: made here, or read."""
+        if k not in self._made:
+            node = self.schedule.nodes[k]
+            if node.op == ca.OP_CONST:
+                self._made[k] = splat(node.value)
+            elif node.op == ca.OP_INPUT:
+                self._made[k] = self.lines.load(inputs[node.place[0]], node.place[1])
             else:
-                work[out[0]] = self._operation(op, [work[i] for i in arguments])
+                self._made[k] = self.lines.load(KEPT, self.schedule.places[k])
+        return self._made[k]
 
     def _operation(self, op: int, a: list[Value]) -> Value:
         b, one, zero = self.lines, splat(1.0), splat(0.0)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import ctypes
 import json
-from collections.abc import Callable
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
 from functools import partial
 
+import casadi as ca
 import numpy as np
 from llvmlite import ir
 
 from fes_pin.models.compile.equations import Equations
 from fes_pin.models.compile.layout import REST_ITERATIONS, REST_STEP, WIDTH, Layout, Sizes
-from fes_pin.models.compile.lower import lowered
+from fes_pin.models.compile.lower import Lowered, lowered
 from fes_pin.models.compile.machine import MachineCode, compile_object
 
+LOOPED = ("sample", "correct", "output", "rates", "follow")
+"""Functions that are called again and again."""
 DOUBLE, INT64 = ir.DoubleType(), ir.IntType(64)
 VECTOR = ir.VectorType(DOUBLE, WIDTH)
 
@@ -45,26 +48,41 @@ class NativeProgram:
 
 def compile_equations(equations: Equations) -> bytes:
     """What a `NativeProgram` is made from: its sizes in one line, then object code."""
-    return json.dumps(asdict(equations.sizes)).encode() + b"\n" + compile_object(emit(equations))
+    text, sizes = emit(equations)
+    return json.dumps(asdict(sizes)).encode() + b"\n" + compile_object(text)
 
 
-def emit(equations: Equations) -> str:
-    """LLVM assembly of a program: static equilibrium, then samples of Runge-Kutta steps."""
-    made = {n: lowered(function) for n, function in equations.functions().items()}
-    declared = {name: line for _, those in made.values() for name, line in those.items()}
-    return "\n".join([str(_Loop(equations).module), *declared.values(), *(text for text, _ in made.values())])
+def emit(equations: Equations) -> tuple[str, Sizes]:
+    """LLVM assembly of a program, and its sizes: static equilibrium, then samples of Runge-Kutta steps."""
+    functions = equations.functions()
+    made = {n: lowered(f, known=_known(n, f)) for n, f in functions.items()}
+    sizes = replace(equations.sizes, kept=sum(one.kept for one in made.values()))
+    declared = {name: line for one in made.values() for name, line in one.declared.items()}
+    loop = _Loop(equations, made, sizes).module
+    return "\n".join([str(loop), *declared.values(), *(one.text for one in made.values())]), sizes
+
+
+def _known(name: str, function: ca.Function) -> list[set[int]]:
+    """Inputs of a function that a run does not change; of rates, also those that an integration step does not."""
+    if name not in LOOPED:
+        return []
+    last = function.n_in()
+    once = {last - 2, last - 1}  # parameters and constants
+    return [once, set(range(1, last)) - {last - 3}] if name == "rates" else [once]  # all but the states and `into`
 
 
 class _Loop:
     """The time loop around a model's functions."""
 
-    def __init__(self, equations: Equations) -> None:
-        self.module, self.equations, self.sizes = ir.Module(name="fes_pin"), equations, equations.sizes
+    def __init__(self, equations: Equations, made: Mapping[str, Lowered], sizes: Sizes) -> None:
+        self.module, self.equations, self.made, self.sizes = ir.Module(name="fes_pin"), equations, made, sizes
         double, elsewhere = ir.PointerType(VECTOR), ir.Module()  # the parts are text: here they have but their names
-        self.parts = {
-            n: ir.Function(elsewhere, ir.FunctionType(ir.VoidType(), [double] * (f.n_in() + f.n_out())), n)
-            for n, f in equations.functions().items()
-        }
+        self.parts = dict[str, ir.Function]()
+        for n, f in equations.functions().items():
+            for part in made[n].parts.values():
+                read = f.n_in() + 1 + (f.n_out() if part == n else 0)
+                kind = ir.FunctionType(ir.VoidType(), [double] * read)
+                self.parts[part] = ir.Function(elsewhere, kind, part)
         function = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [INT64, INT64] + [double] * 6), "simulate")
         self.n, self.substeps, self.u, self.p, self.c, self.z, self.y, scratch = function.args
         self.b = ir.IRBuilder(function.append_basic_block())
@@ -75,10 +93,13 @@ class _Loop:
         self.b.ret_void()
 
     def _carve(self, scratch: ir.Value) -> None:
-        """Vectors in the scratch memory: states, stage states, stage rates, their sum, memories old and new."""
+        """Vectors in the scratch memory: states, stage states, stage rates, their sum, memories old and new, kept."""
         state, memory = self.sizes.state + 1, self.sizes.memory + 1
         self.state, self.stage, self.rate, self.total = (self._at(scratch, k * state) for k in range(4))
         self.memory, self.after = (self._at(scratch, 4 * state + k * memory) for k in range(2))
+        self.kept, at = dict[str, ir.Value](), 4 * state + 2 * memory
+        for name, one in self.made.items():
+            self.kept[name], at = self._at(scratch, at), at + one.kept
         self.t = self.b.alloca(VECTOR)
         self.since, self.into = self.b.alloca(VECTOR), self.b.alloca(VECTOR)
         self.g = self.b.alloca(VECTOR, ir.Constant(INT64, 2))
@@ -91,6 +112,16 @@ class _Loop:
 
     def _store(self, value: ir.Value, pointer: ir.Value, index: int | ir.Value = 0) -> None:
         self.b.store(value, self._at(pointer, index), align=8)
+
+    def _call(self, name: str, given: Sequence[ir.Value], written: Sequence[ir.Value]) -> None:
+        """A function of the model, once what can be known before is."""
+        self.b.call(self.parts[name], [*given, self.kept[name], *written])
+
+    def _before(self, name: str, given: Sequence[ir.Value], stage: int) -> None:
+        """What an earlier stage of a function can work out, if anything."""
+        part = self.made[name].parts.get(stage, name)
+        if part != name:
+            self.b.call(self.parts[part], [*given, self.kept[name]])
 
     def _constants(self) -> None:
         names = self.equations.layout.constants
@@ -122,14 +153,18 @@ class _Loop:
         b = self.b
 
         def newton(_: ir.Value) -> None:
-            b.call(self.parts["rest"], [self.z, self.p, self.c, self.g, self._at(self.g, 1)])
+            self._call("rest", [self.z, self.p, self.c], [self.g, self._at(self.g, 1)])
             step = b.fdiv(self._load(self.g), self._load(self.g, 1))
             for beyond, most in ((">", _splat(REST_STEP)), ("<", _splat(-REST_STEP))):
                 step = b.select(b.fcmp_ordered(beyond, step, most), most, step)
             self._store(b.fsub(self._load(self.z), step), self.z)
 
         self._count(ir.Constant(INT64, REST_ITERATIONS), newton)
-        b.call(self.parts["start"], [self.z, self.p, self.c, self.state, self.memory])
+        self._call("start", [self.z, self.p, self.c], [self.state, self.memory])
+        for name in LOOPED:
+            if name in self.made:
+                known = [self.p, self.c]
+                self._before(name, [self.state] * (self.equations.functions()[name].n_in() - len(known)) + known, 0)
 
     def _samples(self) -> None:
         b, inputs = self.b, len(self.equations.layout.inputs)
@@ -139,14 +174,14 @@ class _Loop:
             b.store(t, self.t, align=8)
             u = self._at(self.u, b.mul(n, ir.Constant(INT64, inputs)))
             y = self._at(self.y, b.mul(n, ir.Constant(INT64, self.sizes.reading)))
-            b.call(self.parts["sample"], [self.state, self.memory, u, self.t, self.p, self.c, self.after])
+            self._call("sample", [self.state, self.memory, u, self.t, self.p, self.c], [self.after])
             self._copy(self.after, self.memory, self.sizes.memory)
             given = [self.state, self.memory, u, self.t, self.p, self.c]
-            if "correct" in self.parts:
-                b.call(self.parts["correct"], [*given, self.stage, y])
+            if "correct" in self.made:
+                self._call("correct", given, [self.stage, y])
                 self._copy(self.stage, self.state, self.sizes.state)
             else:
-                b.call(self.parts["output"], [*given, y])
+                self._call("output", given, [y])
             self._count(self.substeps, lambda j: self._step(j, u))
 
         self._count(self.n, sample)
@@ -155,13 +190,13 @@ class _Loop:
         """From one integration step to the next."""
         b = self.b
         b.store(b.fmul(self._number(j), self.step), self.since, align=8)
-        if "follow" not in self.parts:
+        if "follow" not in self.made:
             self._runge_kutta(u, self.state)
             return
         self._runge_kutta(u, self.total)
         b.store(b.fmul(self.step, _splat(0.5)), self.into, align=8)
         times = [self.t, self.since, self.into]
-        b.call(self.parts["follow"], [self.state, self.total, self.memory, u, *times, self.p, self.c, self.stage])
+        self._call("follow", [self.state, self.total, self.memory, u, *times, self.p, self.c], [self.stage])
         self._copy(self.stage, self.state, self.sizes.state)
 
     def _copy(self, source: ir.Value, target: ir.Value, size: int) -> None:
@@ -171,6 +206,10 @@ class _Loop:
         """One step of the classical Runge-Kutta method of order four, from the state to `end`."""
         b = self.b
         size = ir.Constant(INT64, self.sizes.integrated)
+        times = [self.t, self.since, self.into]
+        begun = [self.state] if "follow" in self.made else []
+        fixed = [*begun, self.memory, u, *times, self.p, self.c]
+        self._before("rates", [self.state, *fixed], 1)
         for weight, ahead, at, source in (
             (1 / 6, 0.5, 0.0, self.state),
             (1 / 3, 0.5, 0.5, self.stage),
@@ -178,9 +217,7 @@ class _Loop:
             (1 / 6, 0.0, 1.0, self.stage),
         ):
             b.store(b.fmul(self.step, _splat(at)), self.into, align=8)
-            times = [self.t, self.since, self.into]
-            begun = [self.state] if "follow" in self.parts else []
-            b.call(self.parts["rates"], [source, *begun, self.memory, u, *times, self.p, self.c, self.rate])
+            self._call("rates", [source, *fixed], [self.rate])
             share, forward = b.fmul(self.step, _splat(weight)), b.fmul(self.step, _splat(ahead))
             self._count(size, partial(self._advance, at=at, share=share, forward=forward, end=end))
 
