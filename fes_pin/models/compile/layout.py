@@ -67,8 +67,8 @@ class Sizes:
 
     @property
     def scratch(self) -> int:
-        """Vectors that a run works in: states four times, memories twice, each with one to spare, and what is kept."""
-        return 4 * (self.state + 1) + 2 * (self.memory + 1) + self.kept
+        """Vectors that a run works in: states five times, memories twice, each with one to spare, and what is kept."""
+        return 5 * (self.state + 1) + 2 * (self.memory + 1) + self.kept
 
 
 def reading_inputs(measured: tuple[str, ...]) -> tuple[str, ...]:

@@ -93,16 +93,31 @@ class _Loop:
         self.b.ret_void()
 
     def _carve(self, scratch: ir.Value) -> None:
-        """Vectors in the scratch memory: states, stage states, stage rates, their sum, memories old and new, kept."""
+        """Vectors in the scratch memory: stage states and rates, their sum, states and memories twice, what is kept."""
         state, memory = self.sizes.state + 1, self.sizes.memory + 1
-        self.state, self.stage, self.rate, self.total = (self._at(scratch, k * state) for k in range(4))
-        self.memory, self.after = (self._at(scratch, 4 * state + k * memory) for k in range(2))
-        self.kept, at = dict[str, ir.Value](), 4 * state + 2 * memory
+        self.stage, self.rate, self.total, *both = (self._at(scratch, k * state) for k in range(5))
+        self.memory, self.after = (self._at(scratch, 5 * state + k * memory) for k in range(2))
+        self.kept, at = dict[str, ir.Value](), 5 * state + 2 * memory
         for name, one in self.made.items():
             self.kept[name], at = self._at(scratch, at), at + one.kept
+        self._states = [self.b.alloca(both[0].type) for _ in both]
+        for where, pointer in zip(self._states, both, strict=True):
+            self.b.store(pointer, where)
         self.t = self.b.alloca(VECTOR)
         self.since, self.into = self.b.alloca(VECTOR), self.b.alloca(VECTOR)
         self.g = self.b.alloca(VECTOR, ir.Constant(INT64, 2))
+
+    @property
+    def state(self) -> ir.Value:
+        """Where the states are."""
+        return self.b.load(self._states[0])
+
+    def _next_state(self, name: str, given: Sequence[ir.Value], *written: ir.Value) -> None:
+        """Call what gives the next states first of all: they are where the states were before the last."""
+        now, other = (self.b.load(one) for one in self._states)
+        self._call(name, [now, *given], [other, *written])
+        for where, pointer in zip(self._states, (other, now), strict=True):
+            self.b.store(pointer, where)
 
     def _at(self, pointer: ir.Value, index: int | ir.Value) -> ir.Value:
         return self.b.gep(pointer, [ir.Constant(INT64, index) if isinstance(index, int) else index])
@@ -176,12 +191,11 @@ class _Loop:
             y = self._at(self.y, b.mul(n, ir.Constant(INT64, self.sizes.reading)))
             self._call("sample", [self.state, self.memory, u, self.t, self.p, self.c], [self.after])
             self._copy(self.after, self.memory, self.sizes.memory)
-            given = [self.state, self.memory, u, self.t, self.p, self.c]
+            given = [self.memory, u, self.t, self.p, self.c]
             if "correct" in self.made:
-                self._call("correct", given, [self.stage, y])
-                self._copy(self.stage, self.state, self.sizes.state)
+                self._next_state("correct", given, y)
             else:
-                self._call("output", given, [y])
+                self._call("output", [self.state, *given], [y])
             self._count(self.substeps, lambda j: self._step(j, u))
 
         self._count(self.n, sample)
@@ -196,8 +210,7 @@ class _Loop:
         self._runge_kutta(u, self.total)
         b.store(b.fmul(self.step, _splat(0.5)), self.into, align=8)
         times = [self.t, self.since, self.into]
-        self._call("follow", [self.state, self.total, self.memory, u, *times, self.p, self.c], [self.stage])
-        self._copy(self.stage, self.state, self.sizes.state)
+        self._next_state("follow", [self.total, self.memory, u, *times, self.p, self.c])
 
     def _copy(self, source: ir.Value, target: ir.Value, size: int) -> None:
         self._count(ir.Constant(INT64, size), lambda i: self._store(self._load(source, i), target, i))
