@@ -232,22 +232,14 @@ DECIDING = {
     "ABSORBED_BELOW",
     "RUNAWAY",
     "FORM_SHARE",
-    "MATERIAL_PERCENT",
-    "LARGE_SHARE",
+    "SMALL_SHARE",
     "AVERAGED_S",
-    "SMALL_PERCENT",
-    "SLOWEST_NOISE",
     "WHITE_SHARE",
     "SHORT_NOISE",
     "FULL_NOISE",
-    "WIDE",
     "MOST_CAUSES",
-    "MOST_IMPOSED",
     "AS_WELL",
     "SMOOTH",
-    "EARNED",
-    "SHARED",
-    "OTHER",
 }
 """Those that say what is claimed, what is left and what is not testable; the others say how and how finely."""
 

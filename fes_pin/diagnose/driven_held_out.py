@@ -19,7 +19,8 @@ from fes_pin.identify.turns import maximise, together
 from fes_pin.workers import in_parallel
 
 WIDE = 10.0
-"""Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size."""
+"""Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size. Of what
+the data tell it cancels between the trials and their folds."""
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fes_pin.diagnose.decide.claims import FORM_SHARE
-from fes_pin.diagnose.decide.held_out import MATERIAL_PERCENT, Evidence, Gain, speaks_for
+from fes_pin.diagnose.decide.held_out import Evidence, Gain, speaks_for
 from fes_pin.diagnose.errors_ahead import RandomPart
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.search.likelihood_search import Found
-from fes_pin.identify.levels import CERTAIN_LEVEL
-
-LARGE_SHARE = 0.1
-"""Random effort, as a share of what drives the rig, from which something acts that no cause explains."""
+from fes_pin.identify.levels import CERTAIN_LEVEL, NOTHING_PERCENT, SMALL_SHARE
 
 
 @dataclass(frozen=True)
@@ -67,11 +64,11 @@ def with_refused_causes(left: Remainder, random: Sequence[RandomPart], refused: 
     """
     if left.unexplained:
         return left
-    large = [r for r in random if r.share > LARGE_SHARE]
+    large = [r for r in random if r.share > SMALL_SHARE]
     if large:
         return replace(left, unexplained=True, where="effort")
     certain = [r for r in refused.values() if r.p_value < CERTAIN_LEVEL and r.share >= FORM_SHARE]
-    certain = [r for r in certain if r.percent > MATERIAL_PERCENT]
+    certain = [r for r in certain if r.percent > NOTHING_PERCENT]
     if certain:
         surest = min(certain, key=lambda r: r.p_value)
         return replace(left, unexplained=True, p_value=surest.p_value, where=surest.stage)

@@ -4,6 +4,10 @@ The filter takes the noise of each reading for new. Noise that lasts it follows 
 that nothing exerts, and inertia is what that effort makes of it. Readings as far apart as their noise is new have
 innovations that are white; and every second of them tells of the same noise, the same random effort and the same rig as
 all do. Where they do not, readings are taken twice as far apart.
+
+New is what shares little with the next two: a model that misses a cause brings a correlation of 0.02 at the steps of a
+recording, noise that was averaged over ten samples 0.5 (`tests/driven/test_lasting.py`). A correlation of `SMALL_SHARE`
+is worth its square in twice the log-likelihood of a reading: by no more may every second of them fit better by itself.
 """
 
 from __future__ import annotations
@@ -15,16 +19,11 @@ from dataclasses import replace
 from fes_pin.data.counts import count_of
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import SMALL_SHARE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs.base import Rig
 
-SHARED = 0.1
-"""Correlation of an innovation with one of the next two, from which noise is not new. A model that misses a cause
-brings 0.02 at the steps of a recording, noise that was averaged over ten samples 0.5; see
-`tests/driven/test_lasting.py`."""
-OTHER = 0.02
-"""Twice the log-likelihood, for each reading, by which every second of them may fit better by itself."""
 FEWEST = 30
 """Readings that every trial keeps."""
 
@@ -51,7 +50,7 @@ def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], Fit]) -> 
         step *= 2
         sparser = nominal(step * max(t.dt for t in trials))
         tried.append((_shared(now), now))
-        if tried[-1][0] < SHARED and _other(now, sparser) < OTHER:
+        if tried[-1][0] < SMALL_SHARE and _other(now, sparser) < SMALL_SHARE**2:
             return now
         now = sparser
     return min(tried, key=lambda one: one[0])[1]

@@ -18,15 +18,13 @@ from scipy.optimize import minimize_scalar
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.levels import SMALL_SHARE
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 
 SMOOTH = 0.3
 """Noise from sample to sample as a share of all that the nominal model leaves, from which a record is as it was read.
 Of ten samples' averages it is below 0.15, of a sensor's noise above 0.5 (`tests/diagnose/test_low_passed.py`)."""
-EARNED = 0.1
-"""Twice the log-likelihood that a low pass must earn for each sample: of readings that were low-passed 0.2 to 10, of
-others, whose model misses a cause, at most 0.07."""
 PERIODS, MOST = 10.0, 0.2
 """Cut-offs that are tried: from so many periods in the shortest trial, of which the ends are one or two, to this share
 of the sampling rate."""
@@ -80,8 +78,13 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
 
 
 def earns(passed: Fit, recorded: Fit) -> bool:
-    """True if a fit of trials that were low-passed leaves a likelier noise than one of the same trials as recorded."""
-    return _cost(passed) < _cost(recorded) - EARNED * sum(map(len, recorded.trials))
+    """True if a fit of trials that were low-passed leaves a likelier noise than one of the same trials as recorded.
+
+    By more than little: the power of what is new in each sample must fall by `SMALL_SHARE` of itself. Of readings that
+    were low-passed twice the log-likelihood rises by 0.2 to 10 a sample, of others, whose model misses a cause, by 0.07
+    at most.
+    """
+    return _cost(passed) < _cost(recorded) - SMALL_SHARE * sum(map(len, recorded.trials))
 
 
 def _cost(fitted: Fit) -> float:

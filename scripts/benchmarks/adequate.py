@@ -4,7 +4,7 @@
 
 Studies that hide nothing, made without the engine (`scripts/confusion`), in white, first-order autoregressive (0.6 to
 0.9) and coloured noise (a random torque, or ARMA(2, 1) in the sensor), are fitted with the nominal model. Printed are
-quantiles of `claims.slowness`, and how many studies lie beyond `claims.SLOWEST_NOISE`, where no model is adequate.
+quantiles of `claims.slowness`, and how many studies lie beyond `levels.SMALL_SHARE`, where no model is adequate.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from confusion_matrix.generator import make
 from confusion_matrix.noise import FAMILIES
 from confusion_matrix.plan import Item
 
-from fes_pin.diagnose.decide.claims import SLOWEST_NOISE, slowness
+from fes_pin.diagnose.decide.claims import slowness
 from fes_pin.identify.fit import fit
+from fes_pin.identify.levels import SMALL_SHARE
 from fes_pin.models.nominal import nominal_model
 
 
@@ -44,13 +45,12 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=40, help="studies of each rig and kind of noise")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    print(
-        f"{'rig':8s}{'noise':10s}{'studies':>8s}{'median':>8s}{'95 %':>8s}{'largest':>8s}{f'> {SLOWEST_NOISE:g}':>8s}"
-    )
+    beyond_all = f"> {1.0 / SMALL_SHARE:g}"
+    print(f"{'rig':8s}{'noise':10s}{'studies':>8s}{'median':>8s}{'95 %':>8s}{'largest':>8s}{beyond_all:>8s}")
     for rig in ("ankle", "joint", "muscle"):
         for noise in FAMILIES:
             r = ratios(rig, noise, given.count, given.seed)
-            beyond = int(np.count_nonzero(r > SLOWEST_NOISE))
+            beyond = int(np.count_nonzero(SMALL_SHARE * r > 1.0))
             print(
                 f"{rig:8s}{noise:10s}{len(r):8d}{np.median(r):8.2f}{np.quantile(r, 0.95):8.2f}{r.max():8.2f}{beyond:8d}"
             )

@@ -10,7 +10,7 @@ from fes_pin.diagnose.search.simulation_fits import SimulationFits
 from fes_pin.diagnose.search.starts import forms_beside
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
-from fes_pin.identify.levels import CERTAIN_GAIN, CLAIM_LEVEL, UNUSUAL_LEVEL
+from fes_pin.identify.levels import CERTAIN_GAIN, CLAIM_LEVEL, SMALL_SHARE, UNUSUAL_LEVEL
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
@@ -18,10 +18,6 @@ from fes_pin.workers import in_parallel
 FORM_SHARE = 0.0625
 """A further cause must explain at least this share of what all causes do: a real cause differs from its equation, and
 an error of a quarter in its form leaves a sixteenth of its likelihood to whatever else comes near."""
-SLOWEST_NOISE = 10.0
-"""Standard deviation of a residual over that of its sample-to-sample part beyond which it counts as misfit. First-order
-autoregressive noise has 3.8 at a coefficient of 0.9, 5.5 at 0.95, 12 at 0.99; 270 studies without
-a cause, of three rigs in three kinds of noise, have 8.3 at most: `scripts/benchmarks/adequate.py --count 30`."""
 
 
 class Claims:
@@ -118,8 +114,13 @@ class Claims:
 
 
 def slow_misfit(fitted: Fit) -> bool:
-    """True if a residual is so much slower than the sample-to-sample noise that it cannot be told from misfit."""
-    return slowness(fitted) > SLOWEST_NOISE
+    """True if the noise from sample to sample is so small beside a residual that this cannot be told from misfit.
+
+    First-order autoregressive noise is 3.8 times its sample-to-sample part at a coefficient of 0.9, 5.5 at 0.95, 12 at
+    0.99; 270 studies without a cause, of three rigs in three kinds of noise, have 8.3 at most:
+    `scripts/benchmarks/adequate.py --count 30`.
+    """
+    return SMALL_SHARE * slowness(fitted) > 1.0
 
 
 def slowness(fitted: Fit) -> float:

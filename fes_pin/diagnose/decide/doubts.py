@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fes_pin.diagnose.decide.claims import SLOWEST_NOISE, slowness
+from fes_pin.diagnose.decide.claims import slow_misfit, slowness
 from fes_pin.diagnose.decide.held_out import FOLDS, errors_of
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.fit import rough_noise
+from fes_pin.identify.levels import SMALL_PERCENT
 from fes_pin.models.model import Model
-
-SMALL_PERCENT = 1.0
-"""Error E that is small however slow: a tenth of what Dombre, Fournier and Coiffet take for a good one (10 %)."""
 
 
 def with_error(left: Remainder, searched: Searched) -> tuple[Remainder, str | None]:
@@ -23,7 +21,7 @@ def with_error(left: Remainder, searched: Searched) -> tuple[Remainder, str | No
     ratio, best = slowness(searched.judged), searched.best
     floor = rough_noise(Model(best.model.rig), best.trials)
     percent = errors_of(best.model, best.trials, floor).error_percent()
-    if left.unexplained or ratio <= SLOWEST_NOISE or percent <= SMALL_PERCENT:
+    if left.unexplained or not slow_misfit(searched.judged) or percent <= SMALL_PERCENT:
         return left, None
     why = f"an error of {percent:.3g} %, {ratio:.3g} times the scatter from sample to sample, is no noise of a reading"
     return replace(left, unexplained=True, where="time"), why

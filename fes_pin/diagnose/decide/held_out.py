@@ -11,7 +11,7 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import SquaredErrors, default_horizon, forecast_errors, own_noise
 from fes_pin.identify.fit import Fit, fit_problem, go_on
-from fes_pin.identify.levels import CONFIDENCE_95, RUNAWAY
+from fes_pin.identify.levels import CONFIDENCE_95, NOTHING_PERCENT, RUNAWAY
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.problem import Problem
@@ -24,10 +24,6 @@ RESAMPLES = 2000
 """Bootstrap draws of a gain: the standard error of its 95 % bounds is 1.5 % of their distance, of a normal gain."""
 FAR = 1e6
 """The same for whitened residuals, in standard deviations."""
-MATERIAL_PERCENT = 0.1
-"""Gain of a cause beside others below which it is no cause, from experience: lags and hums that were not there made up
-to 0.04 % beside forms that are not the library's (`scripts/imposed`, seeds 991015 and 992000); of the second causes of
-nine drawn rigs the low end was 0.27 % and more."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +44,8 @@ class Gain:
 
     @property
     def is_material(self) -> bool:
-        """Whether the low end of its interval is above `MATERIAL_PERCENT`."""
-        return self.low > MATERIAL_PERCENT
+        """Whether the low end of its interval is above `NOTHING_PERCENT`."""
+        return self.low > NOTHING_PERCENT
 
 
 @dataclass(frozen=True)

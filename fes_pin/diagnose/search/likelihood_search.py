@@ -8,6 +8,7 @@ effort, so that what stands beside a cause must earn its place against that.
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Iterable, Sequence
@@ -26,9 +27,6 @@ from fes_pin.identify.levels import DRIVEN_LEVEL, UNUSUAL_LEVEL
 from fes_pin.identify.scatter import excess_scatter
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
-MOST_IMPOSED = 8
-"""Causes that are named at most where motion is imposed: it excites a rig as nothing else does, and a muscle is a set
-of such causes."""
 BEAM = 3
 """Sets that each round extends; greedy search (1) loses 5 to 8 points of exact pairs (DESIGN section 6)."""
 JOINT_FITS = 8
@@ -101,8 +99,7 @@ class LikelihoodSearch:
 
     def _search(self) -> Found:
         sets, best = self.sets, self._fallback
-        imposed = any(t.kind == IMPOSED for t in sets.trials)
-        for size in range(1, (MOST_IMPOSED if imposed else MOST_CAUSES) + 1):
+        for size in self._sizes():
             self.progress(min(0.1 + 0.2 * size, 0.7), f"sets of {size}")
             if best and not self._worth_extending(best):
                 break
@@ -114,6 +111,14 @@ class LikelihoodSearch:
                 break
             best = self._fallback = earned
         return self.settle(self._backward(best))
+
+    def _sizes(self) -> Iterable[int]:
+        """How many causes a set has, round by round, until nothing earns its place.
+
+        An imposed motion excites a rig as nothing else does, and a muscle is a set of such causes.
+        """
+        imposed = any(t.kind == IMPOSED for t in self.sets.trials)
+        return itertools.count(1) if imposed else range(1, MOST_CAUSES + 1)
 
     def _numbers_mislead(self) -> bool:
         """True where counts as intervals keep less than half of what the best cause alone gains by them as numbers.

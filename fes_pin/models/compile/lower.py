@@ -53,7 +53,7 @@ _LANE_FUNCTIONS = {
 
 
 @dataclass(frozen=True)
-class Lowered:
+class Staged:
     """A function as assembly: each part works out what it can of the inputs that are known by then.
 
     Attributes
@@ -76,7 +76,7 @@ class Lowered:
     kept: int
 
 
-def lowered(function: ca.Function, linkage: str = "internal", known: Sequence[Container[int]] = ()) -> Lowered:
+def lowered(function: ca.Function, linkage: str = "internal", known: Sequence[Container[int]] = ()) -> Staged:
     """`function` in LLVM assembly.
 
     Parameters
@@ -95,7 +95,7 @@ def lowered(function: ca.Function, linkage: str = "internal", known: Sequence[Co
         parts[stage] = function.name() if stage == last else f"{function.name()}.{stage}"
         texts.append(lines.function(parts[stage], [*inputs, KEPT], outputs if stage == last else [], linkage))
         declared |= lines.declared
-    return Lowered(parts, "\n".join(texts), declared, len(schedule.places))
+    return Staged(parts, "\n".join(texts), declared, len(schedule.places))
 
 
 class _Node(NamedTuple):

@@ -14,7 +14,7 @@ from llvmlite import ir
 
 from fes_pin.models.compile.equations import Equations
 from fes_pin.models.compile.layout import REST_ITERATIONS, REST_STEP, WIDTH, Layout, Sizes
-from fes_pin.models.compile.lower import Lowered, lowered
+from fes_pin.models.compile.lower import Staged, lowered
 from fes_pin.models.compile.machine import MachineCode, compile_object
 
 LOOPED = ("sample", "correct", "output", "rates", "follow")
@@ -74,7 +74,7 @@ def _known(name: str, function: ca.Function) -> list[set[int]]:
 class _Loop:
     """The time loop around a model's functions."""
 
-    def __init__(self, equations: Equations, made: Mapping[str, Lowered], sizes: Sizes) -> None:
+    def __init__(self, equations: Equations, made: Mapping[str, Staged], sizes: Sizes) -> None:
         self.module, self.equations, self.made, self.sizes = ir.Module(name="fes_pin"), equations, made, sizes
         double, elsewhere = ir.PointerType(VECTOR), ir.Module()  # the parts are text: here they have but their names
         self.parts = dict[str, ir.Function]()
