@@ -27,7 +27,7 @@ be testable."""
 SMALL_SHARE = 0.1
 """Part of a whole that is small beside it, in amplitude: a random effort beside what drives a rig, an error beside the
 motion, noise from sample to sample beside all that is left, what an innovation has in common with the next. A tenth of
-an error that is small anyway is nothing."""
+an error that is small anyway is nothing. A low pass must take as much of the power of what is new in a sample."""
 RUNAWAY = 10.0
 """A prediction is lost where it is so many times as far off as readings ever are, or enlarges an error of its beginning
 so many times: where it goes to says nothing, and it counts as no farther off."""

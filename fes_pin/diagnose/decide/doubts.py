@@ -18,11 +18,12 @@ def with_error(left: Remainder, searched: Searched) -> tuple[Remainder, str | No
 
     An autoregression of a long order takes any slow error for noise; a missing input then ends as noise, too.
     """
-    ratio, best = slowness(searched.judged), searched.best
+    best = searched.best
     floor = rough_noise(Model(best.model.rig), best.trials)
     percent = errors_of(best.model, best.trials, floor).error_percent()
     if left.unexplained or not slow_misfit(searched.judged) or percent <= SMALL_PERCENT:
         return left, None
+    ratio = slowness(searched.judged)
     why = f"an error of {percent:.3g} %, {ratio:.3g} times the scatter from sample to sample, is no noise of a reading"
     return replace(left, unexplained=True, where="time"), why
 

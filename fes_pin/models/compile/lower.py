@@ -77,12 +77,20 @@ class Staged:
 
 
 def lowered(function: ca.Function, linkage: str = "internal", known: Sequence[Container[int]] = ()) -> Staged:
-    """`function` in LLVM assembly.
+    """`function` in LLVM assembly; its inputs and outputs are the nonzeros of CasADi's, a vector of lanes each.
 
     Parameters
     ----------
+    linkage
+        "internal", or "external" of what is called from outside the module.
     known
-        For each earlier stage, the inputs that do not change between it and the stages that follow.
+        For each earlier stage, numbers of the inputs that do not change from it to the last; by default there is one
+        stage alone.
+
+    Raises
+    ------
+    NotImplementedError
+        For an operation of CasADi that has no lowering.
     """
     schedule, last = _Schedule(function, known), len(known)
     parts, texts, declared = dict[int, str](), [], dict[str, str]()
