@@ -122,7 +122,7 @@ class _Work:
             found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
         if not self.was_stopped and (late_s := faults.late_by(found)):
             found = likelier(self._logged(study, replace(found.log, effort_late_s=late_s)), found)
-        return with_words(faults.with_doubt_of_lateness(found))
+        return with_words(faults.with_doubt_of_timing(found))
 
     def _logged(self, study: Study, log: Log) -> Diagnosis:
         """The diagnosis of a study with what a log did to its trials undone."""

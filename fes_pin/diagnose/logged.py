@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -19,9 +18,9 @@ from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_noise
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.lateness import lateness_of, slopes_by_lateness, words_of_lateness
+from fes_pin.identify.lateness import lateness_of, words_of_lateness
 from fes_pin.identify.levels import PARAMETER_PRICE
-from fes_pin.identify.scatter import with_honest_intervals
+from fes_pin.identify.timing import with_doubt_of_timing
 from fes_pin.identify.turns import maximum_from
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
@@ -88,16 +87,10 @@ class LogFaults:
                 late = late if price < extended.price else None
         return late.late_s if late is not None else 0.0
 
-    def with_doubt_of_lateness(self, diagnosis: Diagnosis) -> Diagnosis:
-        """The diagnosis with intervals that hold what is not known of when within a row an effort acts.
-
-        No log says it. Efforts are not moved: an error of form, as of friction by bristles, would take them along.
-        """
+    def with_doubt_of_timing(self, diagnosis: Diagnosis) -> Diagnosis:
+        """The diagnosis with intervals that hold what is not known of when within a row a reading was taken."""
         row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
-        slopes = self._told(lambda: slopes_by_lateness(fitted, row_s), None)
-        if slopes is None:
-            return diagnosis
-        wide = with_honest_intervals(fitted, slopes, row_s / math.sqrt(12.0))
+        wide = self._told(lambda: with_doubt_of_timing(fitted, row_s), fitted)
         causes = tuple(replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)
         return replace(diagnosis, extended=wide, causes=causes)
 

@@ -10,14 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fes_pin.data.log import Log
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import CERTAIN_GAIN
-from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximum_from
 from fes_pin.workers import in_parallel
 
@@ -27,8 +25,6 @@ MOST_ROWS = 2.0
 """Rows of a log by which an effort may be late: one that it is held when it is written down, and one until the next."""
 MOST_EARLY_ROWS = 0.5
 """Rows by which it may act later than written: what is more is a lag, see `SensorLag.smallest`."""
-SLOPE_STEP = 0.05
-"""Step of the slope by lateness, in rows: efforts are held over them, and what is moved by less is in proportion."""
 
 
 @dataclass(frozen=True)
@@ -65,22 +61,6 @@ def lateness_of(fitted: Fit, row_s: float, or_early: bool = False) -> Lateness |
     bounds = (0.0, MOST_ROWS * row_s) if first > 0.0 else (-MOST_EARLY_ROWS * row_s, 0.0)
     found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 0.02 * row_s})
     return Lateness(float(found.x), float(found.fun))
-
-
-def slopes_by_lateness(fitted: Fit, row_s: float) -> list[np.ndarray]:
-    """By how much the residual of each trial falls as efforts are moved, shape (m,), per second that they are late.
-
-    `fitted` and `row_s` are those of `lateness_of`; parameters and what is random stay as they are.
-    """
-    assert fitted.doubt is not None
-    step_s, doubt = SLOPE_STEP * row_s, fitted.doubt
-
-    def residuals(late_s: float) -> list[np.ndarray]:
-        problem = LikelihoodProblem(fitted.model, _moved(fitted, late_s), doubt)
-        return [p.residual for p in problem.linearize(fitted.values, fitted.unknowns)]
-
-    later, earlier = in_parallel(residuals, (step_s, -step_s))
-    return [(b - a) / (2.0 * step_s) for a, b in zip(later, earlier, strict=True)]
 
 
 def _moved(fitted: Fit, late_s: float) -> list[Trial]:

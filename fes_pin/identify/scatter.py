@@ -11,7 +11,6 @@ difference chi-square test statistic for moment structure analysis, Psychometrik
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -26,19 +25,9 @@ PIECES = 40
 as long as they can be."""
 
 
-def with_honest_intervals(fitted: Fit, beside: Sequence[np.ndarray] | None = None, known: float = math.inf) -> Fit:
-    """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter.
-
-    Parameters
-    ----------
-    beside
-        Of each trial, the sensitivity of its predictions to something else that was found from them, shape (m,) as the
-        residual: its doubt is theirs as well.
-    known
-        Standard deviation of that something, as known before.
-    """
-    size = len(fitted.free)
-    return replace(fitted, covariance=widened(*_told(fitted, beside, known))[:size, :size])
+def with_honest_intervals(fitted: Fit) -> Fit:
+    """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter."""
+    return replace(fitted, covariance=widened(*_told(fitted)))
 
 
 def excess_scatter(larger: Fit, smaller: Fit) -> float:
@@ -54,30 +43,24 @@ def excess_scatter(larger: Fit, smaller: Fit) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(own, hermitian=True) @ wide)) / len(more))
 
 
-def _told(
-    fitted: Fit, beside: Sequence[np.ndarray] | None = None, known: float = math.inf
-) -> tuple[np.ndarray, np.ndarray]:
-    """The inverse information of a fit that has ended, and the slopes of the log-likelihood of its pieces.
-
-    What is beside its parameters comes last.
-    """
+def _told(fitted: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """The inverse information of a fit that has ended, and the slopes of the log-likelihood of its pieces."""
     parts, free = at_rest(fitted.parts), np.array([n not in fitted.at_bound for n in fitted.free])
-    if beside is not None:
-        both = zip(parts, beside, strict=True)
-        parts, free = [replace(p, jacobian=np.column_stack([p.jacobian, c])) for p, c in both], np.append(free, True)
+    return covariance_of(normal_equations(parts).hessian, free), scores_of(parts)
+
+
+def scores_of(parts: Sequence[Linearized]) -> np.ndarray:
+    """The slopes of the log-likelihood of `PIECES` pieces of some trials, shape (pieces, parameters)."""
     lengths = [len(p.residual) for p in parts]
     shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
-    scores = [
+    pieces = [
         piece
         for part, count in zip(parts, shares, strict=True)
         for piece in np.add.reduceat(
             part.jacobian * part.residual[:, None], np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
         )
     ]
-    hessian = normal_equations(parts).hessian
-    if beside is not None:
-        hessian[-1, -1] += 1.0 / known**2
-    return covariance_of(hessian, free), np.array(scores)
+    return np.array(pieces)
 
 
 def at_rest(parts: Sequence[Linearized]) -> list[Linearized]:

@@ -1,7 +1,6 @@
 """Efforts that were written down after they acted, as loggers do that ask a controller less often than it works."""
 
 import json
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,13 +14,8 @@ from fes_pin.data.table import read_csv
 from fes_pin.data.trial import Trial, trial_csv
 from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.record import diagnosis_files
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.ahead import foretell
-from fes_pin.identify.lateness import slopes_by_lateness
-from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.identify.stored import load_log
-from fes_pin.models.nominal import nominal_model
 
 ROWS = (2, 3, 4)
 """Samples of the controller between two rows of the log, at random."""
@@ -91,24 +85,6 @@ def test_an_effort_that_acts_later_within_its_row_is_no_cause(tmp_path):
     assert any("ms before it acted, and was moved" in said for said in diagnosis.warnings)
     fitted = diagnosis.extended
     assert abs(fitted.values["inertia_scale"] - 1.0) < 3.0 * fitted.std("inertia_scale")
-
-
-def test_intervals_hold_the_doubt_of_when_within_its_row_an_effort_acts(tmp_path):
-    """No log says it, and the inertia and damping that are likeliest go with it."""
-    study = read_study(draw((), 0.3, 1151005, tmp_path).study)
-    row_s = study.trials[0].dt
-    fitted = LikelihoodFits(nominal_model(study), study.trials, []).nominal()
-    slopes, known = slopes_by_lateness(fitted, row_s), row_s / math.sqrt(12.0)
-    plain, wide, sure = (with_honest_intervals(fitted, *more) for more in ((), (slopes, known), (slopes, 1e-12)))
-    ratios = {n: wide.std(n) / plain.std(n) for n in fitted.free}
-    assert min(ratios.values()) > 0.999 and max(ratios.values()) > 1.1, ratios
-    assert all(sure.std(n) == pytest.approx(plain.std(n), rel=1e-6) for n in fitted.free)
-    told = -2.0 * sum(float(p.residual @ s) for p, s in zip(fitted.parts, slopes, strict=True))
-    late_s, costs = 0.05 * row_s, []
-    for sign in (1.0, -1.0):
-        moved = [advanced(t, "effort", sign * late_s) for t in study.trials]
-        costs.append(LikelihoodProblem(fitted.model, moved, fitted.doubt).cost(fitted.values, fitted.unknowns))
-    assert told == pytest.approx((costs[0] - costs[1]) / (2.0 * late_s), rel=0.02)
 
 
 def test_a_reading_that_is_late_stays_so(tmp_path):

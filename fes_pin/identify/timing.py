@@ -1,0 +1,71 @@
+"""When within its row a reading was taken, and an effort began to act: what no log says, and intervals must hold.
+
+A controller reads, and asks for an effort some time later; a simulation in steps lets it act before. With d the time
+by which a reading is early, and v the velocity of what is read,
+
+    y = h(x) + d v,   |d| <= row / 2, of deviation row / sqrt(12) before anything is measured.
+
+The data tell d, but an error of form, as of friction by bristles, looks like one. So estimates stay where d is 0, and
+intervals hold the mean square of what d moves them by, as the data have it beside what was known before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fes_pin.identify.covariance import covariance_of, widened
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.problem import Linearized, normal_equations, whitened_sse
+from fes_pin.identify.scatter import at_rest, scores_of
+from fes_pin.models.parameters import parameter
+from fes_pin.models.stage import Effect, Stage
+
+STEP = 0.05
+"""Of a row: half the difference that the slope of the cost is. Readings are smooth over a row."""
+
+
+@dataclass(frozen=True)
+class EarlyReading(Effect):
+    """A reading that is early: of no library, as nobody is to be told."""
+
+    early_s: float = parameter(0.0, unit="s", null=0.0)
+
+    name, stage, signal, rigs = "early_reading", Stage.SENSOR, "reading", ("joint",)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value + self.early_s * s.x.v
+
+
+EARLY = "early_reading.early_s"
+
+
+def with_doubt_of_timing(fitted: Fit, row_s: float) -> Fit:
+    """A fit by the likelihood, of a joint that an effort drives, with intervals that hold when a reading was taken.
+
+    Parameters
+    ----------
+    row_s
+        Time from one row of the log to the next.
+    """
+    at = tuple(_linearized(fitted, early_s) for early_s in (-STEP * row_s, 0.0, STEP * row_s))
+    slope = 0.5 * (whitened_sse(at[2]) - whitened_sse(at[0])) / (2.0 * STEP * row_s)  # of half the cost
+    parts, free = at_rest(at[1]), np.array([*(n not in fitted.at_bound for n in fitted.free), True])
+    hessian = normal_equations(parts).hessian
+    hessian[-1, -1] += 12.0 / row_s**2
+    known = covariance_of(hessian, free)
+    moved = known[:, -1] * min(abs(slope), 0.5 * row_s / known[-1, -1])
+    wide = widened(known, scores_of(parts)) + np.outer(moved, moved)
+    return replace(fitted, covariance=wide[:-1, :-1])
+
+
+def _linearized(fitted: Fit, early_s: float) -> Sequence[Linearized]:
+    """The trials of a fit, with readings that are so early, and sensitivities to that behind those of the fit."""
+    assert fitted.doubt is not None
+    free = (*fitted.free, EARLY)
+    problem = LikelihoodProblem(fitted.model + EarlyReading(), fitted.trials, fitted.doubt, free)
+    return problem.linearize({**fitted.values, EARLY: early_s}, fitted.unknowns)

@@ -1,0 +1,71 @@
+"""When within its row a reading was taken: what no log says, and intervals hold."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from driven_rigs.draw import Base, draw, urdf
+
+from fes_pin.data.study import Study, read_study
+from fes_pin.data.trial import Trial
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.identify.scatter import with_honest_intervals
+from fes_pin.identify.timing import with_doubt_of_timing
+from fes_pin.models.nominal import nominal_model
+
+MASS, DAMPING = 12.0, 30.0
+DT = 0.004
+AGE = 0.125
+"""Of a row: how old a reading is when the effort that answers it begins to act."""
+
+
+def held_slide(seed: int) -> Trial:
+    """A slide that a controller moves, solved exactly; a log writes each reading down beside its answer."""
+    rng = np.random.default_rng([4050000, seed])
+    wanted = 0.2 * np.sin(2.0 * np.pi * np.cumsum(np.linspace(0.2, 2.0, 2500)) * DT)
+    q = v = push = before = asked = 0.0
+    effort, position = np.empty_like(wanted), np.empty_like(wanted)
+    for k, w in enumerate(wanted):
+        position[k] = q + 5e-5 * rng.standard_normal()
+        effort[k] = 2000.0 * (w - position[k]) - 60.0 * (position[k] - before) / DT
+        before = position[k]
+        push = 0.96 * push + 0.3 * rng.standard_normal()
+        for u, share in ((asked, AGE), (effort[k], 1.0 - AGE)):
+            held, kept = (u + push) / DAMPING, np.exp(-DAMPING / MASS * share * DT)
+            q, v = q + held * share * DT + (v - held) * (1.0 - kept) * MASS / DAMPING, held + (v - held) * kept
+        asked = effort[k]
+    return Trial("00", "motion", {"effort": effort, "position": position}, np.arange(len(wanted)) * DT)
+
+
+def fitted_slide(seed: int, folder: Path):
+    rig = folder / "rig.urdf"
+    rig.write_text(urdf(Base("slide", MASS, DAMPING, 0.0, 0.25, 15.0)))
+    start = {"inertia_scale": 0.8, "damping": 1.5 * DAMPING}
+    study = Study("slide", "joint", {"gravity_scale": 0.0}, start, (held_slide(seed),), folder, {"urdf": rig})
+    return LikelihoodFits(nominal_model(study), study.trials, []).nominal()
+
+
+def test_intervals_hold_the_truth_where_an_effort_acts_after_its_row_has_begun(tmp_path):
+    """An eighth of a row, which no log says, moves mass and damping by several deviations."""
+    fits = [fitted_slide(seed, tmp_path) for seed in range(6)]
+    truth = {"inertia_scale": 1.0, "damping": DAMPING}
+    plain, doubtful = (
+        [[(f.values[n] - truth[n]) / f.std(n) for n in truth] for f in some]
+        for some in ([with_honest_intervals(f) for f in fits], [with_doubt_of_timing(f, DT) for f in fits])
+    )
+    assert np.sqrt(np.mean(np.square(plain), axis=0)).max() > 2.5, plain
+    assert np.sqrt(np.mean(np.square(doubtful), axis=0)).max() < 1.5, doubtful
+    assert np.abs(doubtful).max() < 3.0, doubtful
+
+
+def test_where_time_is_known_nothing_is_doubted(tmp_path):
+    study = read_study(draw((), 0.3, 1151005, tmp_path).study)
+    fitted = LikelihoodFits(nominal_model(study), study.trials, []).nominal()
+    plain, doubtful, sure = (
+        with_honest_intervals(fitted),
+        with_doubt_of_timing(fitted, study.trials[0].dt),
+        with_doubt_of_timing(fitted, 1e-9),
+    )
+    ratios = {n: doubtful.std(n) / plain.std(n) for n in fitted.free}
+    assert min(ratios.values()) > 0.999 and max(ratios.values()) > 1.1, ratios
+    assert all(sure.std(n) == pytest.approx(plain.std(n), rel=1e-3) for n in fitted.free)
