@@ -94,10 +94,11 @@ def contrast(
 
         searched = contrast_with_conditions(nominal, trials, run)
         if (late_s := late_in_groups(searched)) is not None:
-            moved = {g: [Log(effort_late_s=late_s).applied(t) for t in many] for g, many in trials.items()}
+            log = Log(effort_late_s=late_s)
+            moved = {g: [log.applied(t) for t in many] for g, many in trials.items()}
             timed = contrast_with_conditions(nominal, moved, run)
             if is_cheaper(timed, searched):
-                searched, said = timed, [words_of_lateness(late_s), *said]
+                searched, said = timed, [words_of_lateness(log), *said]
         tell(0.95, "what is left")
         left, words = left_in_groups(searched.fits, searched.found.best, seed)
     said += [*words, *_smoothed(searched.found.best, trials)]

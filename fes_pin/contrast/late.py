@@ -43,7 +43,7 @@ def _late_in(fits: Fits, best: Grouped, group: str) -> float | None:
     assert part.doubt is not None
     own = maximise(LikelihoodProblem(part.model, part.trials, part.doubt), part.values, part.unknowns)
     late = lateness_of(own, min(t.dt for t in part.trials))
-    return late.late_s if late is not None else None
+    return late.log.effort_late_s if late is not None else None
 
 
 def is_cheaper(timed: ContrastSearched, recorded: ContrastSearched) -> bool:

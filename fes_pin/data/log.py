@@ -21,6 +21,9 @@ class Log:
     ----------
     effort_late_s
         How long after it acted the effort is written down, s; negative of one that acts later within its row.
+    effort_over_s
+        For how long after each row what a controller asked for at times that no row holds acted, s: of the effort that
+        acts in a row, its mean over so long, by a cubic spline through all rows. 0 of an effort that is held.
     effort_noise
         Standard deviation of the white noise that the effort is recorded with, in its unit.
     low_pass_hz
@@ -28,6 +31,7 @@ class Log:
     """
 
     effort_late_s: float = 0.0
+    effort_over_s: float = 0.0
     effort_noise: float = 0.0
     low_pass_hz: float | None = None
 
@@ -37,6 +41,8 @@ class Log:
             trial = quiet(trial, answered(trial), self.effort_noise)
         if EFFORT in trial and self.effort_late_s:
             trial = advanced(trial, EFFORT, self.effort_late_s)
+        if EFFORT in trial and self.effort_over_s:
+            trial = followed(trial, EFFORT, self.effort_over_s)
         return replace(trial, low_pass_hz=self.low_pass_hz) if self.low_pass_hz else trial
 
 
@@ -62,3 +68,16 @@ def advanced(trial: Trial, column: str, by_s: float) -> Trial:
     whole = np.interp(at, ends, np.concatenate([[0.0], np.cumsum(held * dt)]))
     whole += held[-1] * np.maximum(at - ends[-1], 0.0) + held[0] * np.minimum(at, 0.0)
     return trial.with_columns(**{column: np.diff(whole) / dt})
+
+
+def followed(trial: Trial, column: str, over_s: float) -> Trial:
+    """The trial with a column as it is on average over so long from each sample on, by a cubic spline through all.
+
+    After the last sample it is as it was there.
+    """
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - for rigs that a controller drives
+
+    time, values = trial.time - trial.time[0], trial[column]
+    ends = np.append(time, [time[-1] + trial.dt, time[-1] + 2.0 * trial.dt])
+    total = CubicSpline(ends, np.append(values, [values[-1]] * 2)).antiderivative()
+    return trial.with_columns(**{column: (total(time + over_s) - total(time)) / over_s})

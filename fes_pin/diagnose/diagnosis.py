@@ -120,8 +120,8 @@ class _Work:
             return found
         if not self.was_stopped and (noise := faults.noise_beside(found)) != found.log.effort_noise:
             found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
-        if not self.was_stopped and (late_s := faults.late_by(found)):
-            found = likelier(self._logged(study, replace(found.log, effort_late_s=late_s)), found)
+        if not self.was_stopped and (log := faults.with_lateness(found)) != found.log:
+            found = likelier(self._logged(study, log), found)
         return with_words(faults.with_doubt_of_timing(found))
 
     def _logged(self, study: Study, log: Log) -> Diagnosis:

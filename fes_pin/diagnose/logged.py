@@ -11,14 +11,14 @@ from typing import TypeVar
 import numpy as np
 
 from fes_pin.data.answered import ControllerAnswer
-from fes_pin.data.log import answered
+from fes_pin.data.log import Log, answered
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.rivals import estimates
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_noise
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.lateness import lateness_of, words_of_lateness
+from fes_pin.identify.lateness import Lateness, lateness_of, words_of_lateness
 from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.timing import with_doubt_of_timing
 from fes_pin.identify.turns import maximum_from
@@ -67,15 +67,18 @@ class LogFaults:
     def _noise(self, fitted: Fit) -> float:
         return effort_noise_of(fitted, self.trials, self.answers, self.prepared)
 
-    def late_by(self, diagnosis: Diagnosis) -> float:
-        """How late the efforts were written down, s; 0 where they were not, or there is no time to tell.
+    def with_lateness(self, diagnosis: Diagnosis) -> Log:
+        """The log of a diagnosis with how late its efforts were; as it is if they were not, or no time is left to tell.
 
         What was found may stand for it: the nominal model is asked where something is left beside, or where it is
         cheaper with efforts in time than all that was found.
         """
-        return self._told(lambda: self._late_by(diagnosis), 0.0)
+        late, log = self._told(lambda: self._lateness(diagnosis), None), diagnosis.log
+        if late is None:
+            return log
+        return replace(log, effort_late_s=late.log.effort_late_s, effort_over_s=late.log.effort_over_s)
 
-    def _late_by(self, diagnosis: Diagnosis) -> float:
+    def _lateness(self, diagnosis: Diagnosis) -> Lateness | None:
         nominal, extended = diagnosis.nominal, diagnosis.extended
         row_s = min(t.dt for t in extended.trials)
         as_logged = row_s < 1.5 * min(t.dt for t in self.trials)
@@ -85,7 +88,7 @@ class LogFaults:
             if late is not None and not diagnosis.remainder.unexplained:
                 price = late.cost + PARAMETER_PRICE * (nominal.degrees + 1)
                 late = late if price < extended.price else None
-        return late.late_s if late is not None else 0.0
+        return late
 
     def with_doubt_of_timing(self, diagnosis: Diagnosis) -> Diagnosis:
         """The diagnosis with intervals that hold what is not known of when within a row a reading was taken."""
@@ -111,8 +114,8 @@ def likelier(other: Diagnosis, one: Diagnosis) -> Diagnosis:
 def with_words(diagnosis: Diagnosis) -> Diagnosis:
     """The diagnosis with what is to be said of efforts that are not as they were recorded."""
     log, said = diagnosis.log, []
-    if log.effort_late_s:
-        said.append(words_of_lateness(log.effort_late_s))
+    if log.effort_late_s or log.effort_over_s:
+        said.append(words_of_lateness(log))
     if log.effort_noise:
         said.append(words_of_noise(log.effort_noise, diagnosis.model.rig.units()["effort"]))
     return replace(diagnosis, warnings=(*said, *diagnosis.warnings))

@@ -23,6 +23,7 @@ LOG_KEY = "log"
 _PARTS = ("white", "std", "time")
 _LOG = {
     "effort_late_s": NumberKey("s", required=False),
+    "effort_over_s": NumberKey("s", lower=0.0, required=False),
     "effort_noise": NumberKey("N m or N", lower=0.0, required=False),
     "low_pass_hz": NumberKey("Hz", lower=0.0, required=False),
 }
