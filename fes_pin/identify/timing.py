@@ -11,6 +11,7 @@ intervals hold the mean square of what d moves them by, as the data have it besi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -47,14 +48,22 @@ EARLY = "early_reading.early_s"
 def with_doubt_of_timing(fitted: Fit, row_s: float) -> Fit:
     """A fit by the likelihood, of a joint that an effort drives, with intervals that hold when a reading was taken.
 
+    As it is where nothing that is read is a place with a velocity `v`, as of a rig of one's own, or where a reading
+    that is a little earlier cannot be foretold.
+
     Parameters
     ----------
     row_s
         Time from one row of the log to the next.
     """
-    at = tuple(_linearized(fitted, early_s) for early_s in (-STEP * row_s, 0.0, STEP * row_s))
-    slope = 0.5 * (whitened_sse(at[2]) - whitened_sse(at[0])) / (2.0 * STEP * row_s)  # of half the cost
-    parts, free = at_rest(at[1]), np.array([*(n not in fitted.at_bound for n in fitted.free), True])
+    rig = fitted.model.rig
+    if not (rig.takes(EarlyReading) and all("v" in rig.states(t.kind) for t in fitted.trials)):
+        return fitted
+    before, now, after = (_linearized(fitted, early_s) for early_s in (-STEP * row_s, 0.0, STEP * row_s))
+    slope = 0.5 * (whitened_sse(after) - whitened_sse(before)) / (2.0 * STEP * row_s)  # of half the cost
+    if not math.isfinite(slope):
+        return fitted
+    parts, free = at_rest(now), np.array([*(n not in fitted.at_bound for n in fitted.free), True])
     hessian = normal_equations(parts).hessian
     hessian[-1, -1] += 12.0 / row_s**2
     known = covariance_of(hessian, free)
