@@ -9,16 +9,19 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from driven_rigs.__main__ import deviations
 from going_on import results_of
 
 import fes_pin as fp
 from fes_pin.diagnose.misread import NAME as MISREAD
+from fes_pin.identify.levels import CONFIDENCE_95
 from fes_pin.models.catalogue import shipped
 
 
 def judged(study: Path, number: int) -> dict[str, Any]:
     """Diagnose a study, and say how the answer compares with the truth."""
-    truth = json.loads((study.parent / "answers" / study.name / "answer.json").read_text())["causes"]
+    answer = json.loads((study.parent / "answers" / study.name / "answer.json").read_text())
+    truth = answer["causes"]
     began = time.process_time()
     found = fp.diagnose(fp.read_study(study))
     seconds = time.process_time() - began
@@ -30,8 +33,16 @@ def judged(study: Path, number: int) -> dict[str, Any]:
         "named": [[c.name, *c.equivalents] for c in found.causes],
         "gain": {c.name: [c.gain_held_out.percent, c.gain_held_out.low, c.gain_held_out.high] for c in found.causes},
         "left": found.remainder.unexplained,
+        "deviations": deviations(found, numbers_of(answer)),
         "seconds": round(seconds, 1),
     }
+
+
+def numbers_of(answer: dict[str, Any]) -> dict[str, float]:
+    """Inertia and damping of a driven rig, as a model has them; nothing where the answer does not say."""
+    if "true_inertia_scale" not in answer:
+        return {}
+    return {"inertia_scale": answer["true_inertia_scale"], "damping": answer["parameters"]["b"]}
 
 
 def table(rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -48,6 +59,10 @@ def table(rows: Sequence[dict[str, Any]]) -> list[str]:
     if outside:
         left = sum(r["left"] for r in outside)
         lines.append(f"outside the library: {left} of {len(outside)} with a remainder")
+    off = [abs(d) for r in rows if _exact(r) for d in r["deviations"].values()]
+    if off:
+        covered = 100.0 * sum(d < CONFIDENCE_95 for d in off) / len(off)
+        lines.append(f"95 % intervals of inertia and damping cover {covered:.1f} % of {len(off)}")
     seconds = sorted(r["seconds"] for r in rows)
     lines.append(f"processor time: {seconds[len(seconds) // 2]:.1f} s in the median, {seconds[-1]:.1f} s at most")
     return lines + [

@@ -73,7 +73,7 @@ def deviations(found: Diagnosis, truth: dict[str, float]) -> dict[str, float]:
     return {
         n: (fitted.values[n] - truth[n]) / fitted.std(n)
         for n in ("inertia_scale", "damping")
-        if n in fitted.free and math.isfinite(fitted.std(n)) and fitted.std(n) > 0.0
+        if n in truth and n in fitted.free and math.isfinite(fitted.std(n)) and fitted.std(n) > 0.0
     }
 
 
