@@ -40,10 +40,13 @@ class ControllerAnswer:
         Shape (n,), the effort as it is foretold from the readings.
     left_std
         Shape (n,), standard deviation of what is left of the effort, over the stretch about each sample.
+    gains
+        Shape (n, readings, 2), by how much it changes with each reading as it is then, and as it was a sample before.
     """
 
     values: np.ndarray
     left_std: np.ndarray
+    gains: np.ndarray
 
     def quieted(self, effort: np.ndarray, noise: float) -> np.ndarray:
         """The effort that acted, shape (n,), as far as a recorded one with noise of this standard deviation tells.
@@ -66,32 +69,41 @@ def answer_of(effort: np.ndarray, readings: Sequence[np.ndarray]) -> ControllerA
     readings
         Each of shape (n,); NaN where nothing was read.
     """
-    columns = _columns(readings, len(effort))
+    columns, moved = _columns(readings, len(effort))
     values, left = effort.copy(), np.zeros(len(effort))
+    gains = np.zeros((len(effort), *moved.shape[1:]))
     for begin, end, triangle in _stretches(np.column_stack([columns, effort])):
         solved = np.linalg.lstsq(triangle[:-1, :-1], triangle[:-1, -1], rcond=1e-9)[0]
         values[begin:end] = columns[begin:end] @ solved
         left[begin:end] = np.sqrt(_missed(triangle) / max(end - begin - columns.shape[1], 1))
-    return ControllerAnswer(values, left)
+        gains[begin:end] = np.tensordot(solved, moved, 1)
+    return ControllerAnswer(values, left, gains)
 
 
-def _columns(readings: Sequence[np.ndarray], n: int) -> np.ndarray:
-    """What an answer is a linear function of, each scaled to a deviation of 1, shape (n, coefficients)."""
+def _columns(readings: Sequence[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:
+    """What an answer is a linear function of, each scaled to a deviation of 1, shape (n, coefficients).
+
+    And by how much each changes with each reading then and a sample before, shape (coefficients, readings, 2).
+    """
     from scipy.signal import lfilter  # noqa: PLC0415 - half a second, for rigs that a controller drives
 
-    out = [np.ones(n), np.linspace(-1.0, 1.0, n)]
-    for reading in readings:
+    out, kept = [np.ones(n), np.linspace(-1.0, 1.0, n)], np.exp(-1.0 / np.array(LOW_PASSES))
+    felt = np.column_stack([np.r_[1.0, 1.0, kept], np.r_[0.0, -1.0, kept * (kept - 1.0)]])
+    moved = [np.zeros((len(out), len(readings), 2))]
+    for k, reading in enumerate(readings):
         seen = np.isfinite(reading)
         if not seen.any():
             continue
         y = np.interp(np.arange(n), np.flatnonzero(seen), reading[seen])
         y = y - y.mean()
         apart = [y, np.diff(y, prepend=y[0])]
-        for samples in LOW_PASSES:
-            kept = np.exp(-1.0 / samples)
-            apart.append(y - lfilter([1.0 - kept], [1.0, -kept], y, zi=[kept * y[0]])[0])
-        out += [one / max(float(one.std()), 1e-300) for one in apart]
-    return np.stack(out, axis=1)
+        apart += [y - lfilter([1.0 - one], [1.0, -one], y, zi=[one * y[0]])[0] for one in kept]
+        sizes = [max(float(one.std()), 1e-300) for one in apart]
+        out += [one / size for one, size in zip(apart, sizes, strict=True)]
+        own = np.zeros((len(apart), len(readings), 2))
+        own[:, k] = felt / np.array(sizes)[:, None]
+        moved.append(own)
+    return np.stack(out, axis=1), np.concatenate(moved)
 
 
 def _stretches(rows: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:

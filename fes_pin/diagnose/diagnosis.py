@@ -19,7 +19,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.driven import driven_diagnosis
 from fes_pin.diagnose.free import judge_free, unfitted
-from fes_pin.diagnose.logged import LogFaults, likelier, with_words
+from fes_pin.diagnose.logged import LogFaults, likelier, with_timing_of, with_words
 from fes_pin.diagnose.long_records import searched_part, thinned
 from fes_pin.diagnose.misread import NAME as MISREAD
 from fes_pin.diagnose.parts import in_parts
@@ -120,9 +120,12 @@ class _Work:
             return found
         if not self.was_stopped and (noise := faults.noise_beside(found)) != found.log.effort_noise:
             found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
-        if not self.was_stopped and (log := faults.with_lateness(found)) != found.log:
-            found = likelier(self._logged(study, log), found)
-        return with_words(faults.with_doubt_of_timing(found))
+        late = None if self.was_stopped else faults.lateness(found)
+        if late is not None:
+            recorded, log = found, with_timing_of(found.log, late.log)
+            found = likelier(self._logged(study, log), recorded)
+            late = None if found is recorded else late
+        return with_words(faults.with_doubt_of_timing(found, late))
 
     def _logged(self, study: Study, log: Log) -> Diagnosis:
         """The diagnosis of a study with what a log did to its trials undone."""

@@ -20,7 +20,7 @@ from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_no
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lateness import Lateness, lateness_of, words_of_lateness
 from fes_pin.identify.levels import PARAMETER_PRICE
-from fes_pin.identify.timing import with_doubt_of_timing
+from fes_pin.identify.timing import with_doubt_of_lateness, with_doubt_of_timing
 from fes_pin.identify.turns import maximum_from
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
@@ -67,16 +67,13 @@ class LogFaults:
     def _noise(self, fitted: Fit) -> float:
         return effort_noise_of(fitted, self.trials, self.answers, self.prepared)
 
-    def with_lateness(self, diagnosis: Diagnosis) -> Log:
-        """The log of a diagnosis with how late its efforts were; as it is if they were not, or no time is left to tell.
+    def lateness(self, diagnosis: Diagnosis) -> Lateness | None:
+        """How late the efforts were written down; None where they were not, or there is no time to tell.
 
         What was found may stand for it: the nominal model is asked where something is left beside, or where it is
         cheaper with efforts in time than all that was found.
         """
-        late, log = self._told(lambda: self._lateness(diagnosis), None), diagnosis.log
-        if late is None:
-            return log
-        return replace(log, effort_late_s=late.log.effort_late_s, effort_over_s=late.log.effort_over_s)
+        return self._told(lambda: self._lateness(diagnosis), None)
 
     def _lateness(self, diagnosis: Diagnosis) -> Lateness | None:
         nominal, extended = diagnosis.nominal, diagnosis.extended
@@ -90,10 +87,25 @@ class LogFaults:
                 late = late if price < extended.price else None
         return late
 
-    def with_doubt_of_timing(self, diagnosis: Diagnosis) -> Diagnosis:
-        """The diagnosis with intervals that hold what is not known of when within a row a reading was taken."""
+    def with_doubt_of_timing(self, diagnosis: Diagnosis, late: Lateness | None) -> Diagnosis:
+        """The diagnosis with intervals that hold what is not known of when a reading was taken, and an effort acted.
+
+        Parameters
+        ----------
+        late
+            How late the efforts are, if they were moved.
+        """
         row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
-        wide = self._told(lambda: with_doubt_of_timing(fitted, row_s), fitted)
+
+        def told() -> Fit:
+            wide = with_doubt_of_timing(fitted, row_s)
+            if late is None:
+                return wide
+            log = with_timing_of(diagnosis.log, late.at_most)
+            moved = self.prepared([log.applied(t) for t in self.trials])
+            return with_doubt_of_lateness(wide, maximum_from(fitted, moved))
+
+        wide = self._told(told, fitted)
         causes = tuple(replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)
         return replace(diagnosis, extended=wide, causes=causes)
 
@@ -104,6 +116,11 @@ class LogFaults:
                 return ask()
         except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
             return otherwise
+
+
+def with_timing_of(log: Log, timed: Log) -> Log:
+    """A log with efforts that acted when another says."""
+    return replace(log, effort_late_s=timed.effort_late_s, effort_over_s=timed.effort_over_s)
 
 
 def likelier(other: Diagnosis, one: Diagnosis) -> Diagnosis:

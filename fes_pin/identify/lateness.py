@@ -17,6 +17,7 @@ from scipy.optimize import minimize_scalar
 from fes_pin.data.log import Log
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import CERTAIN_GAIN
+from fes_pin.identify.simultaneous import cost_of_answers
 from fes_pin.identify.turns import maximum_from
 from fes_pin.workers import in_parallel
 
@@ -30,10 +31,20 @@ MOST_EARLY_ROWS = 0.5
 
 @dataclass(frozen=True)
 class Lateness:
-    """What a log says of when efforts acted, and the cost of trials with efforts when they did."""
+    """What a log says of when efforts acted, and the cost of trials with efforts when they did.
+
+    Attributes
+    ----------
+    log
+        Half way between when they acted by the innovations alone, and by these and what the efforts answer: one is too
+        early and the other too late, see `identify.simultaneous`.
+    at_most
+        The latter.
+    """
 
     log: Log
     cost: float
+    at_most: Log
 
 
 def lateness_of(fitted: Fit, row_s: float, as_logged: bool = False) -> Lateness | None:
@@ -49,31 +60,39 @@ def lateness_of(fitted: Fit, row_s: float, as_logged: bool = False) -> Lateness 
         Whether rows are as they were logged, and no averages: then efforts may also act later than written, or between
         rows.
     """
-    tried: dict[Log, float] = {}
+    tried: dict[Log, Fit] = {}
 
-    def cost(log: Log) -> float:
+    def moved(log: Log) -> Fit:
         if log not in tried:
-            tried[log] = maximum_from(fitted, [log.applied(t) for t in fitted.trials]).sse
+            tried[log] = maximum_from(fitted, [log.applied(t) for t in fitted.trials])
         return tried[log]
 
+    def lowest(way: _Way, cost: Callable[[Log], float]) -> Log:
+        at, most = way
+        bounds, options = (0.0, most * row_s), {"xatol": 0.02 * row_s}
+        found = minimize_scalar(lambda s: cost(at(float(s))), bounds=bounds, method="bounded", options=options)
+        return at(float(found.x))
+
     ways = _WAYS if as_logged else _WAYS[:1]
-    least = [way(LEAST_ROWS * row_s) for way, _ in ways]
-    begun = in_parallel(cost, least)
+    begun = in_parallel(lambda way: moved(way[0](LEAST_ROWS * row_s)).sse, ways)
     if min(begun) > fitted.sse - CERTAIN_GAIN:
         return None
-    worth = [one for one, at_least in zip(ways, begun, strict=True) if at_least < fitted.sse]
-    for way, most in worth:
-        minimize_scalar(
-            lambda s, way=way: cost(way(float(s))),
-            bounds=(0.0, most * row_s),
-            method="bounded",
-            options={"xatol": 0.02 * row_s},
-        )
-    best = min(tried, key=lambda log: tried[log])
-    return Lateness(best, tried[best])
+    worth = [way for way, sse in zip(ways, begun, strict=True) if sse < fitted.sse]
+    found = {lowest(way, lambda log: moved(log).sse): way for way in worth}
+    best = min(found, key=lambda log: moved(log).sse)
+    answering = lowest(found[best], lambda log: moved(log).sse + cost_of_answers(moved(log), fitted.trials, log))
+    between = _middle(best, answering)
+    return Lateness(between, moved(between).sse, answering)
 
 
-_WAYS: tuple[tuple[Callable[[float], Log], float], ...] = (
+def _middle(one: Log, other: Log) -> Log:
+    """The log half way between two of the same kind."""
+    late_s, over_s = (0.5 * (getattr(one, n) + getattr(other, n)) for n in ("effort_late_s", "effort_over_s"))
+    return Log(effort_late_s=late_s, effort_over_s=over_s)
+
+
+_Way = tuple[Callable[[float], Log], float]
+_WAYS: tuple[_Way, ...] = (
     (lambda late_s: Log(effort_late_s=late_s), MOST_ROWS),
     (lambda early_s: Log(effort_late_s=-early_s), MOST_EARLY_ROWS),
     (lambda late_s: Log(effort_over_s=2.0 * late_s), MOST_EARLY_ROWS),

@@ -78,3 +78,17 @@ def _linearized(fitted: Fit, early_s: float) -> Sequence[Linearized]:
     free = (*fitted.free, EARLY)
     problem = LikelihoodProblem(fitted.model + EarlyReading(), fitted.trials, fitted.doubt, free)
     return problem.linearize({**fitted.values, EARLY: early_s}, fitted.unknowns)
+
+
+def with_doubt_of_lateness(fitted: Fit, at_most: Fit) -> Fit:
+    """A fit with intervals that hold by how much its efforts may be later or earlier: up to what another fit has.
+
+    Anything between has the same chance, and the mean square of what an estimate is off by is a third of the most.
+
+    Parameters
+    ----------
+    at_most
+        The same model, with efforts as late as they can be.
+    """
+    apart = np.array([at_most.values[n] - fitted.values[n] for n in fitted.free])
+    return replace(fitted, covariance=fitted.covariance + np.outer(apart, apart) / 3.0)
