@@ -97,15 +97,14 @@ class LogFaults:
         """
         row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
 
-        def told() -> Fit:
-            wide = with_doubt_of_timing(fitted, row_s)
-            if late is None:
-                return wide
-            log = with_timing_of(diagnosis.log, late.at_most)
+        def doubted(wide: Fit, timed: Log) -> Fit:
+            log = with_timing_of(diagnosis.log, timed)
             moved = self.prepared([log.applied(t) for t in self.trials])
             return with_doubt_of_lateness(wide, maximum_from(fitted, moved))
 
-        wide = self._told(told, fitted)
+        wide = known = self._told(lambda: with_doubt_of_timing(fitted, row_s), fitted)
+        if late is not None:
+            wide = self._told(lambda: doubted(known, late.at_most), known)
         causes = tuple(replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)
         return replace(diagnosis, extended=wide, causes=causes)
 

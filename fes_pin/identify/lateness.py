@@ -28,6 +28,8 @@ MOST_ROWS = 2.0
 MOST_EARLY_ROWS = 0.5
 """Rows by which it may act later than written: what is more is a lag, see `SensorLag.smallest`."""
 
+_Way = tuple[Callable[[float], Log], float]
+
 
 @dataclass(frozen=True)
 class Lateness:
@@ -91,7 +93,6 @@ def _middle(one: Log, other: Log) -> Log:
     return Log(effort_late_s=late_s, effort_over_s=over_s)
 
 
-_Way = tuple[Callable[[float], Log], float]
 _WAYS: tuple[_Way, ...] = (
     (lambda late_s: Log(effort_late_s=late_s), MOST_ROWS),
     (lambda early_s: Log(effort_late_s=-early_s), MOST_EARLY_ROWS),

@@ -86,7 +86,8 @@ def _pulsed(trial: Trial, at: np.ndarray, size: float) -> Trial:
 def _felt(change: np.ndarray, at: np.ndarray, gains: np.ndarray) -> np.ndarray:
     """What an effort asks for itself, by way of a reading, from the change of what is foretold by its pulses.
 
-    What is left of pulses before goes on as a parabola, from the last three rows that the pulse cannot have moved.
+    What is left of pulses before goes on as a parabola, from the last three rows that an effort which is held and moved
+    leaves alone; a spline moves the efforts before them by some hundredths of the pulse.
     """
     last = [change[at - k] for k in (2, 3, 4)]
     now = change[at] - np.tensordot([6.0, -8.0, 3.0], last, 1)
