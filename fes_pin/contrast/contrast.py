@@ -171,7 +171,7 @@ def _quieted(study: Study, names: Sequence[str], nominal: Model) -> tuple[Study,
 def _smoothed(best: Grouped, trials: Trials) -> tuple[str, ...]:
     """What is to be said of readings of a driven rig that were smoothed: their noise lasts as long in all groups."""
     group, doubt = next(iter(best.weights.items()))
-    return words_of_reading(doubt if isinstance(doubt, Doubt) else None, best.model.rig, trials[group][0])
+    return words_of_reading(doubt if isinstance(doubt, Doubt) else None, best.model.rig, trials[group])
 
 
 def _common(best: Grouped) -> tuple[str, ...]:

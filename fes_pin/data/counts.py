@@ -45,3 +45,26 @@ def count_of(column: np.ndarray) -> float:
         if len(near) == len(away):
             return count
         reach *= 2.0
+
+
+@np.errstate(all="ignore")
+def hunts(column: np.ndarray) -> np.ndarray:
+    """Samples of a reading that goes to and fro between two neighbouring counts, shape (n,).
+
+    Rounding errs at random where a reading passes counts, and is heard as noise. Where it turns within each of two
+    counts in a row, what is read moves by a whole count and what is measured by less: by how much less no reading says,
+    and the error has the sign of the velocity, as dry friction has. Readings that turn once, as at the end of a swing,
+    or that rest, are not among them.
+
+    Source: Widrow, Kollar and Liu, Statistical theory of quantization, IEEE Trans. Instrumentation and Measurement 45
+    (1996): errors are noise where what is measured is spread over more than a count.
+    """
+    count = count_of(column)
+    if not count:
+        return np.zeros(len(column), dtype=bool)
+    begins = np.flatnonzero(np.diff(column, prepend=np.nan) != 0.0)  # what is missed differs from everything
+    steps = np.diff(column[begins]) / count
+    turns = (np.abs(np.abs(steps[:-1]) - 1.0) < WHOLE) & (np.abs(steps[:-1] + steps[1:]) < WHOLE)
+    turns = np.concatenate([[False], turns, [False]])[: len(begins)]
+    twice = turns & (np.append(turns[1:], False) | np.insert(turns[:-1], 0, False))
+    return np.repeat(twice, np.diff(np.append(begins, len(column))))

@@ -228,7 +228,7 @@ def driven_diagnosis(
         held_out_by=SEPARATE if trials[1] else CROSS_VALIDATED if held else NOTHING,
         left_out={},
         wall_s=0.0,
-        warnings=words_of_reading(best.doubt, best.model.rig, trials[0][0]),
+        warnings=words_of_reading(best.doubt, best.model.rig, trials[0]),
         random=judged.random,
         ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
     )

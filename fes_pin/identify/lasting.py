@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from fes_pin.data.counts import count_of
+from fes_pin.data.counts import count_of, hunts
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import SMALL_SHARE
@@ -77,18 +77,24 @@ def _other(fitted: Fit, sparser: Fit) -> float:
 __all__ = ["with_new_noise"]
 
 
-def words_of_reading(doubt: Doubt | None, rig: Rig, trial: Trial) -> tuple[str, ...]:
-    """What is to be said of a reading whose noise lasts over samples, or whose counts are intervals.
+def words_of_reading(doubt: Doubt | None, rig: Rig, trials: Sequence[Trial]) -> tuple[str, ...]:
+    """What is to be said of a reading that hunts, whose noise lasts over samples, or whose counts are intervals.
 
-    Neighbours that stand on one count err alike; else a record was smoothed.
+    Neighbours that stand on one count err alike; else a record was smoothed. Readings that hunt are followed, and not
+    judged (`hunts`).
     """
-    name = rig.output(trial.kind)
-    count = count_of(trial[name]) if name in trial.columns else 0.0
+    name = rig.output(trials[0].kind)
+    columns = [t[name] for t in trials if name in t.columns]
+    count = max(map(count_of, columns), default=0.0)
+    said = []
+    hunting = sum(int(hunts(c).sum()) for c in columns) / max(sum(map(len, columns)), 1)
+    if hunting > SMALL_SHARE:
+        said = [f"{name} goes to and fro between two counts in {100 * hunting:.0f} % of its samples: they judge nothing"]
     if doubt is not None and doubt.in_counts and count:
-        return (f"{name} is read in counts of {count:.2g}, and each was taken for the interval that it stands for",)
-    if doubt is None or not doubt.lasts_s:
-        return ()
-    step = round(doubt.lasts_s / trial.dt)
-    said = f"is read in counts of {count:.2g}" if count else "was smoothed or interpolated before it was stored"
-    lasts = f"its noise lasts {doubt.lasts_s:.2g} s, and one sample in {step} counts as a reading"
-    return (f"{name} {said}: {lasts}",)
+        said.append(f"{name} is read in counts of {count:.2g}, and each was taken for the interval that it stands for")
+    elif doubt is not None and doubt.lasts_s:
+        step = round(doubt.lasts_s / trials[0].dt)
+        read = f"is read in counts of {count:.2g}" if count else "was smoothed or interpolated before it was stored"
+        lasts = f"its noise lasts {doubt.lasts_s:.2g} s, and one sample in {step} counts as a reading"
+        said.append(f"{name} {read}: {lasts}")
+    return tuple(said)

@@ -23,11 +23,12 @@ class ForetoldTrial:
     outputs
         The measured columns, in the order of the arrays.
     values
-        Shape (n, outputs): measured minus foretold one sample ahead; 0 where nothing was measured.
+        Shape (n, outputs): measured minus foretold one sample ahead; 0 where that is not judged.
     variances
         Shape (n, outputs).
     seen
-        Shape (n, outputs): True where something was measured.
+        Shape (n, outputs): True where something was measured that is judged: a reading that hunts between two counts is
+        only followed, see `fes_pin.data.counts.hunts`.
     sensitivities
         Shape (n, outputs, columns): derivatives of `values`, for gains as they are.
     half_counts

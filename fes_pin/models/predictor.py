@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fes_pin.data.counts import count_of
+from fes_pin.data.counts import count_of, hunts
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile.layout import WIDTH, doubt_constants, half_counts
 from fes_pin.models.compile.program import compiled_program
@@ -211,14 +211,16 @@ class _Block:
         )
         self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
         self.seen = np.zeros((self.count, len(self.outputs), WIDTH), dtype=bool)
+        self.judged = self.seen.copy()
         self.measured = np.zeros((self.count, len(self.outputs), WIDTH))
         self.repeated = np.ones((self.count, len(self.outputs), WIDTH))
         for lane, trial in enumerate(self.trials):
-            judged = rig.follows(trial) & are_news(trial, lasts_s)
+            followed = rig.follows(trial) & are_news(trial, lasts_s)
             for k, name in enumerate(self.outputs):
                 column = trial[name]
-                finite = np.isfinite(column) & judged
+                finite = np.isfinite(column) & followed
                 self.seen[: len(trial), k, lane] = finite
+                self.judged[: len(trial), k, lane] = finite & ~hunts(column)
                 self.measured[: len(trial), k, lane] = np.where(finite, column, 0.0)
                 self.repeated[: len(trial), k, lane] = repeated(column)
         self._given: tuple[tuple[int, ...], np.ndarray] | None = None
@@ -253,7 +255,7 @@ class _Block:
         k, by_lane = len(self.outputs), np.ascontiguousarray(np.moveaxis(s, -1, 0))
         for lane, trial in enumerate(self.trials):
             n = len(trial)
-            seen = self.seen[:n, :, lane]
+            seen = self.judged[:n, :, lane]
             own = by_lane[lane, :n]
             if self.places == list(range(width)):
                 sensitivities = own
