@@ -67,7 +67,7 @@ LONG = {
         "[2230006]",
         "test_friction_that_is_there",
         "test_a_hum",
-        "test_a_search_that_numbers_mislead",
+        "test_counts_that_hunt_hide_no_cogging",
     ),
     "driven/test_driven.py": ("test_play_before", "test_what_no_cause", "adequate[12]", "no_cause[14"),
     "driven/test_evidence_of_held_out_trials.py": ("test_one_trial_unlike_the_others", "test_a_stop_that_one_of"),

@@ -56,24 +56,20 @@ def p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> fl
     the spread between trials. A repeat that differs by more than its noise is no change.
     """
     degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
-    noise = noise_p_value(fits, family, larger, smaller)
+    noise = noise_p_value(family, larger, smaller)
     if not noise < CLAIM_LEVEL:
         return noise
     return max(noise, family.adjusted(between_trials(fits, larger, fits.weighed_as(smaller, larger), degrees)))
 
 
-def noise_p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> float:
+def noise_p_value(family: Family, larger: Grouped, smaller: Grouped) -> float:
     """Family-wise p-value against the noise alone: of a cause of all groups, which claims no change.
 
-    Gains count as far as pieces of the data agree on them. Of readings in counts also where these are intervals: how
-    counts stand or hunt is no cause of all groups either.
+    Gains count as far as pieces of the data agree on them.
     """
     degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
     scatter = excess_scatter(larger.fit, smaller.fit)
-    p = family.p_value((smaller.fit.sse - larger.fit.sse) / scatter, degrees)
-    if p < CLAIM_LEVEL and fits.counts.are_there:
-        p = max(p, family.p_value(fits.counts.gained(larger, smaller) / scatter, degrees))
-    return p
+    return family.p_value((smaller.fit.sse - larger.fit.sse) / scatter, degrees)
 
 
 def between_trials(fits: Fits, larger: Grouped, smaller: Grouped, degrees: int) -> float:

@@ -14,7 +14,6 @@ from fes_pin.contrast.promises import Bench, Promise, promises
 from fes_pin.contrast.repeats import Repeats, scatter, without_locals, without_scatter
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.library import Library
-from fes_pin.diagnose.search.likelihood_counts import LikelihoodCounts, in_counts
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.diagnose.search.starts import STARTS, forms_beside, refinements
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
@@ -61,8 +60,6 @@ class Fits:
     ----------
     first_weights
         What is random that fits of driven rigs begin with, too: little, and that of each group fitted alone.
-    counts
-        The same sets with counts as intervals, of driven rigs.
     """
 
     def __init__(
@@ -76,9 +73,6 @@ class Fits:
         self.of_group = {g: Library(self.nominal, many, effects) for g, many in self.trials.items()}
         for one in self.of_group.values():
             one.measured = self.library.measured
-        self.counts: LikelihoodCounts[Grouped] = LikelihoodCounts(
-            nominal.rig, self.every if driven else (), lambda one: one.fit, self._in_counts
-        )
 
     def first(self) -> Grouped:
         """Fit the nominal model to all groups, under the noise that no item of the library could explain."""
@@ -127,13 +121,6 @@ class Fits:
             return self._scattered(Grouped(tuple(items), fitted, weights))
         fitted = by_turns(problem, model.parameters(), unknowns, ROUNDS, LOOK_DRIVEN)
         return Grouped(tuple(items), fitted, {g: p.doubt for g, p in problem.parts.items()})
-
-    def _in_counts(self, one: Grouped, values: Mapping[str, float], other: Grouped | None) -> Grouped:
-        """The maximum of a set where counts are intervals; see `LikelihoodCounts`."""
-        begun = other or one
-        weights = {g: in_counts(w) for g, w in begun.weights.items() if isinstance(w, Doubt)}
-        model = one.model.with_parameters({n: v for n, v in values.items() if n in one.fit.values})
-        return self.converged(model, one.items, weights, begun.fit.unknowns)
 
     def _scattered(self, one: Grouped) -> Grouped:
         """The set again, with the scatter of repeats that is most likely beside it."""

@@ -130,7 +130,7 @@ class ContrastSearch:
     def _common(self, tried: list[Grouped], base: Grouped) -> Grouped | None:
         """The cheapest set with a cause of all groups more, as long as no change stands out: it may hide one."""
         common = [f for f in tried if f.items[-1].group is None]
-        if base.changes or not common or not noise_p_value(self.fits, self.family, common[0], base) < CLAIM_LEVEL:
+        if base.changes or not common or not noise_p_value(self.family, common[0], base) < CLAIM_LEVEL:
             return None
         return common[0]
 
@@ -202,7 +202,7 @@ class ContrastSearch:
     def _worth(self, item: Item, best: Grouped, without: Grouped) -> float:
         """p-value of an item beside all others: of a common cause against the noise, of a change against both."""
         if item.group is None:
-            return noise_p_value(self.fits, self.family, best, without)
+            return noise_p_value(self.family, best, without)
         return p_value(self.fits, self.family, best, without)
 
     def _told(self, nominal: Grouped, best: Grouped) -> ContrastFound:

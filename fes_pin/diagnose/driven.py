@@ -124,7 +124,7 @@ def judge_driven(
         folds = make_folds(found, train, test, again)
         evidence = evidence_of(folds, found, alike) if folds else {}
         gains = gains_of(folds or [Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon, seed)
-        seen = _remainder(search, found.best, seed)
+        seen = driven_remainder(found.best, seed)
         names = frozenset(found.without)
         if weak := unsupported(evidence, gains, seen):
             weakest = min(weak, key=lambda n: gains[n].low)
@@ -175,19 +175,11 @@ def _alike(found: Found, name: str) -> tuple[str, ...]:
     return (name, *alternatives(found.best, found.rivals[name], name))
 
 
-def _remainder(search: LikelihoodSearch, fitted: Fit, seed: int) -> Remainder:
-    """What is left of a fit; of readings in counts what is left of them as intervals, if less is."""
-    left, counts = driven_remainder(fitted, seed), search.sets.counts
-    if left.unexplained and counts.are_there:
-        left = max(left, driven_remainder(counts.of(fitted), seed), key=lambda one: one.p_value)
-    return left
-
-
 def _ceiling(fitted: Fit) -> float:
     """E of the reading noise alone, percent."""
     assert fitted.doubt is not None
     rig = fitted.model.rig
-    columns = [(t[rig.output(t.kind)], fitted.doubt.variance(t, rig.output(t.kind))) for t in fitted.trials]
+    columns = [(t[rig.output(t.kind)], fitted.doubt.white[rig.output(t.kind)] ** 2) for t in fitted.trials]
     noise = sum(float(np.isfinite(y).sum()) * variance for y, variance in columns)
     return 100.0 * noise / max(sum(float(np.nansum((y - np.nanmean(y)) ** 2)) for y, _ in columns), 1e-300)
 

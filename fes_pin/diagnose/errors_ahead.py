@@ -126,7 +126,7 @@ def _squares(fitted: Fit, floor: Fit, trial: Trial, horizon_s: float) -> tuple[n
     foretold = over_horizon(fitted.model, trial, fitted.doubt, horizon_s)
     total, around = np.zeros(len(trial)), np.zeros(len(trial))
     for name, values in foretold.items():
-        variance = floor.doubt.variance(trial, name)
+        variance = floor.doubt.white[name] ** 2
         total += np.nan_to_num(trial[name] - values, posinf=0.0, neginf=0.0) ** 2 / variance
         around += np.nan_to_num(trial[name] - np.nanmean(trial[name])) ** 2 / variance
     pieces = [np.array_split(x, max(1, round(trial.duration))) for x in (total, around)]

@@ -78,7 +78,7 @@ __all__ = ["with_new_noise"]
 
 
 def words_of_reading(doubt: Doubt | None, rig: Rig, trials: Sequence[Trial]) -> tuple[str, ...]:
-    """What is to be said of a reading that hunts, whose noise lasts over samples, or whose counts are intervals.
+    """What is to be said of a reading that hunts, or whose noise lasts over samples.
 
     Neighbours that stand on one count err alike; else a record was smoothed. Readings that hunt are followed, and not
     judged (`hunts`).
@@ -89,10 +89,9 @@ def words_of_reading(doubt: Doubt | None, rig: Rig, trials: Sequence[Trial]) -> 
     said = []
     hunting = sum(int(hunts(c).sum()) for c in columns) / max(sum(map(len, columns)), 1)
     if hunting > SMALL_SHARE:
-        said = [f"{name} goes to and fro between two counts in {100 * hunting:.0f} % of its samples: they judge nothing"]
-    if doubt is not None and doubt.in_counts and count:
-        said.append(f"{name} is read in counts of {count:.2g}, and each was taken for the interval that it stands for")
-    elif doubt is not None and doubt.lasts_s:
+        share = f"{100 * hunting:.0f} % of its samples"
+        said.append(f"{name} goes to and fro between two counts in {share}: these are followed, and judge nothing")
+    if doubt is not None and doubt.lasts_s:
         step = round(doubt.lasts_s / trials[0].dt)
         read = f"is read in counts of {count:.2g}" if count else "was smoothed or interpolated before it was stored"
         lasts = f"its noise lasts {doubt.lasts_s:.2g} s, and one sample in {step} counts as a reading"

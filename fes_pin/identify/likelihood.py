@@ -77,7 +77,7 @@ class LikelihoodProblem:
         """The compiled predictor, with sensitivities to `free` and to the effects' unknowns."""
         if self._predictor is None:
             columns = (*self.free, *self.unknown_names)
-            own = (self.doubt.processes, self.priors, self.doubt.lasts_s, self.doubt.in_counts)
+            own = (self.doubt.processes, self.priors, self.doubt.lasts_s)
             self._predictor = Predictor(self.model, self.trials, columns, *own)
         return self._predictor
 
@@ -121,7 +121,7 @@ class LikelihoodProblem:
         """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
         count, trials = self.abreast, len(self.trials)
         if self._abreast is None:
-            own = (self.doubt.processes, self.priors * count, self.doubt.lasts_s, self.doubt.in_counts)
+            own = (self.doubt.processes, self.priors * count, self.doubt.lasts_s)
             self._abreast = Predictor(self.model, self.trials * count, (), *own)
         predictor = self._abreast
 
@@ -230,5 +230,4 @@ def _joined(run: Sequence[ForetoldTrial]) -> Told:
         float(sum(one.cost() for one in run)),
         np.concatenate([one.values[one.seen] for one in run]),
         np.concatenate([one.variances[one.seen] for one in run]),
-        np.concatenate([one.costs() for one in run]) if any(one.half_counts is not None for one in run) else None,
     )

@@ -5,9 +5,6 @@ their derivatives by differences, in which the filter's gains go with the parame
 
     g_i = sum r r_i / V + (1 - r^2 / V) V_i / (2 V),    I_ij = sum r_i r_j / V + V_i V_j / (2 V^2)
 
-Of counts that stand for intervals the slopes s_k of half the cost of each reading say both: g = sum s, I = sum s s'
-(Berndt, Hall, Hall and Hausman, Annals of Economic and Social Measurement 3, 1974).
-
 Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
 
@@ -42,22 +39,19 @@ Point = tuple[Mapping[str, float], Unknowns, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Told:
-    """Innovations that were seen, all trials end to end, with their variances; their cost, of counts one by one too."""
+    """Innovations that were seen, all trials end to end, with their variances and their cost."""
 
     cost: float
     innovations: np.ndarray
     variances: np.ndarray
-    costs: np.ndarray | None = None
 
     @classmethod
     def joined(cls, parts: Sequence[Told]) -> Told:
         """What several sets of trials tell, end to end."""
-        costs = [p.costs for p in parts if p.costs is not None]
         return cls(
             float(sum(p.cost for p in parts)),
             np.concatenate([p.innovations for p in parts]),
             np.concatenate([p.variances for p in parts]),
-            np.concatenate(costs) if costs else None,
         )
 
 
@@ -266,9 +260,6 @@ def _first_below(
 
 def _scored(now: Told, moved: Sequence[Told], widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gradient and expected information of half the cost, from differences of such widths; see the module."""
-    if now.costs is not None:
-        slopes = np.stack([0.5 * (m.costs - now.costs) for m in moved], axis=1) / widths
-        return slopes.sum(axis=0), slopes.T @ slopes
     r, v = now.innovations, now.variances
     dr = np.stack([m.innovations - r for m in moved], axis=1) / widths
     dv = np.stack([m.variances - v for m in moved], axis=1) / widths / v[:, None]

@@ -55,9 +55,9 @@ def load_log(path: str | Path) -> Log:
 
 def _random_table(fitted: Fit) -> dict[str, Any]:
     if fitted.doubt is not None:
-        lasts_s, in_counts = float(fitted.doubt.lasts_s), fitted.doubt.in_counts
+        lasts_s = float(fitted.doubt.lasts_s)
         parts = {part: {n: float(v) for n, v in getattr(fitted.doubt, part).items()} for part in _PARTS}
-        return {**({"lasts_s": lasts_s} if lasts_s else {}), **({"in_counts": True} if in_counts else {}), **parts}
+        return {**({"lasts_s": lasts_s} if lasts_s else {}), **parts}
     return {"noise": {n: _noise_table(one) for n, one in fitted.noise.items()}}
 
 
@@ -79,12 +79,9 @@ def load_random(path: str | Path) -> Random | None:
     table = document.table(KEY)
     if "noise" not in table:
         parts = {part: _numbers(document, table, part) for part in _PARTS}
-        in_counts = table.get("in_counts", False)
-        if not isinstance(in_counts, bool):
-            raise document.error(f"{KEY}.in_counts", f"expected true or false, found {in_counts!r}")
-        lasts = {n: v for n, v in table.items() if n not in (*_PARTS, "in_counts")}
-        numbers = document.numbers(KEY, lasts, {"lasts_s": NumberKey("s", required=False)}, also=("in_counts",))
-        return Doubt(**parts, **numbers, in_counts=in_counts)  # type: ignore[arg-type]
+        lasts = {n: v for n, v in table.items() if n not in _PARTS}
+        numbers = document.numbers(KEY, lasts, {"lasts_s": NumberKey("s", required=False)})
+        return Doubt(**parts, **numbers)  # type: ignore[arg-type]
     channels = document.table(f"{KEY}.noise", table)
     return {name: _noise(document, name, channels) for name in channels}
 

@@ -7,12 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.models.counted import count_told
-
-SMALLEST = 1e-12
-"""Share of what a reading tells that a residual is divided by at least: a count far wider than what was foretold tells
-nothing."""
-
 
 @dataclass(frozen=True)
 class ForetoldTrial:
@@ -31,8 +25,6 @@ class ForetoldTrial:
         only followed, see `fes_pin.data.counts.hunts`.
     sensitivities
         Shape (n, outputs, columns): derivatives of `values`, for gains as they are.
-    half_counts
-        Shape (outputs,), where readings are taken for the intervals that their counts stand for.
     """
 
     outputs: tuple[str, ...]
@@ -40,7 +32,6 @@ class ForetoldTrial:
     variances: np.ndarray
     seen: np.ndarray
     sensitivities: np.ndarray
-    half_counts: np.ndarray | None = None
 
     def of_seen(self, array: np.ndarray) -> np.ndarray:
         """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
@@ -55,24 +46,9 @@ class ForetoldTrial:
     def costs(self) -> np.ndarray:
         """The cost of every reading that was seen, shape (m,)."""
         v, variance = self.of_seen(self.values), self.of_seen(self.variances)
-        return self._in_counts()[0] if self.half_counts is not None else v * v / variance + np.log(variance)
+        return np.asarray(v * v / variance + np.log(variance))
 
     def whitened(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of what was seen: residuals over deviations, what `values` are scaled with in them, logarithms of variances.
-
-        Costs are squares of the first and the last; half their slopes by `values` the products of the first two.
-        """
-        if self.half_counts is None:
-            scale = 1.0 / np.sqrt(self.of_seen(self.variances))
-            return self.of_seen(self.values) * scale, scale, -2.0 * np.log(scale)
-        costs, mean, left, std = self._in_counts()
-        known = np.sqrt(np.maximum(1.0 - left, SMALLEST))
-        return mean / known, known / std, costs - (mean / known) ** 2
-
-    def _in_counts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Costs, m and v of `models.counted`, and standard deviations of what was foretold."""
-        assert self.half_counts is not None
-        std = np.sqrt(self.of_seen(self.variances))
-        half = self.of_seen(np.broadcast_to(self.half_counts, self.seen.shape))
-        costs, mean, left = count_told(self.of_seen(self.values) / std, half / std)
-        return costs - np.log(2.0 * np.pi) + 2.0 * np.log(std), mean, left, std
+        """Residuals over deviations, what `values` are scaled with, logarithms of variances; of what was seen."""
+        scale = 1.0 / np.sqrt(self.of_seen(self.variances))
+        return self.of_seen(self.values) * scale, scale, -2.0 * np.log(scale)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fes_pin.data.counts import count_of, hunts
+from fes_pin.data.counts import hunts
 from fes_pin.data.trial import Trial
-from fes_pin.models.compile.layout import WIDTH, doubt_constants, half_counts
+from fes_pin.models.compile.layout import WIDTH, doubt_constants
 from fes_pin.models.compile.program import compiled_program
 from fes_pin.models.disturbance import disturbed
 from fes_pin.models.foretold import ForetoldTrial
@@ -32,29 +32,17 @@ class Doubt:
     lasts_s
         How long the noise of a reading lasts, s: what is read within that time says nothing new, see
         `identify.lasting`. 0 where the noise of every sample is its own.
-    in_counts
-        Whether readings that are whole counts are taken for the intervals that these stand for, and not for numbers
-        with an error.
     """
 
     white: Mapping[str, float]
     std: Mapping[str, float] = field(default_factory=dict)
     time: Mapping[str, float] = field(default_factory=dict)
     lasts_s: float = 0.0
-    in_counts: bool = False
 
     @property
     def processes(self) -> tuple[str, ...]:
         """The random processes that act."""
         return tuple(self.std)
-
-    def variance(self, trial: Trial, output: str) -> float:
-        """Of the noise of a reading, in its unit squared, and of rounding, count^2 / 12, where counts are intervals.
-
-        Source: Sheppard, On the calculation of the most probable values of frequency-constants, Proc. London Math. Soc.
-        29 (1898).
-        """
-        return self.white[output] ** 2 + (count_of(trial[output]) ** 2 / 12.0 if self.in_counts else 0.0)
 
     def with_values(self, values: Mapping[str, float]) -> Doubt:
         """The same with other values, by name as in `values`."""
@@ -62,7 +50,7 @@ class Doubt:
         for name, value in values.items():
             part, _, which = name.partition(".")
             parts[part][which] = value
-        return Doubt(**parts, lasts_s=self.lasts_s, in_counts=self.in_counts)
+        return Doubt(**parts, lasts_s=self.lasts_s)
 
     def values(self) -> dict[str, float]:
         """Every value by name: white.position, std.effort, time.effort."""
@@ -86,8 +74,6 @@ class Predictor:
         Of each trial, standard deviation of each unknown of its start about what its first samples say.
     lasts_s
         How long the noise of a reading lasts; see `Doubt`.
-    in_counts
-        Whether counts are taken for intervals; see `Doubt`.
     """
 
     def __init__(
@@ -98,13 +84,12 @@ class Predictor:
         processes: tuple[str, ...],
         priors: Sequence[Mapping[str, float]],
         lasts_s: float = 0.0,
-        in_counts: bool = False,
     ) -> None:
         self.model, self.trials, self.columns = model, tuple(trials), columns
         self.max_step_s = min([max_step(model), *(e.foretold_step_s for e in model.effects)])
         self._delayed = is_delayed(model)
         self._blocks = [
-            _Block(model, self.trials, lanes, columns, processes, priors, self.max_step_s, lasts_s, in_counts)
+            _Block(model, self.trials, lanes, columns, processes, priors, self.max_step_s, lasts_s)
             for lanes in self._groups()
         ]
 
@@ -181,7 +166,6 @@ class _Block:
         priors: Sequence[Mapping[str, float]],
         max_step_s: float,
         lasts_s: float,
-        in_counts: bool,
     ) -> None:
         first, self.lanes = trials[lanes[0]], lanes
         self.rig = rig = model.rig
@@ -190,21 +174,17 @@ class _Block:
         model = disturbed(model.acting(first.kind, rig.input_columns(first)), first.kind, processes)
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         chosen = tuple(c for c in columns if c in available)
-        self.program = compiled_program(model, first.kind, self.inputs, chosen, self.outputs, in_counts)
+        self.program = compiled_program(model, first.kind, self.inputs, chosen, self.outputs)
         self.layout = self.program.layout
         self.places = [columns.index(n) for n in self.layout.columns]
         self.substeps = substeps(model, first.dt, max_step_s)
         self.trials = [trials[i] for i in lanes]
         self.count = max(len(t) for t in self.trials)
         padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
-        halves = [[0.5 * count_of(t[n]) for n in self.outputs] for t in self.trials] if in_counts else None
-        self.half_counts = halves
         known = [{**rig.constants_of(t), **timing(t, self.substeps)} for t in padded]
         own = [priors[i] for i in lanes] + [priors[lanes[-1]]] * (WIDTH - len(lanes))
         for constants, prior in zip(known, own, strict=True):
             constants.update({f"prior.{n}": prior[n] for n in rig.unknowns(first.kind)})
-        for constants, half in zip(known, halves or (), strict=False):
-            constants.update(zip(half_counts(self.outputs), half, strict=True))
         self.doubtful = [n for n in doubt_constants(model, first.kind, self.outputs) if not n.startswith("prior.")]
         self.constants = np.array([[c.get(n, 0.0) for c in known] for n in self.layout.constants], dtype=float).reshape(
             -1, WIDTH
@@ -262,9 +242,8 @@ class _Block:
             else:
                 sensitivities = np.zeros((n, k, width))
                 sensitivities[..., self.places] = own
-            half = np.array(self.half_counts[lane]) if self.half_counts else None
             values = np.where(seen, y[:n, :k, lane], 0.0)
-            yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities, half)
+            yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities)
 
     def foretold(self, y: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         """What is foretold in each lane, by output: what was given as measured less the innovation."""

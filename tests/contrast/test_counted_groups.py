@@ -9,7 +9,7 @@ from fes_pin.data.study import read_study
 
 
 def test_counts_are_no_common_cause(tmp_path):
-    """As numbers with an error they tell dry friction in both groups."""
+    """Were readings judged that hunt, they would tell dry friction in both groups."""
     study = read_study(draw_swing_up((), 1810006, tmp_path).study)
     half = len(study.trials) // 2
     trials = tuple(replace(t, group="before" if k < half else "after") for k, t in enumerate(study.trials))

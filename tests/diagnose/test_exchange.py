@@ -29,7 +29,6 @@ class Sets:
     def __init__(self):
         self.fits, self.trials = {(): self.fit(())}, ()
         self.library = SimpleNamespace(silent=lambda: ())
-        self.counts = SimpleNamespace(are_there=False)
         self.screen = SimpleNamespace(scores=lambda base: Scores([], np.zeros((0, 0)), np.zeros(0), []))
         self.forms = SimpleNamespace(
             refined=lambda base: None, simplified=lambda base: None, reformed=lambda base: None
@@ -86,7 +85,7 @@ def test_an_answer_is_the_cheapest_of_its_size(search):
 
 
 def test_a_cheaper_set_whose_cause_does_not_earn_its_place_is_no_answer(search, monkeypatch):
-    """As a hum that is the counts' own: cheapest as numbers, and nothing as intervals."""
+    """As a hum that the pieces of the data do not agree on."""
     cheapest = ("tendon", "velocity")
     monkeypatch.setattr(search, "p_value", lambda more, less: 0.5 if more.names == cheapest else 1e-6)
     found = search.settle(("lag", "velocity"))

@@ -9,7 +9,6 @@ from driven_rigs.draw import draw
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import lfilter
 
-from fes_pin.data.errors import InputError
 from fes_pin.data.log import Log
 from fes_pin.data.smooth import low_pass
 from fes_pin.data.study import read_study
@@ -71,28 +70,16 @@ def test_it_is_kept_with_a_model(tmp_path):
     assert load_random(tmp_path / "model.toml").lasts_s == pytest.approx(found.doubt.lasts_s, rel=1e-5)
 
 
-@pytest.mark.parametrize("in_counts", [False, True])
 @pytest.mark.parametrize("lasts_s", [0.0, 0.008])
-def test_what_is_random_is_kept_with_a_model(in_counts, lasts_s, tmp_path):
-    """Noise that is new in every sample and counts that are numbers are written in no key."""
+def test_what_is_random_is_kept_with_a_model(lasts_s, tmp_path):
+    """Noise that is new in every sample is written in no key."""
     study = read_study(draw((), 0.3, 22, tmp_path).study)
     model = nominal_model(study)
-    doubt = replace(first_guess(model, study.trials), lasts_s=lasts_s, in_counts=in_counts)
+    doubt = replace(first_guess(model, study.trials), lasts_s=lasts_s)
     path = tmp_path / "model.toml"
     path.write_text(model_toml(model, stored_tables(SimpleNamespace(doubt=doubt), Log())))
     assert load_random(path) == doubt
-    assert ("in_counts" in path.read_text()) == in_counts
     assert ("lasts_s" in path.read_text()) == bool(lasts_s)
-
-
-def test_counts_that_are_neither_true_nor_false_are_told(tmp_path):
-    study = read_study(draw((), 0.3, 22, tmp_path).study)
-    model = nominal_model(study)
-    tables = stored_tables(SimpleNamespace(doubt=first_guess(model, study.trials)), Log())
-    tables["random"]["in_counts"] = "yes"
-    (tmp_path / "model.toml").write_text(model_toml(model, tables))
-    with pytest.raises(InputError, match=r"random\.in_counts: expected true or false, found 'yes'"):
-        load_random(tmp_path / "model.toml")
 
 
 def test_where_noise_is_nowhere_new_innovations_have_least_in_common():

@@ -9,7 +9,6 @@ from dataclasses import replace
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.cause_sets import Names, names_of
 from fes_pin.diagnose.search.library import Library
-from fes_pin.diagnose.search.likelihood_counts import LikelihoodCounts, in_counts
 from fes_pin.diagnose.search.likelihood_forms import LikelihoodForms
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnose.search.likelihood_screen import LikelihoodScreen
@@ -61,8 +60,6 @@ class LikelihoodFits:
         What every cause promises beside a fit.
     forms
         Other forms of a set that is fitted.
-    counts
-        The same fits with counts as intervals.
     """
 
     def __init__(self, model: Model, trials: Sequence[Trial], effects: Sequence[type[Effect]] | None = None) -> None:
@@ -75,14 +72,6 @@ class LikelihoodFits:
         self._maxima = LikelihoodMaxima(trials)
         self.screen = LikelihoodScreen(self.library)
         self.forms = LikelihoodForms(self._maxima, self.library.measured)
-        self.counts = LikelihoodCounts(model.rig, self.trials, lambda f: f, self._in_counts)
-
-    def _in_counts(self, fitted: Fit, values: Mapping[str, float], other: Fit | None) -> Fit:
-        """The maximum of a fit's set where counts are intervals; see `LikelihoodCounts`."""
-        begun = other or fitted
-        assert begun.doubt is not None
-        model = fitted.model.with_parameters({n: v for n, v in values.items() if n in fitted.values})
-        return self._maxima.from_start(model, in_counts(begun.doubt), begun.unknowns)
 
     def nominal(self) -> Fit:
         """Fit the nominal model, from several sizes of what is random."""
@@ -95,18 +84,10 @@ class LikelihoodFits:
         starts = [replace(guess, std={n: k * v for n, v in guess.std.items()}) for k in FIRST_DOUBTS]
         return min(in_parallel(lambda d: self._maxima.from_start(self.model, d), starts), key=lambda f: f.sse)
 
-    def take_counts_for_intervals(self) -> Fit:
-        """Begin anew from the nominal model where counts are intervals, in every fit from now on; returns its fit."""
-        nominal = self.counts.of(self.fits[()])
-        self.fits, self._converged = {(): nominal}, set()
-        self.counts = LikelihoodCounts(self.model.rig, (), lambda f: f, self._in_counts)
-        return nominal
-
     def _guess(self) -> Doubt:
-        """Little that is random, with noise that lasts as it does, and counts as they are taken."""
+        """Little that is random, with noise that lasts as it does."""
         known = self.fits[()].doubt
-        guess = first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
-        return in_counts(guess) if known and known.in_counts else guess
+        return first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
 
     def extend(self, base: Fit, scored: Sequence[Scored]) -> tuple[Model, list[Fit]]:
         """Begin a base with one more effect, from its shapes of largest score: the start, and first fits from there."""

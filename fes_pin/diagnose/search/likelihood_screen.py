@@ -44,7 +44,7 @@ class LikelihoodScreen:
         assert base.doubt is not None
         out = []
         for one in self._library.grid(effect):
-            key = (*(nominal + one).structure(), *(nominal + one).unused_parameters().items(), base.doubt.in_counts)
+            key = (*(nominal + one).structure(), *(nominal + one).unused_parameters().items())
             if key not in self._probing:  # its columns are those of a fit, which shares the program
                 self._probing[key] = LikelihoodProblem(nominal + one, self._library.trials, base.doubt)
             problem = self._probing[key]

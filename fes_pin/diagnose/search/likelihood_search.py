@@ -98,14 +98,12 @@ class LikelihoodSearch:
         return self.sets.fits[()]
 
     def _search(self) -> Found:
-        sets, best = self.sets, self._fallback
+        best = self._fallback
         for size in self._sizes():
             self.progress(min(0.1 + 0.2 * size, 0.7), f"sets of {size}")
             if best and not self._worth_extending(best):
                 break
             self._extend(size)
-            if size == 1 and sets.counts.are_there and self._numbers_mislead():
-                return self._search_intervals()
             earned = self._first_that_earns(size, best)
             if earned is None:
                 break
@@ -120,37 +118,8 @@ class LikelihoodSearch:
         imposed = any(t.kind == IMPOSED for t in self.sets.trials)
         return itertools.count(1) if imposed else range(1, MOST_CAUSES + 1)
 
-    def _numbers_mislead(self) -> bool:
-        """True where counts as intervals keep less than half of what the best cause alone gains by them as numbers.
-
-        Where neighbours are many counts apart both say the same, and where they are few intervals say more; but the
-        error of a count that stands or hunts is no noise, and what holds a rig explains it.
-        """
-        fits, first = self.sets.fits, self._refined(1, ())
-        if not first or self._by_numbers(fits[first[0]], fits[()]) >= DRIVEN_LEVEL:
-            return False
-        kept = self.sets.counts.gained(fits[first[0]], fits[()])
-        return kept < 0.5 * self.sets.gained(fits[first[0]], fits[()])
-
-    def _search_intervals(self) -> Found:
-        """Search anew with counts as the intervals that they stand for: as numbers they lead elsewhere."""
-        with time_limit(math.inf):
-            nominal = self.sets.take_counts_for_intervals()
-            self.family = Family(self.sets.screen.scores(nominal), self.seed)
-        self._formed, self._unearned = set(), set()
-        return self._search()
-
     def p_value(self, larger: Fit, smaller: Fit) -> float:
-        """Family-wise p-value of what a larger set adds, as far as pieces of the data agree on it.
-
-        Of readings in counts also where these are intervals.
-        """
-        p = self._by_numbers(larger, smaller)
-        if p < DRIVEN_LEVEL and self.sets.counts.are_there:
-            p = max(p, self._p_value(self.sets.counts.gained(larger, smaller), larger, smaller))
-        return p
-
-    def _by_numbers(self, larger: Fit, smaller: Fit) -> float:
+        """Family-wise p-value of what a larger set adds, as far as pieces of the data agree on it."""
         return self._p_value(self.sets.gained(larger, smaller), larger, smaller)
 
     def _p_value(self, gain: float, larger: Fit, smaller: Fit) -> float:

@@ -35,8 +35,6 @@ class Layout:
     """Parameters of forms that are switched off, with the values that are compiled in: such forms cost nothing."""
     measured: tuple[str, ...] = ()
     """Outputs whose measurement corrects the states; none of a simulation. See `compile.predictor`."""
-    in_counts: bool = False
-    """Whether what is measured stands for all within half a count of it; see `models.counted`."""
 
     @property
     def reported(self) -> int:
@@ -76,11 +74,6 @@ def reading_inputs(measured: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(f"{what}.{n}" for what in ("measured", "seen", "repeated") for n in measured)
 
 
-def half_counts(measured: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the constants that hold half a count of each reading."""
-    return tuple(f"half_count.{n}" for n in measured)
-
-
 def doubt_constants(model: Model, kind: str, measured: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the constants of a predictor: deviations of reading noise and initial states, of random states too."""
     return (
@@ -96,12 +89,10 @@ def make_layout(
     inputs: tuple[str, ...],
     columns: tuple[str, ...],
     measured: tuple[str, ...] = (),
-    in_counts: bool = False,
 ) -> Layout:
     """The layout of a model's program for trials of a kind with these input columns."""
     rig = model.rig
     doubt = doubt_constants(model, kind, measured) if measured else ()
-    doubt += half_counts(measured) if in_counts else ()
     past = PAST if any(e.remembers for e in model.effects) else ()
     fixed = {n: value for n, value in model.unused_parameters().items() if n not in columns}
     return Layout(
@@ -114,5 +105,4 @@ def make_layout(
         columns=columns,
         fixed=tuple(fixed.items()),
         measured=measured,
-        in_counts=in_counts,
     )

@@ -19,12 +19,7 @@ At a sample, for each measured output y_k in turn, with H = dh_k/dx where it was
 The gains K are taken as they are when sensitivities are formed: what a parameter does to them acts through past
 innovations alone, which are white and independent of what is foretold where the model is right (Ljung, System
 Identification, 2nd ed., section 7.4). A sample that was not seen corrects nothing. The same count n times in a
-row, as of an encoder that stands, is one reading and not n: its error is the same each time. Where counts are taken for
-the intervals that they stand for, each is one, and with z, m and v of `models.counted`
-
-    x <- x + K sqrt(V) m,    P <- P - (1 - v) K V K',    S <- S + (1 - v) K dr/dp
-
-What a trial begins with
+row, as of an encoder that stands, is one reading and not n: its error is the same each time. What a trial begins with
 is known as its unknowns are, and these as their readings are: P = X diag(prior / g)^2 X', X the sensitivities of the
 first states to them and g the slope of the reading: a scale of it that another inertia undoes must not be told from it.
 
@@ -45,7 +40,6 @@ import casadi as ca
 
 from fes_pin.models.compile.equations import Equations, Tangents, column, dense_function, nonzeros
 from fes_pin.models.compile.layout import Layout
-from fes_pin.models.counted import count_moments
 from fes_pin.models.model import Model
 
 REACH = 3.0**0.5
@@ -225,17 +219,11 @@ def _corrected(d: Carried, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packed
         foretold = reading + ca.mtimes(row, x - now)
         innovation = u[f"measured.{name}"] - foretold
         toward = ca.mtimes(covariance, row.T)
-        repeated = 1.0 if d.layout.in_counts else u[f"repeated.{name}"]
-        variance = ca.mtimes(row, toward) + repeated * c[f"white.{name}"] ** 2
+        variance = ca.mtimes(row, toward) + u[f"repeated.{name}"] * c[f"white.{name}"] ** 2
         gain = u[f"seen.{name}"] * toward / variance
         slope = -(beside + ca.mtimes(row, moved))
-        step, learned = innovation, 1.0
-        if d.layout.in_counts:
-            std = ca.sqrt(variance)
-            mean, left = count_moments(innovation / std, c[f"half_count.{name}"] / std)
-            step, learned = std * mean, 1.0 - left
-        x, covariance = x + gain * step, covariance - learned * ca.mtimes(gain, toward.T)
-        moved = moved + learned * ca.mtimes(gain, slope)
+        x, covariance = x + gain * innovation, covariance - ca.mtimes(gain, toward.T)
+        moved = moved + ca.mtimes(gain, slope)
         innovations.append(innovation)
         variances.append(variance)
         slopes.append(ca.densify(slope))

@@ -63,7 +63,6 @@ def compiled_program(
     inputs: tuple[str, ...],
     columns: tuple[str, ...],
     measured: tuple[str, ...] = (),
-    in_counts: bool = False,
 ) -> Program:
     """The program of a model, compiled if it was not before.
 
@@ -77,15 +76,13 @@ def compiled_program(
         Parameters and unknowns to give sensitivities for.
     measured
         Outputs whose measurement corrects the states, for a predictor.
-    in_counts
-        Whether these are counts that stand for intervals.
 
     Raises
     ------
     InputError
         If FES_PIN_ENGINE names no engine, or FES_PIN_CPU no processor.
     """
-    layout, engine = make_layout(model, kind, inputs, columns, measured, in_counts), settings.engine()
+    layout, engine = make_layout(model, kind, inputs, columns, measured), settings.engine()
     key = (engine, settings.processor(), _classes(model), layout)
     if key not in _PROGRAMS:
         with _LOCK:
