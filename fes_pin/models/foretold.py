@@ -25,6 +25,8 @@ class ForetoldTrial:
         only followed, see `fes_pin.data.counts.hunts`.
     sensitivities
         Shape (n, outputs, columns): derivatives of `values`, for gains as they are.
+    repeats
+        Shape (n, outputs): how often the same was read in a row; together they are one reading.
     """
 
     outputs: tuple[str, ...]
@@ -32,6 +34,7 @@ class ForetoldTrial:
     variances: np.ndarray
     seen: np.ndarray
     sensitivities: np.ndarray
+    repeats: np.ndarray
 
     def of_seen(self, array: np.ndarray) -> np.ndarray:
         """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
@@ -46,9 +49,9 @@ class ForetoldTrial:
     def costs(self) -> np.ndarray:
         """The cost of every reading that was seen, shape (m,)."""
         v, variance = self.of_seen(self.values), self.of_seen(self.variances)
-        return np.asarray(v * v / variance + np.log(variance))
+        return np.asarray(v * v / variance + np.log(variance) / self.of_seen(self.repeats))
 
     def whitened(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residuals over deviations, what `values` are scaled with, logarithms of variances; of what was seen."""
         scale = 1.0 / np.sqrt(self.of_seen(self.variances))
-        return self.of_seen(self.values) * scale, scale, -2.0 * np.log(scale)
+        return self.of_seen(self.values) * scale, scale, -2.0 * np.log(scale) / self.of_seen(self.repeats)

@@ -243,7 +243,7 @@ class _Block:
                 sensitivities = np.zeros((n, k, width))
                 sensitivities[..., self.places] = own
             values = np.where(seen, y[:n, :k, lane], 0.0)
-            yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities)
+            yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities, self.repeated[:n, :, lane])
 
     def foretold(self, y: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         """What is foretold in each lane, by output: what was given as measured less the innovation."""
