@@ -1,7 +1,7 @@
 """What a study's numbers alone say against it, before anything is fitted: refused, or warned of, in one line each.
 
-Refused, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change, too
-few samples, an angle that only degrees explain, a length that only millimetres explain, an imposed motion that never
+Refused, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change or go
+to and fro between two counts, too few samples, an angle that only degrees explain, a length that only millimetres explain, an imposed motion that never
 moves. Everything else is a warning: the diagnosis goes on, and tells it.
 """
 
@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from fes_pin.data.counts import hunts
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED
@@ -65,6 +66,7 @@ def implausible(study: Study) -> list[str]:
     outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
     measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in _driving(study, t)]
     constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
+    _check_counts(study, [one for one in measured if one not in constant])
     if len(constant) == len(measured):
         raise InputError("no output changes in any trial; there is nothing to compare a model with", file=study.folder)
     warnings += _told("does not change at all", constant)
@@ -74,6 +76,19 @@ def implausible(study: Study) -> list[str]:
     for trial, name in moving:
         warnings += dropouts(trial, name) or _held(trial, name)
     return [*warnings, *_rates(study.trials)]
+
+
+def _check_counts(study: Study, moving: Sequence[tuple[Trial, str]]) -> None:
+    """Refuse outputs that hardly ever do more than go to and fro between two counts; what moves is in none of them."""
+    hunting = [hunts(t[n]) for t, n in moving]
+    wanted, found = SAMPLES_EACH * len(study.start), sum(int((~h).sum()) for h in hunting)
+    if any(h.any() for h in hunting) and found < wanted:
+        names = ", ".join(dict.fromkeys(n for _, n in moving))
+        raise InputError(
+            f"{names} only goes to and fro between two counts: expected at least {wanted} samples, {SAMPLES_EACH} for "
+            f"each value of [start], where it does not; found {found}",
+            file=study.folder,
+        )
 
 
 def _read(study: Study) -> list[str]:

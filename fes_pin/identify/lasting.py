@@ -71,7 +71,7 @@ def _other(fitted: Fit, sparser: Fit) -> float:
     problem = LikelihoodProblem(sparser.model, sparser.trials, sparser.doubt)
     as_it_was = replace(fitted.doubt, lasts_s=sparser.doubt.lasts_s)
     lost = problem.cost(fitted.values, fitted.unknowns, as_it_was) - sparser.sse
-    return lost / sum(len(p.residual) for p in sparser.parts)
+    return lost / max(sum(len(p.residual) for p in sparser.parts), 1)
 
 
 __all__ = ["with_new_noise"]

@@ -53,6 +53,11 @@ def coarse(values):
     return 0.01 * np.rint(values / 0.01)
 
 
+def to_and_fro(values):
+    """As an encoder reads what moves by less than one of its counts, five samples here and five there."""
+    return 0.01 * (np.arange(len(values)) // 5 % 2)
+
+
 def free(position):
     """Joint studies that nobody drives, with these positions over time."""
     study = made("joint", driven=False)
@@ -67,6 +72,7 @@ REFUSED = {  # rig, what was done, words
     "never_stimulated": ("ankle", lambda s: changed(s, INPUTS, np.zeros_like), "never above the threshold of 180 us in all"),
     "faint": ("muscle", lambda s: changed(s, INPUTS, lambda u: 0.1 * u), "never above the threshold"),
     "constant": ("joint", lambda s: changed(s, OUTPUTS, lambda y: 0.0 * y + 1.0), "no output changes in any trial"),
+    "hunting": ("joint", lambda s: changed(s, OUTPUTS, to_and_fro), "only goes to and fro between two counts"),
     "degrees": ("ankle", lambda s: changed(s, ("angle_rad",), np.degrees), "is it in degrees"),
     "pulse_widths_in_ms": ("ankle", lambda s: changed(s, INPUTS, lambda u: 1e-3 * u), "is it in ms"),
     "milliseconds": ("ankle", lambda s: timed(s, 1e3), "is time_s in ms"),
