@@ -1,8 +1,8 @@
 """What a study's numbers alone say against it, before anything is fitted: refused, or warned of, in one line each.
 
 Refused, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change or go
-to and fro between two counts, too few samples, an angle that only degrees explain, a length that only millimetres explain, an imposed motion that never
-moves. Everything else is a warning: the diagnosis goes on, and tells it.
+to and fro between two counts, too few samples, an angle that only degrees explain, a length that only millimetres
+explain, an imposed motion that never moves. Everything else is a warning: the diagnosis goes on, and tells it.
 """
 
 from __future__ import annotations
@@ -80,13 +80,15 @@ def implausible(study: Study) -> list[str]:
 
 def _check_counts(study: Study, moving: Sequence[tuple[Trial, str]]) -> None:
     """Refuse outputs that hardly ever do more than go to and fro between two counts; what moves is in none of them."""
-    hunting = [hunts(t[n]) for t, n in moving]
-    wanted, found = SAMPLES_EACH * len(study.start), sum(int((~h).sum()) for h in hunting)
-    if any(h.any() for h in hunting) and found < wanted:
+    columns = [t[n] for t, n in moving]
+    hunting = [hunts(c) for c in columns]
+    beside = sum(int(np.sum(~h & (np.diff(c, prepend=np.nan) != 0.0))) for c, h in zip(columns, hunting, strict=True))
+    wanted = SAMPLES_EACH * len(study.start)
+    if any(h.any() for h in hunting) and beside < wanted:
         names = ", ".join(dict.fromkeys(n for _, n in moving))
         raise InputError(
-            f"{names} only goes to and fro between two counts: expected at least {wanted} samples, {SAMPLES_EACH} for "
-            f"each value of [start], where it does not; found {found}",
+            f"{names} only goes to and fro between two counts: expected at least {wanted} readings beside, "
+            f"{SAMPLES_EACH} for each value of [start]; found {beside}",
             file=study.folder,
         )
 
