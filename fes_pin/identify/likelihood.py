@@ -2,10 +2,11 @@
 
 Twice the negative log-likelihood of the innovations r_k of an extended Kalman filter with variances V_k,
 
-    cost = sum r_k^2 / V_k + w_k log V_k,
+    cost = sum r_k^2 / V_k + log V_k - (1 - 1 / n_k) log N_k,
 
-depends on the model's parameters and on what is random (`Doubt`) alone. Its maximum: `identify.turns`. The weights w_k
-are 1 but where a count is read n times in a row: that is one reading (`models.compile.predictor`), and they are 1 / n.
+depends on the model's parameters and on what is random (`Doubt`) alone. Its maximum: `identify.turns`. The last term
+is 0 but where a count is read n times in a row: that is one reading, to which the filter gives the variance
+N = n white^2 each time (`models.compile.predictor`). Its one error has one logarithm, and not n of them.
 
 Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
@@ -231,5 +232,6 @@ def _joined(run: Sequence[ForetoldTrial]) -> Told:
         float(sum(one.cost() for one in run)),
         np.concatenate([one.values[one.seen] for one in run]),
         np.concatenate([one.variances[one.seen] for one in run]),
-        1.0 / np.concatenate([one.repeats[one.seen] for one in run]),
+        np.concatenate([one.noise[one.seen] for one in run]),
+        1.0 - 1.0 / np.concatenate([one.repeats[one.seen] for one in run]),
     )

@@ -1,9 +1,11 @@
 """Parameters of a model and what is random about it, made more likely by Fisher scoring.
 
-In parameters and in logarithms of what is random, with r_k, V_k and w_k the innovations, their variances and how much
-of a reading each is, r_i and V_i their derivatives by differences, in which the filter's gains go with the parameters:
+In parameters and in logarithms of what is random, with r_k and V_k the innovations and their variances, r_i and V_i
+their derivatives by differences, in which the filter's gains go with the parameters, and N_k the noise of what is read
+n_k times in a row (`identify.likelihood`):
 
-    g_i = sum r r_i / V + (w - r^2 / V) V_i / (2 V),    I_ij = sum r_i r_j / V + w V_i V_j / (2 V^2)
+    g_i = sum r r_i / V + (1 - r^2 / V) V_i / (2 V) - (1 - 1 / n) N_i / (2 N)
+    I_ij = sum r_i r_j / V + V_i V_j / (2 n V^2)
 
 Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
@@ -39,12 +41,13 @@ Point = tuple[Mapping[str, float], Unknowns, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Told:
-    """Innovations that were seen, all trials end to end, their variances, weights and cost."""
+    """What was seen, all trials end to end: innovations, variances, the noise in these, 1 - 1 / n; their cost."""
 
     cost: float
     innovations: np.ndarray
     variances: np.ndarray
-    weights: np.ndarray
+    noise: np.ndarray
+    again: np.ndarray
 
     @classmethod
     def joined(cls, parts: Sequence[Told]) -> Told:
@@ -53,7 +56,8 @@ class Told:
             float(sum(p.cost for p in parts)),
             np.concatenate([p.innovations for p in parts]),
             np.concatenate([p.variances for p in parts]),
-            np.concatenate([p.weights for p in parts]),
+            np.concatenate([p.noise for p in parts]),
+            np.concatenate([p.again for p in parts]),
         )
 
 
@@ -265,8 +269,9 @@ def _scored(now: Told, moved: Sequence[Told], widths: np.ndarray) -> tuple[np.nd
     r, v = now.innovations, now.variances
     dr = np.stack([m.innovations - r for m in moved], axis=1) / widths
     dv = np.stack([m.variances - v for m in moved], axis=1) / widths / v[:, None]
-    gradient = (r / v) @ dr + 0.5 * (now.weights - r * r / v) @ dv
-    return gradient, (dr / v[:, None]).T @ dr + 0.5 * dv.T @ (now.weights[:, None] * dv)
+    dn = np.stack([m.noise - now.noise for m in moved], axis=1) / widths / now.noise[:, None]
+    gradient = (r / v) @ dr + 0.5 * (1.0 - r * r / v) @ dv - 0.5 * now.again @ dn
+    return gradient, (dr / v[:, None]).T @ dr + 0.5 * dv.T @ ((1.0 - now.again)[:, None] * dv)
 
 
 def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray, damping: float) -> np.ndarray:

@@ -26,7 +26,9 @@ class ForetoldTrial:
     sensitivities
         Shape (n, outputs, columns): derivatives of `values`, for gains as they are.
     repeats
-        Shape (n, outputs): how often the same was read in a row; together they are one reading.
+        Shape (n, outputs): how often the same was read in a row, n; together they are one reading.
+    noise
+        Shape (n, outputs): variance of the noise of each as it stands in `variances`, that of one reading times n.
     """
 
     outputs: tuple[str, ...]
@@ -35,6 +37,7 @@ class ForetoldTrial:
     seen: np.ndarray
     sensitivities: np.ndarray
     repeats: np.ndarray
+    noise: np.ndarray
 
     def of_seen(self, array: np.ndarray) -> np.ndarray:
         """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
@@ -49,9 +52,13 @@ class ForetoldTrial:
     def costs(self) -> np.ndarray:
         """The cost of every reading that was seen, shape (m,)."""
         v, variance = self.of_seen(self.values), self.of_seen(self.variances)
-        return np.asarray(v * v / variance + np.log(variance) / self.of_seen(self.repeats))
+        return np.asarray(v * v / variance + np.log(variance) - self._told_again())
+
+    def _told_again(self) -> np.ndarray:
+        """What the determinant holds of noise that was told before: n equal readings have n logarithms of one error."""
+        return np.asarray((1.0 - 1.0 / self.of_seen(self.repeats)) * np.log(self.of_seen(self.noise)))
 
     def whitened(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residuals over deviations, what `values` are scaled with, logarithms of variances; of what was seen."""
         scale = 1.0 / np.sqrt(self.of_seen(self.variances))
-        return self.of_seen(self.values) * scale, scale, -2.0 * np.log(scale) / self.of_seen(self.repeats)
+        return self.of_seen(self.values) * scale, scale, -2.0 * np.log(scale) - self._told_again()

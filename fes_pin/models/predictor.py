@@ -125,8 +125,10 @@ class Predictor:
         out: dict[int, ForetoldTrial] = {}
         each = [values] * len(self.trials) if isinstance(values, Mapping) else values
         for block in self._blocks:
-            y, s = block.run(each, self._doubts(doubt), unknowns, self._delays(each))
-            out.update(zip(block.lanes, block.innovations(y, s, len(self.columns)), strict=True))
+            doubts = self._doubts(doubt)
+            y, s = block.run(each, doubts, unknowns, self._delays(each))
+            told = block.innovations(y, s, len(self.columns), [doubts[i] for i in block.lanes])
+            out.update(zip(block.lanes, told, strict=True))
         return [out[i] for i in range(len(self.trials))]
 
     def foretell(
@@ -230,8 +232,10 @@ class _Block:
         constants[self.layout.constants.index("shift"), : len(shift)] = shift
         return self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
 
-    def innovations(self, y: np.ndarray, s: np.ndarray, width: int) -> Iterator[ForetoldTrial]:
-        """The innovations of each lane, with sensitivities to `width` columns."""
+    def innovations(
+        self, y: np.ndarray, s: np.ndarray, width: int, doubts: Sequence[Mapping[str, float]]
+    ) -> Iterator[ForetoldTrial]:
+        """The innovations of each lane and under its doubt, with sensitivities to `width` columns."""
         k, by_lane = len(self.outputs), np.ascontiguousarray(np.moveaxis(s, -1, 0))
         for lane, trial in enumerate(self.trials):
             n = len(trial)
@@ -243,7 +247,9 @@ class _Block:
                 sensitivities = np.zeros((n, k, width))
                 sensitivities[..., self.places] = own
             values = np.where(seen, y[:n, :k, lane], 0.0)
-            yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities, self.repeated[:n, :, lane])
+            repeats = self.repeated[:n, :, lane]
+            noise = repeats * np.array([doubts[lane][f"white.{o}"] for o in self.outputs]) ** 2
+            yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities, repeats, noise)
 
     def foretold(self, y: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
         """What is foretold in each lane, by output: what was given as measured less the innovation."""
