@@ -26,9 +26,10 @@ class ForetoldTrial:
     sensitivities
         Shape (n, outputs, columns): derivatives of `values`, for gains as they are.
     repeats
-        Shape (n, outputs): how often the same was read in a row, n; together they are one reading.
+        Shape (n, outputs): how often the same count was read in a row, n; together they are one reading. 1 of what is
+        not read in counts: what a log holds or interpolates stands for other reasons.
     noise
-        Shape (n, outputs): variance of the noise of each as it stands in `variances`, that of one reading times n.
+        Shape (n, outputs): variance of the noise of each in counts as it stands in `variances`, that of one times n.
     """
 
     outputs: tuple[str, ...]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fes_pin.data.counts import hunts
+from fes_pin.data.counts import count_of, hunts
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile.layout import WIDTH, doubt_constants
 from fes_pin.models.compile.program import compiled_program
@@ -196,6 +196,7 @@ class _Block:
         self.judged = self.seen.copy()
         self.measured = np.zeros((self.count, len(self.outputs), WIDTH))
         self.repeated = np.ones((self.count, len(self.outputs), WIDTH))
+        self.in_counts = [[count_of(t[n]) > 0.0 for n in self.outputs] for t in self.trials]
         for lane, trial in enumerate(self.trials):
             followed = rig.follows(trial) & are_news(trial, lasts_s)
             for k, name in enumerate(self.outputs):
@@ -247,7 +248,7 @@ class _Block:
                 sensitivities = np.zeros((n, k, width))
                 sensitivities[..., self.places] = own
             values = np.where(seen, y[:n, :k, lane], 0.0)
-            repeats = self.repeated[:n, :, lane]
+            repeats = np.where(self.in_counts[lane], self.repeated[:n, :, lane], 1.0)
             noise = repeats * np.array([doubts[lane][f"white.{o}"] for o in self.outputs]) ** 2
             yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities, repeats, noise)
 
