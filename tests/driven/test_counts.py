@@ -34,7 +34,7 @@ def test_a_count_that_hunts_is_no_friction(seed, tmp_path):
 @pytest.mark.parametrize("hunting", [False, True])
 @pytest.mark.parametrize("seed", HELD)
 def test_readings_that_hunt_would_tell_of_friction_that_is_not_there(seed, hunting, tmp_path, monkeypatch):
-    """By 11 and 38 in twice the log-likelihood, where they are judged."""
+    """By 36 and 47 in twice the log-likelihood, where they are judged."""
     if hunting:
         monkeypatch.setattr(predictor, "hunts", lambda column: np.zeros(len(column), dtype=bool))
     study = read_study(draw_swing_up((), seed, tmp_path).study)
@@ -42,7 +42,7 @@ def test_readings_that_hunt_would_tell_of_friction_that_is_not_there(seed, hunti
     none = sets.nominal()
     sets.extend_all(())
     gained = none.sse - sets.fits["coulomb_friction",].sse
-    assert gained > 8.0 if hunting else gained < 4.0
+    assert gained > 30.0 if hunting else gained < 4.0
 
 
 def test_a_count_that_is_read_again_and_again_is_one_reading_of_the_noise(tmp_path):
