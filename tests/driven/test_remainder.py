@@ -4,10 +4,8 @@ import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.remainder import driven
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
-from fes_pin.models.effects import Backlash
-from fes_pin.models.nominal import nominal_model
 
 
 class Promised(driven._Featured):
@@ -22,10 +20,10 @@ class Promised(driven._Featured):
 def test_a_promise_counts_as_far_as_the_likelihood_keeps_it(tmp_path, monkeypatch):
     """A rig of `scripts/driven --count 60 --seed 1118000 --recorded` where something was "left"."""
     study = read_study(draw(("backlash",), 0.3, 1118025, tmp_path, recorded=True).study)
-    sets = LikelihoodFits(nominal_model(study), study.trials, [Backlash])
-    sets.nominal()
-    sets.extend_all(())
-    fitted = sets.fits["backlash",]
+    found = diagnose_joint(study)
+    fitted = found.extended
+    assert [e.name for e in fitted.model.effects] == ["backlash"]
+    assert not found.remainder.unexplained
     assert not driven.driven_remainder(fitted).unexplained
     monkeypatch.setattr(driven, "_Featured", Promised)
     assert driven.driven_remainder(fitted).unexplained
