@@ -269,8 +269,10 @@ def _scored(now: Told, moved: Sequence[Told], widths: np.ndarray) -> tuple[np.nd
     r, v = now.innovations, now.variances
     dr = np.stack([m.innovations - r for m in moved], axis=1) / widths
     dv = np.stack([m.variances - v for m in moved], axis=1) / widths / v[:, None]
-    dn = np.stack([m.noise - now.noise for m in moved], axis=1) / widths / now.noise[:, None]
-    gradient = (r / v) @ dr + 0.5 * (1.0 - r * r / v) @ dv - 0.5 * now.again @ dn
+    gradient = (r / v) @ dr + 0.5 * (1.0 - r * r / v) @ dv
+    if (held := np.flatnonzero(now.again)).size:
+        dn = np.stack([m.noise[held] / now.noise[held] - 1.0 for m in moved], axis=1) / widths
+        gradient = gradient - 0.5 * now.again[held] @ dn
     return gradient, (dr / v[:, None]).T @ dr + 0.5 * dv.T @ ((1.0 - now.again)[:, None] * dv)
 
 

@@ -57,7 +57,8 @@ class ForetoldTrial:
 
     def _told_again(self) -> np.ndarray:
         """What the determinant holds of noise that was told before: n equal readings have n logarithms of one error."""
-        return np.asarray((1.0 - 1.0 / self.of_seen(self.repeats)) * np.log(self.of_seen(self.noise)))
+        again = 1.0 - 1.0 / self.of_seen(self.repeats)
+        return np.asarray(again * np.log(self.of_seen(self.noise)) if again.any() else again)
 
     def whitened(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residuals over deviations, what `values` are scaled with, logarithms of variances; of what was seen."""
