@@ -100,6 +100,10 @@ class Effect:
         """Next value of each memory."""
         return {}
 
+    def slack(self, s: Any) -> Mapping[str, tuple[Any, Any]]:
+        """Of each memory that only follows something by `update` once a slack is taken up: what, and half the slack."""
+        return {}
+
     def rest(self, s: Any) -> Mapping[str, Any]:
         """States and memories at rest that are not zero."""
         return {}

@@ -33,12 +33,22 @@ Drawing = Callable[[tuple[str, ...], int, Path], Drawn]
 """Draws a rig with such causes from such a seed into a folder."""
 
 
-def items(count: int, drawn: ModuleType | None = None) -> Iterator[tuple[str, ...]]:
-    """What is hidden in each of so many studies: nothing, every cause in turn, pairs, and something else."""
+def items(count: int, drawn: ModuleType | None = None, play: bool = False) -> Iterator[tuple[str, ...]]:
+    """What is hidden in each of so many studies: nothing, every cause in turn, pairs, and something else.
+
+    Parameters
+    ----------
+    drawn
+        Another generator's own causes and pairs.
+    play
+        Nothing, a play, and every other cause beside one.
+    """
     rows: list[tuple[str, ...]] = [(), *((c,) for c in CAUSES[:5]), (), *((c,) for c in CAUSES[5:])]
     rows += [*PAIRS[:2], (), OUTSIDE, *PAIRS[2:]]
     if drawn is not None:
         rows = [(), *((c,) for c in drawn.CAUSES), (), drawn.CAUSES[:1], *drawn.PAIRS]
+    if play:
+        rows = [(), ("backlash",), *((c, "backlash") for c in CAUSES if c != "backlash")]
     for k in range(count):
         yield rows[k % len(rows)]
 
@@ -130,6 +140,7 @@ def main(
     laboratory: Annotated[
         bool, typer.Option("--laboratory", help="Of another generator: other controllers, motions, encoders, rates.")
     ] = False,
+    play: Annotated[bool, typer.Option("--play", help="Every cause beside a play.")] = False,
     swing_up: Annotated[bool, typer.Option("--swing-up", help="Pendulums that are swung up and held.")] = False,
     results: Annotated[
         Path | None, typer.Option(help="A file of one line a study, with which a run can go on.")
@@ -148,7 +159,7 @@ def main(
         return judged(() if nulls else causes, k, drawn)
 
     other = pendulums if swing_up else laboratories if laboratory else None
-    rows = results_of(items(count, other), seed, one, results)
+    rows = results_of(items(count, other, play), seed, one, results)
     typer.echo("\n".join(table(rows)))
 
 

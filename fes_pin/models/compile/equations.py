@@ -68,6 +68,7 @@ class _Symbols:
         self.since, self.into = ca.SX.sym("since"), ca.SX.sym("into")
         self.v_std = ca.SX.sym("v_std") if estimated and "v" in self.states else 0.0
         self.is_late = any(e.signal == "delay" for e in model.effects)
+        self.slacks: dict[str, tuple[Any, Any]] = {}
 
     def vector(self, which: dict[str, Any]) -> ca.SX:
         return ca.vertcat(*which.values()) if which else ca.SX(0, 1)
@@ -149,6 +150,7 @@ class _Symbols:
         for effect in s.effects:
             for n, value in effect.update(s.of(effect)).items():
                 memories[f"{effect.name}.{n}"] = value
+            self.slacks |= {f"{effect.name}.{n}": pair for n, pair in effect.slack(s.of(effect)).items()}
         s = self.within_a_sample(self.signals(self.x, self.m))
         s.v_std = self.v_std
         rates = dict(rig.rates(s))

@@ -40,6 +40,7 @@ import casadi as ca
 
 from fes_pin.models.compile.equations import Equations, Tangents, column, dense_function, nonzeros
 from fes_pin.models.compile.layout import Layout
+from fes_pin.models.compile.slack import Gaussian, mixed, normalized
 from fes_pin.models.model import Model
 
 REACH = 3.0**0.5
@@ -119,6 +120,8 @@ class Carried(Tangents):
         Places of those memories among the states.
     followed
         What each is after a sample.
+    slacks
+        Places of those that follow with slack, with what they follow and half the slack.
     """
 
     def __init__(self, model: Model, layout: Layout) -> None:
@@ -130,6 +133,8 @@ class Carried(Tangents):
         self.carried = [states + k for k in range(len(places))]
         self.followed = [self.after[k] for k in places]
         self._names = [self.sym.memories[k] for k in places]
+        named = zip(self.carried, self._names, strict=True)
+        self.slacks = {k: self.sym.slacks[n] for k, n in named if n in self.sym.slacks}
         self.x = column([*ca.vertsplit(self.x), *(self.m[k] for k in places)])
         self.x0 = column([*ca.vertsplit(self.x0), *(self.m0[k] for k in places)])
         self.rates = column([*ca.vertsplit(self.rates), *[0.0] * len(places)])
@@ -209,21 +214,28 @@ def _followed(d: Carried, doubt: _Doubt, s: Any, r: Any, reached: Any) -> tuple[
 
 def _corrected(d: Carried, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packed: Any) -> list[Any]:
     """State after the measurements of a sample; innovations, their variances, sensitivities of the innovations."""
-    now, covariance, moved = _remembered(d, doubt.covariance, s, inner)
+    slack = _read_with_slack(d)
+    now, covariance, moved = _remembered(d, doubt.covariance, s, inner, slack)
     x, u, c = now, d.sym.u, d.sym.c
     innovations, variances, slopes = [], [], []
     for name in d.layout.measured:
         reading = d.readings[d.layout.outputs.index(name)]
-        expressions = (reading, ca.jacobian(reading, d.x), d.through(reading, *inner[1:]))
-        reading, row, beside = (ca.substitute(one, d.x, now) for one in expressions)
-        foretold = reading + ca.mtimes(row, x - now)
-        innovation = u[f"measured.{name}"] - foretold
-        toward = ca.mtimes(covariance, row.T)
-        variance = ca.mtimes(row, toward) + u[f"repeated.{name}"] * c[f"white.{name}"] ** 2
-        gain = u[f"seen.{name}"] * toward / variance
-        slope = -(beside + ca.mtimes(row, moved))
-        x, covariance = x + gain * innovation, covariance - ca.mtimes(gain, toward.T)
-        moved = moved + ca.mtimes(gain, slope)
+        given = (u[f"measured.{name}"], u[f"repeated.{name}"] * c[f"white.{name}"] ** 2, u[f"seen.{name}"])
+        if slack is not None and ca.depends_on(reading, d.x[slack]):
+            told, x, covariance, moved = _across_slack(d, slack, reading, given, Gaussian(x, covariance), moved, inner)
+            innovation, variance, slope = told
+            slack, now = None, x
+        else:
+            measured, noise, seen = given
+            expressions = (reading, ca.jacobian(reading, d.x), d.through(reading, *inner[1:]))
+            reading, row, beside = (ca.substitute(one, d.x, now) for one in expressions)
+            innovation = measured - (reading + ca.mtimes(row, x - now))
+            toward = ca.mtimes(covariance, row.T)
+            variance = ca.mtimes(row, toward) + noise
+            gain = seen * toward / variance
+            slope = -(beside + ca.mtimes(row, moved))
+            x, covariance = x + gain * innovation, covariance - ca.mtimes(gain, toward.T)
+            moved = moved + ca.mtimes(gain, slope)
         innovations.append(innovation)
         variances.append(variance)
         slopes.append(ca.densify(slope))
@@ -232,10 +244,61 @@ def _corrected(d: Carried, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packed
     return [packed(x, moved, covariance), y]
 
 
-def _remembered(d: Carried, covariance: Any, s: Any, inner: tuple[Any, ...]) -> tuple[Any, Any, Any]:
-    """States, their covariance and sensitivities once the memories among them have followed."""
+def _read_with_slack(d: Carried) -> int | None:
+    """Place of the first memory that follows with slack and is read; None if there is none."""
+    read = [d.readings[d.layout.outputs.index(n)] for n in d.layout.measured]
+    return next((k for k in d.slacks if any(ca.depends_on(one, d.x[k]) for one in read)), None)
+
+
+def _across_slack(
+    d: Carried, k: int, reading: Any, given: tuple[Any, Any, Any], known: Gaussian, moved: Any, inner: tuple[Any, ...]
+) -> tuple[tuple[Any, Any, Any], Any, Any, Any]:
+    """Innovation, its variance and sensitivities; state, covariance and sensitivities; see `compile.slack`."""
+    (measured, noise, seen), count = given, d.x.numel()
+    mean = ca.SX.sym("mean", count)
+    position, half = d.slacks[k]
+    there, along = (ca.substitute(one, d.x, mean) for one in (position, ca.jacobian(position, d.x)))
+    away, across = there - mean[k], along - ca.SX.eye(count)[k, :]
+    before, foretold, after = [], [], []
+    for low, high, ahead in ((-half, half, None), (half, None, -half), (None, -half, half)):
+        turned, beside = ca.SX.eye(count), ca.SX(0)
+        if ahead is not None:
+            turned[k, :], beside = along, there - ca.mtimes(along, mean) + ahead
+
+        def mapped(one: Gaussian, turned: Any = turned, beside: Any = beside) -> Gaussian:
+            moved = ca.mtimes(turned, one.mean)
+            return one.mapped(turned, _with_row(moved, k, moved[k] + beside))
+
+        own = Gaussian(mean, known.covariance)
+        share, part = own.cut(across, away, low, high)
+        there_now = mapped(part)
+        value, row = (ca.substitute(e, d.x, there_now.mean) for e in (reading, ca.jacobian(reading, d.x)))
+        through = ca.mtimes(row, turned)
+        uncut = value + ca.mtimes(through, mean - part.mean)
+        told, density = own.seen(through, measured - uncut, noise, seen)
+        left, cut = told.cut(across, away + ca.mtimes(across, told.mean - mean), low, high)
+        before.append(share)
+        foretold.append(Gaussian(value, ca.mtimes([through, part.covariance, through.T])))
+        after.append((left + density, mapped(cut)))
+    told = mixed(normalized(before), foretold)
+    left = mixed(normalized([weight for weight, _ in after]), [one for _, one in after])
+
+    def through_all(f: Any) -> Any:
+        return ca.substitute(d.through(f, *inner[1:]) + ca.mtimes(ca.jacobian(f, mean), moved), mean, known.mean)
+
+    slope, turned = -through_all(told.mean), through_all(left.mean)
+    value, spread, x, covariance = (
+        ca.substitute(e, mean, known.mean) for e in (told.mean, told.covariance, left.mean, left.covariance)
+    )
+    return (measured - value, spread + noise, slope), x, covariance, turned
+
+
+def _remembered(d: Carried, covariance: Any, s: Any, inner: tuple[Any, ...], but: int | None) -> tuple[Any, Any, Any]:
+    """States, their covariance and sensitivities once the memories among them, but for one, have followed."""
     x, moved = d.x, s
     for k, after in zip(d.carried, d.followed, strict=True):
+        if k == but:
+            continue
         mean, slope, rest = _spread(after, d.x, covariance)
         turned = ca.SX.eye(d.x.numel())
         turned[k, :] = slope

@@ -60,6 +60,9 @@ class Backlash(Effect):
     def update(self, s: Any) -> Mapping[str, Any]:
         return {"followed": self._play(s.sensed, s)}
 
+    def slack(self, s: Any) -> Mapping[str, tuple[Any, Any]]:
+        return {"followed": (s.sensed, self.half_width)}
+
     def rest(self, s: Any) -> Mapping[str, Any]:
         return {"followed": s.sensed}
 
