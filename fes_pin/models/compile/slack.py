@@ -19,18 +19,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import casadi as ca
+import numpy as np
+import scipy.special
 
 LEAST = 1e-20
 """Variance that a slack has at least, in its unit squared: nothing is divided by 0."""
-FAR = 5.0
-"""Deviations beyond which tails are those of a continued fraction: there 1 - erf has few digits left."""
-TERMS = 12
-"""Of that fraction: right to ten digits from `FAR` on."""
-NARROW = 1e-9
-"""Share of a Gaussian between two ends below which it is as if only the nearer one cut it."""
+MIDDLE, DEGREE = 4.0, 16
+"""Of the polynomial of Mills' ratio in 4 / (4 + z): it errs by 4e-12 of it at most (`tests/models/test_slack.py`)."""
+NARROW, TINY = 1e-9, 1e-100
+"""Share between two ends, in those beyond them and by itself, below which it is as if only the nearer end cut."""
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,9 @@ class Gaussian:
 
 def mixed(shares: list[Any], parts: list[Gaussian]) -> Gaussian:
     """Mean and covariance of a mixture."""
-    mean = sum((share * one.mean for share, one in zip(shares, parts, strict=True)), ca.SX(0))
-    covariance = ca.SX(0)
-    for share, one in zip(shares, parts, strict=True):
-        away = one.mean - mean
-        covariance = covariance + share * (one.covariance + ca.mtimes(away, away.T))
-    return Gaussian(mean, covariance)
+    mean = _sum([share * one.mean for share, one in zip(shares, parts, strict=True)])
+    spread = [one.covariance + ca.mtimes(one.mean - mean, (one.mean - mean).T) for one in parts]
+    return Gaussian(mean, _sum([share * one for share, one in zip(shares, spread, strict=True)]))
 
 
 def normalized(logs: list[Any]) -> list[Any]:
@@ -90,51 +88,80 @@ def normalized(logs: list[Any]) -> list[Any]:
     for one in logs[1:]:
         most = ca.fmax(most, one)
     sizes = [ca.exp(one - most) for one in logs]
-    return [one / sum(sizes[1:], sizes[0]) for one in sizes]
+    return [one / _sum(sizes) for one in sizes]
+
+
+def _sum(many: list[Any]) -> Any:
+    return sum(many[1:], many[0])
+
+
+class _End:
+    """An end that cuts a standard Gaussian: logarithms of the shares beyond and below it, and means of these."""
+
+    def __init__(self, z: Any) -> None:
+        self.density = ca.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+        size = ca.fabs(z)
+        mills = _mills(size)
+        self.tail = self.density * mills
+        """Share on the side where the Gaussian's middle is not."""
+        far = ca.log(mills) - 0.5 * z * z - 0.5 * math.log(2.0 * math.pi), 1.0 / mills
+        near = ca.log(1.0 - self.tail), self.density / (1.0 - self.tail)
+        self.z, is_above = z, z > 0.0
+        self.beyond, self.hazard = (ca.if_else(is_above, a, b) for a, b in zip(far, near, strict=True))
+        self.below, self.other = (ca.if_else(is_above, b, a) for a, b in zip(far, near, strict=True))
+
+    def as_low(self) -> tuple[Any, Any, Any]:
+        """Logarithm of the share beyond it, mean and variance there."""
+        return self.beyond, self.hazard, ca.fmax(1.0 + self.z * self.hazard - self.hazard * self.hazard, 0.0)
+
+    def as_high(self) -> tuple[Any, Any, Any]:
+        """The same below it."""
+        return self.below, -self.other, ca.fmax(1.0 - self.z * self.other - self.other * self.other, 0.0)
 
 
 def _between(low: Any, high: Any) -> tuple[Any, Any, Any]:
     """Logarithm of the share of a standard Gaussian between two ends, mean and variance there; an end may be None."""
     if high is None:
-        hazard = _hazard(low)
-        return _log_beyond(low, hazard), hazard, ca.fmax(1.0 + low * hazard - hazard * hazard, 0.0)
+        return _End(low).as_low()
     if low is None:
-        share, mean, spread = _between(-high, None)
-        return share, -mean, spread
-    below, above = _density(low), _density(high)
-    share = 0.5 * (ca.erf(high / math.sqrt(2.0)) - ca.erf(low / math.sqrt(2.0)))
-    wide, safe = share > NARROW, ca.fmax(share, NARROW)
-    mean = (below - above) / safe
-    spread = 1.0 + (low * below - high * above) / safe - mean * mean
-    from_above = _without(_between(None, high), _between(None, low))
-    from_below = _without(_between(low, None), _between(high, None))
-    near = [ca.if_else(high < -low, a, b) for a, b in zip(from_above, from_below, strict=True)]
+        return _End(high).as_high()
+    a, b = _End(low), _End(high)
+    share = ca.if_else(low > 0.0, a.tail - b.tail, ca.if_else(high < 0.0, b.tail - a.tail, 1.0 - a.tail - b.tail))
+    wide, safe = share > NARROW * (a.tail + b.tail) + TINY, ca.fmax(share, TINY)
+    mean = (a.density - b.density) / safe
+    spread = 1.0 + (low * a.density - high * b.density) / safe - mean * mean
+    near = [
+        ca.if_else(high < -low, one, other)
+        for one, other in zip(_without(b.as_high(), a.below), _without(a.as_low(), b.beyond), strict=True)
+    ]
     whole = (ca.log(safe), mean, ca.fmax(spread, 0.0))
-    share, mean, spread = (ca.if_else(wide, a, b) for a, b in zip(whole, near, strict=True))
+    share, mean, spread = (ca.if_else(wide, one, other) for one, other in zip(whole, near, strict=True))
     return share, mean, spread
 
 
-def _without(nearer: tuple[Any, Any, Any], farther: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-    """What one end cuts off, where the other cuts off little of that: its share alone feels the other."""
-    share = ca.log(ca.fmax(1.0 - ca.exp(farther[0] - nearer[0]), 1e-300))
-    return nearer[0] + share, *nearer[1:]
+def _without(inside: tuple[Any, Any, Any], beyond: Any) -> tuple[Any, Any, Any]:
+    """What the nearer of two ends leaves: its share alone feels what is beyond the other."""
+    share = ca.log(ca.fmax(1.0 - ca.exp(beyond - inside[0]), TINY))
+    return inside[0] + share, *inside[1:]
 
 
-def _density(z: Any) -> Any:
-    return ca.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+def _mills(z: Any) -> Any:
+    """Share of a standard Gaussian beyond z > 0 over its density there, to eleven digits."""
+    t = MIDDLE / (MIDDLE + z)
+    terms, power = list(_coefficients()), 2.0 * t - 1.0
+    while len(terms) > 1:  # in pairs of pairs: a short chain
+        pairs = [terms[k] + power * terms[k + 1] for k in range(0, len(terms) - 1, 2)]
+        terms, power = pairs + terms[2 * len(pairs) :], power * power
+    return t * terms[0]
 
 
-def _hazard(z: Any) -> Any:
-    """Density over the share beyond: the mean of what is beyond z."""
-    far, near = ca.fmax(z, FAR), ca.fmin(z, FAR)
-    fraction = far
-    for k in range(TERMS, 0, -1):
-        fraction = far + k / fraction
-    return ca.if_else(z > FAR, fraction, _density(near) / (0.5 - 0.5 * ca.erf(near / math.sqrt(2.0))))
+@cache
+def _coefficients() -> tuple[float, ...]:
+    """Of the polynomial in 2 t - 1, t = MIDDLE / (MIDDLE + z), that is Mills' ratio over t from 0 to infinity."""
 
+    def over_t(x: np.ndarray) -> np.ndarray:
+        t = 0.5 * (x + 1.0)
+        return math.sqrt(0.5 * math.pi) * scipy.special.erfcx(MIDDLE * (1.0 - t) / t / math.sqrt(2.0)) / t
 
-def _log_beyond(z: Any, hazard: Any) -> Any:
-    """Logarithm of the share beyond z."""
-    near = ca.fmin(z, FAR)
-    tail = -0.5 * z * z - 0.5 * math.log(2.0 * math.pi) - ca.log(ca.fmax(hazard, 1e-300))
-    return ca.if_else(z > FAR, tail, ca.log(0.5 - 0.5 * ca.erf(near / math.sqrt(2.0))))
+    found = np.polynomial.Chebyshev.interpolate(over_t, DEGREE).convert(kind=np.polynomial.Polynomial)
+    return tuple(float(c) for c in found.coef)
