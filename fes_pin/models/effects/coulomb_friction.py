@@ -122,8 +122,13 @@ class CoulombFriction(Effect):
 
     @classmethod
     def forms(cls, measured: Mapping[str, np.ndarray]) -> tuple[Mapping[str, float], ...]:
-        """With presliding as well where the motion is imposed: at rates of many samples a band's stretch is no jump."""
-        return ({}, *({"presliding": way} for way in cls.grids(measured)["presliding"]))
+        """With presliding as well where the motion is imposed: at rates of many samples a band's stretch is no jump.
+
+        With a stretch where it is free: beside a play, a joint that sticks and creeps otherwise passes for no friction.
+        """
+        grids = cls.grids(measured)
+        tried = "presliding" if any(grids["presliding"]) else "stretch"
+        return ({}, *({tried: way} for way in grids[tried] if way > 0.0))
 
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
         """A fall of friction with speed ends among the speeds that a joint moves at; else it is less damping.
