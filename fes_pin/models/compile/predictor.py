@@ -25,7 +25,8 @@ first states to them and g the slope of the reading: a scale of it that another 
 
 A memory that states go into, as the play of a gear does, is as uncertain as they are: it is carried as a state that
 changes at samples alone, m+ = D(x, m). Where D bends within that uncertainty its tangent says little of it: mean, slope
-and what no slope explains are those of differences as long as the uncertainty is, see `_spread`.
+and what no slope explains are those of differences as long as the uncertainty is, see `_spread`. One that follows with
+slack, and is read, takes part in a sample's first reading of it: see `compile.slack`.
 
 Source: Jazwinski, Stochastic Processes and Filtering Theory, 1970, section 8.3; Kristensen, Madsen and Jorgensen,
 Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
@@ -40,7 +41,7 @@ import casadi as ca
 
 from fes_pin.models.compile.equations import Equations, Tangents, column, dense_function, nonzeros
 from fes_pin.models.compile.layout import Layout
-from fes_pin.models.compile.slack import Gaussian, mixed, normalized
+from fes_pin.models.compile.slack import Gaussian, Slack, read_across
 from fes_pin.models.model import Model
 
 REACH = 3.0**0.5
@@ -254,39 +255,13 @@ def _across_slack(
     d: Carried, k: int, reading: Any, given: tuple[Any, Any, Any], known: Gaussian, moved: Any, inner: tuple[Any, ...]
 ) -> tuple[tuple[Any, Any, Any], Any, Any, Any]:
     """Innovation, its variance and sensitivities; state, covariance and sensitivities; see `compile.slack`."""
-    (measured, noise, seen), count = given, d.x.numel()
-    mean = ca.SX.sym("mean", count)
-    position, half = d.slacks[k]
-    there, along = (ca.substitute(one, d.x, mean) for one in (position, ca.jacobian(position, d.x)))
-    away, across = there - mean[k], along - ca.SX.eye(count)[k, :]
-    before, foretold, after = [], [], []
-    for low, high, ahead in ((-half, half, None), (half, None, -half), (None, -half, half)):
-        turned, beside = ca.SX.eye(count), ca.SX(0)
-        if ahead is not None:
-            turned[k, :], beside = along, there - ca.mtimes(along, mean) + ahead
+    mean, (measured, noise, _) = ca.SX.sym("mean", d.x.numel()), given
+    told, left = read_across(Slack(k, *d.slacks[k]), d.x, reading, given, Gaussian(mean, known.covariance))
 
-        def mapped(one: Gaussian, turned: Any = turned, beside: Any = beside) -> Gaussian:
-            moved = ca.mtimes(turned, one.mean)
-            return one.mapped(turned, _with_row(moved, k, moved[k] + beside))
-
-        own = Gaussian(mean, known.covariance)
-        share, part = own.cut(across, away, low, high)
-        there_now = mapped(part)
-        value, row = (ca.substitute(e, d.x, there_now.mean) for e in (reading, ca.jacobian(reading, d.x)))
-        through = ca.mtimes(row, turned)
-        uncut = value + ca.mtimes(through, mean - part.mean)
-        told, density = own.seen(through, measured - uncut, noise, seen)
-        left, cut = told.cut(across, away + ca.mtimes(across, told.mean - mean), low, high)
-        before.append(share)
-        foretold.append(Gaussian(value, ca.mtimes([through, part.covariance, through.T])))
-        after.append((left + density, mapped(cut)))
-    told = mixed(normalized(before), foretold)
-    left = mixed(normalized([weight for weight, _ in after]), [one for _, one in after])
-
-    def through_all(f: Any) -> Any:
+    def through(f: Any) -> Any:
         return ca.substitute(d.through(f, *inner[1:]) + ca.mtimes(ca.jacobian(f, mean), moved), mean, known.mean)
 
-    slope, turned = -through_all(told.mean), through_all(left.mean)
+    slope, turned = -through(told.mean), through(left.mean)
     value, spread, x, covariance = (
         ca.substitute(e, mean, known.mean) for e in (told.mean, told.covariance, left.mean, left.covariance)
     )

@@ -70,10 +70,6 @@ class Gaussian:
             self.mean + toward * (middle / std), self.covariance - less * ca.mtimes(toward, toward.T)
         )
 
-    def mapped(self, slopes: Any, mean: Any) -> Gaussian:
-        """What a linear map makes of it, whose mean is known."""
-        return Gaussian(mean, ca.mtimes([slopes, self.covariance, slopes.T]))
-
 
 def mixed(shares: list[Any], parts: list[Gaussian]) -> Gaussian:
     """Mean and covariance of a mixture."""
@@ -93,6 +89,86 @@ def normalized(logs: list[Any]) -> list[Any]:
 
 def _sum(many: list[Any]) -> Any:
     return sum(many[1:], many[0])
+
+
+@dataclass(frozen=True)
+class Slack:
+    """A memory that follows with slack: its place among the states, what it follows, and half the slack."""
+
+    place: int
+    position: Any
+    half: Any
+
+
+def read_across(
+    slack: Slack, x: Any, reading: Any, given: tuple[Any, Any, Any], known: Gaussian
+) -> tuple[Gaussian, Gaussian]:
+    """What is foretold of a reading, but for its noise, and what it leaves of the states; see the module.
+
+    Parameters
+    ----------
+    x
+        Symbols of the states, which the slack and the reading are expressions in.
+    given
+        What was measured, the variance of its noise, and 1 where it was seen, 0 else.
+    known
+        The states before the memory has followed.
+    """
+    position, along = (ca.substitute(e, x, known.mean) for e in (slack.position, ca.jacobian(slack.position, x)))
+    across, away = along - ca.SX.eye(x.numel())[slack.place, :], position - known.mean[slack.place]
+    pieces = []
+    for low, high, behind in (
+        (-slack.half, slack.half, None),
+        (slack.half, None, slack.half),
+        (None, -slack.half, -slack.half),
+    ):
+        turned, beside = ca.SX.eye(x.numel()), ca.SX.zeros(x.numel())
+        if behind is not None:
+            turned[slack.place, :] = along
+            beside[slack.place] = position - ca.mtimes(along, known.mean) - behind
+        pieces.append(_Piece(across, away, low, high, turned, beside).read(x, reading, given, known))
+    told = mixed(normalized([one.share for one in pieces]), [one.foretold for one in pieces])
+    return told, mixed(normalized([one.weight for one in pieces]), [one.left for one in pieces])
+
+
+@dataclass(frozen=True)
+class _Read:
+    """A piece once a reading has come: logarithms of its share before and of its weight after, what it says, leaves."""
+
+    share: Any
+    weight: Any
+    foretold: Gaussian
+    left: Gaussian
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Where a slack, linear in the states with such slopes and mean, is between two ends; the memory's map there."""
+
+    across: Any
+    away: Any
+    low: Any
+    high: Any
+    turned: Any
+    beside: Any
+
+    def _followed(self, one: Gaussian) -> Gaussian:
+        mean = ca.mtimes(self.turned, one.mean) + self.beside
+        return Gaussian(mean, ca.mtimes([self.turned, one.covariance, self.turned.T]))
+
+    def read(self, x: Any, reading: Any, given: tuple[Any, Any, Any], known: Gaussian) -> _Read:
+        """The piece across a reading, which is linear about the middle of it."""
+        measured, noise, seen = given
+        share, part = known.cut(self.across, self.away, self.low, self.high)
+        middle = self._followed(part).mean
+        value, row = (ca.substitute(e, x, middle) for e in (reading, ca.jacobian(reading, x)))
+        row = ca.mtimes(row, self.turned)
+        uncut = value + ca.mtimes(row, known.mean - part.mean)
+        told, density = known.seen(row, measured - uncut, noise, seen)
+        away = self.away + ca.mtimes(self.across, told.mean - known.mean)
+        left, cut = told.cut(self.across, away, self.low, self.high)
+        foretold = Gaussian(value, ca.mtimes([row, part.covariance, row.T]))
+        return _Read(share, left + density, foretold, self._followed(cut))
 
 
 class _End:
