@@ -1,8 +1,8 @@
 """How rough the likelihood is about a fit: what its cost differs by between points that the data cannot tell apart.
 
-The likelihood of a model that bends sharply, as a play does where its slack is taken up, is that of an approximate
-filter, and jumps by far more than what a parameter's deviation is worth. Where a fit ends there is chance, and of two
-fits nothing is said by less than that.
+The likelihood of a model that bends sharply is that of an approximate filter, and may jump by more than what a
+parameter's deviation is worth: that of a play did, before what its slack cuts was carried (`compile.slack`). Where a
+fit ends there is chance, and of two fits nothing is said by less than that.
 """
 
 from __future__ import annotations
