@@ -39,9 +39,6 @@ class Sets:
         known = {"degrees": len(names), "model": SimpleNamespace(effects=()), "free": ()}
         return SimpleNamespace(names=names, sse=sse, price=sse + 5.0 * len(names), **known)
 
-    def gained(self, larger, smaller):
-        return smaller.sse - larger.sse
-
     def extend_all(self, base, most=None):
         for name in ("lag", "tendon", "velocity"):
             names = tuple(sorted({*base, name}))

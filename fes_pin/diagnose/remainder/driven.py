@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,6 @@ from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import DRIVEN_LEVEL
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import limits_of
-from fes_pin.identify.roughness import roughness, uncertain_gain
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
 from fes_pin.models.stage import Effect
 
@@ -115,12 +113,7 @@ class _Featured:
         tried = [{n: float(np.clip(values[n] + t * m, *limits[n])) for n, m in moves.items()} for t in (0.0, *TRIED)]
         points = [({**values, **one}, fitted.unknowns) for one in tried]
         now, *costs = self._problem.bounds(points)
-        return max(0.0, now - min(costs) - uncertain_gain(*[self._rough] * 2))
-
-    @cached_property
-    def _rough(self) -> float:
-        """How rough the likelihood is about the fit: what it may lose without features as with them."""
-        return roughness(self.fitted)
+        return max(0.0, now - min(costs))
 
 
 def _scaled(effect: Effect, fitted: Fit) -> Effect:

@@ -20,7 +20,6 @@ from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.problem import normal_equations
-from fes_pin.identify.roughness import roughness, uncertain_gain
 from fes_pin.identify.scoring import LITTLE, WORTH
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
@@ -68,7 +67,6 @@ class LikelihoodFits:
         self.fits: dict[Names, Fit] = {}
         self._converged: set[Names] = set()
         self._compared: dict[tuple[Names, str], Fit] = {}
-        self._roughness: dict[int, tuple[Fit, float]] = {}
         self._maxima = LikelihoodMaxima(trials)
         self.screen = LikelihoodScreen(self.library)
         self.forms = LikelihoodForms(self._maxima, self.library.measured)
@@ -212,19 +210,6 @@ class LikelihoodFits:
                 nothing = {n: float(one.parameters()[n].null) for n in one.amplitudes()}  # type: ignore[arg-type]
                 fitted = self._maxima.from_start(fitted.model + started(one, nothing), fitted.doubt, fitted.unknowns)
         return fitted
-
-    def gained(self, larger: Fit, smaller: Fit) -> float:
-        """What a larger set gains in twice the log-likelihood beyond what fits as rough differ by."""
-        gained = smaller.sse - larger.sse
-        if gained > 0.0:
-            gained = max(0.0, gained - uncertain_gain(self._rough(larger), self._rough(smaller)))
-        return gained
-
-    def _rough(self, fitted: Fit) -> float:
-        """How rough the likelihood is about a fit."""
-        if self._roughness.get(id(fitted), (None,))[0] is not fitted:
-            self._roughness[id(fitted)] = (fitted, roughness(fitted))
-        return self._roughness[id(fitted)][1]
 
     def ranked(self, size: int) -> list[Names]:
         """Sets of a size, cheapest first; those that have converged to what cannot be come last."""

@@ -120,7 +120,7 @@ class LikelihoodSearch:
 
     def p_value(self, larger: Fit, smaller: Fit) -> float:
         """Family-wise p-value of what a larger set adds, as far as pieces of the data agree on it."""
-        return self._p_value(self.sets.gained(larger, smaller), larger, smaller)
+        return self._p_value(smaller.sse - larger.sse, larger, smaller)
 
     def _p_value(self, gain: float, larger: Fit, smaller: Fit) -> float:
         """Family-wise p-value of a gain in twice the log-likelihood."""
