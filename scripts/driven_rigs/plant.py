@@ -88,14 +88,17 @@ class _State:
     def read(self) -> np.ndarray:
         """The encoder's reading now."""
         p, hidden = self.plant, self.plant.hidden
-        y = self.lagged if "sensor_lag" in hidden else self.q
-        if "backlash" in hidden:
-            half = hidden["backlash"]
-            self.followed = np.minimum(np.maximum(self.followed, y - half), y + half)
-            y = self.followed
+        y = self.lagged if "sensor_lag" in hidden else self._through_play()
         y = y * (1.0 + hidden.get("sensor_gain", 0.0)) + hidden.get("sensor_offset", 0.0)
         y = y + p.noise * self.rng.standard_normal(len(y))
         return np.round(y / p.count) * p.count if p.count else y
+
+    def _through_play(self) -> np.ndarray:
+        """What a play leaves of the position: a sensor may lag behind that."""
+        if (half := self.plant.hidden.get("backlash")) is None:
+            return self.q
+        self.followed = np.minimum(np.maximum(self.followed, self.q - half), self.q + half)
+        return self.followed
 
     def advance(self, effort: np.ndarray, time: float) -> None:
         """To the next sample by Heun's method; the random torque is held over an integration step."""
@@ -108,7 +111,8 @@ class _State:
             a1 = self._acceleration(effort, t + h, q1, v1, self.relaxed) - bristles
             lag, relax = p.hidden.get("sensor_lag", 0.0), p.hidden.get("relaxation_s", 0.0)
             if lag:
-                self.lagged = self.q + (self.lagged - self.q) * np.exp(-h / lag)
+                sensed = self._through_play()
+                self.lagged = sensed + (self.lagged - sensed) * np.exp(-h / lag)
             if relax:
                 self.relaxed = self.q + (self.relaxed - self.q) * np.exp(-h / relax)
             v = self.v + 0.5 * h * (a0 + a1)

@@ -85,7 +85,8 @@ class ChosenAgain:
 def _by_trial(fitted: Fit) -> list[_Trial]:
     """Each trial's part; of parameters that do not lie at a bound, which would not move, scaled to the size of each."""
     moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
-    parts = at_rest(fitted.parts) if fitted.together else fitted.parts  # what slopes promise there, no step keeps
+    by_likelihood = fitted.doubt is not None  # slopes for gains as they are promise there what no step keeps
+    parts = at_rest(fitted.parts) if by_likelihood else fitted.parts
     each = [(p, normal_equations([p])) for p in parts]
     size = np.sqrt(np.maximum(sum(np.diag(e.hessian)[moving] for _, e in each), 1e-300))
     return [
