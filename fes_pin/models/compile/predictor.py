@@ -218,31 +218,37 @@ def _corrected(d: Carried, doubt: _Doubt, s: Any, inner: tuple[Any, ...], packed
     slack = _read_with_slack(d)
     now, covariance, moved = _remembered(d, doubt.covariance, s, inner, slack)
     x, u, c = now, d.sym.u, d.sym.c
-    innovations, variances, slopes = [], [], []
+    told: list[tuple[Any, Any, Any]] = []
     for name in d.layout.measured:
         reading = d.readings[d.layout.outputs.index(name)]
         given = (u[f"measured.{name}"], u[f"repeated.{name}"] * c[f"white.{name}"] ** 2, u[f"seen.{name}"])
+        known = Gaussian(x, covariance)
         if slack is not None and ca.depends_on(reading, d.x[slack]):
-            told, x, covariance, moved = _across_slack(d, slack, reading, given, Gaussian(x, covariance), moved, inner)
-            innovation, variance, slope = told
+            one, x, covariance, moved = _across_slack(d, slack, reading, given, known, moved, inner)
             slack, now = None, x
         else:
-            measured, noise, seen = given
-            expressions = (reading, ca.jacobian(reading, d.x), d.through(reading, *inner[1:]))
-            reading, row, beside = (ca.substitute(one, d.x, now) for one in expressions)
-            innovation = measured - (reading + ca.mtimes(row, x - now))
-            toward = ca.mtimes(covariance, row.T)
-            variance = ca.mtimes(row, toward) + noise
-            gain = seen * toward / variance
-            slope = -(beside + ca.mtimes(row, moved))
-            x, covariance = x + gain * innovation, covariance - ca.mtimes(gain, toward.T)
-            moved = moved + ca.mtimes(gain, slope)
-        innovations.append(innovation)
-        variances.append(variance)
-        slopes.append(ca.densify(slope))
+            one, x, covariance, moved = _linear(d, now, reading, given, known, moved, inner)
+        told.append(one)
+    innovations, variances, slopes = ([one[k] for one in told] for k in range(3))
     dr = ca.vertcat(*slopes)
     y = ca.vertcat(column(innovations), column(variances), ca.vec(dr.T) if d.layout.columns else ca.SX(0, 1))
     return [packed(x, moved, covariance), y]
+
+
+def _linear(
+    d: Carried, now: Any, reading: Any, given: tuple[Any, Any, Any], known: Gaussian, moved: Any, inner: tuple[Any, ...]
+) -> tuple[tuple[Any, Any, Any], Any, Any, Any]:
+    """Innovation, its variance and sensitivities; state, covariance and sensitivities, linear about `now`."""
+    measured, noise, seen = given
+    expressions = (reading, ca.jacobian(reading, d.x), d.through(reading, *inner[1:]))
+    foretold, row, beside = (ca.substitute(one, d.x, now) for one in expressions)
+    innovation = measured - (foretold + ca.mtimes(row, known.mean - now))
+    toward = ca.mtimes(known.covariance, row.T)
+    variance = ca.mtimes(row, toward) + noise
+    gain = seen * toward / variance
+    slope = ca.densify(-(beside + ca.mtimes(row, moved)))
+    left = known.covariance - ca.mtimes(gain, toward.T)
+    return (innovation, variance, slope), known.mean + gain * innovation, left, moved + ca.mtimes(gain, slope)
 
 
 def _read_with_slack(d: Carried) -> int | None:
@@ -261,7 +267,7 @@ def _across_slack(
     def through(f: Any) -> Any:
         return ca.substitute(d.through(f, *inner[1:]) + ca.mtimes(ca.jacobian(f, mean), moved), mean, known.mean)
 
-    slope, turned = -through(told.mean), through(left.mean)
+    slope, turned = ca.densify(-through(told.mean)), through(left.mean)
     value, spread, x, covariance = (
         ca.substitute(e, mean, known.mean) for e in (told.mean, told.covariance, left.mean, left.covariance)
     )
