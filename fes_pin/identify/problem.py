@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.noise import NoiseModel, thinning
 from fes_pin.models.least_squares import least_squares
@@ -193,6 +194,14 @@ def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndar
         if rig.output(trial.kind) in trial.columns and "reading" in rig.signals(trial.kind):
             out.setdefault("reading", []).append(trial[rig.output(trial.kind)])
     return {n: np.concatenate(v) for n, v in out.items()}
+
+
+def answered_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
+    """The same of a rig that the likelihood judges, whose effort, if it has one, answers what is read: `answer`."""
+    measured = measured_columns(model, trials)
+    if "effort" in measured and not any(t.kind == IMPOSED for t in trials):
+        measured["answer"] = measured["effort"]
+    return measured
 
 
 def limits_of(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, float]]:

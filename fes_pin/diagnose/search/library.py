@@ -13,7 +13,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.starts import near_null
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel
-from fes_pin.identify.problem import Problem, measured_columns
+from fes_pin.identify.problem import Problem, answered_columns, measured_columns
 from fes_pin.models.catalogue import installed
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -42,12 +42,26 @@ class Probe:
 
 
 class Library:
-    """The causes that a rig can have, ready to be linearized on trials."""
+    """The causes that a rig can have, ready to be linearized on trials.
 
-    def __init__(self, model: Model, trials: Sequence[Trial], effects: Sequence[type[Effect]] | None = None) -> None:
+    Parameters
+    ----------
+    effects
+        Those that are looked for; by default all that are known of the rig.
+    answered
+        Whether an effort, if there is one, answers what is read; see `answered_columns`.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        effects: Sequence[type[Effect]] | None = None,
+        answered: bool = False,
+    ) -> None:
         self.effects = tuple(installed().effects_for(model.rig) if effects is None else effects)
         self.model, self.trials = Model(model.rig), tuple(trials)
-        self.measured = measured_columns(model, trials)
+        self.measured = (answered_columns if answered else measured_columns)(model, trials)
         self._problems: dict[tuple, Problem] = {}
 
     def grid(self, effect: type[Effect]) -> list[Effect]:

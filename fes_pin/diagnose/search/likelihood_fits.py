@@ -63,7 +63,7 @@ class LikelihoodFits:
 
     def __init__(self, model: Model, trials: Sequence[Trial], effects: Sequence[type[Effect]] | None = None) -> None:
         self.model, self.trials = Model(model.rig), tuple(trials)
-        self.library = Library(self.model, trials, effects)
+        self.library = Library(self.model, trials, effects, answered=True)
         self.fits: dict[Names, Fit] = {}
         self._converged: set[Names] = set()
         self._compared: dict[tuple[Names, str], Fit] = {}

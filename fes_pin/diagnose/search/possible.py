@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from fes_pin.data.schema import IMPOSED
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.problem import measured_columns
+from fes_pin.identify.problem import answered_columns, measured_columns
 
 
 def is_possible(fitted: Fit) -> bool:
@@ -14,7 +11,8 @@ def is_possible(fitted: Fit) -> bool:
 
     It ended where that ends, other than at nothing, or is less than what is read can tell.
     """
-    measured = _measured(fitted) if fitted.model.effects else {}
+    columns = measured_columns if fitted.doubt is None else answered_columns
+    measured = columns(fitted.model, fitted.trials) if fitted.model.effects else {}
     for effect in fitted.model.effects:
         info, smallest = effect.parameters(), effect.smallest(measured)
         for n in effect.amplitudes():
@@ -24,11 +22,3 @@ def is_possible(fitted: Fit) -> bool:
             if 0.0 < abs(size) < smallest.get(n, 0.0):
                 return False
     return True
-
-
-def _measured(fitted: Fit) -> dict[str, np.ndarray]:
-    """What was measured; `answer` is an effort that answers what is read, as of a rig that the likelihood judges."""
-    measured = measured_columns(fitted.model, fitted.trials)
-    if fitted.doubt is not None and "effort" in measured and not any(t.kind == IMPOSED for t in fitted.trials):
-        measured["answer"] = measured["effort"]
-    return measured

@@ -124,10 +124,10 @@ class CoulombFriction(Effect):
     def forms(cls, measured: Mapping[str, np.ndarray]) -> tuple[Mapping[str, float], ...]:
         """With presliding as well where the motion is imposed: at rates of many samples a band's stretch is no jump.
 
-        With a stretch where it is free: beside a play, a joint that sticks and creeps otherwise passes for no friction.
+        With a stretch where an effort answers what is read: beside a play, a joint that sticks and creeps otherwise
+        passes for no friction.
         """
-        grids = cls.grids(measured)
-        tried = "presliding" if any(grids["presliding"]) else "stretch"
+        grids, tried = cls.grids(measured), "stretch" if "answer" in measured else "presliding"
         return ({}, *({tried: way} for way in grids[tried] if way > 0.0))
 
     def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
