@@ -11,8 +11,10 @@ def is_possible(fitted: Fit) -> bool:
 
     It ended where that ends, other than at nothing, or is less than what is read can tell.
     """
+    if not fitted.model.effects:
+        return True
     columns = measured_columns if fitted.doubt is None else answered_columns
-    measured = columns(fitted.model, fitted.trials) if fitted.model.effects else {}
+    measured = columns(fitted.model, fitted.trials)
     for effect in fitted.model.effects:
         info, smallest = effect.parameters(), effect.smallest(measured)
         for n in effect.amplitudes():
