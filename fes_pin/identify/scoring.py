@@ -25,7 +25,7 @@ LITTLE = 0.1
 """Fall of twice the log-likelihood with which turns end: a third of a standard deviation of one parameter."""
 STEPS = (1e-3, 0.03)
 """Steps of the differences in logarithms: the second where the first promises what no step keeps, as where the cost is
-rough: that of a play jumps where an estimate crosses its slack."""
+rough: that of a filter which takes for linear what bends sharply."""
 DEVIATIONS = 10.0
 """How many deviations of a parameter, as far as it is known with gains as they are, count as one of a logarithm: a
 difference is then 0.01 of them, or 0.3."""
