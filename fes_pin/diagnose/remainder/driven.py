@@ -35,7 +35,8 @@ def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     A remainder is claimed at the level that a cause is. Half of it goes to the largest single feature, half to all
     together. The chi-square is divided by its inflation under random signs of the trials, where there are enough.
     What slopes promise counts as far as the likelihood keeps it: those of a filter are an approximation, worst of
-    what bends sharply. Not where effort is read: there fits follow such slopes to their end, and leave promises that none keeps.
+    what bends sharply. Not where effort is read: there fits follow such slopes to their end, and leave promises that
+    none keeps.
     """
     featured = _Featured(fitted)
     projection = Projection(fitted.parts)
