@@ -5,7 +5,8 @@ and the curvature of half that cost, each trial's own unknowns eliminated,
 
     cost(others) = |r|^2 - g' H^-1 g
 
-is where one Gauss-Newton step ends. Sets are compared by the rule that the search goes by: the cheapest of a size takes
+is where one Gauss-Newton step ends. Of a fit by the likelihood, whose slopes are those for gains as they are, less is
+gained by what they promise of all trials together: no step has kept that. Sets are compared by the rule that the search goes by: the cheapest of a size takes
 the place of the best smaller one if what it adds earns its place. No trial that is held out has a say in it. What the
 others tell counts as if there were as many of them as of all: asked is whether they say the same, not whether fewer say
 as much.
@@ -26,7 +27,6 @@ from fes_pin.diagnose.search.cause_sets import Names
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.problem import normal_equations
-from fes_pin.identify.scatter import at_rest
 
 Worthwhile = Callable[[Fit, Fit, float, float], bool]
 """Whether a set is worth more than a smaller one where it gains so much in twice the log-likelihood, and all its causes
@@ -76,18 +76,21 @@ class ChosenAgain:
         """The cost of the other trials at the end of one step, as if there were as many of them as of all."""
         every = self._trials[names]
         others = [t for i, t in enumerate(every) if i not in held]
-        slope, curvature = sum(t.slope for t in others), sum(t.curvature for t in others)
-        step = np.linalg.lstsq(curvature, slope, rcond=1e-12)[0]
         many = sum(t.readings for t in every) / sum(t.readings for t in others)
-        return many * (sum(t.cost for t in others) - float(slope @ step))
+        gained = _promised(others) - (0.0 if self._fits[names].doubt is None else _promised(every))
+        return many * (sum(t.cost for t in others) - gained)
+
+
+def _promised(trials: Sequence[_Trial]) -> float:
+    """What one Gauss-Newton step to the minimum of some trials promises."""
+    slope, curvature = sum(t.slope for t in trials), sum(t.curvature for t in trials)
+    return float(slope @ np.linalg.lstsq(curvature, slope, rcond=1e-12)[0])
 
 
 def _by_trial(fitted: Fit) -> list[_Trial]:
     """Each trial's part; of parameters that do not lie at a bound, which would not move, scaled to the size of each."""
     moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
-    by_likelihood = fitted.doubt is not None  # slopes for gains as they are promise there what no step keeps
-    parts = at_rest(fitted.parts) if by_likelihood else fitted.parts
-    each = [(p, normal_equations([p])) for p in parts]
+    each = [(p, normal_equations([p])) for p in fitted.parts]
     size = np.sqrt(np.maximum(sum(np.diag(e.hessian)[moving] for _, e in each), 1e-300))
     return [
         _Trial(
