@@ -5,11 +5,11 @@ and the curvature of half that cost, each trial's own unknowns eliminated,
 
     cost(others) = |r|^2 - g' H^-1 g
 
-is where one Gauss-Newton step ends. Of a fit by the likelihood, whose slopes are those for gains as they are, less is
-gained by what they promise of all trials together: no step has kept that. Sets are compared by the rule that the search goes by: the cheapest of a size takes
-the place of the best smaller one if what it adds earns its place. No trial that is held out has a say in it. What the
-others tell counts as if there were as many of them as of all: asked is whether they say the same, not whether fewer say
-as much.
+is where one Gauss-Newton step ends. Of a fit by the likelihood, whose slopes are those for gains as they are, what
+others gain by the step that all trials promise together is none: no step has kept that. Sets are compared by the rule
+that the search goes by: the cheapest of a size takes the place of the best smaller one if what it adds earns its place.
+No trial that is held out has a say in it. What the others tell counts as if there were as many of them as of all: asked
+is whether they say the same, not whether fewer say as much.
 
 Source: Stone, Cross-validatory choice and assessment of statistical predictions, J. R. Stat. Soc. B 36 (1974);
 Giordano, Stephenson, Liu, Jordan and Broderick, A Swiss army infinitesimal jackknife, AISTATS 2019.
@@ -77,14 +77,18 @@ class ChosenAgain:
         every = self._trials[names]
         others = [t for i, t in enumerate(every) if i not in held]
         many = sum(t.readings for t in every) / sum(t.readings for t in others)
-        gained = _promised(others) - (0.0 if self._fits[names].doubt is None else _promised(every))
+        slope, curvature, step = _step(others)
+        gained = float(slope @ step)
+        if self._fits[names].doubt is not None:  # what all promise together no step has kept
+            _, _, kept = _step(every)
+            gained -= float(2.0 * slope @ kept - kept @ curvature @ kept)
         return many * (sum(t.cost for t in others) - gained)
 
 
-def _promised(trials: Sequence[_Trial]) -> float:
-    """What one Gauss-Newton step to the minimum of some trials promises."""
-    slope, curvature = sum(t.slope for t in trials), sum(t.curvature for t in trials)
-    return float(slope @ np.linalg.lstsq(curvature, slope, rcond=1e-12)[0])
+def _step(trials: Sequence[_Trial]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Slope and curvature of half the cost of some trials, and the Gauss-Newton step to take away to its minimum."""
+    slope, curvature = np.sum([t.slope for t in trials], axis=0), np.sum([t.curvature for t in trials], axis=0)
+    return slope, curvature, np.linalg.lstsq(curvature, slope, rcond=1e-12)[0]
 
 
 def _by_trial(fitted: Fit) -> list[_Trial]:
