@@ -13,6 +13,7 @@ from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.problem import Problem
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
+from fes_pin.models.predictor import Doubt
 
 NAMES = ("coulomb_friction", "effort_offset", "quadratic_damping")
 
@@ -68,3 +69,23 @@ def test_what_one_trial_alone_speaks_for_is_not_chosen_without_it(fits):
 
 def test_without_folds_nothing_is_said():
     assert share_of([], ["coulomb_friction"]) is None
+
+
+def test_what_all_trials_promise_together_and_no_step_has_kept_counts_for_no_fold(fits):
+    """Slopes of a filter for gains as they are promise that; those of a free simulation keep it."""
+    offset = fits["effort_offset",]
+    k, push = offset.free.index("effort_offset.offset"), 20.0 * offset.std("effort_offset.offset")
+    parts = tuple(replace(p, residual=p.residual + push * p.jacobian[:, k]) for p in offset.parts)
+    free = replace(offset, parts=parts)
+    doubt = Doubt({"position": 1.0})
+
+    def gained(fitted, held):
+        others = [p for i, p in enumerate(fitted.parts) if i not in held]
+        many = sum(len(p.residual) for p in fitted.parts) / sum(len(p.residual) for p in others)
+        now = many * sum(float(p.residual @ p.residual) + p.log_determinant for p in others)
+        return now - ChosenAgain({(): fitted}, earns)._cost((), held)
+
+    for held in folds_of(offset.trials):
+        assert gained(free, held) > gained(offset, held) + 100.0
+        same = gained(replace(offset, doubt=doubt), held)
+        assert gained(replace(free, doubt=doubt), held) == pytest.approx(same, abs=1e-3)

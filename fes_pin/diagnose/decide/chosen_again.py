@@ -27,6 +27,8 @@ from fes_pin.diagnose.search.cause_sets import Names
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.problem import normal_equations
+from fes_pin.identify.scatter import at_rest
+from fes_pin.identify.scoring import LITTLE
 
 Worthwhile = Callable[[Fit, Fit, float, float], bool]
 """Whether a set is worth more than a smaller one where it gains so much in twice the log-likelihood, and all its causes
@@ -94,7 +96,8 @@ def _step(trials: Sequence[_Trial]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 def _by_trial(fitted: Fit) -> list[_Trial]:
     """Each trial's part; of parameters that do not lie at a bound, which would not move, scaled to the size of each."""
     moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
-    each = [(p, normal_equations([p])) for p in fitted.parts]
+    has_ended = fitted.together and fitted.gradient_norm < LITTLE
+    each = [(p, normal_equations([p])) for p in (at_rest(fitted.parts) if has_ended else fitted.parts)]
     size = np.sqrt(np.maximum(sum(np.diag(e.hessian)[moving] for _, e in each), 1e-300))
     return [
         _Trial(
