@@ -80,10 +80,10 @@ def test_what_all_trials_promise_together_and_no_step_has_kept_counts_for_no_fol
     doubt = Doubt({"position": 1.0})
 
     def gained(fitted, held):
-        others = [p for i, p in enumerate(fitted.parts) if i not in held]
-        many = sum(len(p.residual) for p in fitted.parts) / sum(len(p.residual) for p in others)
-        now = many * sum(float(p.residual @ p.residual) + p.log_determinant for p in others)
-        return now - ChosenAgain({(): fitted}, earns)._cost((), held)
+        again = ChosenAgain({(): fitted}, earns)
+        others = [t for i, t in enumerate(again._trials[()]) if i not in held]
+        many = sum(t.readings for t in again._trials[()]) / sum(t.readings for t in others)
+        return many * sum(t.cost for t in others) - again._cost((), held)
 
     for held in folds_of(offset.trials):
         assert gained(free, held) > gained(offset, held) + 100.0
