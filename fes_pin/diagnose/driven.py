@@ -29,7 +29,15 @@ from fes_pin.diagnose.driven_held_out import (
     make_folds,
     with_choices,
 )
-from fes_pin.diagnose.driven_refused import Refused, refused_from, share_in, unsupported, with_refused_causes
+from fes_pin.diagnose.driven_refused import (
+    UNMOVED,
+    Refused,
+    is_moved_by_what_is_recorded,
+    refused_from,
+    share_in,
+    unsupported,
+    with_refused_causes,
+)
 from fes_pin.diagnose.errors_ahead import (
     Ahead,
     AheadErrors,
@@ -72,6 +80,8 @@ class Judged:
         The same on trials held out; None where none could be.
     chosen
         For each fold, the fit to all trials of the set that is chosen without its own.
+    reason
+        Why no cause may be named, if none may.
     """
 
     found: Found
@@ -85,6 +95,7 @@ class Judged:
     random: tuple[RandomPart, ...]
     ceiling_percent: float
     chosen: tuple[Fit, ...]
+    reason: str | None
 
     def gain_fit(self, name: str) -> float:
         """Share, in percent, of what the extended model adds to the log-likelihood that is lost without a cause."""
@@ -117,6 +128,8 @@ def judge_driven(
         How far ahead errors over a horizon look; `default_horizon` by default.
     """
     refused: dict[str, Refused] = {}
+    reason = None if is_moved_by_what_is_recorded(found.best) else UNMOVED
+    found = search.told(()) if reason else found
     horizon = horizon_s or default_horizon(train)
     settled, formed = frozenset(found.without), set[frozenset[str]]()
     again, alike = Again(afresh), Again(as_random_as_in_all)
@@ -134,7 +147,7 @@ def judge_driven(
         if names != settled:
             found, settled = search.settle(tuple(sorted(names)), {n: r.p_value for n, r in refused.items()}), names
             continue
-        chosen = _chosen(search, found, train) if folds and folds[0].within else []
+        chosen = _chosen(search, found, train) if folds and folds[0].within and not reason else []
         if rare := [n for n in names if not is_chosen(share_of(chosen, _alike(found, n)))]:
             rarest = min(rare, key=lambda n: gains[n].low)
             refused[rarest] = refused_from(found, rarest, gains[rarest].percent)
@@ -161,6 +174,7 @@ def judge_driven(
         random=random,
         ceiling_percent=_ceiling(found.best),
         chosen=tuple(chosen),
+        reason=reason,
     )
 
 
@@ -222,6 +236,7 @@ def driven_diagnosis(
         wall_s=0.0,
         warnings=words_of_reading(best.doubt, best.model.rig, trials[0]),
         random=judged.random,
+        reason=judged.reason,
         ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
     )
 

@@ -1,16 +1,23 @@
-"""Causes of driven rigs that held-out trials do not speak for, and what that leaves."""
+"""Causes of driven rigs that are refused: held-out trials do not speak for them, or no recorded input moves the rig."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from fes_pin.diagnose.decide.claims import FORM_SHARE
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, speaks_for
-from fes_pin.diagnose.errors_ahead import RandomPart
+from fes_pin.diagnose.errors_ahead import RandomPart, random_parts
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.search.likelihood_search import Found
+from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import CERTAIN_LEVEL, NOTHING_PERCENT, SMALL_SHARE
+from fes_pin.identify.likelihood import LikelihoodProblem
+
+UNMOVED = "the motion is as likely without the recorded input, so something else moves the rig"
+"""Why no cause is named where `is_moved_by_what_is_recorded` is False."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,21 @@ def share_in(found: Found, name: str) -> float:
     """Share of a cause in what all that were found add to the log-likelihood."""
     whole = found.nominal.sse - found.best.sse
     return (found.without[name].sse - found.best.sse) / max(whole, 1e-9)
+
+
+def is_moved_by_what_is_recorded(fitted: Fit) -> bool:
+    """False where most of what moves a rig acts at random, and the motion is as likely without what was recorded.
+
+    A column of another joint, or of another trial, is not what drove the rig; a spring or a friction beside it would
+    stand for the controller that did. A rig without recorded inputs is moved by what it is.
+    """
+    inputs = {id(t): [n for n in fitted.model.driven_by(t) if n in t] for t in fitted.trials}
+    if not any(inputs.values()) or all(r.share <= SMALL_SHARE for r in random_parts(fitted)):
+        return True
+    assert fitted.doubt is not None
+    still = [t.with_columns(**{n: np.zeros(len(t)) for n in inputs[id(t)]}) for t in fitted.trials]
+    (without,) = LikelihoodProblem(fitted.model, still, fitted.doubt).bounds([(fitted.values, fitted.unknowns)])
+    return without > fitted.sse
 
 
 def with_refused_causes(left: Remainder, random: Sequence[RandomPart], refused: dict[str, Refused]) -> Remainder:

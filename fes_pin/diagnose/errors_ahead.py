@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.decide.held_out import Errors
-from fes_pin.identify.ahead import SquaredErrors, forecast_errors, one_step, over_horizon, own_noise
+from fes_pin.identify.ahead import SquaredErrors, forecast_errors, forecasts, one_step, own_noise, reach_of
 from fes_pin.identify.doubts import driving_size
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import SMALL_SHARE
 from fes_pin.identify.noise import NoiseModel
+from fes_pin.models.predictor import Doubt
 from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel
 
@@ -45,11 +47,16 @@ class RandomPart:
 
 @dataclass(frozen=True)
 class Ahead:
-    """Errors E of one model, percent: one sample ahead, over the horizon, free (None where the rig falls)."""
+    """Errors E of one model, percent: one sample ahead, over the horizon, free (None where the rig falls).
+
+    `noise` is what noise alone leaves over the horizon, see `noise_in`; None of a rig that is simulated
+    freely.
+    """
 
     one_step: float
     horizon: float
     free: float | None
+    noise: float | None = None
 
     @classmethod
     def of(cls, total: SquaredErrors) -> Ahead:
@@ -117,41 +124,77 @@ def errors_over_horizon(pairs: Sequence[tuple[Fit, Fit, Sequence[Trial]]], horiz
     """
     work = [(fitted, floor, trial) for fitted, floor, trials in pairs for trial in trials]
     found = in_parallel(lambda w: _squares(*w, horizon_s), work)
-    squares, spread, counts = (np.concatenate([f[k] for f in found]) for k in range(3))
-    return Errors(squares, spread, counts)
+    return Errors(*np.concatenate(found, axis=1))
 
 
-def _squares(fitted: Fit, floor: Fit, trial: Trial, horizon_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    assert fitted.doubt is not None and floor.doubt is not None
-    foretold = over_horizon(fitted.model, trial, fitted.doubt, horizon_s)
-    total, around = np.zeros(len(trial)), np.zeros(len(trial))
-    for name, values in foretold.items():
-        variance = floor.doubt.white[name] ** 2
-        total += np.nan_to_num(trial[name] - values, posinf=0.0, neginf=0.0) ** 2 / variance
-        around += np.nan_to_num(trial[name] - np.nanmean(trial[name])) ** 2 / variance
-    pieces = [np.array_split(x, max(1, round(trial.duration))) for x in (total, around)]
-    sizes = np.array([float(len(foretold) * len(p)) for p in pieces[0]])
-    return np.array([p.sum() for p in pieces[0]]), np.array([p.sum() for p in pieces[1]]), sizes
+def _squares(fitted: Fit, floor: Fit, trial: Trial, horizon_s: float) -> np.ndarray:
+    """`Errors` of a trial by its seconds, shape (4, seconds); errors of as long as the horizon have one origin."""
+    assert floor.doubt is not None
+    told, noise = _told(fitted, trial, horizon_s)
+    lines = np.zeros((4, len(trial)))
+    for name, values in told.items():
+        variance, measured = floor.doubt.white[name] ** 2, trial[name]
+        squares = noise[name] / variance
+        lines[0] += np.nan_to_num(measured - values, posinf=0.0, neginf=0.0) ** 2 / variance
+        lines[1] += np.nan_to_num(measured - np.nanmean(measured)) ** 2 / variance
+        lines[2] += squares
+        lines[3] += 2.0 * squares**2 * max(1.0, horizon_s / trial.dt)
+    lines[:, : _first(fitted, trial, horizon_s)] = 0.0
+    pieces = np.array_split(lines, max(1, round(trial.duration)), axis=1)
+    return np.array([p.sum(axis=1) for p in pieces]).T
+
+
+def _told(fitted: Fit, trial: Trial, horizon_s: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """What is foretold over the horizon, and the variance of its errors by noise alone, shape (n,) by output."""
+    assert fitted.doubt is not None
+    calm = noise_in(fitted)
+    told = forecasts(fitted.model, trial, fitted.doubt, horizon_s)
+    alone = told if calm is fitted.doubt else forecasts(fitted.model, trial, calm, horizon_s)
+    noise = {n: np.where(np.isfinite(trial[n]), np.nan_to_num(one.variances), 0.0) for n, one in alone.items()}
+    return {n: one.values for n, one in told.items()}, noise
+
+
+def _first(fitted: Fit, trial: Trial, horizon_s: float) -> int:
+    """The first sample that is foretold from more than the first; 0 where the trial ends before, or where nothing of
+    its start is unknown."""
+    first = sum(reach_of(trial, horizon_s)) if fitted.model.rig.unknowns(trial.kind) else 0
+    return first if first < len(trial) else 0
+
+
+def noise_in(fitted: Fit) -> Doubt:
+    """What is random about a rig and its readings that is noise.
+
+    A random effort as far as it is small beside what drives the rig: what is more than `SMALL_SHARE` of that, is
+    something that the model misses.
+    """
+    assert fitted.doubt is not None
+    less = {r.name: SMALL_SHARE / r.share for r in random_parts(fitted) if r.share > SMALL_SHARE}
+    std = {n: value * less.get(n, 1.0) for n, value in fitted.doubt.std.items()}
+    return replace(fitted.doubt, std=std) if less else fitted.doubt
 
 
 def errors_ahead(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float, falling: bool) -> Ahead:
     """E of the first output one sample ahead, over the horizon, and free."""
-    missed = {"one_step": 0.0, "horizon": 0.0, "free": 0.0}
-    around = 0.0
+    missed = {"one_step": 0.0, "horizon": 0.0, "free": 0.0, "noise": 0.0}
+    around = dict.fromkeys(missed, 0.0)
     for fitted, trials in pairs:
         assert fitted.doubt is not None
         for trial in trials:
             name = fitted.model.rig.output(trial.kind)
             measured = trial[name]
+            told, noise = _told(fitted, trial, horizon_s)
+            begun = np.arange(len(trial)) < _first(fitted, trial, horizon_s)
             free = Simulator(fitted.model, [trial]).run(fitted.values)[0].readings[:, 0]
             errors = {
                 "one_step": one_step(fitted.model, trial, fitted.doubt)[name],
-                "horizon": measured - over_horizon(fitted.model, trial, fitted.doubt, horizon_s)[name],
+                "horizon": np.where(begun, np.nan, measured - told[name]),
                 "free": measured - free,
+                "noise": np.where(begun, np.nan, np.sqrt(noise[name])),
             }
+            spread = (measured - np.nanmean(measured)) ** 2
             with np.errstate(all="ignore"):
                 for key, values in errors.items():
                     missed[key] += float(np.nansum(values**2))
-            around += float(np.nansum((measured - np.nanmean(measured)) ** 2))
-    percent = {n: 100.0 * v / max(around, 1e-300) for n, v in missed.items()}
-    return Ahead(percent["one_step"], percent["horizon"], None if falling else percent["free"])
+                    around[key] += float(np.nansum(spread[~begun] if key in ("horizon", "noise") else spread))
+    percent = {n: 100.0 * v / max(around[n], 1e-300) for n, v in missed.items()}
+    return replace(Ahead(**percent), free=None if falling else percent["free"])

@@ -144,7 +144,8 @@ def _over_time(diagnosis: Diagnosis) -> dict[str, Any]:
         }
         for r in diagnosis.random
     }
-    return {**horizon, "random": random}
+    told = diagnosis.ahead.extended_held_out or diagnosis.ahead.extended
+    return {**horizon, "horizon_ceiling_percent": shown(told.noise), "random": random}
 
 
 def _experiment(diagnosis: Diagnosis) -> dict[str, Any] | None:

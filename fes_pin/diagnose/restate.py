@@ -198,7 +198,7 @@ def _errors_of_halves(made: Restated, trial: Trial) -> tuple[Errors, Errors]:
     pieces = len(plain.squares)
     odd = halves(pieces)[0]
     squares = np.where(odd, by_half[1].squares, by_half[0].squares)  # each piece by the value of the other half
-    return plain, Errors(squares, plain.spread, plain.counts)
+    return plain, Errors(squares, plain.spread, plain.noise)
 
 
 __all__ = ["Restated", "restated_study", "search_with_conditions", "with_misread"]

@@ -137,13 +137,12 @@ class Diagnosis:
         """
         if (ahead := self.over_horizon) is not None:
             one, other = ahead.nominal_held_out or ahead.nominal, ahead.extended_held_out or ahead.extended
-            return float(np.clip(100.0 * (one.horizon - other.horizon) / max(one.horizon, 1e-300), 0.0, 100.0))
+            return _explained(one.horizon, other.horizon, other.noise or 0.0)
         outside = self.nominal_error[1] is not None and self.extended_error[1] is not None
         before, after = (e[1] if outside else e[0] for e in (self.nominal_error, self.extended_error))
         assert before is not None
         assert after is not None
-        excess = max(before - self.ceiling_percent, before - after, 1e-300)
-        return float(np.clip(100.0 * (before - after) / excess, 0.0, 100.0))
+        return _explained(before, after, self.ceiling_percent)
 
     def headline(self) -> str:
         """The verdict in one sentence, with how much is explained and how much is not."""
@@ -210,3 +209,8 @@ class Diagnosis:
     def __str__(self) -> str:
         lines = [f"{self.study.name}: {self.headline()}", *cause_table(self.causes, self.gain_name)]
         return "\n".join(lines + [f" {note}" for note in self.footnotes()])
+
+
+def _explained(before: float, after: float, noise: float) -> float:
+    """Share of an error above that of noise alone which is gone, 0 to 100 percent."""
+    return float(np.clip(100.0 * (before - after) / max(before - noise, before - after, 1e-300), 0.0, 100.0))

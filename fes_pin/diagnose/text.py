@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
-from fes_pin.diagnose.errors_ahead import AheadErrors, RandomPart
+from fes_pin.diagnose.errors_ahead import Ahead, AheadErrors, RandomPart
 
 LEAST_P, LEAST_PERCENT = 1e-12, 1e-3
 """Below these a p-value and a percentage are no longer told apart from zero when they are printed."""
@@ -78,7 +78,7 @@ def ahead_notes(ahead: AheadErrors | None, random: Sequence[RandomPart], unit: s
     if ahead.nominal_held_out and ahead.extended_held_out:
         pairs.append(("held out", ahead.nominal_held_out, ahead.extended_held_out))
     lines = [
-        f"error E {ahead.horizon_s:g} s ahead {b.horizon:.2g} -> {a.horizon:.2g} %, "
+        f"error E {ahead.horizon_s:g} s ahead {b.horizon:.2g} -> {a.horizon:.2g} %{_of_noise(a)}, "
         f"one sample ahead {b.one_step:.2g} -> {a.one_step:.2g} % {where}"
         for where, b, a in pairs
     ]
@@ -90,6 +90,10 @@ def ahead_notes(ahead: AheadErrors | None, random: Sequence[RandomPart], unit: s
         for r in random
     ]
     return lines
+
+
+def _of_noise(ahead: Ahead) -> str:
+    return "" if ahead.noise is None else f" (noise alone {ahead.noise:.2g} %)"
 
 
 def left_out_text(left_out: dict[str, dict[str, tuple[int, ...]]], trials: Sequence[Trial]) -> str:

@@ -25,6 +25,7 @@ from fes_pin.identify.levels import RUNAWAY
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel, thin, thinning
 from fes_pin.identify.per_trial import predictions
+from fes_pin.models.foretold import Forecast
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, masked
 from fes_pin.models.simulate import Simulator
@@ -172,10 +173,15 @@ def one_step(model: Model, trial: Trial, doubt: Doubt) -> dict[str, np.ndarray]:
     problem = LikelihoodProblem(model, [trial], doubt, ())
     (foretold,) = problem.foretold(model.parameters())
     judged = model.rig.follows(trial) & (np.arange(len(trial)) > 0)
-    return {n: np.where(judged & np.isfinite(trial[n]), trial[n] - values, 0.0) for n, values in foretold.items()}
+    return {n: np.where(judged & np.isfinite(trial[n]), trial[n] - one.values, 0.0) for n, one in foretold.items()}
 
 
 def over_horizon(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dict[str, np.ndarray]:
+    """The values of `forecasts`, shape (n,), by output column that the trial has."""
+    return {n: one.values for n, one in forecasts(model, trial, doubt, horizon_s).items()}
+
+
+def forecasts(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dict[str, Forecast]:
     """What a model foretells of each sample from what was measured up to `horizon_s` before it.
 
     Parameters
@@ -186,23 +192,29 @@ def over_horizon(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> 
 
     Returns
     -------
-    dict of str to ndarray, shape (n,)
-        By output column that the trial has.
+    dict of str to Forecast
+        By output column that the trial has. The first sample, before which nothing was measured, is as measured.
     """
-    ahead = max(1, round(horizon_s / trial.dt))
-    stride = max(1, round(STRIDE * ahead))
+    ahead, stride = reach_of(trial, horizon_s)
     outputs = tuple(n for n in model.rig.outputs(trial.kind) if n in trial.columns)
     starts = range(0, max(len(trial) - ahead, 1), stride)
     abreast = [starts[k :: _abreast(ahead, stride)] for k in range(min(_abreast(ahead, stride), len(starts)))]
     shown = [masked(trial, outputs, [range(s + 1, s + ahead + stride) for s in own]) for own in abreast]
     problem = LikelihoodProblem(model, shown, doubt, (), starts=[trial] * len(shown))
-    out = {n: np.array(trial[n]) for n in outputs}
+    out = {n: Forecast(np.array(trial[n]), np.zeros(len(trial))) for n in outputs}
     for own, foretold in zip(abreast, problem.foretold(model.parameters()), strict=True):
         for s in own:
             rows = slice(s + ahead if s else 1, min(s + ahead + stride, len(trial)))
             for n in outputs:
-                out[n][rows] = foretold[n][rows]
+                for whole, part in zip(out[n], foretold[n], strict=True):
+                    whole[rows] = part[rows]
     return out
+
+
+def reach_of(trial: Trial, horizon_s: float) -> tuple[int, int]:
+    """Samples that a horizon is long, and by how many more the newest that is used may be older."""
+    ahead = max(1, round(horizon_s / trial.dt))
+    return ahead, max(1, round(STRIDE * ahead))
 
 
 def _abreast(ahead: int, stride: int) -> int:

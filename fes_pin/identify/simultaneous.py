@@ -64,7 +64,7 @@ def cost_of_answers(fitted: Fit, logged: Sequence[Trial], log: Log) -> float:
         if not len(at) or size == 0.0:
             continue
         gains = answer_of(trial[EFFORT], [trial[n] for n in before]).gains[at]
-        loop = sum(_felt((after[n] - before[n]) / size, at, gains[:, k]) for k, n in enumerate(before))
+        loop = sum(_felt((after[n].values - before[n].values) / size, at, gains[:, k]) for k, n in enumerate(before))
         counted = int(np.sum(are_news(trial, fitted.doubt.lasts_s)))
         with np.errstate(divide="ignore"):
             total -= 2.0 * counted * float(np.mean(np.log(np.abs(1.0 - loop))))

@@ -4,8 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+
+
+class Forecast(NamedTuple):
+    """What is foretold of an output, measured or not, and the variance of what it is off by if the model is right.
+
+    Both have shape (n,).
+    """
+
+    values: np.ndarray
+    variances: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ def test_a_prediction_that_runs_away_counts_as_a_large_error():
     most = RUNAWAY * max(np.abs(t["position"]).max() for t in study.trials)
     assert np.isfinite(errors.squares).all()
     assert errors.squares.max() > errors_of(base.model, study.trials, base.noise).squares.max()
-    assert (errors.squares <= (1.0 + 1e-9) * errors.counts * (most / base.noise["position"].std) ** 2).all()
+    assert (errors.squares <= (1.0 + 1e-9) * errors.noise * (most / base.noise["position"].std) ** 2).all()
 
 
 def test_evidence_against_a_model_that_runs_away_is_a_number():

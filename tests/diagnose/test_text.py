@@ -35,6 +35,8 @@ def test_a_driven_rigs_errors_and_what_acts_at_random_are_told():
         "a random effort of 0.12 N m acts, 4 % of what drives the rig, changing within 0.3 s",
     ]
     falling = ahead_notes(AheadErrors(0.3, Ahead(0.5, 20.0, None), Ahead(0.1, 2.0, None), None, None), (), "N m")
+    noisy = ahead_notes(AheadErrors(0.3, before, Ahead(0.1, 2.0, 5.0, 1.9), None, None), (), "N m")
+    assert noisy == ["error E 0.3 s ahead 20 -> 2 % (noise alone 1.9 %), one sample ahead 0.5 -> 0.1 % fitted"]
     assert falling[1:] == ["the rig falls by itself: a free simulation of it says nothing of the model"]
     assert ahead_notes(None, (wind,), "N m") == []
 

@@ -8,6 +8,7 @@ from driven_rigs.draw import BASES, draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnose.driven_refused import UNMOVED
 from fes_pin.diagnose.record import diagnosis_record
 
 
@@ -60,6 +61,7 @@ def test_what_no_cause_explains_is_said(tmp_path):
     found = diagnose_joint(replace(study, trials=trials))
     assert found.verdict == "unexplained" and not found.causes
     assert found.remainder.unexplained
+    assert found.reason == UNMOVED
 
 
 @pytest.mark.parametrize(("seed", "until"), [(13, None), (14, 0.4)])

@@ -169,7 +169,7 @@ def test_a_horizon_uses_all_that_is_older():
         older = masked(trial, ["position"], [range(last + 1, len(trial))])
         alone = LikelihoodProblem(found.model, [older], found.doubt, ())
         rows = slice(last + 25, last + 31)
-        told = alone.foretold(found.model.parameters())[0]["position"][rows]
+        told = alone.foretold(found.model.parameters())[0]["position"].values[rows]
         assert np.abs(shared[rows] - told).max() < 1e-4 * np.ptp(trial["position"])
 
 

@@ -58,13 +58,20 @@ class Errors:
         Shape (units,): sums of squares in units of the noise variance, all channels.
     spread
         The same of the measurement about its trial's mean.
-    counts
-        Samples in each unit.
+    noise
+        The same that noise alone leaves, by expectation: of white noise the number of samples.
+    variances
+        Of that; None where it is white, which leaves twice the number of samples.
     """
 
     squares: np.ndarray
     spread: np.ndarray
-    counts: np.ndarray
+    noise: np.ndarray
+    variances: np.ndarray | None = None
+
+    def scatter(self) -> np.ndarray:
+        """Variance of what noise alone leaves in each unit."""
+        return 2.0 * self.noise if self.variances is None else self.variances
 
     def error_percent(self) -> float:
         """E of eq. (2), pooled."""
@@ -72,7 +79,7 @@ class Errors:
 
     def ceiling_percent(self) -> float:
         """E of a model that leaves the noise alone."""
-        return 100.0 * float(self.counts.sum() / max(self.spread.sum(), 1e-300))
+        return 100.0 * float(self.noise.sum() / max(self.spread.sum(), 1e-300))
 
 
 def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
@@ -106,19 +113,21 @@ def held_out_gain(nominal: Errors, without: Errors, extended: Errors, seed: int)
     The interval is a bootstrap over the units of evidence.
     """
     draws = np.random.default_rng(seed).integers(len(nominal.squares), size=(RESAMPLES, len(nominal.squares)))
-    many = _share(*(e[draws].sum(axis=1) for e in (nominal.squares, without.squares, extended.squares, nominal.counts)))
-    one = _share(nominal.squares.sum(), without.squares.sum(), extended.squares.sum(), nominal.counts.sum())
+    told = (nominal.squares, without.squares, extended.squares, extended.noise, extended.scatter())
+    many, one = _share(*(e[draws].sum(axis=1) for e in told)), _share(*(e.sum() for e in told))
     low, high = np.quantile(many, (0.025, 0.975))
     return Gain(float(one), float(low), float(high))
 
 
-def _share(nominal: np.ndarray, without: np.ndarray, extended: np.ndarray, count: np.ndarray) -> np.ndarray:
+def _share(
+    nominal: np.ndarray, without: np.ndarray, extended: np.ndarray, noise: np.ndarray, scatter: np.ndarray
+) -> np.ndarray:
     """Percent; the error above the noise is at least what the extension removes.
 
-    It is at least its own scatter, too, the root of 2 n for n squares of noise: units of evidence in which there is
-    next to no error would else show gains of any size.
+    It is at least its own scatter, too, of which `scatter` is the variance: units of evidence in which there is next to
+    no error would else show gains of any size.
     """
-    excess = np.maximum(np.maximum(nominal - count, nominal - extended), np.sqrt(2.0 * count))
+    excess = np.maximum(np.maximum(nominal - noise, nominal - extended), np.sqrt(scatter))
     return 100.0 * (without - extended) / excess
 
 
@@ -315,4 +324,4 @@ def added_likelihood(without: np.ndarray, extended: np.ndarray) -> Evidence:
 
 
 def _joined(errors: Sequence[Errors]) -> Errors:
-    return Errors(*(np.concatenate([getattr(e, name) for e in errors]) for name in ("squares", "spread", "counts")))
+    return Errors(*(np.concatenate([getattr(e, name) for e in errors]) for name in ("squares", "spread", "noise")))
