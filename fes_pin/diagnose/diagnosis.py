@@ -141,7 +141,7 @@ class _Work:
         test = test or spared
         recorded = train if said else [t for t in study.trials if t.role != "held_out"]
         effects = self.catalogue.effects_for(nominal.rig)
-        searches = Searches(nominal, train, recorded, test, driven, effects, self.seed, self.tell)
+        searches = Searches(nominal, train, recorded, test, driven, effects, self.seed, self.tell, study.horizon_s)
         try:
             found = self._judged(study, searches, train, test)
         except NominalFitError as problem:

@@ -16,15 +16,14 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.cause import Cause
 from fes_pin.diagnose.decide.chosen_again import ChosenAgain, is_chosen, share_of
+from fes_pin.diagnose.decide.gains_ahead import Fold, gains_of
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, folds_of
 from fes_pin.diagnose.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
 from fes_pin.diagnose.driven_held_out import (
     Again,
-    Fold,
     afresh,
     as_random_as_in_all,
     evidence_of,
-    gains_of,
     held_errors_ahead,
     make_folds,
     with_choices,
@@ -51,7 +50,7 @@ from fes_pin.diagnose.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosi
 from fes_pin.diagnose.search.cause_sets import names_of
 from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import Searched
-from fes_pin.identify.ahead import default_horizon, falls
+from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_reading
 from fes_pin.identify.scatter import with_honest_intervals
@@ -108,7 +107,6 @@ def judge_driven(
     train: Sequence[Trial],
     test: Sequence[Trial],
     seed: int,
-    horizon_s: float | None = None,
 ) -> Judged:
     """Hold out, and judge what is left.
 
@@ -124,19 +122,18 @@ def judge_driven(
         Trials that were fitted, and those that the study itself holds out.
     seed
         Of critical values.
-    horizon_s
-        How far ahead errors over a horizon look; `default_horizon` by default.
     """
     refused: dict[str, Refused] = {}
     reason = None if is_moved_by_what_is_recorded(found.best) else UNMOVED
     found = search.told(()) if reason else found
-    horizon = horizon_s or default_horizon(train)
+    horizon = search.horizon_s
     settled, formed = frozenset(found.without), set[frozenset[str]]()
     again, alike = Again(afresh), Again(as_random_as_in_all)
     while True:
         folds = make_folds(found, train, test, again)
         evidence = evidence_of(folds, found, alike) if folds else {}
-        gains = gains_of(folds or [Fold(found.nominal, found.best, found.without, tuple(train))], found, horizon, seed)
+        within = folds or [Fold(found.nominal, found.best, found.without, tuple(train))]
+        gains = gains_of(within, found.without, horizon, seed)
         seen = driven_remainder(found.best, seed)
         names = frozenset(found.without)
         if weak := unsupported(evidence, gains, seen):
@@ -202,7 +199,7 @@ def driven_diagnosis(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
-    judged = judge_driven(search, found, search.sets.trials, trials[1], seed, study.horizon_s)
+    judged = judge_driven(search, found, search.sets.trials, trials[1], seed)
     found, left = judged.found, judged.left
     best = with_honest_intervals(found.best)
     searched = Searched(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.decide.held_out import Errors, Evidence, Gain, folds_of, held_out_gain
-from fes_pin.diagnose.errors_ahead import Ahead, errors_ahead, errors_over_horizon
+from fes_pin.diagnose.decide.gains_ahead import Fold
+from fes_pin.diagnose.decide.held_out import Evidence, folds_of
+from fes_pin.diagnose.errors_ahead import Ahead, errors_ahead
 from fes_pin.diagnose.search.likelihood_search import Found
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -21,20 +22,6 @@ from fes_pin.workers import in_parallel
 WIDE = 10.0
 """Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size. Of what
 the data tell it cancels between the trials and their folds."""
-
-
-@dataclass(frozen=True)
-class Fold:
-    """Fits without some trials, and those trials."""
-
-    nominal: Fit
-    best: Fit
-    without: dict[str, Fit]
-    test: tuple[Trial, ...]
-    within: bool = True
-    """False if the trials were held out by the study itself, and are in no fit."""
-    chosen: Fit | None = None
-    """What is chosen anew without the trials, fitted to the others; None where `best` is not to be doubted."""
 
 
 class Again:
@@ -150,33 +137,3 @@ def held_errors_ahead(folds: Sequence[Fold], horizon_s: float, falling: bool) ->
         errors_ahead([(f.nominal, f.test) for f in folds], horizon_s, falling),
         errors_ahead([(f.chosen or f.best, f.test) for f in folds], horizon_s, falling),
     )
-
-
-def gains_of(folds: Sequence[Fold], found: Found, horizon_s: float, seed: int) -> dict[str, Gain]:
-    """What each cause gains over the horizon.
-
-    Where that is nothing, over as long as the random effort lasts that stands for the cause in the fit without it: a
-    filter follows what is slow, as a spring's torque, and foretells it for so long.
-    """
-    found_over = _gains_over(folds, tuple(found.without), horizon_s, seed)
-    shortest = min(t.duration for f in folds for t in f.test)
-    for name, gain in found_over.items():
-        doubt = found.without[name].doubt
-        assert doubt is not None
-        lasts = min(max(doubt.time.values(), default=0.0), shortest)
-        if not gain.is_material and lasts > horizon_s:
-            longer = _gains_over(folds, (name,), lasts, seed)[name]
-            found_over[name] = replace(longer, ahead_s=lasts) if longer.is_material else gain
-    return found_over
-
-
-def _gains_over(folds: Sequence[Fold], names: Sequence[str], horizon_s: float, seed: int) -> dict[str, Gain]:
-    """What causes gain on the trials of the folds, so far ahead."""
-
-    def errors(of: Callable[[Fold], Fit]) -> Errors:
-        return errors_over_horizon([(of(f), f.best, f.test) for f in folds], horizon_s)
-
-    if not names:
-        return {}
-    nominal, best = errors(lambda f: f.nominal), errors(lambda f: f.best)
-    return {n: held_out_gain(nominal, errors(lambda f, n=n: f.without[n]), best, seed) for n in names}  # type: ignore[misc]

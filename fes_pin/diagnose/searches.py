@@ -33,8 +33,8 @@ class Searches:
         True if the rig's effort answers its reading.
     effects
         The causes that are looked for.
-    seed, progress
-        As of a diagnosis.
+    seed, progress, horizon_s
+        As of a diagnosis and its study.
 
     Attributes
     ----------
@@ -52,10 +52,11 @@ class Searches:
         effects: Sequence[type[Effect]],
         seed: int,
         progress: Callable[[float, str], None],
+        horizon_s: float | None,
     ) -> None:
         self.nominal, self.train, self.recorded, self.test = nominal, tuple(train), tuple(recorded), tuple(test)
         self.driven = driven
-        self._effects, self._seed, self._progress = effects, seed, progress
+        self._effects, self._seed, self._progress, self._horizon_s = effects, seed, progress, horizon_s
         self.last: Search | None = None
 
     def run(self, trials: Sequence[Trial]) -> tuple[Search, Result]:
@@ -81,7 +82,8 @@ class Searches:
 
     def _by_likelihood(self, trials: Sequence[Trial]) -> LikelihoodSearch:
         parts = in_parts(self.nominal.rig, trials)
-        return LikelihoodSearch(LikelihoodFits(self.nominal, parts, self._effects), self._seed, self._progress)
+        sets = LikelihoodFits(self.nominal, parts, self._effects)
+        return LikelihoodSearch(sets, self._seed, self._progress, self._horizon_s)
 
     def _is_undecided(self, found: Searched) -> bool:
         """True where no set of causes leaves only noise of the reading, and there is no second trial to compare by.

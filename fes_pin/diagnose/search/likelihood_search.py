@@ -15,12 +15,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from fes_pin.data.schema import IMPOSED
+from fes_pin.diagnose.decide.gains_ahead import Fold, gains_of
 from fes_pin.diagnose.decide.significance import Family
 from fes_pin.diagnose.search.cause_sets import MOST_CAUSES
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names
 from fes_pin.diagnose.search.possible import is_possible
 from fes_pin.diagnose.search.score import Scored, best_pairs
 from fes_pin.diagnose.search.simulation_search import NominalFitError
+from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import DRIVEN_LEVEL, UNUSUAL_LEVEL
@@ -70,8 +72,9 @@ class Found:
 class LikelihoodSearch:
     """One search on the sets of one study."""
 
-    def __init__(self, sets: LikelihoodFits, seed: int, progress: Progress) -> None:
+    def __init__(self, sets: LikelihoodFits, seed: int, progress: Progress, horizon_s: float | None = None) -> None:
         self.sets, self.seed, self.progress = sets, seed, progress
+        self._horizon_s = horizon_s
         self.was_stopped, self._end = False, math.inf
         self._formed: set[Names] = set()
         self._unearned: set[Names] = set()
@@ -92,6 +95,11 @@ class LikelihoodSearch:
             self.was_stopped = True
             with time_limit(math.inf):
                 return self.told(self._fallback)
+
+    @property
+    def horizon_s(self) -> float:
+        """How far ahead errors over a horizon look, s."""
+        return self._horizon_s or default_horizon(self.sets.trials)
 
     def nominal(self) -> Fit:
         """The nominal model."""
@@ -174,8 +182,19 @@ class LikelihoodSearch:
 
     def _earns_beside(self, names: Names, best: Names) -> bool:
         """Whether a set can be, and is worth more than the best smaller one."""
-        fits = self.sets.fits
-        return self._kept(names, self.p_value(fits[names], fits[best]) < DRIVEN_LEVEL) and is_possible(fits[names])
+        larger, smaller = self.sets.fits[names], self.sets.fits[best]
+        earned = self.p_value(larger, smaller) < DRIVEN_LEVEL and self._foretells_more(larger, smaller)
+        return self._kept(names, earned) and is_possible(larger)
+
+    def _foretells_more(self, larger: Fit, smaller: Fit) -> bool:
+        """Whether what stands beside a cause lessens the errors ahead of the very trials that it was fitted to.
+
+        Of trials that took no part it must do so to be named, see `speaks_for`.
+        """
+        if not smaller.model.effects:
+            return True
+        fold = Fold(self.nominal(), larger, {"": smaller}, self.sets.trials)
+        return gains_of([fold], fold.without, self.horizon_s, self.seed)[""].is_material
 
     def _kept(self, names: Names, earned: bool) -> bool:
         """Whether a set earns its place, and keep in mind that it does not."""
