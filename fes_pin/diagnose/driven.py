@@ -134,9 +134,9 @@ def judge_driven(
         evidence = evidence_of(folds, found, alike) if folds else {}
         within = folds or [Fold(found.nominal, found.best, found.without, tuple(train))]
         gains = gains_of(within, found.without, horizon, seed)
-        seen = driven_remainder(found.best, seed)
+        seen, random = driven_remainder(found.best, seed), random_parts(found.best)
         names = frozenset(found.without)
-        if weak := unsupported(evidence, gains, seen):
+        if weak := unsupported(evidence, gains, seen, random):
             weakest = min(weak, key=lambda n: gains[n].low)
             refused[weakest] = refused_from(found, weakest, gains[weakest].percent)
             found = search.told(tuple(sorted(names - {weakest})))
@@ -150,7 +150,6 @@ def judge_driven(
             refused[rarest] = refused_from(found, rarest, gains[rarest].percent)
             found = search.told(tuple(sorted(names - {rarest})))
             continue
-        random = random_parts(found.best)
         left = with_refused_causes(seen, random, refused)
         if not left.unexplained or names in formed or not search.form_otherwise(tuple(sorted(names))):
             break
@@ -158,7 +157,7 @@ def judge_driven(
         refused, found = {}, search.settle(tuple(sorted(names)))  # what was refused was so beside another form
         settled = frozenset(found.without)
     falling = falls(found.best.model, train)
-    folds = with_choices(folds, chosen, again) if chosen else folds
+    folds = with_choices(folds, chosen, again) if chosen and found.without else folds
     return Judged(
         found=found,
         left=left,

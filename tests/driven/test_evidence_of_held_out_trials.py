@@ -42,15 +42,26 @@ def test_a_large_random_effort_is_something_whatever_was_refused():
 def test_of_a_single_trial_a_cause_beside_others_gains_something_over_the_horizon():
     """Before, a torque that repeats was named beside friction for 0.00 % of the error."""
     gains = {"coulomb_friction": gain(40.0), "periodic_torque": gain(0.0)}
-    assert unsupported({}, gains, NOTHING) == ["periodic_torque"]
-    assert unsupported({}, {"periodic_torque": gain(0.0)}, NOTHING) == []
+    assert unsupported({}, gains, NOTHING, ()) == ["periodic_torque"]
+    assert unsupported({}, {"periodic_torque": gain(0.0)}, NOTHING, ()) == []
 
 
 def test_of_several_trials_a_cause_beside_others_needs_their_likelihood_too():
     gains = {"coulomb_friction": gain(40.0), "sensor_lag": gain(2.0)}
     evidence = {"coulomb_friction": Evidence(500.0, 500.0), "sensor_lag": Evidence(-3.0, 0.0)}
-    assert unsupported(evidence, gains, NOTHING) == ["sensor_lag"]
-    assert unsupported(evidence, gains, Remainder(True, 1e-9, "effort")) == []
+    assert unsupported(evidence, gains, NOTHING, ()) == ["sensor_lag"]
+    assert unsupported(evidence, gains, Remainder(True, 1e-9, "effort"), ()) == []
+
+
+@pytest.mark.parametrize(("low", "refused"), [(2.0, True), (5.9, True), (6.5, False)])
+def test_beside_what_no_cause_explains_a_cause_is_more_than_an_error_of_form(low, refused):
+    """A torque of 3 % was named dry friction where positions had been stored in degrees, and a frame that swings where
+    the effort had been stuck."""
+    large = (RandomPart("effort", 1.0, 1.1, 0.32),)
+    evidence = {"coulomb_friction": Evidence(500.0, 500.0)}
+    for known in (evidence, {}):
+        assert (unsupported(known, {"coulomb_friction": gain(low)}, NOTHING, large) != []) is refused
+        assert unsupported(known, {"coulomb_friction": gain(low)}, NOTHING, LITTLE) == []
 
 
 def test_one_trial_unlike_the_others_silences_no_cause(tmp_path):
