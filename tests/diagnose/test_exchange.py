@@ -108,6 +108,14 @@ def test_what_stands_beside_a_cause_must_lessen_errors_ahead(beside, low, earns,
     assert (names in search.possible()) is earns
 
 
+def test_other_forms_are_tried_of_sets_half_way_to_what_they_must_gain(search):
+    """Beside a lag a tendon gains 0.5 and velocity 50, of 10 that are demanded: no form makes up for the rest."""
+    assert search._is_rough(("lag", "velocity"), ("lag",))
+    assert not search._is_rough(("lag", "tendon"), ("lag",))
+    search._refine(("lag", "velocity"))
+    assert not search._is_rough(("lag", "velocity"), ("lag",))
+
+
 def test_no_other_form_is_tried_past_the_limit_of_the_search(search):
     better = search.sets.fits[()]
     search.sets.nominal, search.sets.forms.otherwise = lambda: better, lambda base: check_limit() or better

@@ -167,18 +167,26 @@ class LikelihoodSearch:
     def _first_that_earns(self, size: int, best: Names) -> Names | None:
         """The cheapest set of a size that earns its place; what comes near it is judged without those that do not."""
         tried: list[Names] = []
-        while len(tried) < BEAM and (rest := self._refined(size, tried)):
+        while len(tried) < BEAM and (rest := self._refined(size, tried, best)):
             if self._earns_beside(rest[0], best):
                 return rest[0]
             tried.append(rest[0])
             self.sets.converge(size, tried)
         return None
 
-    def _refined(self, size: int, without: Sequence[Names]) -> list[Names]:
+    def _refined(self, size: int, without: Sequence[Names], best: Names) -> list[Names]:
         """The best sets of a size but for some, cheapest first, once each has the form that the data demand."""
-        while rough := [n for n in self.sets.near(size, without)[:BEAM] if n not in self._formed]:
+        while rough := [n for n in self.sets.near(size, without)[:BEAM] if self._is_rough(n, best)]:
             self._refine(rough[0])
         return self.sets.near(size, without)[:BEAM]
+
+    def _is_rough(self, names: Names, best: Names) -> bool:
+        """Whether a set has not had another form yet, and half of what it must gain: a form may give the rest."""
+        if names in self._formed:
+            return False
+        larger, smaller = self.sets.fits[names], self.sets.fits[best]
+        degrees = max(larger.degrees - smaller.degrees, 1)
+        return self.family.p_value(2.0 * (smaller.sse - larger.sse), degrees) < DRIVEN_LEVEL
 
     def _earns_beside(self, names: Names, best: Names) -> bool:
         """Whether a set can be, and is worth more than the best smaller one."""
