@@ -8,7 +8,7 @@ from identify.rigs import WHITE, measured
 from models.cases import RIGS, trial
 
 from fes_pin.diagnose.search.refined_forms import is_identified
-from fes_pin.diagnose.search.starts import forms_beside
+from fes_pin.diagnose.search.starts import forms_beside, refinements
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.problem import Problem
 from fes_pin.models.effects import CoulombFriction, SensorNonlinearity
@@ -56,3 +56,15 @@ def test_a_form_shares_its_level_with_all_that_are_tried(rig, effects, count):
     for one in effects:
         model = model + one
     assert forms_beside(model, model.effects) == count
+
+
+@pytest.mark.parametrize(("way", "tried"), [(0.0, False), (0.3, True)])
+def test_a_form_that_the_measured_motion_gives_no_size_is_not_tried(way, tried):
+    """Presliding is a share of the way of an imposed motion: where none is, it had been fitted twice as no form at all."""
+    time = np.arange(200) * 0.01
+    measured = {"time": time, "position": way * np.sin(time), "reading": np.zeros(200)}
+    model = Model(RIGS["joint"]) + CoulombFriction(0.05)
+    starts = refinements(model, model.effects[0], measured)
+    assert starts
+    assert all(one.effects[0].refined() for one in starts)
+    assert any("presliding" in one.effects[0].refined() for one in starts) is tried

@@ -64,14 +64,18 @@ def started(
 def refinements(
     model: Model, effect: Effect, measured: Mapping[str, np.ndarray], barred: str | None = None
 ) -> list[Model]:
-    """Starts with one more refinement of an effect switched on, but for one that is barred."""
+    """Starts with one more refinement of an effect switched on, but for one that is barred.
+
+    A value that is the refinement's null, as the way of an imposed motion where none is, switches nothing on.
+    """
     out, info, refined, grids = [], effect.parameters(), effect.refined(), effect.grids(measured)
     for names in effect.refinements():
         if names[0] in refined or names[0] == barred or not fits_rig(model, info[names[0]]):
             continue
         paths = [f"{effect.name}.{n}" for n in names]
         for values in itertools.product(*(grids[n] for n in names)):
-            out.append(model.with_parameters(dict(zip(paths, values, strict=True))))
+            if values[0] != info[names[0]].null:
+                out.append(model.with_parameters(dict(zip(paths, values, strict=True))))
     return out
 
 
