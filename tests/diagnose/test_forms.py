@@ -60,7 +60,7 @@ def test_a_form_shares_its_level_with_all_that_are_tried(rig, effects, count):
 
 @pytest.mark.parametrize(("way", "tried"), [(0.0, False), (0.3, True)])
 def test_a_form_that_the_measured_motion_gives_no_size_is_not_tried(way, tried):
-    """Presliding is a share of the way of an imposed motion: where none is, it had been fitted twice as no form at all."""
+    """Presliding is a share of the way of an imposed motion: where none is, it had been fitted as no form."""
     time = np.arange(200) * 0.01
     measured = {"time": time, "position": way * np.sin(time), "reading": np.zeros(200)}
     model = Model(RIGS["joint"]) + CoulombFriction(0.05)
