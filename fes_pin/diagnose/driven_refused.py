@@ -9,11 +9,11 @@ import numpy as np
 
 from fes_pin.diagnose.decide.claims import FORM_SHARE
 from fes_pin.diagnose.decide.held_out import Evidence, Gain, speaks_for
-from fes_pin.diagnose.errors_ahead import RandomPart, random_parts
+from fes_pin.diagnose.errors_ahead import RandomPart, are_large, random_parts
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.search.likelihood_search import Found
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import CERTAIN_LEVEL, NOTHING_PERCENT, SMALL_SHARE
+from fes_pin.identify.levels import CERTAIN_LEVEL, NOTHING_PERCENT
 from fes_pin.identify.likelihood import LikelihoodProblem
 
 UNMOVED = "the motion is as likely without the recorded input, so something else moves the rig"
@@ -48,17 +48,12 @@ def unsupported(
     Where none could be held out, a cause beside others must still gain something over the horizon. Where something
     acts that no cause explains, one that explains no more than an error of form does may be of that.
     """
-    if _are_large(random) and (formal := [n for n, gain in gains.items() if gain.low < 100.0 * FORM_SHARE]):
+    if are_large(random) and (formal := [n for n, gain in gains.items() if gain.low < 100.0 * FORM_SHARE]):
         return formal
     if not evidence:
         return [n for n, gain in gains.items() if len(gains) > 1 and not gain.is_material]
     known = {n: None if left.unexplained else e for n, e in evidence.items()}
     return [n for n, e in known.items() if not speaks_for(e, gains[n], alone=len(known) == 1)]
-
-
-def _are_large(random: Sequence[RandomPart]) -> bool:
-    """Whether what acts at random is more than small beside what drives the rig."""
-    return any(r.share > SMALL_SHARE for r in random)
 
 
 def refused_from(found: Found, name: str, percent: float) -> Refused:
@@ -80,7 +75,7 @@ def is_moved_by_what_is_recorded(fitted: Fit) -> bool:
     stand for the controller that did. A rig without recorded inputs is moved by what it is.
     """
     inputs = {id(t): [n for n in fitted.model.driven_by(t) if n in t] for t in fitted.trials}
-    if not any(inputs.values()) or not _are_large(random_parts(fitted)):
+    if not any(inputs.values()) or not are_large(random_parts(fitted)):
         return True
     assert fitted.doubt is not None
     still = [t.with_columns(**{n: np.zeros(len(t)) for n in inputs[id(t)]}) for t in fitted.trials]
@@ -96,7 +91,7 @@ def with_refused_causes(left: Remainder, random: Sequence[RandomPart], refused: 
     """
     if left.unexplained:
         return left
-    if _are_large(random):
+    if are_large(random):
         return replace(left, unexplained=True, where="effort")
     certain = [r for r in refused.values() if r.p_value < CERTAIN_LEVEL and r.share >= FORM_SHARE]
     certain = [r for r in certain if r.percent > NOTHING_PERCENT]

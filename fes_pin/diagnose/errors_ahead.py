@@ -84,6 +84,11 @@ def random_parts(fitted: Fit) -> tuple[RandomPart, ...]:
     return tuple(RandomPart(n, std, time, _averaged(std, time) / sizes[n]) for n, std, time in parts)
 
 
+def are_large(random: Sequence[RandomPart]) -> bool:
+    """Whether what acts at random is more than small beside what drives the rig."""
+    return any(r.share > SMALL_SHARE for r in random)
+
+
 def _averaged(std: float, time: float) -> float:
     """Deviation of the means over `AVERAGED_S` of a first-order process.
 

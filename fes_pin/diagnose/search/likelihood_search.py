@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnose.decide.gains_ahead import Fold, gains_of
 from fes_pin.diagnose.decide.significance import Family
+from fes_pin.diagnose.errors_ahead import are_large, random_parts
+from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.search.cause_sets import MOST_CAUSES
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits, Names
 from fes_pin.diagnose.search.possible import is_possible
@@ -197,12 +199,17 @@ class LikelihoodSearch:
     def _foretells_more(self, larger: Fit, smaller: Fit) -> bool:
         """Whether what stands beside a cause lessens the errors ahead of the very trials that it was fitted to.
 
-        Of trials that took no part it must do so to be named, see `speaks_for`.
+        Of trials that took no part it must do so to be named, see `speaks_for`. Where the smaller set leaves more than
+        noise, a further cause may bring that about.
         """
-        if not smaller.model.effects:
+        if not smaller.model.effects or not self._leaves_noise(smaller):
             return True
         fold = Fold(self.nominal(), larger, {"": smaller}, self.sets.trials)
         return gains_of([fold], fold.without, self.horizon_s, self.seed)[""].is_material
+
+    def _leaves_noise(self, fitted: Fit) -> bool:
+        """Whether nothing is left beside a fit but a random effort that is small."""
+        return not (are_large(random_parts(fitted)) or driven_remainder(fitted, self.seed).unexplained)
 
     def _kept(self, names: Names, earned: bool) -> bool:
         """Whether a set earns its place, and keep in mind that it does not."""
