@@ -53,7 +53,7 @@ from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_reading
-from fes_pin.identify.scatter import with_honest_intervals
+from fes_pin.identify.scatter import as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.models.stage import Effect
 
 
@@ -81,6 +81,8 @@ class Judged:
         For each fold, the fit to all trials of the set that is chosen without its own.
     reason
         Why no cause may be named, if none may.
+    again
+        The extended model fitted again without each part of the trials that is held out.
     """
 
     found: Found
@@ -95,6 +97,7 @@ class Judged:
     ceiling_percent: float
     chosen: tuple[Fit, ...]
     reason: str | None
+    again: tuple[Fit, ...]
 
     def gain_fit(self, name: str) -> float:
         """Share, in percent, of what the extended model adds to the log-likelihood that is lost without a cause."""
@@ -171,6 +174,7 @@ def judge_driven(
         ceiling_percent=_ceiling(found.best),
         chosen=tuple(chosen),
         reason=reason,
+        again=tuple(f.best for f in folds if f.within),
     )
 
 
@@ -200,7 +204,7 @@ def driven_diagnosis(
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
     judged = judge_driven(search, found, search.sets.trials, trials[1], seed)
     found, left = judged.found, judged.left
-    best = with_honest_intervals(found.best)
+    best = as_wide_as_trials_differ(with_honest_intervals(found.best), judged.again)
     searched = Searched(
         nominal=found.nominal,
         best=best,

@@ -17,7 +17,9 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.identify.covariance import covariance_of, scattered, widened
+from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import UNUSUAL_LEVEL
 from fes_pin.identify.problem import Linearized, normal_equations
 
 PIECES = 40
@@ -28,6 +30,36 @@ as long as they can be."""
 def with_honest_intervals(fitted: Fit) -> Fit:
     """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter."""
     return replace(fitted, covariance=widened(*_told(fitted)))
+
+
+def as_wide_as_trials_differ(fitted: Fit, again: Sequence[Fit]) -> Fit:
+    """The fit with intervals of parameters that trials differ in by more than each is sure of as wide as they differ.
+
+    Of fits without one of k parts of the trials each, the jackknife's variance is
+
+        (k - 1) / k sum (p_i - mean p)^2
+
+    which over that of the fit is a chi-square over its k - 1 degrees of freedom where it is sure as it says; it counts
+    where that is unusual.
+
+    Source: Miller, The jackknife - a review, Biometrika 61 (1974); of intervals that are widened as measurements
+    differ, Birge, The calculation of errors by the method of least squares, Physical Review 40 (1932).
+
+    Parameters
+    ----------
+    again
+        Fits of the same model without one part of the trials each; of fewer than two nothing follows.
+    """
+    if len(again) < 2:
+        return fitted
+    known, degrees = np.diag(fitted.covariance), len(again) - 1
+    values = np.array([[one.values[n] for n in fitted.free] for one in again])
+    differ = degrees * np.var(values, axis=0)
+    with np.errstate(all="ignore"):
+        ratio = np.where(np.isfinite(known) & (known > 0.0), differ / known, 0.0)
+    unusual = degrees * ratio > chi2_quantile(1.0 - UNUSUAL_LEVEL, degrees)
+    wider = np.sqrt(np.where(unusual, ratio, 1.0))
+    return replace(fitted, covariance=fitted.covariance * np.outer(wider, wider))
 
 
 def excess_scatter(larger: Fit, smaller: Fit) -> float:

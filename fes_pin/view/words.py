@@ -6,6 +6,7 @@ import math
 import re
 
 from fes_pin.diagnose.cause import Cause
+from fes_pin.diagnose.errors_ahead import Ahead
 from fes_pin.diagnose.record import NEXT_FILE
 from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.text import LEAST_P, percent, probability, quantity
@@ -125,8 +126,8 @@ def _explains(diagnosis: Diagnosis, share: float) -> str:
             else (diagnosis.over_horizon.nominal, diagnosis.over_horizon.extended)
         )
         return (
-            f"{share:.0f} % of it. Predicting {diagnosis.over_horizon.horizon_s:g} s ahead, the error E falls from "
-            f"{percent(one.horizon)} to {percent(other.horizon)}{_outside(diagnosis)}."
+            f"{share:.0f} % of what is not noise. Predicting {diagnosis.over_horizon.horizon_s:g} s ahead, the error E "
+            f"falls from {percent(one.horizon)} to {percent(other.horizon)}{_outside(diagnosis)}{_noise_ahead(other)}."
         )
     outside = diagnosis.nominal_error[1] is not None and diagnosis.extended_error[1] is not None
     before, after = (e[1] if outside else e[0] for e in (diagnosis.nominal_error, diagnosis.extended_error))
@@ -134,6 +135,10 @@ def _explains(diagnosis: Diagnosis, share: float) -> str:
         f"{share:.0f} % of what is not noise{_outside(diagnosis)}: {what} take{ends} the error E from "
         f"{percent(before)} to {percent(after)}; the noise alone is {percent(diagnosis.ceiling_percent)}."
     )
+
+
+def _noise_ahead(ahead: Ahead) -> str:
+    return "" if ahead.noise is None else f"; the noise alone is {percent(ahead.noise)}"
 
 
 def _outside(diagnosis: Diagnosis) -> str:
@@ -159,8 +164,8 @@ def _nothing(diagnosis: Diagnosis) -> list[tuple[str, Content]]:
     left, count = diagnosis.remainder, len(diagnosis.catalogue.effects_for(diagnosis.model.rig))
     error = diagnosis.nominal_error[1] if diagnosis.nominal_error[1] is not None else diagnosis.nominal_error[0]
     if diagnosis.over_horizon is not None:
-        error = (diagnosis.over_horizon.nominal_held_out or diagnosis.over_horizon.nominal).horizon
-        size = f"E is {percent(error)}, {diagnosis.over_horizon.horizon_s:g} s ahead"
+        told = diagnosis.over_horizon.nominal_held_out or diagnosis.over_horizon.nominal
+        size = f"E is {percent(told.horizon)}, {diagnosis.over_horizon.horizon_s:g} s ahead{_noise_ahead(told)}"
     else:
         size = f"E is {percent(error)}; the noise alone is {percent(diagnosis.ceiling_percent)}"
     if diagnosis.verdict == "adequate":

@@ -1,5 +1,6 @@
 """Gains beside errors that are no white noise: as far as the scores of pieces of the data agree on them."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.problem import Linearized
-from fes_pin.identify.scatter import excess_scatter
+from fes_pin.identify.scatter import as_wide_as_trials_differ, excess_scatter
 
 EACH, TRIALS, DRAWS = 500, 4, 200
 
@@ -61,3 +62,50 @@ def test_what_is_there_in_all_pieces_keeps_its_gain():
 def test_nothing_more_scatters_nothing():
     one = fitted(np.ones((EACH * TRIALS, 1)), np.random.default_rng(3).normal(size=EACH * TRIALS), ("a",))
     assert excess_scatter(one, one) == 1.0
+
+
+@dataclass(frozen=True)
+class Means:
+    """Means of two quantities, as far as `as_wide_as_trials_differ` looks at them."""
+
+    values: dict[str, float]
+    covariance: np.ndarray
+    free: tuple[str, ...] = ("steady", "own")
+
+
+def means(rng, apart):
+    """Of 5 trials of variance 1, whose second quantity differs between them as well; and without each trial."""
+    trials = rng.normal(size=(5, 2)) * (1.0, np.hypot(1.0, apart))
+    known = np.diag([0.2, 0.2])
+    kept = [trials, *(np.delete(trials, k, axis=0) for k in range(5))]
+    whole, *again = (Means(dict(zip(Means.free, some.mean(axis=0), strict=True)), known) for some in kept)
+    return whole, as_wide_as_trials_differ(whole, again)
+
+
+def covered(apart):
+    """How often 95 % intervals hold the truth, 0, of each quantity; and how often they were widened."""
+    rng, inside, wider = np.random.default_rng(3), np.zeros(2), np.zeros(2)
+    for _ in range(2000):
+        plain, wide = means(rng, apart)
+        std = np.sqrt(np.diag(wide.covariance))
+        inside += np.abs(list(wide.values.values())) < 1.96 * std
+        wider += std > np.sqrt(np.diag(plain.covariance)) * (1.0 + 1e-12)
+    return inside / 2000, wider / 2000
+
+
+def test_intervals_are_widened_where_trials_differ_more_than_by_chance():
+    inside, wider = covered(0.0)
+    assert inside == pytest.approx(0.95, abs=0.02)
+    assert wider == pytest.approx(0.05, abs=0.02)
+    inside, wider = covered(2.0)
+    assert wider[0] == pytest.approx(0.05, abs=0.02) and wider[1] > 0.7
+    assert inside[0] == pytest.approx(0.95, abs=0.02)
+    assert inside[1] > 0.8  # without it 0.62
+
+
+def test_a_single_fit_says_nothing_of_how_trials_differ():
+    one = Means({"steady": 0.0, "own": 0.0}, np.eye(2))
+    assert as_wide_as_trials_differ(one, [one]) is one
+    unknown = Means({"steady": 0.0, "own": 0.0}, np.diag([np.inf, 0.0]))
+    others = [Means({"steady": x, "own": x}, np.eye(2)) for x in (-9.0, 9.0)]
+    assert (as_wide_as_trials_differ(unknown, others).covariance == unknown.covariance).all()

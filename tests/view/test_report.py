@@ -227,7 +227,7 @@ def driven_diagnosis(folder, free):
     made = diagnosed(joint_study(folder), ("coulomb_friction",))
     white = dict.fromkeys(("position", "velocity"), 1e-3)
     doubt = Doubt(white, {"effort": 1e-3}, {"effort": 0.1})
-    before, after = Ahead(2e-4, 9.5, free), Ahead(1e-4, 0.4, free)
+    before, after = Ahead(2e-4, 9.5, free, 0.3), Ahead(1e-4, 0.4, free, 0.2)
     return replace(
         made,
         nominal=replace(made.nominal, doubt=doubt),
@@ -243,6 +243,7 @@ def test_a_driven_rig_shows_three_errors_side_by_side_and_reasons_along_its_moti
     text = checked(driven_diagnosis(tmp_path, 310.0))
     for words in (
         "Predicting 0.3 s ahead, the error E falls from 9.5 % to 0.4 %",
+        "; the noise alone is 0.2 %",
         "one sample ahead below 0.001 %",
         "free, from the inputs 310 % 310 %",
         "the effort of a stiff servo that keeps the model on the measured motion",
