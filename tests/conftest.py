@@ -89,6 +89,7 @@ LONG = {
     "driven/test_presliding.py": ("test_a_contact_that_stretches_far",),
     "driven/test_products.py": ("[1]", "[2]"),
     "driven/test_rough_cost.py": ("test_a_torque_is_found",),
+    "driven/test_smooth_play.py": ("test_a_sensor_that_lags",),
     "driven/test_smoothed.py": ("test_dry_friction_is_named_alone", "adequate[40"),
     "driven/test_swing_up.py": (
         *("held[('quadratic", "held[('parallel", "held[('effort_offset", "held[('cogging"),

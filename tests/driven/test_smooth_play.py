@@ -35,3 +35,14 @@ def test_a_play_is_named_alone_and_its_likelihood_is_a_parabola(tmp_path):
     assert missed_by_a_parabola(fitted.model, fitted) < 1.0  # what a deviation is worth
     (play,) = fitted.model.effects
     assert missed_by_a_parabola(Model(fitted.model.rig, (LinearPlay(play.half_width),)), fitted) > 10.0
+
+
+def test_a_sensor_that_lags_behind_a_play_is_named_beside_it(tmp_path):
+    """A lag that had the joint's own motion for its input, beside the play, gained 0 in such rigs; now 4000."""
+    drawn = draw(("sensor_lag", "backlash"), 0.3, 4520031, tmp_path, recorded=True)
+    found = diagnose_joint(read_study(drawn.study))
+    assert {c.name for c in found.causes} == {"sensor_lag", "backlash"}, str(found)
+    assert not found.remainder.unexplained
+    fitted = found.extended
+    for name, true in (("sensor_lag.lag_s", "sensor_lag"), (WIDTH, "backlash"), ("inertia_scale", "inertia_scale")):
+        assert fitted.values[name] == pytest.approx(drawn.truth[true], rel=0.02)

@@ -6,12 +6,13 @@ import re
 import numpy as np
 import pinocchio as pin
 import pytest
+from models.cases import RIGS
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import make_layout
-from fes_pin.models.effects import effect_named
+from fes_pin.models.effects import Backlash, SensorLag, effect_named
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle, Muscle
 from fes_pin.models.rigs.joint import joint_model
@@ -24,6 +25,7 @@ from fes_pin.models.rigs.rigid import (
     point_foot,
     urdf_path,
 )
+from fes_pin.models.simulate import simulate
 from fes_pin.paper.equation_1 import static_torque_nm
 
 STATES = 200
@@ -267,3 +269,18 @@ def test_units_are_those_of_the_rig(tmp_path, kind, units):
 
 def test_a_force_sensor_is_off_by_newtons():
     assert (Model(Muscle()) + effect_named("sensor_offset")()).parameter_info()["sensor_offset.offset"].unit == "N"
+
+
+def test_a_sensor_lags_behind_a_play_and_not_beside_it():
+    """Where a play stands its reading comes to rest; a low pass of the play, by its exact recursion."""
+    lag, dt = 0.03, 1e-3
+    time = np.arange(3000) * dt
+    columns = {"effort": 0.4 * np.sin(4.0 * time), "position": np.zeros(len(time))}
+    swung = Trial("t", "motion", columns, time, {"position0": 0.0, "velocity0": 0.0})
+    plain = Model(RIGS["joint"]) + Backlash(half_width=0.02)
+    play, late = (simulate(m, swung)["position"] for m in (plain, plain + SensorLag(lag_s=lag)))
+    keep, expected = np.exp(-dt / lag), np.zeros(len(time))
+    for k in range(1, len(time)):
+        expected[k] = keep * expected[k - 1] + (1.0 - keep) * 0.5 * (play[k] + play[k - 1])
+    assert np.ptp(play) > 0.1
+    assert np.abs(late - expected).max() < 2e-3 * np.ptp(play)

@@ -58,13 +58,13 @@ class Backlash(Effect):
         return self._play(value, s)
 
     def update(self, s: Any) -> Mapping[str, Any]:
-        return {"followed": self._play(s.sensed, s)}
+        return {"followed": self._play(s.q, s)}
 
     def slack(self, s: Any) -> Mapping[str, tuple[Any, Any]]:
-        return {"followed": (s.sensed, self.half_width)}
+        return {"followed": (s.q, self.half_width)}
 
     def rest(self, s: Any) -> Mapping[str, Any]:
-        return {"followed": s.sensed}
+        return {"followed": s.q}
 
     def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
         """Where in the slack a trial begins nobody knows: evenly spread over 2 half_width."""

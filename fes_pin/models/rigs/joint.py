@@ -211,7 +211,7 @@ class Joint(Rig):
         s.act, s.inertia = 0.0, self.inertia_scale * s.c.inertia
         if s.kind == IMPOSED:
             return self._imposed(s)
-        s.q, s.v, s.sensed = s.x.q, s.x.v, s.x.q
+        s.q, s.v, s.sensed = s.x.q, s.x.v, s.through("play", s.x.q)
         gravity, s.bearing_load = self._gravity(s, s.v)
         effort = s.through("effort", getattr(s.u, "effort", 0.0))
         s.torque = s.through("friction", s.through("torque", effort - gravity - self.damping * s.v))
@@ -244,8 +244,8 @@ class Joint(Rig):
             s.rest_reading = s.idle_reading = 0.0
             self.rates(s)
             return (s.through("reading", s.sensed),)
-        s.rest_reading, s.idle_reading, s.sensed = s.m.rest, s.c.idle, s.x.q
-        return s.through("reading", s.through("play", s.x.q)), s.x.v
+        s.rest_reading, s.idle_reading, s.sensed = s.m.rest, s.c.idle, s.through("play", s.x.q)
+        return s.through("reading", s.sensed), s.x.v
 
 
 def joint_model(urdf: Path, constants: Mapping[str, Any], start: Mapping[str, Any], driven: bool = True) -> Joint:
