@@ -49,8 +49,7 @@ class RandomPart:
 class Ahead:
     """Errors E of one model, percent: one sample ahead, over the horizon, free (None where the rig falls).
 
-    `noise` is what noise alone leaves over the horizon, see `noise_in`; None of a rig that is simulated
-    freely.
+    `noise` is what noise alone leaves over the horizon, see `noise_in`; None of a rig that is simulated freely.
     """
 
     one_step: float

@@ -28,10 +28,17 @@ class Fold:
 def gains_of(folds: Sequence[Fold], without: Mapping[str, Fit], horizon_s: float, seed: int) -> dict[str, Gain]:
     """What each cause gains over the horizon.
 
-    `without` are the fits to all trials without it.
-
     Where that is nothing, over as long as the random effort lasts that stands for the cause in the fit without it: a
     filter follows what is slow, as a spring's torque, and foretells it for so long.
+
+    Parameters
+    ----------
+    folds
+        Trials, and fits that they are foretold by.
+    without
+        By cause, the fit to all trials without it.
+    horizon_s, seed
+        How far ahead errors look, s; of the bootstrap of their intervals.
     """
     found_over = _gains_over(folds, tuple(without), horizon_s, seed)
     shortest = min(t.duration for f in folds for t in f.test)
