@@ -55,7 +55,7 @@ def sets_of(study: Study, driven: bool) -> list[tuple[str, ...]]:
     """What a search finds: every cause with what cannot be told from it."""
     nominal, (train, test) = nominal_model(study), split(study)
     effects = shipped().effects_for(nominal.rig)
-    _, found = Searches(nominal, train, train, test, driven, effects, 0, lambda *_: None).run(train)
+    _, found = Searches(nominal, train, train, test, driven, effects, 0, lambda *_: None, None).run(train)
     best = found.best if isinstance(found, Found) else found.judged
     return [(e.name, *alternatives(best, found.rivals[e.name], e.name)) for e in best.model.effects]
 

@@ -127,9 +127,10 @@ class _Symbols:
         return dataclasses.replace(self.model.rig, **nominal)
 
     def at_rest(self) -> tuple[dict[str, Any], dict[str, Any], Any]:
-        """States, memories and residual of the static equilibrium as expressions in z."""
-        rig = self.rig()
+        """States, memories and residual of the static equilibrium as expressions in z; nothing drives the rig there."""
+        rig, still = self.rig(), SimpleNamespace(**dict.fromkeys(self.u, 0.0))
         s = self.signals(dict.fromkeys(self.states, 0.0), dict.fromkeys(self.memories, 0.0))
+        s.u = still
         rig.set_rest(s, self.z)
         states = dict.fromkeys(self.states, 0.0) | vars(s.x)
         memories = dict.fromkeys(self.memories, 0.0) | vars(s.m)
@@ -137,7 +138,7 @@ class _Symbols:
             for n, value in effect.rest(s.of(effect)).items():
                 (states if n in effect.states else memories)[f"{effect.name}.{n}"] = value
         s = self.signals(states, memories)
-        s.time = 0.0
+        s.time, s.u = 0.0, still
         rig.rates(s)
         return states, memories, rig.rest_residual(s, self.z)
 

@@ -157,7 +157,10 @@ class Ankle(Rig):
         return np.clip((trial["pulse_width_us"] - low) / (high - low), 0.0, 1.0)
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
-        """Where a motion is imposed: of a free one the readings alone are judged."""
+        """Of a free motion what the cable's torque would be at the start values."""
+        if moved := [t for t in trials if t.kind == "motion"]:
+            c, most = self.constants, max(float(np.mean(self.recruited(t) ** 2)) for t in moved)
+            return {"effort": max(float(self.gain * c["force_scale_n"] * c["moment_arm_m"]) * math.sqrt(most), 1e-9)}
         if all(t.kind != IMPOSED for t in trials):
             return {}
         read = {n: [t[c] for t in trials if c in t] for n, c in (("effort", "torque_nm"), ("force", "force_n"))}

@@ -1,0 +1,72 @@
+"""An ankle whose stimulator answers its angle: a position controller that keeps the foot on a wave.
+
+Made by the independent rig, sample by sample; the pulse width is held over each.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnose.hidden import study_of
+from oracle.rigs import Ankle
+from oracle.studies import ANGLE_NOISE_RAD, PROCESS_TORQUE_NM, RATE_HZ, SATURATION_US, THRESHOLD_US, ankle_rig
+from scipy.integrate import odeint
+
+from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.identify.feedback import is_fed_back
+from fes_pin.models.nominal import nominal_model
+
+SEED = 4
+WIDEST = 700.0
+"""Widest pulse that the controller gives, us: below saturation."""
+KP, KI = 600.0, 500.0
+"""Of the controller, us per rad and us per rad s."""
+
+
+def controlled(trial, constants, nominal, causes, rng):
+    """The trial again, its foot kept on a wave about where a pulse of middle width holds it."""
+    rig, n, dt = Ankle(constants, nominal, causes, trial), len(trial), 1.0 / RATE_HZ
+    x, gathered = np.array(rig.rest(), dtype=float), 0.0
+    where = rig.names.index("q")
+    sign = -1.0 if trial["angle_rad"].mean() < x[where] else 1.0
+    slow, fast, phase = rng.uniform(0.25, 0.4), rng.uniform(0.7, 1.1), rng.uniform(0.0, 6.28, 2)
+    width, angle = np.zeros(n), np.zeros(n)
+    for k in range(n):
+        angle[k] = x[where] + ANGLE_NOISE_RAD * rng.normal()
+        t = k * dt
+        wanted = rig.rest()[where] + sign * (0.15 + 0.06 * np.sin(6.28 * slow * t + phase[0]))
+        wanted += 0.03 * np.sin(6.28 * fast * t + phase[1])
+        error = sign * (wanted - angle[k])
+        gathered += KI * error * dt
+        width[k] = np.clip(THRESHOLD_US + 100.0 + KP * error + gathered, 0.0, WIDEST) if k else 0.0
+        share = np.clip((width[k] - THRESHOLD_US) / (SATURATION_US - THRESHOLD_US), 0.0, 1.0)
+        held = {"r": float(share), "disturbance": PROCESS_TORQUE_NM * rng.normal()}
+        x = odeint(rig.rates, x, [t, t + dt], args=(held,), tfirst=True, rtol=1e-9, atol=1e-11)[-1]
+    return trial.with_columns(pulse_width_us=width, angle_rad=angle)
+
+
+def stimulated(causes):
+    """A study of such trials, beside isometric ones that a script has stimulated."""
+    study = study_of("ankle", causes, "process", SEED)
+    constants, nominal, _ = ankle_rig(np.random.default_rng(SEED))
+    rng = np.random.default_rng([SEED, 1])
+    moved = [controlled(t, constants, nominal, causes, rng) if t.kind == "motion" else t for t in study.trials]
+    return replace(study, trials=tuple(moved))
+
+
+@pytest.mark.parametrize("causes", [{}, {"coulomb_friction": {"torque_nm": 0.04}}], ids=["nothing", "dry friction"])
+def test_what_hides_in_an_ankle_under_position_control_is_named(causes):
+    """Judged by free simulation friction had been 0.0388 +- 0.0001 N m beside something that is left."""
+    study = stimulated(causes)
+    rig = nominal_model(study).rig
+    assert is_fed_back(rig, study.trials)
+    whole = [t.with_columns(pulse_width_us=np.round(t["pulse_width_us"])) for t in study.trials]
+    assert is_fed_back(rig, whole)
+    assert not is_fed_back(rig, study_of("ankle", causes, "process", SEED).trials)
+    found = diagnose_joint(study)
+    assert found.is_driven
+    assert [c.name for c in found.causes] == list(causes), str(found)
+    assert not found.remainder.unexplained
+    if causes:
+        (friction,) = found.causes
+        assert friction.parameters["torque_nm"].value == pytest.approx(0.04, rel=0.1)
