@@ -49,7 +49,7 @@ class RandomPart:
 class Ahead:
     """Errors E of one model, percent: one sample ahead, over the horizon, free (None where the rig falls).
 
-    `noise` is what noise alone leaves over the horizon, see `noise_in`; None of a rig that is simulated freely.
+    `noise` is what noise alone leaves over the horizon, see `noise_that_is_small`; None of one that is simulated freely.
     """
 
     one_step: float
@@ -151,7 +151,7 @@ def _squares(fitted: Fit, floor: Fit, trial: Trial, horizon_s: float) -> np.ndar
 def _told(fitted: Fit, trial: Trial, horizon_s: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """What is foretold over the horizon, and the variance of its errors by noise alone, shape (n,) by output."""
     assert fitted.doubt is not None
-    calm = noise_in(fitted)
+    calm = noise_that_is_small(fitted)
     told = forecasts(fitted.model, trial, fitted.doubt, horizon_s)
     alone = told if calm is fitted.doubt else forecasts(fitted.model, trial, calm, horizon_s)
     noise = {n: np.where(np.isfinite(trial[n]), np.nan_to_num(one.variances), 0.0) for n, one in alone.items()}
@@ -165,7 +165,7 @@ def _first(fitted: Fit, trial: Trial, horizon_s: float) -> int:
     return first if first < len(trial) else 0
 
 
-def noise_in(fitted: Fit) -> Doubt:
+def noise_that_is_small(fitted: Fit) -> Doubt:
     """What is random about a rig and its readings that is noise.
 
     A random effort as far as it is small beside what drives the rig: what is more than `SMALL_SHARE` of that, is

@@ -25,7 +25,7 @@ from fes_pin.identify.levels import RUNAWAY
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel, thin, thinning
 from fes_pin.identify.per_trial import predictions
-from fes_pin.models.foretold import Forecast
+from fes_pin.models.foretold import ForetoldOutput
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, masked
 from fes_pin.models.simulate import Simulator
@@ -181,7 +181,7 @@ def over_horizon(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> 
     return {n: one.values for n, one in forecasts(model, trial, doubt, horizon_s).items()}
 
 
-def forecasts(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dict[str, Forecast]:
+def forecasts(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dict[str, ForetoldOutput]:
     """What a model foretells of each sample from what was measured up to `horizon_s` before it.
 
     Parameters
@@ -192,7 +192,7 @@ def forecasts(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dic
 
     Returns
     -------
-    dict of str to Forecast
+    dict of str to ForetoldOutput
         By output column that the trial has. The first sample, before which nothing was measured, is as measured.
     """
     ahead, stride = reach_of(trial, horizon_s)
@@ -201,7 +201,7 @@ def forecasts(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dic
     abreast = [starts[k :: _abreast(ahead, stride)] for k in range(min(_abreast(ahead, stride), len(starts)))]
     shown = [masked(trial, outputs, [range(s + 1, s + ahead + stride) for s in own]) for own in abreast]
     problem = LikelihoodProblem(model, shown, doubt, (), starts=[trial] * len(shown))
-    out = {n: Forecast(np.array(trial[n]), np.zeros(len(trial))) for n in outputs}
+    out = {n: ForetoldOutput(np.array(trial[n]), np.zeros(len(trial))) for n in outputs}
     for own, foretold in zip(abreast, problem.foretold(model.parameters()), strict=True):
         for s in own:
             rows = slice(s + ahead if s else 1, min(s + ahead + stride, len(trial)))

@@ -26,7 +26,7 @@ from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Linearized, Unknowns, limits_of, whitened_sse
 from fes_pin.identify.scoring import TURN, Point, Told, climb
 from fes_pin.models.compile.layout import WIDTH
-from fes_pin.models.foretold import Forecast, ForetoldTrial
+from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, Predictor
 from fes_pin.workers import check_limit, in_parallel
@@ -144,7 +144,7 @@ class LikelihoodProblem:
         """How many points are tried in one run."""
         return max(1, WIDTH // len(self.trials))
 
-    def foretold(self, values: Mapping[str, float]) -> list[dict[str, Forecast]]:
+    def foretold(self, values: Mapping[str, float]) -> list[dict[str, ForetoldOutput]]:
         """What is foretold of each output of each trial, also where nothing was measured."""
         own = [{**begin, **u} for begin, u in zip(self.begins, self.start_unknowns(), strict=True)]
         with np.errstate(all="ignore"):

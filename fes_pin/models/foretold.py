@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Forecast(NamedTuple):
+class ForetoldOutput(NamedTuple):
     """What is foretold of an output, measured or not, and the variance of what it is off by if the model is right.
 
     Both have shape (n,).

@@ -13,7 +13,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.models.compile.layout import WIDTH, doubt_constants
 from fes_pin.models.compile.program import compiled_program
 from fes_pin.models.disturbance import disturbed
-from fes_pin.models.foretold import Forecast, ForetoldTrial
+from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import is_delayed, lane_inputs, lane_values, max_step, substeps, timing, total_delay
 
@@ -133,9 +133,9 @@ class Predictor:
 
     def foretell(
         self, values: Mapping[str, float], doubt: Doubt, unknowns: Sequence[Mapping[str, float]]
-    ) -> list[dict[str, Forecast]]:
+    ) -> list[dict[str, ForetoldOutput]]:
         """What is foretold of every output of every trial, by name; see `run`."""
-        out: dict[int, dict[str, Forecast]] = {}
+        out: dict[int, dict[str, ForetoldOutput]] = {}
         each = [values] * len(self.trials)
         for block in self._blocks:
             y, _ = block.run(each, self._doubts(doubt), unknowns, self._delays(each))
@@ -252,7 +252,7 @@ class _Block:
             noise = repeats * np.array([doubts[lane][f"white.{o}"] for o in self.outputs]) ** 2
             yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities, repeats, noise)
 
-    def foretold(self, y: np.ndarray) -> Iterator[dict[str, Forecast]]:
+    def foretold(self, y: np.ndarray) -> Iterator[dict[str, ForetoldOutput]]:
         """What is foretold in each lane, by output: what was given as measured less the innovation."""
         count = len(self.outputs)
         for lane, trial in enumerate(self.trials):
@@ -260,7 +260,7 @@ class _Block:
                 self.measured[: len(trial), :, lane] - y[: len(trial), :count, lane],
                 y[: len(trial), count:, lane],
             )
-            yield {o: Forecast(told[:, k], variances[:, k]) for k, o in enumerate(self.outputs)}
+            yield {o: ForetoldOutput(told[:, k], variances[:, k]) for k, o in enumerate(self.outputs)}
 
 
 def are_news(trial: Trial, lasts_s: float) -> np.ndarray:

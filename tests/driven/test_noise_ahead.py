@@ -7,7 +7,7 @@ import pytest
 from identify.test_likelihood import TRUE, believed, held
 
 from fes_pin.diagnose.driven_refused import is_moved_by_what_is_recorded
-from fes_pin.diagnose.errors_ahead import errors_ahead, errors_over_horizon, noise_in, random_parts
+from fes_pin.diagnose.errors_ahead import errors_ahead, errors_over_horizon, noise_that_is_small, random_parts
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.levels import SMALL_SHARE
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -36,9 +36,9 @@ def test_errors_of_a_right_model_are_those_of_noise(horizon_s, fitted):
 
 
 def test_a_random_effort_that_is_large_is_no_noise(fitted):
-    assert noise_in(fitted) is fitted.doubt
+    assert noise_that_is_small(fitted) is fitted.doubt
     large = replace(fitted, doubt=fitted.doubt.with_values({"std.effort": 3.0 * TRUE["weight"]}))
-    (part,) = random_parts(replace(fitted, doubt=noise_in(large)))
+    (part,) = random_parts(replace(fitted, doubt=noise_that_is_small(large)))
     assert part.share == pytest.approx(SMALL_SHARE)
 
 
