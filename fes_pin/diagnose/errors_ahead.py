@@ -49,7 +49,7 @@ class RandomPart:
 class Ahead:
     """Errors E of one model, percent: one sample ahead, over the horizon, free (None where the rig falls).
 
-    `noise` is what noise alone leaves over the horizon, see `noise_that_is_small`; None of one that is simulated freely.
+    `noise` is what noise alone leaves over the horizon, see `noise_that_is_small`; None of one simulated freely.
     """
 
     one_step: float
