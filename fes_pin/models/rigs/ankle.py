@@ -158,11 +158,10 @@ class Ankle(Rig):
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         """Of a free motion what the cable's torque would be at the start values."""
-        if moved := [t for t in trials if t.kind == "motion"]:
-            c, most = self.constants, max(float(np.mean(self.recruited(t) ** 2)) for t in moved)
-            return {"effort": max(float(self.gain * c["force_scale_n"] * c["moment_arm_m"]) * math.sqrt(most), 1e-9)}
         if all(t.kind != IMPOSED for t in trials):
-            return {}
+            c, moved = self.constants, [float(np.mean(self.recruited(t) ** 2)) for t in trials if t.kind == "motion"]
+            size = float(self.gain * c["force_scale_n"] * c["moment_arm_m"]) * math.sqrt(max(moved, default=0.0))
+            return {"effort": max(size, 1e-9)} if moved else {}
         read = {n: [t[c] for t in trials if c in t] for n, c in (("effort", "torque_nm"), ("force", "force_n"))}
         return {n: max(math.sqrt(max(float(np.nanmean(y**2)) for y in many)), 1e-9) for n, many in read.items() if many}
 
