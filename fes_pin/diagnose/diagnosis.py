@@ -29,7 +29,7 @@ from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import NominalFitError, SimulationSearch
 from fes_pin.diagnose.searches import Result, Search, Searches
-from fes_pin.identify.feedback import is_fed_back
+from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
 from fes_pin.identify.recording import earns, low_pass_of
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
@@ -165,6 +165,11 @@ class _Work:
             with time_limit(self.end - time.perf_counter()):
                 search, searched = searches.by_likelihood(train)
             diagnosis = _judged(whole, search, searched, (train, test), self.seed)
+        elif _may_be_stimulated_back(diagnosis, search, train):
+            with time_limit(self.end - time.perf_counter()):
+                search, searched = searches.by_likelihood(train)
+            other = _judged(whole, search, searched, (train, test), self.seed)
+            diagnosis = diagnosis if other.remainder.unexplained else other
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
 
 
@@ -223,6 +228,17 @@ def _may_be_driven(diagnosis: Diagnosis, search: Search, trials: Sequence[Trial]
     """
     free = isinstance(search, SimulationSearch) and not search.was_stopped
     return free and diagnosis.verdict == "unexplained" and diagnosis.nominal.model.rig.is_driven(trials)
+
+
+def _may_be_stimulated_back(diagnosis: Diagnosis, search: Search, trials: Sequence[Trial]) -> bool:
+    """True where free simulation leaves something of a rig whose stimulus answers its reading.
+
+    Its noise and what acts on it at random come back as stimulus. The likelihood's answer is taken where it leaves
+    nothing: it knows no noise of a reading that lasts, beside which free simulation does better.
+    """
+    free = isinstance(search, SimulationSearch) and not search.was_stopped
+    rig = diagnosis.nominal.model.rig
+    return free and diagnosis.remainder.unexplained and is_stimulus_fed_back(rig, trials)
 
 
 @dataclass(frozen=True)

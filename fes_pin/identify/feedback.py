@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -24,31 +24,41 @@ JUMP = 5.0
 
 
 def is_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
-    """True if what drives a rig, an effort or a stimulus, answers its reading.
+    """True if the effort of a rig answers its reading.
 
     Granger's question, asked of the second differences u'' of the effort and y'' of the reading, mostly noise: are the
     last readings any help to foretell the effort, beside the last efforts? Trials are combined as Fisher does.
 
         u''_t = a_1 u''_(t-1) + ... + b_0 y''_t + b_1 y''_(t-1) + ...
 
-    An effort that was chosen beforehand knows nothing of the noise. A stimulus that was, follows the motion that it
-    made: readings then foretell a little of it, and of a controller's most (`MOST`).
+    An effort that was chosen beforehand knows nothing of the noise.
 
     Source: Granger, Investigating causal relations by econometric models and cross-spectral methods, Econometrica 37
     (1969); Fisher, Statistical Methods for Research Workers, 1932, section 21.1.
     """
-    logs = [math.log(max(p, 1e-300)) for p in _p_values(rig, trials)]
+    return _certainly(p for p, _ in _answers(rig, [t for t in trials if rig.is_driven([t])]))
+
+
+def is_stimulus_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
+    """The same of a stimulus.
+
+    One that was chosen beforehand follows the motion that it made: readings foretell a little of it, and of a
+    controller's most.
+    """
+    free = [t for t in trials if t.kind != IMPOSED and not rig.is_driven([t])]
+    return _certainly(p if share > MOST else 1.0 for p, share in _answers(rig, free))
+
+
+def _certainly(p_values: Iterable[float]) -> bool:
+    logs = [math.log(max(p, 1e-300)) for p in p_values]
     return bool(logs) and float(chi2_tail(-2.0 * sum(logs), 2 * len(logs))) < CERTAIN_LEVEL
 
 
-def _p_values(rig: Rig, trials: Sequence[Trial]) -> Iterator[float]:
+def _answers(rig: Rig, trials: Sequence[Trial]) -> Iterator[tuple[float, float]]:
     for trial in trials:
         output = rig.output(trial.kind)
-        if trial.kind == IMPOSED or output not in trial.columns:
-            continue
-        for name in rig.input_columns(trial):
-            p_value, share = _granger(trial[name], trial[output])
-            yield p_value if share > MOST or rig.is_driven([trial]) else 1.0
+        if output in trial.columns:
+            yield from (_granger(trial[n], trial[output]) for n in rig.input_columns(trial))
 
 
 def _granger(effort: np.ndarray, reading: np.ndarray) -> tuple[float, float]:
