@@ -89,7 +89,7 @@ class Searches:
         """True where no set of causes leaves only noise of the reading, and there is no second trial to compare by.
 
         Something acts in the rig itself then; it is a random effort to the likelihood, which one trial is enough for.
-        Not of a stimulated joint in motion: beside noise of its angle that lasts the likelihood names what is not there.
+        Not of a stimulated joint in motion: beside noise that lasts the likelihood names what is not there.
         """
         trials = found.nominal.trials
         if found.complete or found.stopped or len(trials) > 1 or self.test:
