@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -166,10 +167,11 @@ class _Work:
                 search, searched = searches.by_likelihood(train)
             diagnosis = _judged(whole, search, searched, (train, test), self.seed)
         elif _may_be_stimulated_back(diagnosis, search, train):
-            with time_limit(self.end - time.perf_counter()):
-                search, searched = searches.by_likelihood(train)
-            other = _judged(whole, search, searched, (train, test), self.seed)
-            diagnosis = diagnosis if other.remainder.unexplained else other
+            with suppress(NominalFitError, ArithmeticError, np.linalg.LinAlgError):  # the first answer stands
+                with time_limit(self.end - time.perf_counter()):
+                    search, searched = searches.by_likelihood(train)
+                other = _judged(whole, search, searched, (train, test), self.seed)
+                diagnosis = diagnosis if other.remainder.unexplained else other
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
 
 
