@@ -16,9 +16,9 @@ from fes_pin.models.rigs.base import Rig
 LAGS = 4
 """Samples that a controller's answer is sought in: it acts in the sample in which it reads, or a few later."""
 MOST = 0.5
-"""Share of a stimulus, beyond what its past foretells, that readings tell where it answers them. Of 369 trials that a
-script stimulated it was 0.01 in the median and 0.10 at most, of four that a controller did 1.0, or 0.94 if its pulse
-widths are stored in whole microseconds (`tests/driven/test_stimulated.py`)."""
+"""Share of a stimulus, beyond what its past foretells, that readings tell where it answers them. Of trials that a
+script stimulated it was 0.01 in the median, 0.10 at most (`tests/identify/test_feedback.py`); a controller's are told
+so far even if its pulse widths are stored in whole microseconds (`tests/driven/test_stimulated.py`)."""
 JUMP = 5.0
 """Deviations beyond which a second difference is a jump, not noise."""
 
