@@ -48,7 +48,7 @@ def simulate(lanes: Lanes, forms: Sequence[Form], steps: int) -> np.ndarray:
     steps
         Integration steps per sample.
     """
-    return _Run(lanes, forms, steps).readings()
+    return Run(lanes, forms, steps).readings()
 
 
 def recruitment(lanes: Lanes, forms: Sequence[Form]) -> np.ndarray:
@@ -63,7 +63,7 @@ def recruitment(lanes: Lanes, forms: Sequence[Form]) -> np.ndarray:
     return share
 
 
-class _Run:
+class Run:
     """One integration of all lanes."""
 
     def __init__(self, lanes: Lanes, forms: Sequence[Form], steps: int) -> None:
@@ -121,18 +121,18 @@ class _Run:
         if self.lanes.rig == "joint":
             x[1], x[2] = k["position0"], k["velocity0"]
         elif self.lanes.rig == "ankle":
-            x[1] = np.where(self.lanes.moving, self._equilibrium(count), k["angle_rad"])
+            x[1] = np.where(self.lanes.moving, self.equilibrium(count), k["angle_rad"])
         for row, (form, name) in enumerate(self.names, start=3):
             x[row] = form.rest(name, x[1])
         return x
 
-    def _equilibrium(self, count: int) -> np.ndarray:
-        """Angle at which the unstimulated joint rests under its load, by bisection."""
+    def equilibrium(self, count: int, activation: float = 0.0) -> np.ndarray:
+        """Angle at which the joint rests under its load and an activation, by bisection."""
         low, high = np.full(count, 0.3), np.full(count, 3.0)
         for _ in range(60):
             middle = 0.5 * (low + high)
             x = np.zeros((3 + len(self.names), count))
-            x[1] = middle
+            x[0], x[1] = activation, middle
             for row, (form, name) in enumerate(self.names, start=3):
                 x[row] = form.rest(name, middle)
             self._rates(x, 0.0, np.zeros(count), 0.0)

@@ -66,18 +66,24 @@ def make(items: Sequence[Item], folder: Path) -> list[Made]:
         For the URDFs of joints.
     """
     forms = items[0].forms()
-    drafts = [draft(item, folder) for item in items]
-    bare = run_trials(drafts, [()] * len(drafts), (), COARSE) if forms else []
-    for one, quiet in zip(drafts, bare, strict=False):
-        angles = np.concatenate([y for y, p in zip(quiet, one.trials, strict=True) if p.kind == "motion"] or [[0.0]])
-        one.shapes = [form.draw(one.item.rng(10 + k), angles) for k, form in enumerate(forms)]
-    quiet = [_size(drafts, k, form) for k, form in enumerate(forms)]
+    drafts, quiet = sized(items, folder)
     finest = max([COARSE, *(form.fine for form in forms)])
     run = run_trials(drafts, [one.sizes for one in drafts], forms, finest, fresh=True)
     return [
         _made(one, forms, readings, quiet[0][i] if quiet else None)
         for i, (one, readings) in enumerate(zip(drafts, run, strict=True))
     ]
+
+
+def sized(items: Sequence[Item], folder: Path) -> tuple[list[Draft], list[list[list[np.ndarray]]]]:
+    """Drafts that know how large each of their causes is, and noiseless readings with each cause alone."""
+    forms = items[0].forms()
+    drafts = [draft(item, folder) for item in items]
+    bare = run_trials(drafts, [()] * len(drafts), (), COARSE) if forms else []
+    for one, quiet in zip(drafts, bare, strict=False):
+        angles = np.concatenate([y for y, p in zip(quiet, one.trials, strict=True) if p.kind == "motion"] or [[0.0]])
+        one.shapes = [form.draw(one.item.rng(10 + k), angles) for k, form in enumerate(forms)]
+    return drafts, [_size(drafts, k, form) for k, form in enumerate(forms)]
 
 
 def _size(drafts: list[Draft], k: int, form: type[Form]) -> list[list[np.ndarray]]:

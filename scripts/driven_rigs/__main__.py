@@ -14,6 +14,7 @@ import typer
 from going_on import results_of
 
 from driven_rigs import laboratory as laboratories
+from driven_rigs import stimulated as ankles
 from driven_rigs import swing_up as pendulums
 from driven_rigs.draw import CAUSES, OUTSIDE, Drawn, draw
 from fes_pin.data.study import read_study
@@ -28,6 +29,9 @@ PAIRS = (
     ("coulomb_friction", "periodic_torque"),
     ("coulomb_friction", "parallel_stiffness"),
 )
+
+UNKNOWN = (*OUTSIDE, *ankles.OUTSIDE)
+"""What no library has, of any generator."""
 
 Drawing = Callable[[tuple[str, ...], int, Path], Drawn]
 """Draws a rig with such causes from such a seed into a folder."""
@@ -47,6 +51,7 @@ def items(count: int, drawn: ModuleType | None = None, play: bool = False) -> It
     rows += [*PAIRS[:2], (), OUTSIDE, *PAIRS[2:]]
     if drawn is not None:
         rows = [(), *((c,) for c in drawn.CAUSES), (), drawn.CAUSES[:1], *drawn.PAIRS]
+        rows += [(c,) for c in getattr(drawn, "OUTSIDE", ())]
     if play:
         rows = [(), ("backlash",), *((c, "backlash") for c in CAUSES if c != "backlash")]
     for k in range(count):
@@ -82,7 +87,7 @@ def deviations(found: Diagnosis, truth: dict[str, float]) -> dict[str, float]:
     fitted = found.extended
     return {
         n: (fitted.values[n] - truth[n]) / fitted.std(n)
-        for n in ("inertia_scale", "damping")
+        for n in ("inertia_scale", "damping", "inertia_kgm2", "damping_nms")
         if n in truth and n in fitted.free and math.isfinite(fitted.std(n)) and fitted.std(n) > 0.0
     }
 
@@ -96,7 +101,7 @@ def table(rows: Sequence[dict[str, Any]]) -> list[str]:
         adequate, alarms = (sum(f(r) for r in nulls) for f in (_adequate, lambda r: bool(r["named"])))
         lines.append(f"nothing hidden: {adequate} of {len(nulls)} adequate, {alarms} with a name")
     for count in (1, 2):
-        many = [r for r in good if len(r["causes"]) == count and r["causes"][0] not in OUTSIDE]
+        many = [r for r in good if len(r["causes"]) == count and r["causes"][0] not in UNKNOWN]
         if many:
             first = sum(_all_named(r) for r in many)
             alone = sum(sorted(n[0] for n in r["named"]) == sorted(r["causes"]) for r in many)
@@ -106,7 +111,7 @@ def table(rows: Sequence[dict[str, Any]]) -> list[str]:
                 for r in many
                 if not _all_named(r)
             ]
-    outside = [r for r in good if r["causes"] and r["causes"][0] in OUTSIDE]
+    outside = [r for r in good if r["causes"] and r["causes"][0] in UNKNOWN]
     if outside:
         lines.append(f"outside the library: {sum(r['left'] for r in outside)} of {len(outside)} with a remainder")
     exact = [r for r in good if sorted(n[0] for n in r["named"]) == sorted(r["causes"])]
@@ -142,6 +147,9 @@ def main(
     ] = False,
     play: Annotated[bool, typer.Option("--play", help="Every cause beside a play.")] = False,
     swing_up: Annotated[bool, typer.Option("--swing-up", help="Pendulums that are swung up and held.")] = False,
+    stimulated: Annotated[
+        bool, typer.Option("--stimulated", help="Ankles under position control, by their stimulus.")
+    ] = False,
     results: Annotated[
         Path | None, typer.Option(help="A file of one line a study, with which a run can go on.")
     ] = None,
@@ -149,6 +157,8 @@ def main(
     """Hide known causes in rigs that a controller drives, and count what the diagnosis makes of them."""
 
     def drawn(causes: tuple[str, ...], k: int, folder: Path) -> Drawn:
+        if stimulated:
+            return ankles.draw_stimulated(causes, k, folder)
         if swing_up:
             return pendulums.draw_swing_up(causes, k, folder)
         if laboratory:
@@ -158,7 +168,7 @@ def main(
     def one(causes: tuple[str, ...], k: int) -> dict[str, Any]:
         return judged(() if nulls else causes, k, drawn)
 
-    other = pendulums if swing_up else laboratories if laboratory else None
+    other = ankles if stimulated else pendulums if swing_up else laboratories if laboratory else None
     rows = results_of(items(count, other, play), seed, one, results)
     typer.echo("\n".join(table(rows)))
 
