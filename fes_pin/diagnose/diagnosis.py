@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,6 +33,7 @@ from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
 from fes_pin.identify.recording import earns, low_pass_of
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
+from fes_pin.models.rigs.base import Rig
 from fes_pin.workers import OutOfTime, Progress, one_thread_each, time_limit
 
 
@@ -110,7 +110,7 @@ class _Work:
     def diagnosis_of_log(self, study: Study) -> Diagnosis:
         """The diagnosis of a study as its log wrote it down, with what that did to its trials undone if it can be."""
         nominal, (train, _) = nominal_model(study), split(study)
-        driven = is_fed_back(nominal.rig, train)
+        driven = _is_answered(nominal.rig, train)
         logged = all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
         faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
         log = Log(effort_noise=faults.noise_beside_nominal(nominal)) if driven and logged else Log()
@@ -137,7 +137,7 @@ class _Work:
         """Search the causes of one study, and judge what is found."""
         nominal = nominal_model(study)
         train, test = split(study)
-        driven = is_fed_back(nominal.rig, train)
+        driven = _is_answered(nominal.rig, train)
         train, spared, said = searched_part(train, study.schema, driven)
         test = test or spared
         recorded = train if said else [t for t in study.trials if t.role != "held_out"]
@@ -166,13 +166,12 @@ class _Work:
             with time_limit(self.end - time.perf_counter()):
                 search, searched = searches.by_likelihood(train)
             diagnosis = _judged(whole, search, searched, (train, test), self.seed)
-        elif _may_be_stimulated_back(diagnosis, search, train):
-            with suppress(NominalFitError, ArithmeticError, np.linalg.LinAlgError):  # the first answer stands
-                with time_limit(self.end - time.perf_counter()):
-                    search, searched = searches.by_likelihood(train)
-                other = _judged(whole, search, searched, (train, test), self.seed)
-                diagnosis = diagnosis if other.remainder.unexplained else other
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
+
+
+def _is_answered(rig: Rig, trials: Sequence[Trial]) -> bool:
+    """True if what drives a rig answers its reading: noise, and what acts at random, come back as an input."""
+    return is_fed_back(rig, trials) or is_stimulus_fed_back(rig, trials)
 
 
 def _searched(study: Study, trials: Sequence[Trial], driven: bool) -> list[Trial]:
@@ -230,17 +229,6 @@ def _may_be_driven(diagnosis: Diagnosis, search: Search, trials: Sequence[Trial]
     """
     free = isinstance(search, SimulationSearch) and not search.was_stopped
     return free and diagnosis.verdict == "unexplained" and diagnosis.nominal.model.rig.is_driven(trials)
-
-
-def _may_be_stimulated_back(diagnosis: Diagnosis, search: Search, trials: Sequence[Trial]) -> bool:
-    """True where free simulation leaves something of a rig whose stimulus answers its reading.
-
-    Its noise and what acts on it at random come back as stimulus. The likelihood's answer is taken where it leaves
-    nothing: it knows no noise of a reading that lasts, beside which free simulation does better.
-    """
-    free = isinstance(search, SimulationSearch) and not search.was_stopped
-    rig = diagnosis.nominal.model.rig
-    return free and diagnosis.remainder.unexplained and is_stimulus_fed_back(rig, trials)
 
 
 @dataclass(frozen=True)

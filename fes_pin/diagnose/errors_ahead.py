@@ -14,8 +14,8 @@ from fes_pin.identify.doubts import driving_size
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import SMALL_SHARE
 from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.per_trial import predictions
 from fes_pin.models.predictor import Doubt
-from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel
 
 AVERAGED_S = 0.05
@@ -188,7 +188,7 @@ def errors_ahead(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float,
             measured = trial[name]
             told, noise = _told(fitted, trial, horizon_s)
             begun = np.arange(len(trial)) < _first(fitted, trial, horizon_s)
-            free = Simulator(fitted.model, [trial]).run(fitted.values)[0].readings[:, 0]
+            free = predictions(fitted.model, [trial], fitted.noise)[0][:, 0]
             errors = {
                 "one_step": one_step(fitted.model, trial, fitted.doubt)[name],
                 "horizon": np.where(begun, np.nan, measured - told[name]),

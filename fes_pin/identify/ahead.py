@@ -24,7 +24,8 @@ from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.levels import RUNAWAY
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel, thin, thinning
-from fes_pin.identify.per_trial import predictions
+from fes_pin.identify.per_trial import foretold_unknowns, predictions
+from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.foretold import ForetoldOutput
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, masked
@@ -112,18 +113,9 @@ def forecast(residual: np.ndarray, noise: Noise, dt: float, ahead_s: float) -> n
     steps = max(1, math.ceil((ahead_s - dt) / (every * dt) - 1e-9) + 1)
     foretold = np.zeros(len(seen))
     if order and len(seen) > steps:
-        weights = _weights(np.array(noise.ar), steps)
-        foretold[steps:] = np.convolve(seen, weights)[: len(seen) - steps]
+        foretold[steps:] = np.convolve(seen, weights_ahead(noise.ar, steps)[-1])[: len(seen) - steps]
     out = np.repeat(foretold, every)
     return np.pad(out, (0, len(residual) - len(out)), mode="edge") if len(out) else np.zeros(len(residual))
-
-
-def _weights(ar: np.ndarray, steps: int) -> np.ndarray:
-    """First row of the companion matrix to the power of `steps`."""
-    row = ar.copy()
-    for _ in range(steps - 1):
-        row = row[0] * ar + np.append(row[1:], 0.0)
-    return row
 
 
 def foretell(model: Model, trial: Trial, random: Random, horizon_s: float) -> dict[str, np.ndarray]:
@@ -171,9 +163,14 @@ def one_step(model: Model, trial: Trial, doubt: Doubt) -> dict[str, np.ndarray]:
     It is 0 where nothing was measured, and at the first sample, before which nothing was.
     """
     problem = LikelihoodProblem(model, [trial], doubt, ())
-    (foretold,) = problem.foretold(model.parameters())
     judged = model.rig.follows(trial) & (np.arange(len(trial)) > 0)
-    return {n: np.where(judged & np.isfinite(trial[n]), trial[n] - one.values, 0.0) for n, one in foretold.items()}
+    out: dict[str, np.ndarray] = {}
+    for rows, own in foretold_unknowns(model, trial, doubt):
+        (foretold,) = problem.foretold(model.parameters(), [own])
+        for n, one in foretold.items():
+            missed = np.where(judged & np.isfinite(trial[n]), trial[n] - one.values, 0.0)
+            out[n] = np.where(rows, missed, out.get(n, missed))
+    return out
 
 
 def over_horizon(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dict[str, np.ndarray]:
@@ -202,12 +199,15 @@ def forecasts(model: Model, trial: Trial, doubt: Doubt, horizon_s: float) -> dic
     shown = [masked(trial, outputs, [range(s + 1, s + ahead + stride) for s in own]) for own in abreast]
     problem = LikelihoodProblem(model, shown, doubt, (), starts=[trial] * len(shown))
     out = {n: ForetoldOutput(np.array(trial[n]), np.zeros(len(trial))) for n in outputs}
-    for own, foretold in zip(abreast, problem.foretold(model.parameters()), strict=True):
-        for s in own:
-            rows = slice(s + ahead if s else 1, min(s + ahead + stride, len(trial)))
-            for n in outputs:
-                for whole, part in zip(out[n], foretold[n], strict=True):
-                    whole[rows] = part[rows]
+    for wanted, unknowns in foretold_unknowns(model, trial, doubt):
+        run = problem.foretold(model.parameters(), [unknowns] * len(shown))
+        for own, foretold in zip(abreast, run, strict=True):
+            for s in own:
+                rows = np.arange(s + ahead if s else 1, min(s + ahead + stride, len(trial)))
+                rows = rows[wanted[rows]]
+                for n in outputs:
+                    for whole, part in zip(out[n], foretold[n], strict=True):
+                        whole[rows] = part[rows]
     return out
 
 

@@ -63,6 +63,12 @@ def _rough_noise(model: Model, trials: Sequence[Trial], lasts_s: float) -> dict[
     return rough_noise(model, apart)
 
 
+def stilled(model: Model, trials: Sequence[Trial], doubt: Doubt) -> Doubt:
+    """The same with random processes that are too small to do anything, and stay so."""
+    sizes = driving_size(model, trials)
+    return replace(doubt, std={n: SMALLEST * sizes[n] for n in doubt.std}, still=doubt.processes)
+
+
 def doubt_limits(model: Model, trials: Sequence[Trial], lasts_s: float = 0.0) -> dict[str, tuple[float, float]]:
     """Bounds of everything that is random, by name."""
     step, longest = max(t.dt for t in trials), max(t.duration for t in trials)

@@ -15,10 +15,10 @@ from fes_pin.models.rigs.base import Rig
 
 LAGS = 4
 """Samples that a controller's answer is sought in: it acts in the sample in which it reads, or a few later."""
-MOST = 0.5
+ANSWERED = 1.0 / 6.0
 """Share of a stimulus, beyond what its past foretells, that readings tell where it answers them. Of trials that a
-script stimulated it was 0.01 in the median, 0.10 at most (`tests/identify/test_feedback.py`); a controller's are told
-so far even if its pulse widths are stored in whole microseconds (`tests/driven/test_stimulated.py`)."""
+script stimulated it was 0.01 in the median, 0.10 at most (`tests/identify/test_feedback.py`); of a controller's it is
+0.23 even where pulse widths come in steps of 10 us (`tests/driven/test_stimulated.py`)."""
 JUMP = 5.0
 """Deviations beyond which a second difference is a jump, not noise."""
 
@@ -42,11 +42,11 @@ def is_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
 def is_stimulus_fed_back(rig: Rig, trials: Sequence[Trial]) -> bool:
     """The same of a stimulus.
 
-    One that was chosen beforehand follows the motion that it made: readings foretell a little of it, and of a
-    controller's most.
+    One that was chosen beforehand follows the motion that it made: readings foretell a little of it, and more of a
+    controller's.
     """
     free = [t for t in trials if t.kind != IMPOSED and not rig.is_driven([t])]
-    return _certainly(p if share > MOST else 1.0 for p, share in _answers(rig, free))
+    return _certainly(p if share > ANSWERED else 1.0 for p, share in _answers(rig, free))
 
 
 def _certainly(p_values: Iterable[float]) -> bool:
@@ -58,7 +58,15 @@ def _answers(rig: Rig, trials: Sequence[Trial]) -> Iterator[tuple[float, float]]
     for trial in trials:
         output = rig.output(trial.kind)
         if output in trial.columns:
-            yield from (_granger(trial[n], trial[output]) for n in rig.input_columns(trial))
+            yield from (_granger(*_when_given(trial[n], trial[output])) for n in rig.input_columns(trial))
+
+
+def _when_given(drive: np.ndarray, reading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both at the samples in which the input may change: a pulse width is held until the next pulse."""
+    changes = np.flatnonzero(np.diff(drive) != 0.0) + 1
+    step = int(np.gcd.reduce(np.diff(changes))) if len(changes) > 1 else 1
+    begin = int(changes[0]) % step if len(changes) else 0
+    return drive[begin::step], reading[begin::step]
 
 
 def _granger(effort: np.ndarray, reading: np.ndarray) -> tuple[float, float]:

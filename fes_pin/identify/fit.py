@@ -176,8 +176,9 @@ class Fit:
 
     @property
     def price(self) -> float:
-        """Twice the negative log-likelihood, with what its degrees of freedom must earn."""
-        return self.sse + PARAMETER_PRICE * self.degrees
+        """Twice the negative log-likelihood, with what its degrees of freedom and random processes must earn."""
+        acting = 2 * (len(self.doubt.std) - len(self.doubt.still)) if self.doubt else 0
+        return self.sse + PARAMETER_PRICE * (self.degrees + acting)
 
 
 def fit_problem(

@@ -13,6 +13,7 @@ Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic gre
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -21,10 +22,12 @@ import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
+from fes_pin.identify.autoregressions import autoregressions, with_autoregressions
 from fes_pin.identify.doubts import doubt_limits, first_doubt
-from fes_pin.identify.noise import Noise
+from fes_pin.identify.noise import ORDERS, Noise
 from fes_pin.identify.problem import Linearized, Unknowns, limits_of, whitened_sse
 from fes_pin.identify.scoring import TURN, Point, Told, climb
+from fes_pin.models.autoregression import stationary_variance
 from fes_pin.models.compile.layout import WIDTH
 from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial
 from fes_pin.models.model import Model
@@ -71,8 +74,11 @@ class LikelihoodProblem:
 
     @property
     def noise(self) -> dict[str, Noise]:
-        """The white noise of the readings, by column."""
-        return {n: Noise(std, (), std) for n, std in self.doubt.white.items()}
+        """The noise of the readings, by column."""
+        return {
+            n: Noise(std, ar := self.doubt.ar.get(n, ()), std * math.sqrt(stationary_variance(ar)))
+            for n, std in self.doubt.white.items()
+        }
 
     @property
     def predictor(self) -> Predictor:
@@ -103,8 +109,9 @@ class LikelihoodProblem:
 
     @property
     def randomness(self) -> dict[str, float]:
-        """What is random, by name."""
-        return self.doubt.values()
+        """What is random and may change, by name: not the noise of a reading that none of the trials has."""
+        still, known = self.doubt.still, self.randomness_limits
+        return {n: v for n, v in self.doubt.values().items() if n in known and n.partition(".")[2] not in still}
 
     @property
     def randomness_limits(self) -> dict[str, tuple[float, float]]:
@@ -120,6 +127,11 @@ class LikelihoodProblem:
         return [one.cost for one in self._told([(*point, self.doubt) for point in points])]
 
     def _told(self, points: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[Told]:
+        """What every trial tells at each of several points."""
+        with np.errstate(all="ignore"):
+            return [_joined(run) for run in self._runs(points)]
+
+    def _runs(self, points: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[list[ForetoldTrial]]:
         """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
         count, trials = self.abreast, len(self.trials)
         if self._abreast is None:
@@ -127,14 +139,14 @@ class LikelihoodProblem:
             self._abreast = Predictor(self.model, self.trials * count, (), *own)
         predictor = self._abreast
 
-        def abreast(some: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[Told]:
+        def abreast(some: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[list[ForetoldTrial]]:
             check_limit()
             filled = [*some, *[some[-1]] * (count - len(some))]
             values, doubts = ([one[j] for one in filled for _ in range(trials)] for j in (0, 2))
             own = [{**begin, **u} for one in filled for begin, u in zip(self.begins, one[1], strict=True)]
             with np.errstate(all="ignore"):
                 run = predictor.run(values, doubts, own)  # type: ignore[arg-type]
-            return [_joined(run[j * trials : (j + 1) * trials]) for j in range(len(some))]
+            return [run[j * trials : (j + 1) * trials] for j in range(len(some))]
 
         told = in_parallel(abreast, [points[k : k + count] for k in range(0, len(points), count)])
         return [one for some in told for one in some]
@@ -144,9 +156,12 @@ class LikelihoodProblem:
         """How many points are tried in one run."""
         return max(1, WIDTH // len(self.trials))
 
-    def foretold(self, values: Mapping[str, float]) -> list[dict[str, ForetoldOutput]]:
+    def foretold(
+        self, values: Mapping[str, float], unknowns: Unknowns | None = None
+    ) -> list[dict[str, ForetoldOutput]]:
         """What is foretold of each output of each trial, also where nothing was measured."""
-        own = [{**begin, **u} for begin, u in zip(self.begins, self.start_unknowns(), strict=True)]
+        given = self.start_unknowns() if unknowns is None else unknowns
+        own = [{**begin, **u} for begin, u in zip(self.begins, given, strict=True)]
         with np.errstate(all="ignore"):
             return self.predictor.foretell(values, self.doubt, own)
 
@@ -167,7 +182,26 @@ class LikelihoodProblem:
         """Improve what is random, in place; returns by how much that lowers the cost."""
         reached = climb(self, values, unknowns, {}, TURN)
         self.become(reached.randomness)
-        return reached.gained
+        return reached.gained + self.renew(values, unknowns)
+
+    def renew(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Find again, in place, what noise foretells of itself; returns by how much that lowers the cost."""
+        if not any(self.doubt.ar.values()):
+            return 0.0
+        run = self._runs([(values, unknowns, self.doubt)])[0]
+        orders = {n: (len(ar),) for n, ar in self.doubt.ar.items()}
+        found = {**self.doubt.ar, **autoregressions(run, orders)}
+        before, after = (
+            sum(one.cost() for one in some) for some in (run, [with_autoregressions(one, found) for one in run])
+        )
+        if after < before:
+            self.doubt = replace(self.doubt, ar=found)
+        return max(before - after, 0.0)
+
+    def with_orders(self, values: Mapping[str, float], unknowns: Unknowns) -> Doubt:
+        """What is random, with autoregressions of the orders that what the filter leaves shows."""
+        (run,) = self._runs([(values, unknowns, self.doubt)])
+        return replace(self.doubt, ar=autoregressions(run, dict.fromkeys(self.doubt.white, ORDERS)))
 
     def become(self, randomness: Mapping[str, float]) -> None:
         """Change what is random, in place."""
@@ -209,9 +243,8 @@ class LikelihoodProblem:
     def _whitened(self, one: ForetoldTrial) -> Linearized:
         """A trial's innovations over their deviations; its sensitivities are scaled where they are."""
         with np.errstate(all="ignore"):
-            residual, scale, logs = one.whitened()
-            moved = one.of_seen(one.sensitivities)
-            moved *= -scale[:, None]
+            residual, logs = one.whitened()
+            moved = -one.white(one.sensitivities)
         split = len(self.free)
         return Linearized(residual, moved[:, :split], moved[:, split:], float(np.sum(logs)))
 
@@ -230,7 +263,7 @@ def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Lineariz
 def _joined(run: Sequence[ForetoldTrial]) -> Told:
     return Told(
         float(sum(one.cost() for one in run)),
-        np.concatenate([one.values[one.seen] for one in run]),
+        np.concatenate([one.whitened()[0] for one in run]),
         np.concatenate([one.variances[one.seen] for one in run]),
         np.concatenate([one.noise[one.seen] for one in run]),
         1.0 - 1.0 / np.concatenate([one.repeats[one.seen] for one in run]),

@@ -14,10 +14,12 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
+from fes_pin.models.predictor import Doubt
 from fes_pin.models.simulate import Simulated, Simulator
 from fes_pin.models.stage import Effect
 
@@ -80,6 +82,26 @@ def _estimated(
         now = moved
     own = set(model.own_unknowns())
     return [{n: (new[n] if n in own else old[n]) for n in old} for old, new in zip(start, now, strict=True)]
+
+
+def foretold_unknowns(model: Model, trial: Trial, doubt: Doubt) -> list[tuple[np.ndarray, dict[str, float]]]:
+    """What effects have of a trial's own by the likelihood, and the samples, shape (n,), that it is to foretell.
+
+    Of an effect without such amplitudes that is all of the trial.
+    """
+    if not model.own_unknowns():
+        return [(np.ones(len(trial), dtype=bool), {})]
+    outputs, values = [n for n in model.rig.outputs(trial.kind) if n in trial.columns], model.parameters()
+    out = []
+    for told in halves(len(trial)):
+        shown = trial.with_columns(**{n: np.where(told, np.nan, trial[n]) for n in outputs})
+        problem = LikelihoodProblem(model, [shown], doubt, (), starts=[trial])
+        now = problem.start_unknowns()
+        for _ in range(STEPS):
+            (part,) = problem.linearize(values, now)
+            now = [_moved(part, np.ones(len(part.residual), dtype=bool), problem.unknown_names, now[0])]
+        out.append((told, now[0]))
+    return out
 
 
 def _moved(part: Linearized, rows: np.ndarray, names: Sequence[str], now: dict[str, float]) -> dict[str, float]:

@@ -267,13 +267,14 @@ def _first_below(
 def _scored(now: Told, moved: Sequence[Told], widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gradient and expected information of half the cost, from differences of such widths; see the module."""
     r, v = now.innovations, now.variances
-    dr = np.stack([m.innovations - r for m in moved], axis=1) / widths
+    de = np.stack([m.innovations - r for m in moved], axis=1) / widths
     dv = np.stack([m.variances - v for m in moved], axis=1) / widths / v[:, None]
-    gradient = (r / v) @ dr + 0.5 * (1.0 - r * r / v) @ dv
+    gradient = r @ de + 0.5 * dv.sum(axis=0)
+    dr = de + 0.5 * r[:, None] * dv
     if (held := np.flatnonzero(now.again)).size:
         dn = np.stack([m.noise[held] / now.noise[held] - 1.0 for m in moved], axis=1) / widths
         gradient = gradient - 0.5 * now.again[held] @ dn
-    return gradient, (dr / v[:, None]).T @ dr + 0.5 * dv.T @ ((1.0 - now.again)[:, None] * dv)
+    return gradient, dr.T @ dr + 0.5 * dv.T @ ((1.0 - now.again)[:, None] * dv)
 
 
 def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray, damping: float) -> np.ndarray:

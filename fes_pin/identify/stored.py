@@ -1,7 +1,7 @@
 """What is known beside a model, on disk: the tables `random` and `log` of a `model.toml`.
 
-A rig that is simulated freely has autoregressive noise by output column; one whose effort answers its reading has white
-noise of each column and first-order random processes.
+A rig that is simulated freely has autoregressive noise by output column; one whose input answers its reading has
+noise of each column, autoregressive where it lasts, and first-order random processes.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ def _random_table(fitted: Fit) -> dict[str, Any]:
     if fitted.doubt is not None:
         lasts_s = float(fitted.doubt.lasts_s)
         parts = {part: {n: float(v) for n, v in getattr(fitted.doubt, part).items()} for part in _PARTS}
-        return {**({"lasts_s": lasts_s} if lasts_s else {}), **parts}
+        ar = {n: [float(a) for a in own] for n, own in fitted.doubt.ar.items() if own}
+        return {**({"lasts_s": lasts_s} if lasts_s else {}), **parts, **({"ar": ar} if ar else {})}
     return {"noise": {n: _noise_table(one) for n, one in fitted.noise.items()}}
 
 
@@ -79,9 +80,11 @@ def load_random(path: str | Path) -> Random | None:
     table = document.table(KEY)
     if "noise" not in table:
         parts = {part: _numbers(document, table, part) for part in _PARTS}
-        lasts = {n: v for n, v in table.items() if n not in _PARTS}
+        own = document.table(f"{KEY}.ar", table) if "ar" in table else {}
+        ar = {n: _coefficients(document, f"{KEY}.ar.{n}", one) for n, one in own.items()}
+        lasts = {n: v for n, v in table.items() if n not in (*_PARTS, "ar")}
         numbers = document.numbers(KEY, lasts, {"lasts_s": NumberKey("s", required=False)})
-        return Doubt(**parts, **numbers)  # type: ignore[arg-type]
+        return Doubt(**parts, **numbers, ar=ar)  # type: ignore[arg-type]
     channels = document.table(f"{KEY}.noise", table)
     return {name: _noise(document, name, channels) for name in channels}
 
@@ -94,8 +97,12 @@ def _numbers(document: Document, table: dict[str, Any], part: str) -> dict[str, 
 def _noise(document: Document, name: str, channels: dict[str, Any]) -> Noise:
     key = f"{KEY}.noise.{name}"
     one = dict(document.table(key, channels))
-    ar = one.pop("ar", None)
-    if not isinstance(ar, list) or not all(isinstance(a, int | float) and not isinstance(a, bool) for a in ar):
-        raise document.error(f"{key}.ar", "expected a list of numbers")
+    ar = _coefficients(document, f"{key}.ar", one.pop("ar", None))
     numbers = document.numbers(key, one, _NOISE)
-    return Noise(numbers["innovation_std"], tuple(float(a) for a in ar), numbers["std"], numbers["step_s"])
+    return Noise(numbers["innovation_std"], ar, numbers["std"], numbers["step_s"])
+
+
+def _coefficients(document: Document, key: str, given: object) -> tuple[float, ...]:
+    if not isinstance(given, list) or not all(isinstance(a, int | float) and not isinstance(a, bool) for a in given):
+        raise document.error(key, "expected a list of numbers")
+    return tuple(float(a) for a in given)

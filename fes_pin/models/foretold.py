@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fes_pin.models.autoregression import beginning, unforetold
+
 
 class ForetoldOutput(NamedTuple):
     """What is foretold of an output, measured or not, and the variance of what it is off by if the model is right.
@@ -41,6 +43,8 @@ class ForetoldTrial:
         not read in counts: what a log holds or interpolates stands for other reasons.
     noise
         Shape (n, outputs): variance of the noise of each in counts as it stands in `variances`, that of one times n.
+    ar
+        Autoregression of each output's `values` over their deviations; all are white if there is none.
     """
 
     outputs: tuple[str, ...]
@@ -50,6 +54,7 @@ class ForetoldTrial:
     sensitivities: np.ndarray
     repeats: np.ndarray
     noise: np.ndarray
+    ar: tuple[tuple[float, ...], ...] = ()
 
     def of_seen(self, array: np.ndarray) -> np.ndarray:
         """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
@@ -63,15 +68,27 @@ class ForetoldTrial:
 
     def costs(self) -> np.ndarray:
         """The cost of every reading that was seen, shape (m,)."""
-        v, variance = self.of_seen(self.values), self.of_seen(self.variances)
-        return np.asarray(v * v / variance + np.log(variance) - self._told_again())
+        residual, logs = self.whitened()
+        return np.asarray(residual**2 + logs)
 
     def _told_again(self) -> np.ndarray:
         """What the determinant holds of noise that was told before: n equal readings have n logarithms of one error."""
         again = 1.0 - 1.0 / self.of_seen(self.repeats)
         return np.asarray(again * np.log(self.of_seen(self.noise)) if again.any() else again)
 
-    def whitened(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Residuals over deviations, what `values` are scaled with, logarithms of variances; of what was seen."""
-        scale = 1.0 / np.sqrt(self.of_seen(self.variances))
-        return self.of_seen(self.values) * scale, scale, -2.0 * np.log(scale) - self._told_again()
+    def whitened(self) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals over deviations and logarithms of variances; of what was seen."""
+        logs = np.log(self.variances)
+        for k, ar in enumerate(self.ar):
+            first = np.log(beginning(ar)[1])[: len(logs)]
+            logs[: len(first), k] += first
+        return self.white(self.values), self.of_seen(logs) - self._told_again()
+
+    def white(self, array: np.ndarray) -> np.ndarray:
+        """What is seen of an array of shape (n, outputs, ...) over deviations, less what noise foretells of itself."""
+        scale = np.where(self.seen, 1.0 / np.sqrt(self.variances), 0.0)
+        out = array * scale.reshape(*scale.shape, *[1] * (array.ndim - 2))
+        for k, ar in enumerate(self.ar):
+            if ar:
+                out[:, k] = unforetold(out[:, k], ar)
+        return self.of_seen(out)

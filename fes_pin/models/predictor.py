@@ -10,6 +10,7 @@ import numpy as np
 
 from fes_pin.data.counts import count_of, hunts
 from fes_pin.data.trial import Trial
+from fes_pin.models.autoregression import noise_ahead
 from fes_pin.models.compile.layout import WIDTH, doubt_constants
 from fes_pin.models.compile.program import compiled_program
 from fes_pin.models.disturbance import disturbed
@@ -32,12 +33,19 @@ class Doubt:
     lasts_s
         How long the noise of a reading lasts, s: what is read within that time says nothing new, see
         `identify.lasting`. 0 where the noise of every sample is its own.
+    ar
+        Autoregression of what the filter leaves of each output, by column name; `white` is then the deviation of its
+        innovations. See `models.autoregression`.
+    still
+        Random processes that stay as small as they are.
     """
 
     white: Mapping[str, float]
     std: Mapping[str, float] = field(default_factory=dict)
     time: Mapping[str, float] = field(default_factory=dict)
     lasts_s: float = 0.0
+    ar: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    still: tuple[str, ...] = ()
 
     @property
     def processes(self) -> tuple[str, ...]:
@@ -50,7 +58,7 @@ class Doubt:
         for name, value in values.items():
             part, _, which = name.partition(".")
             parts[part][which] = value
-        return Doubt(**parts, lasts_s=self.lasts_s)
+        return replace(self, **parts)  # type: ignore[arg-type]
 
     def values(self) -> dict[str, float]:
         """Every value by name: white.position, std.effort, time.effort."""
@@ -123,10 +131,10 @@ class Predictor:
             For each trial its start, and what effects have of each trial's own.
         """
         out: dict[int, ForetoldTrial] = {}
+        doubts = [doubt] * len(self.trials) if isinstance(doubt, Doubt) else list(doubt)
         each = [values] * len(self.trials) if isinstance(values, Mapping) else values
         for block in self._blocks:
-            doubts = self._doubts(doubt)
-            y, s = block.run(each, doubts, unknowns, self._delays(each))
+            y, s = block.run(each, [one.values() for one in doubts], unknowns, self._delays(each))
             told = block.innovations(y, s, len(self.columns), [doubts[i] for i in block.lanes])
             out.update(zip(block.lanes, told, strict=True))
         return [out[i] for i in range(len(self.trials))]
@@ -138,14 +146,9 @@ class Predictor:
         out: dict[int, dict[str, ForetoldOutput]] = {}
         each = [values] * len(self.trials)
         for block in self._blocks:
-            y, _ = block.run(each, self._doubts(doubt), unknowns, self._delays(each))
-            out.update(zip(block.lanes, block.foretold(y), strict=True))
+            y, _ = block.run(each, [doubt.values()] * len(self.trials), unknowns, self._delays(each))
+            out.update(zip(block.lanes, block.foretold(y, doubt), strict=True))
         return [out[i] for i in range(len(self.trials))]
-
-    def _doubts(self, doubt: Doubt | Sequence[Doubt]) -> list[dict[str, float]]:
-        if isinstance(doubt, Doubt):
-            return [doubt.values()] * len(self.trials)
-        return [one.values() for one in doubt]
 
     def _delays(self, values: Sequence[Mapping[str, float]]) -> list[float]:
         return [total_delay(self.model, v) if self._delayed else 0.0 for v in values]
@@ -233,9 +236,7 @@ class _Block:
         constants[self.layout.constants.index("shift"), : len(shift)] = shift
         return self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
 
-    def innovations(
-        self, y: np.ndarray, s: np.ndarray, width: int, doubts: Sequence[Mapping[str, float]]
-    ) -> Iterator[ForetoldTrial]:
+    def innovations(self, y: np.ndarray, s: np.ndarray, width: int, doubts: Sequence[Doubt]) -> Iterator[ForetoldTrial]:
         """The innovations of each lane and under its doubt, with sensitivities to `width` columns."""
         k, by_lane = len(self.outputs), np.ascontiguousarray(np.moveaxis(s, -1, 0))
         for lane, trial in enumerate(self.trials):
@@ -249,18 +250,34 @@ class _Block:
                 sensitivities[..., self.places] = own
             values = np.where(seen, y[:n, :k, lane], 0.0)
             repeats = np.where(self.in_counts[lane], self.repeated[:n, :, lane], 1.0)
-            noise = repeats * np.array([doubts[lane][f"white.{o}"] for o in self.outputs]) ** 2
-            yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities, repeats, noise)
+            noise = repeats * np.array([doubts[lane].white[o] for o in self.outputs]) ** 2
+            ar = tuple(doubts[lane].ar.get(o, ()) for o in self.outputs)
+            yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities, repeats, noise, ar)
 
-    def foretold(self, y: np.ndarray) -> Iterator[dict[str, ForetoldOutput]]:
-        """What is foretold in each lane, by output: what was given as measured less the innovation."""
+    def foretold(self, y: np.ndarray, doubt: Doubt) -> Iterator[dict[str, ForetoldOutput]]:
+        """What is foretold in each lane, by output: what was given as measured less the innovation.
+
+        What noise that was seen foretells of itself is part of it.
+        """
         count = len(self.outputs)
         for lane, trial in enumerate(self.trials):
             told, variances = (
                 self.measured[: len(trial), :, lane] - y[: len(trial), :count, lane],
                 y[: len(trial), count:, lane],
             )
-            yield {o: ForetoldOutput(told[:, k], variances[:, k]) for k, o in enumerate(self.outputs)}
+            each = {o: ForetoldOutput(told[:, k], variances[:, k]) for k, o in enumerate(self.outputs)}
+            for k, o in enumerate(self.outputs):
+                if ar := doubt.ar.get(o):
+                    each[o] = _with_noise_ahead(each[o], y[: len(trial), k, lane], self.seen[: len(trial), k, lane], ar)
+            yield each
+
+
+def _with_noise_ahead(
+    told: ForetoldOutput, missed: np.ndarray, seen: np.ndarray, ar: tuple[float, ...]
+) -> ForetoldOutput:
+    size = np.sqrt(told.variances)
+    beside, growth = noise_ahead(missed / size, seen, ar)
+    return ForetoldOutput(told.values + size * beside, told.variances * growth)
 
 
 def are_news(trial: Trial, lasts_s: float) -> np.ndarray:

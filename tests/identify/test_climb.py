@@ -28,10 +28,10 @@ class Line:
 
     def one(self, values, random):
         left = self.y - values["slope"] * X - values["offset"]
-        variance = np.full(len(X), random.get("std", self.randomness["std"]) ** 2)
-        return Told(
-            float(np.sum(left**2 / variance + np.log(variance))), left, variance, variance, np.zeros_like(variance)
-        )
+        std = random.get("std", self.randomness["std"])
+        variance = np.full(len(X), std**2)
+        cost = float(np.sum(left**2 / variance + np.log(variance)))
+        return Told(cost, left / std, variance, variance, np.zeros_like(variance))
 
     def sizes(self):
         return {"slope": float(np.linalg.norm(X)) / STD, "offset": len(X) ** 0.5 / STD}

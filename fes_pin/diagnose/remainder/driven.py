@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.diagnose.remainder.open_set import SIGN_DRAWS, Remainder
+from fes_pin.diagnose.remainder.open_set import SIGN_DRAWS, Remainder, beside_smooth
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
@@ -30,6 +30,22 @@ KEPT = 1e-3
 
 
 def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
+    """Test whether a fit by the likelihood leaves anything but noise.
+
+    Where nothing acts at random a predictor is free simulation, and what that leaves is tested as elsewhere, see
+    `remainder.open_set`; the p-value is that of the most significant of the tests, times their number.
+    """
+    featured = _features_left(fitted, seed)
+    if not (fitted.doubt and fitted.doubt.still):
+        return featured
+    found = [(featured.p_value, featured.where), *beside_smooth(fitted, seed)]
+    p_value, where = min(found, key=lambda f: f[0])
+    p_value = min(1.0, len(found) * p_value)
+    unexplained = p_value < DRIVEN_LEVEL
+    return Remainder(unexplained, p_value, where if unexplained else None)
+
+
+def _features_left(fitted: Fit, seed: int) -> Remainder:
     """Test whether any feature stands out of what a fit leaves.
 
     A remainder is claimed at the level that a cause is. Half of it goes to the largest single feature, half to all
@@ -95,7 +111,7 @@ class _Featured:
         self._problem = LikelihoodProblem(self._model, fitted.trials, fitted.doubt, free)
         self.can_keep = not self._problem.is_final
         run = self._problem.innovations(self._model.parameters(), fitted.unknowns)
-        columns = [-i.sensitivities[i.seen][:, : len(free)] * i.whitened()[1][:, None] for i in run]
+        columns = [-i.white(i.sensitivities[..., : len(free)]) for i in run]
         self.columns = np.nan_to_num(np.concatenate(columns))
 
     def gained(self, amplitudes: np.ndarray) -> float:

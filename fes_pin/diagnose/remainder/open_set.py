@@ -167,14 +167,14 @@ def unexplained_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     The p-value is that of the most significant of the tests, times their number.
     """
     smooth = smooth_remainder(fitted, seed)
-    found = [(smooth.p_value, smooth.where), *_others(fitted, seed)]
+    found = [(smooth.p_value, smooth.where), *beside_smooth(fitted, seed)]
     p_value, where = min(found, key=lambda f: f[0])
     p_value = min(1.0, len(found) * p_value)
     unexplained = p_value < CLAIM_LEVEL
     return Remainder(unexplained, p_value, where if unexplained else None, smooth.excess)
 
 
-def _others(fitted: Fit, seed: int) -> list[tuple[float, str]]:
+def beside_smooth(fitted: Fit, seed: int) -> list[tuple[float, str]]:
     """p-values of all tests but that of smooth features, and what each deviation depends on."""
     own = under_own_noise(fitted)
     full = under_own_noise(fitted, FULL_NOISE, FULL_NOISE)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.diagnose.search.cause_sets import Names, names_of
 from fes_pin.diagnose.search.library import Library
@@ -16,9 +17,10 @@ from fes_pin.diagnose.search.possible import is_possible
 from fes_pin.diagnose.search.score import Scored, best_by_effect
 from fes_pin.diagnose.search.starts import STARTS, from_afar, started
 from fes_pin.identify.covariance import step_gain
-from fes_pin.identify.doubts import first_guess
+from fes_pin.identify.doubts import first_guess, stilled
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import with_new_noise
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import normal_equations
 from fes_pin.identify.scoring import LITTLE, WORTH
 from fes_pin.models.model import Model
@@ -65,6 +67,7 @@ class LikelihoodFits:
         self.model, self.trials = Model(model.rig), tuple(trials)
         self.library = Library(self.model, trials, effects, answered=True)
         self.fits: dict[Names, Fit] = {}
+        self._calm: Doubt | None = None
         self._converged: set[Names] = set()
         self._compared: dict[tuple[Names, str], Fit] = {}
         self._maxima = LikelihoodMaxima(trials)
@@ -73,8 +76,30 @@ class LikelihoodFits:
 
     def nominal(self) -> Fit:
         """Fit the nominal model, from several sizes of what is random."""
-        self.fits[()] = with_new_noise(self.trials, self._nominal)
+        from_rest = all(t.kind != IMPOSED and not self.model.rig.unknowns(t.kind) for t in self.trials)
+        self.fits[()] = self._from_rest() if from_rest else with_new_noise(self.trials, self._nominal)
         return self.fits[()]
+
+    def _from_rest(self) -> Fit:
+        """The nominal fit under noise that foretells itself; with a random effort besides, if that earns its price."""
+        guess = first_guess(self.model, self.trials)
+        calm = self._with_orders(self._maxima.from_start(self.model, stilled(self.model, self.trials, guess)))
+        assert calm.doubt is not None
+        self._calm = calm.doubt
+        if not guess.std:
+            return calm
+        white = {n: (0.0,) * len(own) for n, own in calm.doubt.ar.items()}
+        begun = [replace(calm.doubt, std=guess.std, still=())]
+        begun += [replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in FIRST_DOUBTS]
+        found = in_parallel(lambda d: self._maxima.from_start(calm.model, d), begun)
+        return min(calm, self._with_orders(min(found, key=lambda f: f.sse)), key=lambda f: f.price)
+
+    def _with_orders(self, fitted: Fit) -> Fit:
+        """A fit again, with autoregressions of the orders that what its filter leaves shows."""
+        assert fitted.doubt is not None
+        problem = LikelihoodProblem(fitted.model, self.trials, fitted.doubt)
+        doubt = problem.with_orders(fitted.values, fitted.unknowns)
+        return self._maxima.from_start(fitted.model, doubt, fitted.unknowns)
 
     def _nominal(self, lasts_s: float) -> Fit:
         """The nominal fit where the noise of a reading lasts so long."""
@@ -83,7 +108,9 @@ class LikelihoodFits:
         return min(in_parallel(lambda d: self._maxima.from_start(self.model, d), starts), key=lambda f: f.sse)
 
     def _guess(self) -> Doubt:
-        """Little that is random, with noise that lasts as it does."""
+        """Little that is random, or nothing where noise foretells itself, with noise that lasts as it does."""
+        if self._calm is not None:
+            return self._calm
         known = self.fits[()].doubt
         return first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
 
@@ -128,10 +155,10 @@ class LikelihoodFits:
         """
         assert base.doubt is not None
         guess = self._guess()
-        if all(base.doubt.std[n] <= FIRST_DOUBTS[-1] * small for n, small in guess.std.items()):
+        if all(n in base.doubt.still or base.doubt.std[n] <= FIRST_DOUBTS[-1] * v for n, v in guess.std.items()):
             return {}
         first = in_parallel(lambda start: self._maxima.from_start(start, guess, rounds=1), list(starts.values()))
-        lowest = sorted(zip(starts, first, strict=True), key=lambda one: one[1].sse)[:AFRESH_SETS]
+        lowest = sorted(zip(starts, first, strict=True), key=lambda one: one[1].price)[:AFRESH_SETS]
         gone_on = in_parallel(lambda one: self._maxima.go_on(one[1], AFRESH_ROUNDS - 1), lowest)
         return {names: [fitted] for (names, _), fitted in zip(lowest, gone_on, strict=True)}
 

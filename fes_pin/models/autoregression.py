@@ -1,0 +1,119 @@
+"""Noise of a reading that lasts: an autoregression of what a filter leaves of it, in units of its deviation.
+
+    x_t = a_1 x_(t-1) + ... + a_p x_(t-p) + e_t,    e_t of unit variance
+
+Where nothing acts at random on a rig the filter is the free simulation, and x is the noise of the reading itself. Where
+something does, x is white if the reading's noise is.
+
+The first samples, which have fewer before them, are foretold by the best predictors of lower orders k, and miss by
+variances v_k (Levinson's recursion backwards, c the last coefficient of each):
+
+    a_i <- (a_i + c a_(k-i)) / (1 - c^2),    v <- v / (1 - c^2)
+
+Source: Ljung, System Identification, 2nd ed., sections 3.2 and 10.1.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+REACH = 400
+"""Samples ahead after which nothing is left of what was seen."""
+
+
+def unforetold(x: np.ndarray, ar: tuple[float, ...]) -> np.ndarray:
+    """What noise is besides what it foretells of itself, or sensitivities that go with it, shape (n, ...)."""
+    if x.ndim == 1:
+        out = np.convolve(x, [1.0, *(-a for a in ar)])[: len(x)]
+    else:
+        out = x.copy()
+        for i, a in enumerate(ar, 1):
+            out[i:] -= a * x[:-i]
+    first = _first(ar)[: len(x), : len(x)]
+    out[: len(first)] = np.tensordot(first, x[: len(first)], 1)
+    return out
+
+
+@cache
+def _first(ar: tuple[float, ...]) -> np.ndarray:
+    """What makes innovations of the first samples, shape (p, p): row t is a predictor of order t."""
+    predictors, variances = beginning(ar)
+    out = np.eye(len(ar))
+    for t, own in enumerate(predictors):
+        out[t, :t] = -own[::-1]
+    return out / np.sqrt(variances)[:, None]
+
+
+@cache
+def beginning(ar: tuple[float, ...]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    """The best predictors of each of the first samples from those before, and the variances of what they miss.
+
+    Returns
+    -------
+    predictors
+        Of orders 0, 1, ... below that of the autoregression.
+    variances
+        Shape (p,).
+    """
+    now, variance = np.array(ar), 1.0
+    predictors, variances = [], np.ones(len(ar))
+    for k in reversed(range(len(ar))):
+        left = 1.0 - now[k] ** 2
+        variance, now = variance / left, (now[:k] + now[k] * now[:k][::-1]) / left
+        predictors.append(now)
+        variances[k] = variance
+    return tuple(reversed(predictors)), variances
+
+
+def stationary_variance(ar: tuple[float, ...]) -> float:
+    """Of noise whose innovations have unit variance."""
+    return float(beginning(ar)[1][0]) if ar else 1.0
+
+
+def weights_ahead(ar: tuple[float, ...], count: int) -> np.ndarray:
+    """What so many samples ahead are foretold by those before, the newest first, shape (count, p).
+
+    Row k is the first row of the companion matrix to the power of k + 1.
+    """
+    rows = np.zeros((count, len(ar)))
+    row = np.array(ar)
+    for k in range(count if ar else 0):
+        rows[k] = row
+        row = row[0] * np.array(ar) + np.append(row[1:], 0.0)
+    return rows
+
+
+@cache
+def _ahead(ar: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """`weights_ahead`, and the variance of what they miss, shape (`REACH`,)."""
+    rows = weights_ahead(ar, REACH)
+    return rows, np.cumsum(np.append(1.0, rows[:-1, 0] if ar else np.zeros(REACH - 1)) ** 2)
+
+
+def noise_ahead(x: np.ndarray, seen: np.ndarray, ar: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """What noise is foretold to be from what was seen of it before, and the variance of what that misses.
+
+    Parameters
+    ----------
+    x
+        Shape (n,); anything where it was not seen.
+    seen
+        Shape (n,).
+    """
+    order, (rows, growth) = len(ar), _ahead(ar)
+    known = np.append(np.zeros(order), np.where(seen, x, 0.0))  # nothing is known of what was before
+    ends = np.flatnonzero(np.diff(np.concatenate([[True], seen, [True]]).astype(int)))
+    for begin, end in ends.reshape(-1, 2):
+        count = min(end - begin, REACH)
+        known[order + begin : order + begin + count] = rows[:count] @ known[begin : begin + order][::-1]
+    foretold = np.convolve(known, [0.0, *ar])[order : order + len(x)]
+    at = np.arange(len(x))
+    newest = np.maximum.accumulate(np.append(-1, np.where(seen, at, -1)))[:-1]
+    variances = growth[np.minimum(at - newest - 1, REACH - 1)]
+    predictors, first = beginning(ar)
+    for t in range(min(order, len(x))):
+        foretold[t] = predictors[t] @ known[order : order + t][::-1]
+        variances[t] = max(variances[t], first[t])
+    return foretold, variances

@@ -1,0 +1,61 @@
+"""The likelihood under noise that lasts: free simulation where nothing acts at random, and how long it lasts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnose.hidden import study_of
+from scipy.signal import lfilter
+
+from fes_pin.identify.autoregressions import autoregressions, with_autoregressions
+from fes_pin.identify.doubts import first_guess, stilled
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.noise import ORDERS, Noise
+from fes_pin.identify.problem import Problem
+from fes_pin.models.nominal import nominal_model
+
+AR = (1.1, -0.4)
+STD = 1e-3
+
+
+@pytest.fixture(scope="module")
+def study():
+    return study_of("ankle", {}, "ar1", 3)
+
+
+def moved(study):
+    return [t for t in study.trials if t.kind == "motion"]
+
+
+def test_a_filter_beside_nothing_random_leaves_what_free_simulation_leaves(study):
+    """Both take the same noise out; simulation drops as many samples of each trial as the noise has coefficients."""
+    model, trials = nominal_model(study), moved(study)
+    guess = stilled(model, trials, first_guess(model, trials))
+    doubt = replace(guess, white={"angle_rad": STD}, ar={"angle_rad": AR})
+    problem = LikelihoodProblem(model, trials, doubt)
+    assert not set(problem.randomness) & {"std.effort", "time.effort"}
+    freely = Problem(model, trials, {"angle_rad": Noise(STD, AR, STD)}, problem.free)
+    values, unknowns = model.parameters(), problem.start_unknowns()
+    both = zip(problem.linearize(values, unknowns), freely.linearize(values, unknowns), strict=True)
+    for filtered, simulated in both:
+        size = np.abs(simulated.residual).max()
+        assert filtered.residual[len(AR) :] == pytest.approx(simulated.residual, abs=1e-5 * size)
+        size = np.abs(simulated.jacobian).max(axis=0)
+        apart = np.abs(filtered.jacobian[len(AR) :] / size - simulated.jacobian / size)
+        assert apart.max() < 1e-2  # a filter's tangent is that of the middle of each step
+
+
+@pytest.mark.parametrize(("ar", "order"), [((), 0), (AR, 2)], ids=["white", "of order 2"])
+def test_how_what_is_left_foretells_itself_is_found(study, ar, order):
+    model, trials = nominal_model(study), moved(study)
+    problem = LikelihoodProblem(model, trials, stilled(model, trials, first_guess(model, trials)))
+    run, rng = problem.innovations(model.parameters(), problem.start_unknowns()), np.random.default_rng(5)
+    noise = [lfilter([1.0], [1.0, *(-a for a in ar)], rng.normal(size=len(t) + 500))[500:] for t in trials]
+    left = [replace(r, values=e[:, None], variances=np.ones((len(e), 1))) for r, e in zip(run, noise, strict=True)]
+    (found,) = autoregressions(left, {"angle_rad": ORDERS}).values()
+    assert len(found) >= order
+    assert found == pytest.approx((*ar, *[0.0] * (len(found) - order)), abs=0.06)
+    white = [with_autoregressions(one, {}) for one in left]
+    lasting = [with_autoregressions(one, {"angle_rad": found}) for one in left]
+    gained = sum(one.cost() for one in white) - sum(one.cost() for one in lasting)
+    assert gained > 1000.0 if order else 0.0 <= gained < 10.0
