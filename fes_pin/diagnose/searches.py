@@ -89,14 +89,11 @@ class Searches:
         """True where no set of causes leaves only noise of the reading, and there is no second trial to compare by.
 
         Something acts in the rig itself then; it is a random effort to the likelihood, which one trial is enough for.
-        Not of a stimulated joint in motion: beside noise that lasts the likelihood names what is not there.
         """
         trials = found.nominal.trials
         if found.complete or found.stopped or len(trials) > 1 or self.test:
             return False
-        rig = found.nominal.model.rig
-        stimulated = rig.schema.inputs_required and any(t.kind == "motion" for t in trials)
-        return bool(rig.driving_sizes(trials)) and not stimulated
+        return bool(found.nominal.model.rig.driving_sizes(trials))
 
 
 def _with(trial: Trial, conditions: Mapping[str, float]) -> Trial:
