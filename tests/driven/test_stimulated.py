@@ -23,17 +23,21 @@ KP, KI = 600.0, 500.0
 """Of the controller, us per rad and us per rad s."""
 
 
-def controlled(trial, constants, nominal, causes, rng, hum=0.0):
+def controlled(trial, constants, nominal, causes, rng, hum=0.0, spasm=0.0):
     """The trial again, its foot kept on a wave about where a pulse of middle width holds it.
 
-    The angle is read with a hum, rad, of a phase of the trial's own.
+    The angle is read with a hum, rad, of a phase of the trial's own, and spasms of a quarter of a second, N m, come in
+    between, three in a trial.
     """
     rig, n, dt = Ankle(constants, nominal, causes, trial), len(trial), 1.0 / RATE_HZ
     x, gathered = np.array(rig.rest(), dtype=float), 0.0
     where = rig.names.index("q")
     sign = -1.0 if trial["angle_rad"].mean() < x[where] else 1.0
     slow, fast, phase = rng.uniform(0.25, 0.4), rng.uniform(0.7, 1.1), rng.uniform(0.0, 6.28, 3)
-    width, angle = np.zeros(n), np.zeros(n)
+    width, angle, push = np.zeros(n), np.zeros(n), np.zeros(n)
+    length = round(0.25 * RATE_HZ)
+    for begin in rng.integers(0, n - length, 3) if spasm else ():
+        push[begin : begin + length] += spasm * np.sin(np.pi * np.arange(length) / length) ** 2
     for k in range(n):
         t = k * dt
         angle[k] = x[where] + ANGLE_NOISE_RAD * rng.normal() + hum * np.sin(2.0 * np.pi * 60.0 * t + phase[2])
@@ -43,17 +47,19 @@ def controlled(trial, constants, nominal, causes, rng, hum=0.0):
         gathered += KI * error * dt
         width[k] = np.clip(THRESHOLD_US + 100.0 + KP * error + gathered, 0.0, WIDEST) if k else 0.0
         share = np.clip((width[k] - THRESHOLD_US) / (SATURATION_US - THRESHOLD_US), 0.0, 1.0)
-        held = {"r": float(share), "disturbance": PROCESS_TORQUE_NM * rng.normal()}
+        held = {"r": float(share), "disturbance": PROCESS_TORQUE_NM * rng.normal() + push[k]}
         x = odeint(rig.rates, x, [t, t + dt], args=(held,), tfirst=True, rtol=1e-9, atol=1e-11)[-1]
     return trial.with_columns(pulse_width_us=width, angle_rad=angle)
 
 
-def stimulated(causes, hum=0.0):
+def stimulated(causes, hum=0.0, spasm=0.0):
     """A study of such trials, beside isometric ones that a script has stimulated."""
     study = study_of("ankle", causes, "process", SEED)
     constants, nominal, _ = ankle_rig(np.random.default_rng(SEED))
     rng = np.random.default_rng([SEED, 1])
-    moved = [controlled(t, constants, nominal, causes, rng, hum) if t.kind == "motion" else t for t in study.trials]
+    moved = [
+        controlled(t, constants, nominal, causes, rng, hum, spasm) if t.kind == "motion" else t for t in study.trials
+    ]
     return replace(study, trials=tuple(moved))
 
 
@@ -88,3 +94,10 @@ def test_a_hum_whose_phase_is_each_trials_own_is_named():
     assert hum.gain_held_out.low > 50.0
     assert hum.parameters["amplitude"].value == pytest.approx(2e-3, rel=0.1)
     assert not found.remainder.unexplained
+
+
+def test_spasms_are_left_beside_a_random_effort():
+    """An effort of a small share stands for their mean power; when they come, the innovations tell."""
+    found = diagnose_joint(stimulated({}, spasm=0.04))
+    assert found.verdict == "unexplained" and found.remainder.where == "time", str(found)
+    assert max(r.share for r in found.random) < 0.1

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.diagnose.remainder.open_set import SIGN_DRAWS, Remainder, beside_smooth
+from fes_pin.diagnose.remainder.innovations import Innovations
+from fes_pin.diagnose.remainder.open_set import SIGN_DRAWS, Remainder, beside_smooth, of_innovations
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
@@ -33,16 +34,29 @@ def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     """Test whether a fit by the likelihood leaves anything but noise.
 
     Where nothing acts at random a predictor is free simulation, and what that leaves is tested as elsewhere, see
-    `remainder.open_set`; the p-value is that of the most significant of the tests, times their number.
+    `remainder.open_set`. Where something does on a rig that begins at rest, its innovations are tested by themselves.
+    The p-value is that of the most significant of the tests, times their number.
     """
     featured = _features_left(fitted, seed)
-    if not (fitted.doubt and fitted.doubt.still):
+    assert fitted.doubt is not None
+    if not fitted.doubt.ar:
         return featured
-    found = [(featured.p_value, featured.where), *beside_smooth(fitted, seed)]
+    others = beside_smooth(fitted, seed) if fitted.doubt.still else of_innovations(_by_output(fitted))
+    found = [(featured.p_value, featured.where), *others]
     p_value, where = min(found, key=lambda f: f[0])
     p_value = min(1.0, len(found) * p_value)
     unexplained = p_value < DRIVEN_LEVEL
     return Remainder(unexplained, p_value, where if unexplained else None)
+
+
+def _by_output(fitted: Fit) -> list[list[Innovations]]:
+    """Innovations of the trials that read the same, each with one reading."""
+    rig, out = fitted.model.rig, dict[str, list[Innovations]]()
+    for trial, part in zip(fitted.trials, fitted.parts, strict=True):
+        whole = Innovations(trial, part.residual, trial.dt, rig.input_columns(trial))
+        if len(part.residual) == len(trial):
+            out.setdefault(rig.output(trial.kind), []).append(whole)
+    return list(out.values())
 
 
 def _features_left(fitted: Fit, seed: int) -> Remainder:
