@@ -1,18 +1,23 @@
 """The likelihood under noise that lasts: free simulation where nothing acts at random, and how long it lasts."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from diagnose.hidden import study_of
 from scipy.signal import lfilter
 
+from fes_pin.data.errors import InputError
+from fes_pin.data.log import Log
 from fes_pin.identify.autoregressions import autoregressions, with_autoregressions
 from fes_pin.identify.doubts import first_guess, stilled
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import ORDERS, Noise
 from fes_pin.identify.problem import Problem
+from fes_pin.identify.stored import load_random, stored_tables
 from fes_pin.models.nominal import nominal_model
+from fes_pin.models.store import model_toml
 
 AR = (1.1, -0.4)
 STD = 1e-3
@@ -59,3 +64,15 @@ def test_how_what_is_left_foretells_itself_is_found(study, ar, order):
     lasting = [with_autoregressions(one, {"angle_rad": found}) for one in left]
     gained = sum(one.cost() for one in white) - sum(one.cost() for one in lasting)
     assert gained > 1000.0 if order else 0.0 <= gained < 10.0
+
+
+def test_what_noise_foretells_of_itself_is_stored_and_read_back(study, tmp_path):
+    model, trials = nominal_model(study), moved(study)
+    doubt = replace(first_guess(model, trials), ar={"angle_rad": AR})
+    fitted = SimpleNamespace(model=model, doubt=doubt)
+    path = tmp_path / "model.toml"
+    path.write_text(model_toml(model, stored_tables(fitted, Log())), encoding="utf-8")
+    assert load_random(path) == doubt
+    path.write_text(path.read_text(encoding="utf-8").replace("    1.1,", '    "much",'), encoding="utf-8")
+    with pytest.raises(InputError, match=r"random\.ar\.angle_rad.*expected a list of numbers"):
+        load_random(path)
