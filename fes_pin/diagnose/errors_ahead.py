@@ -76,10 +76,10 @@ class AheadErrors:
 
 
 def random_parts(fitted: Fit) -> tuple[RandomPart, ...]:
-    """The random efforts of a fit, with their share of what drives the rig."""
+    """The random efforts that act in a fit, with their share of what drives the rig."""
     assert fitted.doubt is not None
-    sizes = driving_size(fitted.model, fitted.trials)
-    parts = ((n, std, fitted.doubt.time[n]) for n, std in fitted.doubt.std.items() if n in sizes)
+    sizes, still = driving_size(fitted.model, fitted.trials), fitted.doubt.still
+    parts = ((n, std, fitted.doubt.time[n]) for n, std in fitted.doubt.std.items() if n in sizes and n not in still)
     return tuple(RandomPart(n, std, time, _averaged(std, time) / sizes[n]) for n, std, time in parts)
 
 
