@@ -41,7 +41,8 @@ def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     assert fitted.doubt is not None
     if not fitted.doubt.ar:
         return featured
-    others = beside_smooth(fitted, seed) if fitted.doubt.still else of_innovations(_by_output(fitted))
+    acts = set(fitted.doubt.processes) - set(fitted.doubt.still)
+    others = of_innovations(_by_output(fitted)) if acts else beside_smooth(fitted, seed)
     found = [(featured.p_value, featured.where), *others]
     p_value, where = min(found, key=lambda f: f[0])
     p_value = min(1.0, len(found) * p_value)
