@@ -244,7 +244,8 @@ class LikelihoodProblem:
         """A trial's innovations over their deviations; its sensitivities are scaled where they are."""
         with np.errstate(all="ignore"):
             residual, logs = one.whitened()
-            moved = -one.white(one.sensitivities)
+            moved = one.white(one.sensitivities)
+            moved *= -1.0
         split = len(self.free)
         return Linearized(residual, moved[:, :split], moved[:, split:], float(np.sum(logs)))
 

@@ -86,6 +86,9 @@ class ForetoldTrial:
 
     def white(self, array: np.ndarray) -> np.ndarray:
         """What is seen of an array of shape (n, outputs, ...) over deviations, less what noise foretells of itself."""
+        if not any(self.ar):
+            out = self.of_seen(array) / np.sqrt(self.of_seen(self.variances)).reshape(-1, *[1] * (array.ndim - 2))
+            return np.asarray(out)
         scale = np.where(self.seen, 1.0 / np.sqrt(self.variances), 0.0)
         out = array * scale.reshape(*scale.shape, *[1] * (array.ndim - 2))
         for k, ar in enumerate(self.ar):
