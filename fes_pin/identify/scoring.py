@@ -1,11 +1,11 @@
 """Parameters of a model and what is random about it, made more likely by Fisher scoring.
 
-In parameters and in logarithms of what is random, with r_k and V_k the innovations and their variances, r_i and V_i
-their derivatives by differences, in which the filter's gains go with the parameters, and N_k the noise of what is read
-n_k times in a row (`identify.likelihood`):
+In parameters and in logarithms of what is random, with e_k = r_k / sqrt(V_k) the innovations over their deviations, less
+what noise foretells of itself, e_i and V_i their derivatives and the variances' by differences, in which the filter's
+gains go with the parameters, and N_k the noise of what is read n_k times in a row (`identify.likelihood`):
 
-    g_i = sum r r_i / V + (1 - r^2 / V) V_i / (2 V) - (1 - 1 / n) N_i / (2 N)
-    I_ij = sum r_i r_j / V + V_i V_j / (2 n V^2)
+    g_i = sum e e_i + V_i / (2 V) - (1 - 1 / n) N_i / (2 N)
+    I_ij = sum s_i s_j + V_i V_j / (2 n V^2),    s_i = e_i + e V_i / (2 V),    which is r_i / sqrt(V) of white noise
 
 Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic grey-box models, Automatica 40 (2004).
 """
@@ -41,7 +41,10 @@ Point = tuple[Mapping[str, float], Unknowns, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Told:
-    """What was seen, all trials end to end: innovations, variances, the noise in these, 1 - 1 / n; their cost."""
+    """What was seen, all trials end to end, each of shape (m,); and its cost.
+
+    Innovations over their deviations, variances, the noise in these, 1 - 1 / n.
+    """
 
     cost: float
     innovations: np.ndarray
@@ -266,15 +269,15 @@ def _first_below(
 
 def _scored(now: Told, moved: Sequence[Told], widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gradient and expected information of half the cost, from differences of such widths; see the module."""
-    r, v = now.innovations, now.variances
-    de = np.stack([m.innovations - r for m in moved], axis=1) / widths
+    e, v = now.innovations, now.variances
+    de = np.stack([m.innovations - e for m in moved], axis=1) / widths
     dv = np.stack([m.variances - v for m in moved], axis=1) / widths / v[:, None]
-    gradient = r @ de + 0.5 * dv.sum(axis=0)
-    dr = de + 0.5 * r[:, None] * dv
+    gradient = e @ de + 0.5 * dv.sum(axis=0)
+    s = de + 0.5 * e[:, None] * dv
     if (held := np.flatnonzero(now.again)).size:
         dn = np.stack([m.noise[held] / now.noise[held] - 1.0 for m in moved], axis=1) / widths
         gradient = gradient - 0.5 * now.again[held] @ dn
-    return gradient, dr.T @ dr + 0.5 * dv.T @ ((1.0 - now.again)[:, None] * dv)
+    return gradient, s.T @ s + 0.5 * dv.T @ ((1.0 - now.again)[:, None] * dv)
 
 
 def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray, damping: float) -> np.ndarray:
