@@ -1,7 +1,7 @@
 """Parameters of a model and what is random about it, made more likely by Fisher scoring.
 
-In parameters and in logarithms of what is random, with e_k = r_k / sqrt(V_k) the innovations over their deviations, less
-what noise foretells of itself, e_i and V_i their derivatives and the variances' by differences, in which the filter's
+In parameters and in logarithms of what is random, with e_k = r_k / sqrt(V_k) the innovations over their deviations,
+less what noise foretells of itself, e_i and V_i their derivatives and the variances' by differences, in which the filter's
 gains go with the parameters, and N_k the noise of what is read n_k times in a row (`identify.likelihood`):
 
     g_i = sum e e_i + V_i / (2 V) - (1 - 1 / n) N_i / (2 N)

@@ -20,7 +20,7 @@ from functools import cache
 import numpy as np
 
 REACH = 400
-"""Samples ahead after which nothing counts as left of what was seen: eight coefficients of a sensor's noise reach tens."""
+"""Samples ahead after which nothing counts as left of what was seen: a sensor's noise lasts for tens."""
 
 
 def unforetold(x: np.ndarray, ar: tuple[float, ...]) -> np.ndarray:
