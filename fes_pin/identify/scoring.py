@@ -1,8 +1,8 @@
 """Parameters of a model and what is random about it, made more likely by Fisher scoring.
 
 In parameters and in logarithms of what is random, with e_k = r_k / sqrt(V_k) the innovations over their deviations,
-less what noise foretells of itself, e_i and V_i their derivatives and the variances' by differences, in which the filter's
-gains go with the parameters, and N_k the noise of what is read n_k times in a row (`identify.likelihood`):
+less what noise foretells of itself, e_i and V_i their derivatives and the variances' by differences, in which the
+filter's gains go with the parameters, and N_k the noise of what is read n_k times in a row (`identify.likelihood`):
 
     g_i = sum e e_i + V_i / (2 V) - (1 - 1 / n) N_i / (2 N)
     I_ij = sum s_i s_j + V_i V_j / (2 n V^2),    s_i = e_i + e V_i / (2 V),    which is r_i / sqrt(V) of white noise
