@@ -177,7 +177,7 @@ class Fit:
     @property
     def price(self) -> float:
         """Twice the negative log-likelihood, with what its degrees of freedom and random processes must earn."""
-        acting = 2 * (len(self.doubt.std) - len(self.doubt.still)) if self.doubt else 0
+        acting = 2 * len(self.doubt.acting) if self.doubt else 0
         return self.sse + PARAMETER_PRICE * (self.degrees + acting)
 
 

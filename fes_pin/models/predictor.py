@@ -49,8 +49,13 @@ class Doubt:
 
     @property
     def processes(self) -> tuple[str, ...]:
-        """The random processes that act."""
+        """The random processes that there are."""
         return tuple(self.std)
+
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """Those that do something: all but `still`."""
+        return tuple(n for n in self.std if n not in self.still)
 
     def with_values(self, values: Mapping[str, float]) -> Doubt:
         """The same with other values, by name as in `values`."""

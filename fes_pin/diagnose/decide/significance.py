@@ -9,6 +9,7 @@ import numpy as np
 from fes_pin.diagnose.search.score import Scores
 from fes_pin.identify.distributions import chi2_tail, f_tail
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import CLAIM_LEVEL, DRIVEN_LEVEL
 
 DRAWS = 4000
 """Simulated score vectors; the 5 % quantile of the smallest p-value then has a standard error of 7 %."""
@@ -42,6 +43,15 @@ class Family:
     def adjusted(self, single: float) -> float:
         """Family-wise p-value of the smallest of the family's p-values."""
         return max(float(-np.expm1(self.tests * np.log1p(-min(single, 1 - 1e-16)))), SMALLEST_P)
+
+
+def level_of(fitted: Fit) -> float:
+    """At which something is claimed beside a fit by the likelihood, or of what it leaves.
+
+    A random effort is of the first order in the model, and as it may be in the rig: noise that is known by less.
+    """
+    assert fitted.doubt is not None
+    return DRIVEN_LEVEL if fitted.doubt.acting else CLAIM_LEVEL
 
 
 def coherence_p_value(smaller: Fit, larger: Fit, degrees: int) -> float:

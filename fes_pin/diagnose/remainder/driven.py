@@ -8,17 +8,17 @@ that was fitted. The random effort that was found is part of the model: what is 
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from fes_pin.diagnose.remainder.innovations import Innovations
-from fes_pin.diagnose.remainder.open_set import SIGN_DRAWS, Remainder, beside_smooth, of_innovations
+from fes_pin.diagnose.decide.significance import level_of
+from fes_pin.diagnose.remainder.open_set import SIGN_DRAWS, Remainder, beside_smooth
 from fes_pin.diagnose.search.score import Projection
 from fes_pin.identify.distributions import chi2_tail
-from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import DRIVEN_LEVEL
+from fes_pin.identify.fit import Fit, fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import limits_of
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
@@ -33,31 +33,19 @@ KEPT = 1e-3
 def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     """Test whether a fit by the likelihood leaves anything but noise.
 
-    Where nothing acts at random a predictor is free simulation, and what that leaves is tested as elsewhere, see
-    `remainder.open_set`. Where something does on a rig that begins at rest, its innovations are tested by themselves.
-    The p-value is that of the most significant of the tests, times their number.
+    A rig that begins at rest can be simulated freely as well: what the same causes leave then is tested as elsewhere,
+    see `remainder.open_set`, for a random effort would take bursts, detents and slips. The p-value is that of the most
+    significant of the tests, times their number.
     """
     featured = _features_left(fitted, seed)
     assert fitted.doubt is not None
-    if not fitted.doubt.ar:
-        return featured
-    acts = set(fitted.doubt.processes) - set(fitted.doubt.still)
-    others = of_innovations(_by_output(fitted)) if acts else beside_smooth(fitted, seed)
+    free = fit(fitted.model, fitted.trials) if fitted.doubt.ar else None
+    others = beside_smooth(free, seed) if free is not None and math.isfinite(free.sse) else []
     found = [(featured.p_value, featured.where), *others]
     p_value, where = min(found, key=lambda f: f[0])
     p_value = min(1.0, len(found) * p_value)
-    unexplained = p_value < DRIVEN_LEVEL
+    unexplained = p_value < level_of(fitted)
     return Remainder(unexplained, p_value, where if unexplained else None)
-
-
-def _by_output(fitted: Fit) -> list[list[Innovations]]:
-    """Innovations of the trials that read the same, each with one reading."""
-    rig, out = fitted.model.rig, dict[str, list[Innovations]]()
-    for trial, part in zip(fitted.trials, fitted.parts, strict=True):
-        whole = Innovations(trial, part.residual, trial.dt, rig.input_columns(trial))
-        if len(part.residual) == len(trial):
-            out.setdefault(rig.output(trial.kind), []).append(whole)
-    return list(out.values())
 
 
 def _features_left(fitted: Fit, seed: int) -> Remainder:
@@ -91,13 +79,12 @@ def _features_left(fitted: Fit, seed: int) -> Remainder:
         return min(1.0, 2.0 * min(p_values))
 
     p = p_value(statistic, float(single[best] ** 2))
-    if p < DRIVEN_LEVEL and featured.can_keep:
+    if p < level_of(fitted) and featured.can_keep:
         alone, together = np.zeros((2, len(featured.names)))
         alone[good[best]] = single[best] / after[good[best]]
         together[good] = vectors[:, kept] @ (shares.sum(axis=0) / np.sqrt(values[kept])) / after[good]
         p = max(p, p_value(featured.gained(together), featured.gained(alone)))
-    unexplained = p < DRIVEN_LEVEL
-    return Remainder(unexplained, p, featured.names[good[best]].split(":")[0] if unexplained else None)
+    return Remainder(p < level_of(fitted), p, featured.names[good[best]].split(":")[0])
 
 
 class _Featured:

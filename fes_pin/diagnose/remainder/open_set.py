@@ -17,7 +17,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnose.remainder.bursts import burst_p_value
 from fes_pin.diagnose.remainder.detents import detent_p_value
 from fes_pin.diagnose.remainder.heteroscedastic import heteroscedastic_p_value
-from fes_pin.diagnose.remainder.innovations import Innovations, channels, driven, under_own_noise
+from fes_pin.diagnose.remainder.innovations import channels, driven, under_own_noise
 from fes_pin.diagnose.remainder.lines import LONGEST_NOISE, line_p_value
 from fes_pin.diagnose.remainder.play import play_p_value
 from fes_pin.diagnose.remainder.repeated import repeated_p_value
@@ -197,22 +197,6 @@ def beside_smooth(fitted: Fit, seed: int) -> list[tuple[float, str]]:
         (count * heteroscedastic, "stimulus"),
         (slip_p_value(full, beside, seed), "time"),
         (play_p_value(full, beside), "rate"),
-    ]
-
-
-def of_innovations(by_channel: Sequence[Sequence[Innovations]]) -> list[tuple[float, str]]:
-    """p-values of the tests that need no more than white innovations, and what each deviation depends on."""
-    return [(len(by_channel) * p, where) for pieces in by_channel for p, where in _of_channel(pieces)]
-
-
-def _of_channel(pieces: Sequence[Innovations]) -> list[tuple[float, str]]:
-    values, dt = [e.values for e in pieces], pieces[0].dt
-    active = [np.abs(driven(e)) for e in pieces]
-    return [
-        (burst_p_value(values, Noise(1.0), dt), "time"),
-        line_p_value(pieces),
-        (repeated_p_value(values, dt), "time"),
-        (heteroscedastic_p_value(values, active, dt), "stimulus"),
     ]
 
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from fes_pin.diagnose.decide.significance import level_of
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnose.search.refined_forms import is_identified
 from fes_pin.diagnose.search.starts import STARTS, begun_anew, forms_beside, refinements
 from fes_pin.identify.distributions import chi2_quantile, chi2_tail
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import DRIVEN_LEVEL
 from fes_pin.identify.scoring import WORTH
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
@@ -45,7 +45,7 @@ class LikelihoodForms:
         models = [refinements(base.model, effect, self._measured, barred) for effect in base.model.effects]
         looks = in_parallel(lambda s: self._maxima.look(s, base), [s for many in models for s in many])
         looks = sorted(looks, key=lambda f: f.price)
-        demanded = chi2_quantile(1.0 - DRIVEN_LEVEL / forms_beside(base.model, base.model.effects), 1)
+        demanded = chi2_quantile(1.0 - level_of(base) / forms_beside(base.model, base.model.effects), 1)
         worth = [f for f in looks[:STARTS] if base.sse - f.sse > 0.5 * max(demanded, base.sse - looks[0].sse)]
         found = [f for f in in_parallel(self._maxima.go_on, worth) if is_identified(f, base)]
         best = min(found, key=lambda f: f.price, default=None)
@@ -90,4 +90,4 @@ class LikelihoodForms:
 def _is_demanded(refined: Fit, base: Fit) -> bool:
     degrees = max(refined.degrees - base.degrees, 1)
     p_value = float(chi2_tail(max(base.sse - refined.sse, 0.0), degrees))
-    return p_value * forms_beside(base.model, base.model.effects) < DRIVEN_LEVEL
+    return p_value * forms_beside(base.model, base.model.effects) < level_of(base)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnose.decide.gains_ahead import Fold, gains_of
-from fes_pin.diagnose.decide.significance import Family
+from fes_pin.diagnose.decide.significance import Family, level_of
 from fes_pin.diagnose.errors_ahead import are_large, random_parts
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.search.cause_sets import MOST_CAUSES
@@ -27,7 +27,7 @@ from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import DRIVEN_LEVEL, UNUSUAL_LEVEL
+from fes_pin.identify.levels import UNUSUAL_LEVEL
 from fes_pin.identify.scatter import excess_scatter
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
@@ -139,7 +139,7 @@ class LikelihoodSearch:
 
     def earns(self, larger: Fit, smaller: Fit, gain: float, _explained: float) -> bool:
         """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood."""
-        return self._p_value(gain, larger, smaller) < DRIVEN_LEVEL
+        return self._p_value(gain, larger, smaller) < level_of(larger)
 
     def possible(self) -> dict[Names, Fit]:
         """All sets that are fitted, but for those that cannot be, or that were found not to earn their place."""
@@ -188,12 +188,12 @@ class LikelihoodSearch:
             return False
         larger, smaller = self.sets.fits[names], self.sets.fits[best]
         degrees = max(larger.degrees - smaller.degrees, 1)
-        return self.family.p_value(2.0 * (smaller.sse - larger.sse), degrees) < DRIVEN_LEVEL
+        return self.family.p_value(2.0 * (smaller.sse - larger.sse), degrees) < level_of(larger)
 
     def _earns_beside(self, names: Names, best: Names) -> bool:
         """Whether a set can be, and is worth more than the best smaller one."""
         larger, smaller = self.sets.fits[names], self.sets.fits[best]
-        earned = self.p_value(larger, smaller) < DRIVEN_LEVEL and self._foretells_more(larger, smaller)
+        earned = self.p_value(larger, smaller) < level_of(larger) and self._foretells_more(larger, smaller)
         return self._kept(names, earned) and is_possible(larger)
 
     def _foretells_more(self, larger: Fit, smaller: Fit) -> bool:
@@ -247,7 +247,7 @@ class LikelihoodSearch:
             less = {n: self.sets.without(names, n) for n in names}
             p_values = {n: self.p_value(self.sets.fits[names], less[n]) for n in names}
             weakest = max(names, key=lambda n: (p_values[n], -less[n].sse))
-            if p_values[weakest] < DRIVEN_LEVEL:
+            if p_values[weakest] < level_of(self.sets.fits[names]):
                 break
             names = tuple(n for n in names if n != weakest)
         return names
