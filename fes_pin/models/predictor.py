@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fes_pin.data.counts import count_of, hunts
+from fes_pin.data.counts import SAME, count_of, hunts
 from fes_pin.data.trial import Trial
 from fes_pin.models.autoregression import noise_ahead
 from fes_pin.models.compile.layout import WIDTH, doubt_constants
@@ -296,8 +296,13 @@ def are_news(trial: Trial, lasts_s: float) -> np.ndarray:
 
 
 def repeated(column: np.ndarray) -> np.ndarray:
-    """How often the value of each sample was read in a row, shape (n,): 1 where its neighbours differ."""
+    """How often the value of each sample was read in a row, shape (n,): 1 where its neighbours differ.
+
+    Where fewer than `SAME` of them are the same, they are so by chance, of numbers written with so many digits.
+    """
     begins = np.flatnonzero(np.diff(column, prepend=np.nan) != 0.0)  # what is missed differs from everything
+    if len(column) - len(begins) < SAME * len(column):
+        return np.ones(len(column))
     lengths = np.diff(np.append(begins, len(column)))
     return np.repeat(lengths, lengths).astype(float)
 
