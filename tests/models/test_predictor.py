@@ -156,6 +156,13 @@ def test_a_count_that_is_read_again_and_again_is_one_reading(monkeypatch):
     assert one.variances[:, 0] == pytest.approx(variances, rel=1e-6)
 
 
+def test_numbers_that_are_the_same_by_chance_are_each_a_reading():
+    """A file's digits make three pairs in 100 equal; taken for one reading, their noise seemed twice as large."""
+    noisy = np.random.default_rng(0).normal(scale=1e-3, size=2000).round(4)
+    assert np.sum(np.diff(noisy) == 0.0) > 20
+    assert (repeated(noisy) == 1.0).all()
+
+
 def test_a_rig_that_stands_is_known_no_better_the_longer_it_is_read():
     """Without a random effort a hundred equal readings of a rig at rest leave its place as doubtful as one."""
     still = driven(5, n=100, size=0.0)
