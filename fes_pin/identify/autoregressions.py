@@ -1,9 +1,9 @@
 """How what a filter leaves of readings foretells itself, found in its innovations: see `models.autoregression`.
 
 All trials together give the coefficients of every order by Burg's method, and the order whose innovations are likeliest
-by what a parameter must earn. Such an autoregression is stationary, whatever the trials. It is nothing but the likeliest:
-coefficients that took 0.3 % of the noise for white left 2 to 9 % more of noise that lasts than need be, which a random
-effort that nothing exerted made up for.
+by what a parameter must earn. Such an autoregression is stationary, whatever the trials. It is nothing but the
+likeliest: coefficients that took 0.3 % of the noise for white left 2 to 9 % more of noise that lasts than need be, and
+a random effort that nothing exerted made up for it.
 
 Source: Burg, Maximum entropy spectral analysis, PhD thesis, Stanford 1975; Brockwell and Davis, Time Series: Theory and
 Methods, 2nd ed., section 8.2.
