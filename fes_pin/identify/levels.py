@@ -15,9 +15,9 @@ CLAIM_LEVEL = 0.01
 changes, all forms of a set that are tried, or all tests of what is left. A diagnosis stays below 5 %, with room for
 noise that is not quite autoregressive."""
 DRIVEN_LEVEL = 1e-3
-"""The same of rigs that are judged by the likelihood. 54 driven rigs with nothing hidden brought p-values of 0.002 and
-0.004 (`scripts/driven --nulls`): as many as 0.01 allows, more than a person who is told a name would accept. What acts
-in a rig that is recorded for a minute is far beyond either."""
+"""The same where a random effort acts in what is judged by the likelihood. 54 driven rigs with nothing hidden brought
+p-values of 0.002 and 0.004 (`scripts/driven --nulls`): as many as 0.01 allows, more than a person who is told a name
+would accept. What acts in a rig that is recorded for a minute is far beyond either."""
 CERTAIN_LEVEL = 1e-6
 """At which something is there, whatever it stands for: a cause whose name held-out trials refuse, a further score, an
 effort that answers its reading or was written down late."""

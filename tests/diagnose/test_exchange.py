@@ -39,7 +39,8 @@ class Sets:
 
     def fit(self, names):
         sse = PRICE[names]
-        known = {"degrees": len(names), "model": SimpleNamespace(effects=()), "free": ()}
+        random = SimpleNamespace(acting=("effort",))
+        known = {"degrees": len(names), "model": SimpleNamespace(effects=()), "free": (), "doubt": random}
         return SimpleNamespace(names=names, sse=sse, price=sse + 5.0 * len(names), **known)
 
     def extend_all(self, base, most=None):
