@@ -15,7 +15,7 @@ from fes_pin.models.predictor import Doubt
 
 END = {"inertia_scale": 1.0014, "damping": 0.018945, "gravity_scale": 1.0007, "backlash.half_width": 0.0064904}
 """Where a fit ended on one computer, 6e-5 rad beside what is hidden; on another it ends elsewhere."""
-THERE = Doubt({"position": 3.0174e-4}, {"effort": 3.8565e-3}, {"effort": 0.024505})
+THERE = Doubt({"position": 3.0143e-4}, {"effort": 3.9363e-3}, {"effort": 0.02378})
 
 
 class Promised(driven._Featured):
