@@ -82,17 +82,30 @@ def _told(fitted: Fit) -> tuple[np.ndarray, np.ndarray]:
 
 
 def scores_of(parts: Sequence[Linearized]) -> np.ndarray:
-    """The slopes of the log-likelihood of `PIECES` pieces of some trials, shape (pieces, parameters)."""
+    """The slopes of the log-likelihood of `PIECES` pieces of some trials, shape (pieces, parameters).
+
+    What is each trial's own goes with the parameters.
+    """
     lengths = [len(p.residual) for p in parts]
     shares = [min(n, max(1, round(PIECES * n / sum(lengths)))) for n in lengths]
     pieces = [
         piece
         for part, count in zip(parts, shares, strict=True)
-        for piece in np.add.reduceat(
-            part.jacobian * part.residual[:, None], np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
-        )
+        for piece in np.add.reduceat(_beside_own(part) * part.residual[:, None], _beginnings(part, count))
     ]
     return np.array(pieces)
+
+
+def _beginnings(part: Linearized, count: int) -> np.ndarray:
+    """Where pieces of a trial begin, shape (count,)."""
+    return np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
+
+
+def _beside_own(part: Linearized) -> np.ndarray:
+    """A trial's sensitivities without what its own unknowns take up, as the information is without it."""
+    if not part.local.any():
+        return part.jacobian
+    return part.jacobian - part.local @ np.linalg.lstsq(part.local, part.jacobian, rcond=1e-10)[0]
 
 
 def at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
