@@ -15,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from fes_pin.data.schema import IMPOSED
+from fes_pin.diagnose.decide.claims import FORM_SHARE
 from fes_pin.diagnose.decide.gains_ahead import Fold, gains_of
 from fes_pin.diagnose.decide.significance import Family, level_of
 from fes_pin.diagnose.errors_ahead import are_large, random_parts
@@ -137,9 +138,17 @@ class LikelihoodSearch:
         degrees = max(larger.degrees - smaller.degrees, 1)
         return self.family.p_value(gain / excess_scatter(larger, smaller), degrees)
 
-    def earns(self, larger: Fit, smaller: Fit, gain: float, _explained: float) -> bool:
-        """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood."""
-        return self._p_value(gain, larger, smaller) < level_of(larger)
+    def earns(self, larger: Fit, smaller: Fit, gain: float, explained: float) -> bool:
+        """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood.
+
+        Where no random effort takes up errors of form, it must gain more than those of all that is explained leave.
+        """
+        assert larger.doubt is not None
+        of_form = not larger.doubt.acting and gain < FORM_SHARE * explained
+        return not of_form and self._p_value(gain, larger, smaller) < level_of(larger)
+
+    def _is_earned(self, larger: Fit, smaller: Fit) -> bool:
+        return self.earns(larger, smaller, smaller.sse - larger.sse, self.nominal().sse - larger.sse)
 
     def possible(self) -> dict[Names, Fit]:
         """All sets that are fitted, but for those that cannot be, or that were found not to earn their place."""
@@ -193,7 +202,7 @@ class LikelihoodSearch:
     def _earns_beside(self, names: Names, best: Names) -> bool:
         """Whether a set can be, and is worth more than the best smaller one."""
         larger, smaller = self.sets.fits[names], self.sets.fits[best]
-        earned = self.p_value(larger, smaller) < level_of(larger) and self._foretells_more(larger, smaller)
+        earned = self._is_earned(larger, smaller) and self._foretells_more(larger, smaller)
         return self._kept(names, earned) and is_possible(larger)
 
     def _foretells_more(self, larger: Fit, smaller: Fit) -> bool:
@@ -247,7 +256,7 @@ class LikelihoodSearch:
             less = {n: self.sets.without(names, n) for n in names}
             p_values = {n: self.p_value(self.sets.fits[names], less[n]) for n in names}
             weakest = max(names, key=lambda n: (p_values[n], -less[n].sse))
-            if p_values[weakest] < level_of(self.sets.fits[names]):
+            if self._is_earned(self.sets.fits[names], less[weakest]):
                 break
             names = tuple(n for n in names if n != weakest)
         return names
