@@ -96,6 +96,14 @@ def test_a_cheaper_set_whose_cause_does_not_earn_its_place_is_no_answer(search, 
     assert ("lag", "velocity") in search.possible()
 
 
+@pytest.mark.parametrize(("acting", "gain", "earned"), [((), 40.0, False), ((), 80.0, True), (("effort",), 40.0, True)])
+def test_a_further_cause_must_explain_more_than_errors_of_form_leave(acting, gain, earned, search, monkeypatch):
+    """Of what all causes do, where no random effort takes such errors up."""
+    monkeypatch.setattr(search, "p_value", lambda more, less: 1e-6)
+    smaller, larger = (SimpleNamespace(sse=s, doubt=SimpleNamespace(acting=acting)) for s in (-1000.0, -1000.0 - gain))
+    assert search._is_earned(larger, smaller) is earned
+
+
 @pytest.mark.parametrize(
     ("beside", "low", "left", "earns"),
     [("lag", 0.05, False, False), ("lag", 0.2, False, True), ("", 0.05, False, True), ("lag", 0.05, True, True)],

@@ -139,16 +139,14 @@ class LikelihoodSearch:
         return self.family.p_value(gain / excess_scatter(larger, smaller), degrees)
 
     def earns(self, larger: Fit, smaller: Fit, gain: float, explained: float) -> bool:
-        """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood.
-
-        Where no random effort takes up errors of form, it must gain more than those of all that is explained leave.
-        """
-        assert larger.doubt is not None
-        of_form = not larger.doubt.acting and gain < FORM_SHARE * explained
-        return not of_form and self._p_value(gain, larger, smaller) < level_of(larger)
+        """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood."""
+        return self._p_value(gain, larger, smaller) < level_of(larger) and not _is_of_form(larger, gain, explained)
 
     def _is_earned(self, larger: Fit, smaller: Fit) -> bool:
-        return self.earns(larger, smaller, smaller.sse - larger.sse, self.nominal().sse - larger.sse)
+        """The same of two fits as they are."""
+        explained = self.nominal().sse - larger.sse
+        significant = self.p_value(larger, smaller) < level_of(larger)
+        return significant and not _is_of_form(larger, smaller.sse - larger.sse, explained)
 
     def possible(self) -> dict[Names, Fit]:
         """All sets that are fitted, but for those that cannot be, or that were found not to earn their place."""
@@ -306,6 +304,12 @@ class LikelihoodSearch:
         p_values = {n: self.p_value(best, without[n]) for n in names}
         scored = sets.screen.scores(none).scored + (sets.screen.scores(best).scored if names else [])
         return Found(none, best, p_values, rivals, without, scored, self.family, sets.library.silent())
+
+
+def _is_of_form(larger: Fit, gain: float, explained: float) -> bool:
+    """Whether a gain is no more than errors of form leave of what is explained, and no random effort takes them up."""
+    assert larger.doubt is not None
+    return not larger.doubt.acting and gain < FORM_SHARE * explained
 
 
 __all__ = ["Found", "LikelihoodSearch"]
