@@ -23,11 +23,11 @@ KP, KI = 600.0, 500.0
 """Of the controller, us per rad and us per rad s."""
 
 
-def controlled(trial, constants, nominal, causes, rng, hum=0.0, spasm=0.0):
+def controlled(trial, constants, nominal, causes, rng, hum=0.0, spasm=0.0, slip=0.0):
     """The trial again, its foot kept on a wave about where a pulse of middle width holds it.
 
     The angle is read with a hum, rad, of a phase of the trial's own, and spasms of a quarter of a second, N m, come in
-    between, three in a trial.
+    between, three in a trial. Its sensor slips by so much, rad, at a time of the trial's own.
     """
     rig, n, dt = Ankle(constants, nominal, causes, trial), len(trial), 1.0 / RATE_HZ
     x, gathered = np.array(rig.rest(), dtype=float), 0.0
@@ -38,9 +38,11 @@ def controlled(trial, constants, nominal, causes, rng, hum=0.0, spasm=0.0):
     length = round(0.25 * RATE_HZ)
     for begin in rng.integers(0, n - length, 3) if spasm else ():
         push[begin : begin + length] += spasm * np.sin(np.pi * np.arange(length) / length) ** 2
+    slips_at = (0.3 + 0.4 * phase[2] / 6.28) * n * dt
     for k in range(n):
         t = k * dt
         angle[k] = x[where] + ANGLE_NOISE_RAD * rng.normal() + hum * np.sin(2.0 * np.pi * 60.0 * t + phase[2])
+        angle[k] += slip * (t > slips_at)
         wanted = rig.rest()[where] + sign * (0.15 + 0.06 * np.sin(6.28 * slow * t + phase[0]))
         wanted += 0.03 * np.sin(6.28 * fast * t + phase[1])
         error = sign * (wanted - angle[k])
@@ -52,15 +54,13 @@ def controlled(trial, constants, nominal, causes, rng, hum=0.0, spasm=0.0):
     return trial.with_columns(pulse_width_us=width, angle_rad=angle)
 
 
-def stimulated(causes, hum=0.0, spasm=0.0):
+def stimulated(causes, hum=0.0, spasm=0.0, slip=0.0):
     """A study of such trials, beside isometric ones that a script has stimulated."""
     study = study_of("ankle", causes, "process", SEED)
     constants, nominal, _ = ankle_rig(np.random.default_rng(SEED))
     rng = np.random.default_rng([SEED, 1])
-    moved = [
-        controlled(t, constants, nominal, causes, rng, hum, spasm) if t.kind == "motion" else t for t in study.trials
-    ]
-    return replace(study, trials=tuple(moved))
+    hidden = (constants, nominal, causes, rng, hum, spasm, slip)
+    return replace(study, trials=tuple(controlled(t, *hidden) if t.kind == "motion" else t for t in study.trials))
 
 
 @pytest.mark.parametrize("causes", [{}, {"coulomb_friction": {"torque_nm": 0.04}}], ids=["nothing", "dry friction"])
@@ -101,3 +101,10 @@ def test_spasms_are_left_beside_a_random_effort():
     found = diagnose_joint(stimulated({}, spasm=0.04))
     assert found.verdict == "unexplained" and found.remainder.where == "time", str(found)
     assert max(r.share for r in found.random) < 0.1
+
+
+def test_a_sensor_that_slips_is_left_beside_a_random_effort():
+    """A filter follows a new zero by the effort; what free simulation leaves keeps it until the trial ends."""
+    found = diagnose_joint(stimulated({}, slip=4e-3))
+    assert found.random and max(r.share for r in found.random) < 0.1
+    assert found.remainder.unexplained, str(found)
