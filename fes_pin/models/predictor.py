@@ -298,14 +298,13 @@ def are_news(trial: Trial, lasts_s: float) -> np.ndarray:
 def repeated(column: np.ndarray) -> np.ndarray:
     """How often the value of each sample was read in a row, shape (n,): 1 where its neighbours differ.
 
-    Where a share p of neighbours below `SAME` is the same, numbers are so by chance, of so many digits: n in a row as
-    long as p^(n - 1) of all samples is one or more. Longer ones are of a rig that stands, or of a reading held.
+    Where fewer than `SAME` of them are the same, they are so by chance, of numbers written with so many digits.
     """
     begins = np.flatnonzero(np.diff(column, prepend=np.nan) != 0.0)  # what is missed differs from everything
+    if len(column) - len(begins) < SAME * len(column):
+        return np.ones(len(column))
     lengths = np.diff(np.append(begins, len(column)))
-    share = 1.0 - len(begins) / max(len(column), 1)
-    by_chance = (share < SAME) & (len(column) * share ** (lengths - 1.0) >= 1.0)
-    return np.repeat(np.where(by_chance, 1.0, lengths), lengths)
+    return np.repeat(lengths, lengths).astype(float)
 
 
 def masked(trial: Trial, outputs: Sequence[str], hidden: Sequence[range]) -> Trial:
