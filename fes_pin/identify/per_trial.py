@@ -8,11 +8,12 @@ are estimated from the even ones and the other way round, so that no sample take
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from fes_pin.data.trial import Trial
+from fes_pin.identify.doubts import first_doubt
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel
@@ -69,16 +70,19 @@ def _estimated(
 ) -> Unknowns:
     """The start with the effects' unknowns as the samples that are seen say, by least squares beside the initial state.
 
-    Sinusoids are estimated as well by ordinary least squares as with the right weights (Grenander 1954).
+    Sinusoids are estimated as well by ordinary least squares as with the right weights (Grenander 1954). An initial
+    state, which what is seen may have forgotten, is no farther from the start than `first_doubt` has it.
     """
     white = {n: Noise(max(m.std, 1e-12)) for n, m in noise.items()}
     problem = Problem(model, trials, white, ())
     names, now = problem.unknown_names, start
+    reaches = [{n: (one[n] - d, one[n] + d) for n, d in first_doubt(model, t).items()} for t, one in zip(trials, start)]
     for _ in range(STEPS):
         moved = []
-        for part, rows, one in zip(problem.linearize(model.parameters(), now), seen, now, strict=True):
+        parts = problem.linearize(model.parameters(), now)
+        for part, rows, one, reach in zip(parts, seen, now, reaches, strict=True):
             chosen = np.resize(rows, len(part.residual))  # channel after channel
-            moved.append(_moved(part, chosen, names, one))
+            moved.append(_moved(part, chosen, names, one, reach))
         now = moved
     own = set(model.own_unknowns())
     return [{n: (new[n] if n in own else old[n]) for n in old} for old, new in zip(start, now, strict=True)]
@@ -104,9 +108,23 @@ def foretold_unknowns(model: Model, trial: Trial, doubt: Doubt) -> list[tuple[np
     return out
 
 
-def _moved(part: Linearized, rows: np.ndarray, names: Sequence[str], now: dict[str, float]) -> dict[str, float]:
-    step = least_squares(part.local[rows], part.residual[rows], rcond=1e-6)
-    return {**now, **{n: now[n] + float(d) for n, d in zip(names, step, strict=True)}}
+def _moved(
+    part: Linearized,
+    rows: np.ndarray,
+    names: Sequence[str],
+    now: dict[str, float],
+    reach: Mapping[str, tuple[float, float]] | None = None,
+) -> dict[str, float]:
+    """A step of least squares from where unknowns are now; where some would leave their reach, the others follow."""
+    local, residual = part.local[rows], part.residual[rows]
+    step = dict(zip(names, least_squares(local, residual, rcond=1e-6), strict=True))
+    kept = {n: float(np.clip(step[n], low - now[n], high - now[n])) for n, (low, high) in (reach or {}).items()}
+    if any(kept[n] != step[n] for n in kept):
+        others = [k for k, n in enumerate(names) if n not in kept]
+        left = residual - local @ [kept.get(n, 0.0) for n in names]
+        free = least_squares(local[:, others], left, rcond=1e-6)
+        step = {**kept, **{names[k]: d for k, d in zip(others, free, strict=True)}}
+    return {**now, **{n: now[n] + float(d) for n, d in step.items()}}
 
 
 def amplitude(fitted: Fit, effect: Effect) -> tuple[float, float]:

@@ -5,6 +5,7 @@ import pytest
 from models.cases import CASES, RIGS, name_of, trial
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.noise import Noise
 from fes_pin.identify.per_trial import amplitude, predictions
@@ -97,6 +98,21 @@ def test_predictions_do_not_see_what_they_predict():
     (again,) = predictions(model, [bare.with_columns(force_n=changed)], noise)
     assert np.array_equal(again[: len(force) // 4], told[: len(force) // 4])
     assert not np.array_equal(again[len(force) // 4 :], told[len(force) // 4 :])
+
+
+def test_a_start_that_is_forgotten_does_not_run_away_with_what_is_each_trials_own():
+    """Half a minute of a heavily damped pendulum tells nothing of its start; all that is missed would be laid to it."""
+    one = next(e for e in EFFECTS if e.name == "periodic_torque")
+    model = Model(RIGS["joint"]).with_parameters({"damping": 0.4}) + one(frequency_hz=0.7).of_each_trial()
+    (bare,) = trials_of("joint", "motion", 8)[:1]
+    time = np.arange(6000) * bare.dt
+    bare = Trial("long", "motion", {"effort": 0.3 * np.sin(1.1 * time)}, time, bare.conditions)
+    own = {"periodic_torque.in_phase": 0.02, "periodic_torque.quadrature": -0.03}
+    (answer,) = Simulator(model, [bare]).run(model.parameters(), with_own(model, [bare], [own]))
+    missed = 0.05 * np.sin(0.45 * time) + 0.02 * np.sin(1.7 * time + 0.3)
+    measured = bare.with_columns(position=answer.readings[:, 0] + missed)
+    (told,) = predictions(model, [measured], {"position": Noise(1e-5)})
+    assert np.std(measured["position"] - told[:, 0]) < 1.1 * np.std(missed)
 
 
 @VARYING
