@@ -76,7 +76,8 @@ def _estimated(
     white = {n: Noise(max(m.std, 1e-12)) for n, m in noise.items()}
     problem = Problem(model, trials, white, ())
     names, now = problem.unknown_names, start
-    reaches = [{n: (one[n] - d, one[n] + d) for n, d in first_doubt(model, t).items()} for t, one in zip(trials, start)]
+    doubts = [first_doubt(model, t) for t in trials]
+    reaches = [{n: (s[n] - d, s[n] + d) for n, d in doubt.items()} for doubt, s in zip(doubts, start, strict=True)]
     for _ in range(STEPS):
         moved = []
         parts = problem.linearize(model.parameters(), now)
