@@ -68,3 +68,14 @@ def test_an_unknown_that_no_trial_feels_takes_nothing():
     parts, columns = parts_of(np.random.default_rng(6), 1)
     wider = [Linearized(p.residual, p.jacobian, np.hstack([p.local, np.zeros((ROWS, 2))])) for p in parts]
     assert np.allclose(Projection(parts)(columns), Projection(wider)(columns), atol=1e-12)
+
+
+def test_a_probe_that_runs_away_tells_nothing_and_takes_nothing_from_another():
+    """Squares of its columns would leave the floating-point numbers."""
+    parts, columns = parts_of(np.random.default_rng(5), 1)
+    runs_away = Probe(MainsHum.absent(), np.full_like(columns, 1e200))
+    alone = Projection(parts).score([Probe(MainsHum.absent(), columns)])
+    beside = Projection(parts).score([Probe(MainsHum.absent(), columns), runs_away])
+    assert beside.scored[0].gain == pytest.approx(alone.scored[0].gain, rel=1e-9)
+    assert beside.scored[1].gain == 0.0
+    assert np.isfinite(beside.gram).all()

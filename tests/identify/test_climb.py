@@ -69,6 +69,22 @@ def test_what_is_not_asked_for_does_not_move():
     assert found.values["slope"] == pytest.approx(SLOPE, abs=0.05)
 
 
+def test_what_a_prediction_runs_away_beside_stays_and_the_others_move():
+    """One such fit among a library's is no maximum; a diagnosis of all the others goes on."""
+
+    class RunsAway(Line):
+        def one(self, values, random):
+            told = super().one(values, random)
+            beside = random.get("std", self.randomness["std"]) != self.randomness["std"]
+            return replace(told, innovations=told.innovations * 1e200 * 1e200) if beside else told
+
+    line = RunsAway()
+    with np.errstate(over="ignore"):
+        found = climbed(line)
+    assert found.randomness["std"] == line.randomness["std"]
+    assert found.values["slope"] == pytest.approx(SLOPE, abs=0.05)
+
+
 def test_a_bound_holds_a_parameter_and_the_others_move_beside_it():
     line = Line(slope=(-1e3, 1.0))
     found = climbed(line)

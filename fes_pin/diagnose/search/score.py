@@ -18,6 +18,8 @@ from fes_pin.workers import in_parallel
 
 RIDGE = 1e-8
 """Added to the scaled Gram matrix of two probes, which may be the same."""
+LARGEST = float(np.finfo(float).max) ** 0.25
+"""Largest entry of a column: products of inner products stay floating-point numbers. What runs away tells nothing."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ class Projection:
         the inner products with the basis of what all trials share."""
         rows, own = self._trials[k], self._own[k]
         columns = np.concatenate([p.columns[rows] for p in probes], axis=1)
-        columns[~np.isfinite(columns)] = 0.0
+        columns[~(np.abs(columns) < LARGEST)] = 0.0
         before = np.einsum("mi,mi->i", columns, columns)
         columns -= own @ (own.T @ columns)
         return columns, before, self._basis[rows].T @ columns
