@@ -44,6 +44,7 @@ from fes_pin.diagnose.errors_ahead import (
     errors_ahead,
     random_parts,
 )
+from fes_pin.diagnose.form_errors import FRESH, searched_again
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosis
@@ -203,6 +204,8 @@ def driven_diagnosis(
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
     judged = judge_driven(search, found, search.sets.trials, trials[1], seed)
+    if (again := searched_again(search, judged.found)) is not None:
+        judged = _foretelling_more(judge_driven(*again, search.sets.trials, trials[1], seed), judged)
     found, left = judged.found, judged.left
     best = as_wide_as_trials_differ(with_honest_intervals(found.best), judged.again)
     searched = Searched(
@@ -234,11 +237,27 @@ def driven_diagnosis(
         held_out_by=SEPARATE if trials[1] else CROSS_VALIDATED if held else NOTHING,
         left_out={},
         wall_s=0.0,
-        warnings=words_of_reading(best.doubt, best.model.rig, trials[0]),
+        warnings=_words(best, trials[0]),
         random=judged.random,
         reason=judged.reason,
         ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
     )
+
+
+def _words(fitted: Fit, trials: Sequence[Trial]) -> tuple[str, ...]:
+    """What is to be said of what is random in a fit."""
+    assert fitted.doubt is not None
+    said = words_of_reading(fitted.doubt, fitted.model.rig, trials)
+    return (*said, FRESH) if fitted.doubt.timed else said
+
+
+def _foretelling_more(other: Judged, one: Judged) -> Judged:
+    """What errs less over the horizon, on trials held out where there are such."""
+
+    def error(judged: Judged) -> float:
+        return (judged.held_out_ahead or judged.ahead)[1].horizon
+
+    return other if error(other) < error(one) else one
 
 
 def _cause(judged: Judged, one: Effect, best: Fit) -> Cause:

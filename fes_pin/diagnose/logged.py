@@ -18,6 +18,7 @@ from fes_pin.diagnose.result import Diagnosis
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_noise
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.fresh_efforts import beside_fresh_efforts
 from fes_pin.identify.lateness import Lateness, lateness_of, words_of_lateness
 from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.timing import with_doubt_of_lateness, with_doubt_of_timing
@@ -138,14 +139,21 @@ def with_words(diagnosis: Diagnosis) -> Diagnosis:
 
 
 def _is_likelier(one: Fit, other: Fit) -> bool:
-    """True if the same readings are foretold better for as many parameters: those that are news to both."""
-    lasts_s = max(f.doubt.lasts_s for f in (one, other) if f.doubt is not None)
-    first, second = (_with_noise_that_lasts(f, lasts_s) for f in (one, other))
+    """True if the same readings are foretold better for as many parameters: those that are news to both.
+
+    Beside random efforts that are new in every sample where those of one are.
+    """
+    both = [f.doubt for f in (one, other) if f.doubt is not None]
+    lasts_s, timed = max(d.lasts_s for d in both), any(d.timed for d in both)
+    first, second = (_as_random(f, lasts_s, timed) for f in (one, other))
     return first.price < second.price
 
 
-def _with_noise_that_lasts(fitted: Fit, lasts_s: float) -> Fit:
-    """The fit to readings so far apart."""
-    if fitted.doubt is None or fitted.doubt.lasts_s == lasts_s:
+def _as_random(fitted: Fit, lasts_s: float, timed: bool) -> Fit:
+    """The fit to readings so far apart, and beside random efforts that are new in every one if these are to be."""
+    if fitted.doubt is None:
         return fitted
-    return maximum_from(fitted, fitted.trials, replace(fitted.doubt, lasts_s=lasts_s))
+    if fitted.doubt.lasts_s != lasts_s:
+        fitted = maximum_from(fitted, fitted.trials, replace(fitted.doubt, lasts_s=lasts_s))
+    assert fitted.doubt is not None
+    return beside_fresh_efforts(fitted) if timed and not fitted.doubt.timed else fitted

@@ -110,8 +110,9 @@ class LikelihoodProblem:
     @property
     def randomness(self) -> dict[str, float]:
         """What is random and may change, by name: not the noise of a reading that none of the trials has."""
-        still, known = self.doubt.still, self.randomness_limits
-        return {n: v for n, v in self.doubt.values().items() if n in known and n.partition(".")[2] not in still}
+        known, given = self.randomness_limits, [f"time.{n}" for n in self.doubt.timed]
+        given += [f"{part}.{n}" for part in ("std", "time") for n in self.doubt.still]
+        return {n: v for n, v in self.doubt.values().items() if n in known and n not in given}
 
     @property
     def randomness_limits(self) -> dict[str, tuple[float, float]]:

@@ -245,13 +245,27 @@ class _Climb:
         if found is None:
             done = self.left < WORTH or len(self.lengths) == 1
             self.lengths = self.lengths[1:] or self.lengths
-            return done
+            return done and not self._leap()
         k, end, after = found
         step, gained = self.z - end, self.now.cost - after.cost
         self.left = abs(gained - slopes.promised(step))
         self.held = self.scale.held(end, gradient - information @ step)
         self.z, self.now, self.damping = end, after, max(0.3 * float(dampings[k]), 1e-6)
         return min(gained, self.left) < LITTLE
+
+    def _leap(self) -> bool:
+        """Go as far as a step may in one logarithm of what is random; False if that leads nowhere.
+
+        Where a prediction goes another way at every change of its gains, as of friction that flips, slopes are of that.
+        """
+        axes = np.eye(len(self.z))[len(self.scale.units) :] * LONGEST_MOVE
+        ends = np.array([np.clip(self.z + m, self.scale.low, self.scale.high) for m in (*axes, *-axes)])
+        told = [one for k in range(0, len(ends), self.abreast) for one in self.at_all(ends[k : k + self.abreast])]
+        best = min(range(len(told)), key=lambda k: told[k].cost, default=None)
+        if best is None or not told[best].cost < self.now.cost - WORTH:
+            return False
+        self.z, self.now, self.lengths = ends[best], told[best], list(STEPS)
+        return True
 
 
 def _first_below(

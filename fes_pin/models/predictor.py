@@ -38,6 +38,8 @@ class Doubt:
         innovations. See `models.autoregression`.
     still
         Random processes that stay as small as they are.
+    timed
+        Those whose time constant is given, and stays.
     """
 
     white: Mapping[str, float]
@@ -46,6 +48,7 @@ class Doubt:
     lasts_s: float = 0.0
     ar: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     still: tuple[str, ...] = ()
+    timed: tuple[str, ...] = ()
 
     @property
     def processes(self) -> tuple[str, ...]:

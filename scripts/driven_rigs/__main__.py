@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 from going_on import results_of
 
+from driven_rigs import arm as arms
 from driven_rigs import laboratory as laboratories
 from driven_rigs import stimulated as ankles
 from driven_rigs import swing_up as pendulums
@@ -68,7 +69,8 @@ def judged(causes: tuple[str, ...], seed: int, drawing: Drawing) -> dict[str, An
         except Exception as error:
             return {"seed": seed, "causes": causes, "error": f"{type(error).__name__}: {error}"}
         seconds = time.perf_counter() - began
-    named = [(c.name, *c.equivalents) for c in found.causes]
+    beside = set(drawn.beside) - set(causes)
+    named = [(c.name, *c.equivalents) for c in found.causes if not beside & {c.name, *c.equivalents}]
     return {
         "seed": seed,
         "rig": drawn.base,
@@ -78,6 +80,9 @@ def judged(causes: tuple[str, ...], seed: int, drawing: Drawing) -> dict[str, An
         "left": found.remainder.unexplained,
         "share": [r.share for r in found.random],
         "deviations": deviations(found, drawn.truth),
+        "off": {
+            n: found.extended.values[n] / v - 1.0 for n, v in drawn.truth.items() if v and n in found.extended.values
+        },
         "seconds": round(seconds, 1),
     }
 
@@ -119,6 +124,9 @@ def table(rows: Sequence[dict[str, Any]]) -> list[str]:
     if off:
         covered = 100.0 * sum(d < CONFIDENCE_95 for d in off) / len(off)
         lines.append(f"95 % intervals of inertia and damping cover {covered:.1f} % of {len(off)}")
+    for name in ("inertia_scale", "damping", "coulomb_friction.torque_nm"):
+        if shares := sorted(100.0 * abs(r["off"][name]) for r in good if name in r["off"]):
+            lines.append(f"{name} is off by {shares[len(shares) // 2]:.1f} % in the median, {shares[-1]:.1f} at most")
     seconds = sorted(r["seconds"] for r in good)
     lines.append(f"a diagnosis takes {seconds[len(seconds) // 2]:.1f} s in the median, {seconds[-1]:.1f} at most")
     return lines
@@ -147,6 +155,7 @@ def main(
     ] = False,
     play: Annotated[bool, typer.Option("--play", help="Every cause beside a play.")] = False,
     swing_up: Annotated[bool, typer.Option("--swing-up", help="Pendulums that are swung up and held.")] = False,
+    arm: Annotated[bool, typer.Option("--arm", help="Joints of industrial arms, behind an elastic drive.")] = False,
     stimulated: Annotated[
         bool, typer.Option("--stimulated", help="Ankles under position control, by their stimulus.")
     ] = False,
@@ -161,6 +170,8 @@ def main(
             return ankles.draw_stimulated(causes, k, folder)
         if swing_up:
             return pendulums.draw_swing_up(causes, k, folder)
+        if arm:
+            return arms.draw_arm(causes, k, folder)
         if laboratory:
             return laboratories.draw_laboratory(causes, k, folder)
         return draw(causes, size, k, folder, recorded, low_pass, every)
@@ -168,7 +179,7 @@ def main(
     def one(causes: tuple[str, ...], k: int) -> dict[str, Any]:
         return judged(() if nulls else causes, k, drawn)
 
-    other = ankles if stimulated else pendulums if swing_up else laboratories if laboratory else None
+    other = ankles if stimulated else pendulums if swing_up else arms if arm else laboratories if laboratory else None
     rows = results_of(items(count, other, play), seed, one, results)
     typer.echo("\n".join(table(rows)))
 

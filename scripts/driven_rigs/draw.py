@@ -55,12 +55,13 @@ BASES = (
 
 @dataclass(frozen=True)
 class Drawn:
-    """A study and what is true of it."""
+    """A study and what is true of it; what acts `beside`, little, may be named as well."""
 
     study: Path
     base: str
     causes: tuple[str, ...]
     truth: dict[str, float]
+    beside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -19,6 +20,7 @@ from fes_pin.diagnose.search.starts import STARTS, from_afar, started
 from fes_pin.identify.covariance import step_gain
 from fes_pin.identify.doubts import first_guess, stilled
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.fresh_efforts import fresh
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import normal_equations
@@ -74,8 +76,17 @@ class LikelihoodFits:
         self.screen = LikelihoodScreen(self.library)
         self.forms = LikelihoodForms(self._maxima, self.library.measured)
 
+    def begun_with(self, fits: Sequence[Fit]) -> LikelihoodFits:
+        """The same trials and causes, with some fits to begin with; what is random is timed as in them."""
+        other = copy.copy(self)
+        other.fits = {names_of(f): f for f in fits}
+        other._converged, other._compared = set(), {}
+        return other
+
     def nominal(self) -> Fit:
-        """Fit the nominal model, from several sizes of what is random."""
+        """Fit the nominal model, from several sizes of what is random; as it is where the fits began with one."""
+        if () in self.fits:
+            return self.fits[()]
         from_rest = all(t.kind != IMPOSED and not self.model.rig.unknowns(t.kind) for t in self.trials)
         self.fits[()] = self._from_rest() if from_rest else with_new_noise(self.trials, self._nominal)
         return self.fits[()]
@@ -112,7 +123,8 @@ class LikelihoodFits:
         if self._calm is not None:
             return self._calm
         known = self.fits[()].doubt
-        return first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
+        guess = first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
+        return fresh(guess, self.trials) if known and known.timed else guess
 
     def extend(self, base: Fit, scored: Sequence[Scored]) -> tuple[Model, list[Fit]]:
         """Begin a base with one more effect, from its shapes of largest score: the start, and first fits from there."""

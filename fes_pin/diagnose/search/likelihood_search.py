@@ -100,6 +100,21 @@ class LikelihoodSearch:
                 return self.told(self._fallback)
 
     @property
+    def seconds_left(self) -> float:
+        """Until the limit of time that the search began with."""
+        return self._end - time.monotonic()
+
+    def begun_with(self, fits: Sequence[Fit]) -> LikelihoodSearch:
+        """A search of the same trials that begins with some fits, and with what is random as it is in them.
+
+        Parameters
+        ----------
+        fits
+            That of the nominal model among them.
+        """
+        return LikelihoodSearch(self.sets.begun_with(fits), self.seed, self.progress, self._horizon_s)
+
+    @property
     def horizon_s(self) -> float:
         """How far ahead errors over a horizon look, s."""
         return self._horizon_s or default_horizon(self.sets.trials)
@@ -243,7 +258,7 @@ class LikelihoodSearch:
     def form_otherwise(self, names: Names) -> bool:
         """Give a set another form than it was led to, if one is better; False if none is, or time is up."""
         try:
-            with time_limit(self._end - time.monotonic()):
+            with time_limit(self.seconds_left):
                 return self._replaced(names, self.sets.forms.otherwise(self.sets.fits[names]))
         except OutOfTime:
             return False
