@@ -1,0 +1,76 @@
+"""Arms behind an elastic drive: what passes for a random effort that lasts, and what a model explains by itself."""
+
+import numpy as np
+import pytest
+from driven_rigs.arm import CAUSES, draw_arm
+
+from fes_pin.data.study import read_study
+from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnose.errors_ahead import errors_ahead
+from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
+from fes_pin.identify.doubts import first_guess
+from fes_pin.identify.fresh_efforts import beside_fresh_efforts, fresh
+from fes_pin.models.effects.coulomb_friction import CoulombFriction
+from fes_pin.models.model import Model
+from fes_pin.models.nominal import nominal_model
+from fes_pin.models.predictor import Doubt
+
+SEEDS = range(8)
+SECONDS = 20.0
+HORIZON_S = 0.3
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """Friction with a stretch of the first arms, by the likelihood and beside efforts that are new in every sample."""
+    out = []
+    for seed in SEEDS:
+        drawn = draw_arm(CAUSES, seed, tmp_path_factory.mktemp("arm"))
+        study = read_study(drawn.study)
+        trials = [t.first(round(SECONDS / t.dt)) for t in study.trials]
+        model = Model(nominal_model(study).rig) + CoulombFriction(torque_nm=3.0, softness=1.0, stretch=2e-4)
+        likeliest = LikelihoodMaxima(trials).from_start(model, first_guess(model, trials))
+        out.append((drawn.truth, likeliest, beside_fresh_efforts(likeliest)))
+    return out
+
+
+def off(truth, found):
+    return np.array([abs(np.log(max(found.values[n], 1e-3) / v)) for n, v in truth.items()])
+
+
+def test_parameters_are_nearer_to_what_they_are(fitted):
+    likeliest, new = (np.array([off(t, f[k]) for t, *f in fitted]) for k in (0, 1))
+    assert np.mean(likeliest, axis=0)[0] > 0.1  # inertia, by the likelihood
+    assert np.all(np.mean(new, axis=0) < 0.8 * np.mean(likeliest, axis=0))
+    assert np.median(new[:, 0]) < 0.02
+
+
+def test_it_foretells_more(fitted):
+    """Freely in every arm; over the horizon in most, and far more than it loses in the others."""
+    ahead = [[errors_ahead([(f, f.trials)], HORIZON_S, falling=False) for f in fits] for _, *fits in fitted]
+    free, horizon = (np.log([[getattr(a, n) for a in both] for both in ahead]) for n in ("free", "horizon"))
+    assert np.all(free[:, 1] < free[:, 0] + 0.05)
+    assert np.mean(free[:, 1] - free[:, 0]) < -0.7
+    assert np.mean(horizon[:, 1] - horizon[:, 0]) < -0.2
+
+
+def test_what_is_new_in_every_sample_has_the_same_power_and_stays_so(fitted):
+    _, likeliest, new = fitted[0]
+    doubt, step = likeliest.doubt, likeliest.trials[0].dt
+    begun = fresh(doubt, likeliest.trials)
+    assert begun.std["effort"] ** 2 * step == pytest.approx(doubt.std["effort"] ** 2 * doubt.time["effort"])
+    assert new.doubt.time == {"effort": step}
+    assert new.doubt.timed == ("effort",)
+    apart = Doubt(doubt.white, doubt.std, doubt.time, lasts_s=8.0 * step)
+    assert fresh(apart, likeliest.trials).time == {"effort": 8.0 * step}
+
+
+@pytest.mark.parametrize("seed", SEEDS[:2])
+def test_a_diagnosis_names_the_friction_as_large_as_it_is(seed, tmp_path):
+    drawn = draw_arm(CAUSES, seed, tmp_path)
+    found = diagnose_joint(read_study(drawn.study))
+    assert "coulomb_friction" in [c.name for c in found.causes]
+    assert found.extended.values["coulomb_friction.torque_nm"] == pytest.approx(
+        drawn.truth["coulomb_friction.torque_nm"], rel=0.1
+    )
+    assert found.extended.values["inertia_scale"] == pytest.approx(1.0, rel=0.1)
