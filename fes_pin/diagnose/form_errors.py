@@ -9,8 +9,9 @@ from fes_pin.diagnose.decide.held_out import held_out_gain
 from fes_pin.diagnose.errors_ahead import errors_over_horizon
 from fes_pin.diagnose.search.cause_sets import names_of
 from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
+from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.fresh_efforts import beside_fresh_efforts
+from fes_pin.identify.fresh_efforts import beside_fresh_efforts, step_s
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 
 FRESH = "what acts at random was taken for new in every sample: beside what lasts, the model foretold less"
@@ -33,8 +34,11 @@ def searched_again(search: LikelihoodSearch, found: Found) -> tuple[LikelihoodSe
         return None
     if again is None:
         return None
-    with time_limit(search.seconds_left):
-        other = again.run()
+    try:
+        with time_limit(search.seconds_left):
+            other = again.run()
+    except NominalFitError:
+        return None
     return None if again.was_stopped else (again, other)
 
 
@@ -53,14 +57,13 @@ def _begun_again(search: LikelihoodSearch, found: Found, fresh: Fit) -> Likeliho
 
 
 def _may_last(fitted: Fit) -> bool:
-    """Whether something acts at random on a rig whose starts are unknown, and lasts longer than a sample.
+    """Whether something acts at random on a rig whose starts are unknown, and lasts longer than a reading.
 
     Where the motion is imposed effort itself is read, and a reading of it lasts as it does; where a rig begins at rest
     noise that foretells itself is told from a random effort (`LikelihoodFits.nominal`).
     """
     assert fitted.doubt is not None
-    step = max(t.dt for t in fitted.trials)
-    lasts = any(fitted.doubt.time[n] > 2.0 * step for n in fitted.doubt.acting)
+    lasts = any(fitted.doubt.time[n] > step_s(fitted.doubt, fitted.trials) for n in fitted.doubt.acting)
     return lasts and all(t.kind != IMPOSED and fitted.model.rig.unknowns(t.kind) for t in fitted.trials)
 
 

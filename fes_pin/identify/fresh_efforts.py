@@ -23,9 +23,14 @@ from fes_pin.identify.turns import maximise
 from fes_pin.models.predictor import Doubt
 
 
+def step_s(doubt: Doubt, trials: Sequence[Trial]) -> float:
+    """From one reading to the next, s."""
+    return max(doubt.lasts_s, *(t.dt for t in trials))
+
+
 def fresh(doubt: Doubt, trials: Sequence[Trial]) -> Doubt:
     """The same with random efforts that are new in every reading, of the power that they have at rest: 2 std^2 time."""
-    step = max(doubt.lasts_s, *(t.dt for t in trials))
+    step = step_s(doubt, trials)
     std = {n: v * (doubt.time[n] / step) ** 0.5 for n, v in doubt.std.items()}
     return replace(doubt, std=std, time=dict.fromkeys(doubt.time, step), timed=doubt.processes)
 
@@ -42,4 +47,4 @@ def beside_fresh_efforts(fitted: Fit) -> Fit:
     return maximise(problem, fitted.values, fitted.unknowns)
 
 
-__all__ = ["beside_fresh_efforts", "fresh"]
+__all__ = ["beside_fresh_efforts", "fresh", "step_s"]
