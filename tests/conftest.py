@@ -15,7 +15,6 @@ ROUNDING = {
     "diagnose/test_claims.py": "verdicts at their critical values",
     "diagnose/test_found.py::coulomb_friction": "verdicts of whole diagnoses",
     "diagnose/test_held_out.py": "verdicts at their critical values",
-    "driven/test_arm.py": ("test_a_diagnosis_names",),
     "driven/test_forms_again.py": "where fits of friction end",
     "identify": "fits to the last digits",
     "paper/test_kalman.py": "factors of nearly singular covariances",
@@ -62,6 +61,7 @@ LONG = {
         "[ankle-hum-white]",
         "kept[ankle",
     ),
+    "driven/test_arm.py": ("test_a_diagnosis_names",),
     "driven/test_counts.py": (
         "friction[1810006]",
         "[1810010]",

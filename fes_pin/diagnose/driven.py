@@ -8,7 +8,7 @@ of causes is judged by the likelihood of its one-step-ahead predictions, with a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,7 +44,7 @@ from fes_pin.diagnose.errors_ahead import (
     errors_ahead,
     random_parts,
 )
-from fes_pin.diagnose.form_errors import FRESH, searched_again
+from fes_pin.diagnose.form_errors import FRESH, judged_again
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosis
@@ -204,7 +204,7 @@ def driven_diagnosis(
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
     judged = judge_driven(search, found, search.sets.trials, trials[1], seed)
-    if (again := searched_again(search, judged.found)) is not None:
+    if (again := judged_again(search, judged.found)) is not None:
         judged = _foretelling_more(judge_driven(*again, search.sets.trials, trials[1], seed), judged)
     found, left = judged.found, judged.left
     best = as_wide_as_trials_differ(with_honest_intervals(found.best), judged.again)
@@ -252,12 +252,17 @@ def _words(fitted: Fit, trials: Sequence[Trial]) -> tuple[str, ...]:
 
 
 def _foretelling_more(other: Judged, one: Judged) -> Judged:
-    """What errs less over the horizon, on trials held out where there are such."""
+    """What errs less over the horizon, on trials held out where there are such; what is left by either is left.
+
+    Beside efforts that are new in every sample little of what is left stands out: it is not what they say is random.
+    """
 
     def error(judged: Judged) -> float:
         return (judged.held_out_ahead or judged.ahead)[1].horizon
 
-    return other if error(other) < error(one) else one
+    if not error(other) < error(one):
+        return one
+    return other if other.left.unexplained else replace(other, left=one.left)
 
 
 def _cause(judged: Judged, one: Effect, best: Fit) -> Cause:

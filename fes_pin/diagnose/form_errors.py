@@ -1,13 +1,16 @@
-"""A search again where errors of form passed for a random effort that lasts; see `identify.fresh_efforts`."""
+"""What was found, judged again where errors of form passed for a random effort that lasts: `identify.fresh_efforts`."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.diagnose.decide.held_out import held_out_gain
+from fes_pin.diagnose.decide.rivals import not_excluded
 from fes_pin.diagnose.errors_ahead import errors_over_horizon
-from fes_pin.diagnose.search.cause_sets import names_of
+from fes_pin.diagnose.search.cause_sets import Names, names_of
 from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.fit import Fit
@@ -15,11 +18,31 @@ from fes_pin.identify.fresh_efforts import beside_fresh_efforts, step_s
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 
 FRESH = "what acts at random was taken for new in every sample: beside what lasts, the model foretold less"
-"""What is told of such a search."""
+"""What is told of it."""
 
 
-def searched_again(search: LikelihoodSearch, found: Found) -> tuple[LikelihoodSearch, Found] | None:
-    """Another search beside random efforts that are new in every sample; None where what was found gains nothing there.
+class FreshSearch(LikelihoodSearch):
+    """What was found, its parts and what cannot be told from it, beside random efforts that are new in every sample.
+
+    No cause is sought there: what is left has a colour that such efforts have not, and a likelihood without it tells
+    causes apart that it should not.
+    """
+
+    def __init__(self, search: LikelihoodSearch, fits: Sequence[Fit], horizon_s: float) -> None:
+        super().__init__(search.sets.begun_with(fits), search.seed, search.progress, horizon_s)
+        self._names = names_of(fits[0])
+
+    def _search(self) -> Found:
+        return self.settle(self._backward(self._names))
+
+    def settle(self, names: Names, refused: Iterable[str] = ()) -> Found:
+        """A set, once it has the form that the data demand."""
+        self._refine(names)
+        return self.told(names)
+
+
+def judged_again(search: LikelihoodSearch, found: Found) -> tuple[LikelihoodSearch, Found] | None:
+    """What was found beside random efforts that are new in every sample; None where it gains nothing there.
 
     It gains where its errors over the horizon are less, by a thousandth of what the nominal model gets wrong, as those
     of a cause must be: a random effort that lasts is foretold as far as it does, and what takes its place gains less.
@@ -29,15 +52,12 @@ def searched_again(search: LikelihoodSearch, found: Found) -> tuple[LikelihoodSe
     try:
         with time_limit(search.seconds_left):
             fresh = beside_fresh_efforts(found.best)
-            again = _begun_again(search, found, fresh) if _foretells_more(fresh, search, found) else None
-    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
-        return None
-    if again is None:
-        return None
-    try:
+            if not _foretells_more(fresh, search, found):
+                return None
+            again = FreshSearch(search, [fresh, *_beside(found)], search.horizon_s)
         with time_limit(search.seconds_left):
             other = again.run()
-    except NominalFitError:
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime, NominalFitError):
         return None
     return None if again.was_stopped else (again, other)
 
@@ -49,11 +69,12 @@ def _foretells_more(fresh: Fit, search: LikelihoodSearch, found: Found) -> bool:
     return held_out_gain(nominal, lasting, new, search.seed).is_material
 
 
-def _begun_again(search: LikelihoodSearch, found: Found, fresh: Fit) -> LikelihoodSearch:
-    """The search that begins with what was found, and with its parts, beside efforts that are new."""
+def _beside(found: Found) -> list[Fit]:
+    """The parts of what was found, and what cannot be told from it, beside efforts that are new."""
     parts = {names_of(f): f for f in (*found.without.values(), found.nominal)}
-    parts.pop(names_of(fresh), None)
-    return search.begun_with([fresh, *in_parallel(beside_fresh_efforts, list(parts.values()))])
+    parts |= {names_of(f): f for many in found.rivals.values() for f in not_excluded(found.best, many)}
+    parts.pop(names_of(found.best), None)
+    return in_parallel(beside_fresh_efforts, list(parts.values()))
 
 
 def _may_last(fitted: Fit) -> bool:
@@ -67,4 +88,4 @@ def _may_last(fitted: Fit) -> bool:
     return lasts and all(t.kind != IMPOSED and fitted.model.rig.unknowns(t.kind) for t in fitted.trials)
 
 
-__all__ = ["FRESH", "searched_again"]
+__all__ = ["FRESH", "judged_again"]

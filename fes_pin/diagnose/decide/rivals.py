@@ -54,8 +54,12 @@ def alternatives(best: Fit, rivals: Sequence[Fit], name: str) -> tuple[str, ...]
     A rival that fits as well with more parameters, as a spring does in the place of a constant torque, is not excluded.
     """
     others = {e.name for e in best.model.effects} - {name}
-    near = [f for f in rivals if min(f.price - best.price, f.sse - best.sse) < SEPARABLE]
-    return tuple(sorted({e.name for f in near for e in f.model.effects} - others - {name}))
+    return tuple(sorted({e.name for f in not_excluded(best, rivals) for e in f.model.effects} - others - {name}))
+
+
+def not_excluded(best: Fit, rivals: Sequence[Fit]) -> list[Fit]:
+    """The rivals that are as cheap, or as likely, as far as data tell."""
+    return [f for f in rivals if min(f.price - best.price, f.sse - best.sse) < SEPARABLE]
 
 
 def absorbed(searched: Searched, silent: Sequence[str]) -> tuple[str, ...]:

@@ -104,16 +104,6 @@ class LikelihoodSearch:
         """Until the limit of time that the search began with."""
         return self._end - time.monotonic()
 
-    def begun_with(self, fits: Sequence[Fit]) -> LikelihoodSearch:
-        """A search of the same trials that begins with some fits, and with what is random as it is in them.
-
-        Parameters
-        ----------
-        fits
-            That of the nominal model among them.
-        """
-        return LikelihoodSearch(self.sets.begun_with(fits), self.seed, self.progress, self._horizon_s)
-
     @property
     def horizon_s(self) -> float:
         """How far ahead errors over a horizon look, s."""
