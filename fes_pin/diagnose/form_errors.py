@@ -15,6 +15,7 @@ from fes_pin.diagnose.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnose.search.simulation_search import NominalFitError
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts, step_s
+from fes_pin.identify.levels import NOTHING_PERCENT
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 
 FRESH = "what acts at random was taken for new in every sample: beside what lasts, the model foretold less"
@@ -44,8 +45,8 @@ class FreshSearch(LikelihoodSearch):
 def judged_again(search: LikelihoodSearch, found: Found) -> tuple[LikelihoodSearch, Found] | None:
     """What was found beside random efforts that are new in every sample; None where it gains nothing there.
 
-    It gains where its errors over the horizon are less, by a thousandth of what the nominal model gets wrong, as those
-    of a cause must be: a random effort that lasts is foretold as far as it does, and what takes its place gains less.
+    It gains where its errors over the horizon are less, by a thousandth of what the nominal model gets wrong: a random
+    effort that lasts is foretold as far as it does, and what takes its place gains nothing. Nothing is claimed by that.
     """
     if search.was_stopped or not _may_last(found.best):
         return None
@@ -63,10 +64,10 @@ def judged_again(search: LikelihoodSearch, found: Found) -> tuple[LikelihoodSear
 
 
 def _foretells_more(fresh: Fit, search: LikelihoodSearch, found: Found) -> bool:
-    """Whether errors over the horizon are materially less beside efforts that are new."""
+    """Whether errors over the horizon are less beside efforts that are new."""
     many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, fresh)]
     nominal, lasting, new = (errors_over_horizon(one, search.horizon_s) for one in many)
-    return held_out_gain(nominal, lasting, new, search.seed).is_material
+    return held_out_gain(nominal, lasting, new, search.seed).percent > NOTHING_PERCENT
 
 
 def _beside(found: Found) -> list[Fit]:
