@@ -1,12 +1,18 @@
 """Arms behind an elastic drive: what passes for a random effort that lasts, and what a model explains by itself."""
 
+from dataclasses import fields, replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from driven_rigs.arm import CAUSES, draw_arm
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.errors_ahead import errors_ahead
+from fes_pin.diagnose.driven import Judged, _foretelling_more
+from fes_pin.diagnose.errors_ahead import Ahead, errors_ahead
+from fes_pin.diagnose.form_errors import judged_again
+from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts, fresh
@@ -18,6 +24,8 @@ from fes_pin.models.predictor import Doubt
 SEEDS = range(8)
 SECONDS = 20.0
 HORIZON_S = 0.3
+BENT = 6510001
+"""A seed whose likeliest inertia is 22 % too large (`docs/accuracy.md`)."""
 
 
 @pytest.fixture(scope="module")
@@ -65,12 +73,31 @@ def test_what_is_new_in_every_sample_has_the_same_power_and_stays_so(fitted):
     assert fresh(apart, likeliest.trials).time == {"effort": 8.0 * step}
 
 
-@pytest.mark.parametrize("seed", SEEDS[:2])
+@pytest.mark.parametrize("seed", [SEEDS[0], BENT])
 def test_a_diagnosis_names_the_friction_as_large_as_it_is(seed, tmp_path):
     drawn = draw_arm(CAUSES, seed, tmp_path)
     found = diagnose_joint(read_study(drawn.study))
     assert "coulomb_friction" in [c.name for c in found.causes]
-    assert found.extended.values["coulomb_friction.torque_nm"] == pytest.approx(
-        drawn.truth["coulomb_friction.torque_nm"], rel=0.1
+    assert all(abs(found.extended.values[n] / v - 1.0) < 0.1 for n, v in drawn.truth.items())
+
+
+@pytest.mark.parametrize(("ahead", "taken"), [(0.5, True), (1.0, False), (2.0, False)])
+@pytest.mark.parametrize("unexplained", [True, False])
+def test_what_errs_less_over_the_horizon_is_taken_and_what_is_left_by_either_stays(ahead, taken, unexplained):
+    nothing, left = Remainder(False, 1.0, None), Remainder(unexplained, 1e-6, "rate")
+    empty = Judged(**dict.fromkeys(f.name for f in fields(Judged)))
+    one, other = (
+        replace(empty, left=what, ahead=(None, Ahead(1.0, error, None)), horizon_s=error)
+        for what, error in ((left, 1.0), (nothing, ahead))
     )
-    assert found.extended.values["inertia_scale"] == pytest.approx(1.0, rel=0.1)
+    chosen = _foretelling_more(other, one)
+    assert chosen.horizon_s == (ahead if taken else 1.0)
+    assert chosen.left.unexplained is unexplained
+
+
+@pytest.mark.parametrize(
+    "search", [SimpleNamespace(was_stopped=True), SimpleNamespace(was_stopped=False, seconds_left=-1.0)]
+)
+def test_a_search_that_has_no_time_left_is_not_judged_again(search, fitted):
+    _, likeliest, _ = fitted[2]
+    assert judged_again(search, SimpleNamespace(best=likeliest)) is None
