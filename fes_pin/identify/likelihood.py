@@ -28,7 +28,7 @@ from fes_pin.identify.noise import ORDERS, Noise
 from fes_pin.identify.problem import Linearized, Unknowns, limits_of, whitened_sse
 from fes_pin.identify.scoring import TURN, Point, Told, climb
 from fes_pin.models.autoregression import stationary_variance
-from fes_pin.models.compile.layout import WIDTH
+from fes_pin.models.compile.layout import WIDE
 from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, Predictor
@@ -155,7 +155,7 @@ class LikelihoodProblem:
     @property
     def abreast(self) -> int:
         """How many points are tried in one run."""
-        return max(1, WIDTH // len(self.trials))
+        return max(1, WIDE // len(self.trials))
 
     def foretold(
         self, values: Mapping[str, float], unknowns: Unknowns | None = None
@@ -244,8 +244,8 @@ class LikelihoodProblem:
     def _whitened(self, one: ForetoldTrial) -> Linearized:
         """A trial's innovations over their deviations; its sensitivities are scaled where they are."""
         with np.errstate(all="ignore"):
-            residual, logs = one.whitened()
-            moved = one.white(one.sensitivities)
+            residual, logs = one.whitened
+            moved = one.over_deviations(one.sensitivities)
             moved *= -1.0
         split = len(self.free)
         return Linearized(residual, moved[:, :split], moved[:, split:], float(np.sum(logs)))
@@ -265,8 +265,8 @@ def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Lineariz
 def _joined(run: Sequence[ForetoldTrial]) -> Told:
     return Told(
         float(sum(one.cost() for one in run)),
-        np.concatenate([one.whitened()[0] for one in run]),
-        np.concatenate([one.variances[one.seen] for one in run]),
-        np.concatenate([one.noise[one.seen] for one in run]),
-        1.0 - 1.0 / np.concatenate([one.repeats[one.seen] for one in run]),
+        np.concatenate([one.whitened[0] for one in run]),
+        np.concatenate([one.seen_variances for one in run]),
+        np.concatenate([one.noise_told_again for one in run]),
+        np.concatenate([one.readings.again for one in run]),
     )

@@ -43,7 +43,7 @@ Point = tuple[Mapping[str, float], Unknowns, Mapping[str, float]]
 class Told:
     """What was seen, all trials end to end, each of shape (m,); and its cost.
 
-    Innovations over their deviations, variances, the noise in these, 1 - 1 / n.
+    Innovations over their deviations, variances, 1 - 1 / n; and of what was told before, the noise in its variance.
     """
 
     cost: float
@@ -283,15 +283,15 @@ def _first_below(
 @np.errstate(over="ignore", invalid="ignore")
 def _scored(now: Told, moved: Sequence[Told], widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gradient and expected information of half the cost, from differences of such widths; see the module."""
-    e, v = now.innovations, now.variances
-    de = np.stack([m.innovations - e for m in moved], axis=1) / widths
-    dv = np.stack([m.variances - v for m in moved], axis=1) / widths / v[:, None]
-    gradient = e @ de + 0.5 * dv.sum(axis=0)
-    s = de + 0.5 * e[:, None] * dv
+    e, v, width = now.innovations, now.variances, widths[:, None]
+    de = (np.array([m.innovations for m in moved]) - e) / width
+    dv = (np.array([m.variances for m in moved]) - v) / width / v
+    gradient = de @ e + 0.5 * dv.sum(axis=1)
+    s = de + 0.5 * e * dv
     if (held := np.flatnonzero(now.again)).size:
-        dn = np.stack([m.noise[held] / now.noise[held] - 1.0 for m in moved], axis=1) / widths
-        gradient = gradient - 0.5 * now.again[held] @ dn
-    return gradient, s.T @ s + 0.5 * dv.T @ ((1.0 - now.again)[:, None] * dv)
+        dn = np.array([m.noise / now.noise - 1.0 for m in moved]) / width
+        gradient = gradient - 0.5 * dn @ now.again[held]
+    return gradient, s @ s.T + 0.5 * ((1.0 - now.again) * dv) @ dv.T
 
 
 def _damped_step(information: np.ndarray, gradient: np.ndarray, free: np.ndarray, damping: float) -> np.ndarray:

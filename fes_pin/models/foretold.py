@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -22,76 +23,142 @@ class ForetoldOutput(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ForetoldTrial:
-    """One trial as it was foretold, sample by sample.
+class Readings:
+    """What was read in one trial, whatever is foretold of it.
 
     Attributes
     ----------
     outputs
         The measured columns, in the order of the arrays.
+    seen
+        Shape (n, outputs): True where something was measured that is judged: a reading that hunts between two counts is
+        only followed, see `fes_pin.data.counts.hunts`.
+    repeats
+        Shape (n, outputs): how often the same count was read in a row, n; together they are one reading. 1 of what is
+        not read in counts: what a log holds or interpolates stands for other reasons.
+    """
+
+    outputs: tuple[str, ...]
+    seen: np.ndarray
+    repeats: np.ndarray
+
+    @cached_property
+    def all_seen(self) -> bool:
+        """Whether every sample of every output is judged."""
+        return bool(self.seen.all())
+
+    @cached_property
+    def again(self) -> np.ndarray:
+        """Share of each reading's noise that was told before, 1 - 1 / n, shape (m,) of what is seen."""
+        return np.asarray(1.0 - 1.0 / self.of_seen(self.repeats))
+
+    @cached_property
+    def told_again(self) -> np.ndarray:
+        """Places among what is seen of readings whose noise was told before."""
+        return np.flatnonzero(self.again)
+
+    def of_seen(self, array: np.ndarray) -> np.ndarray:
+        """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
+        return array.reshape(-1, *array.shape[2:]) if self.all_seen else array[self.seen]
+
+
+@dataclass(frozen=True)
+class ForetoldTrial:
+    """One trial as it was foretold, sample by sample.
+
+    Attributes
+    ----------
+    readings
+        What was measured.
     values
         Shape (n, outputs): measured minus foretold one sample ahead; 0 where that is not judged.
     variances
         Shape (n, outputs).
-    seen
-        Shape (n, outputs): True where something was measured that is judged: a reading that hunts between two counts is
-        only followed, see `fes_pin.data.counts.hunts`.
     sensitivities
         Shape (n, outputs, columns): derivatives of `values`, for gains as they are.
-    repeats
-        Shape (n, outputs): how often the same count was read in a row, n; together they are one reading. 1 of what is
-        not read in counts: what a log holds or interpolates stands for other reasons.
-    noise
-        Shape (n, outputs): variance of the noise of each in counts as it stands in `variances`, that of one times n.
+    white
+        Deviation of the reading noise of each output.
     ar
         Autoregression of each output's `values` over their deviations; all are white if there is none.
     """
 
-    outputs: tuple[str, ...]
+    readings: Readings
     values: np.ndarray
     variances: np.ndarray
-    seen: np.ndarray
     sensitivities: np.ndarray
-    repeats: np.ndarray
-    noise: np.ndarray
+    white: tuple[float, ...]
     ar: tuple[tuple[float, ...], ...] = ()
 
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The measured columns, in the order of the arrays."""
+        return self.readings.outputs
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Shape (n, outputs): True where something was measured that is judged."""
+        return self.readings.seen
+
+    @property
+    def noise_told_again(self) -> np.ndarray:
+        """Variances of noise that was told before as they stand in `variances`, by reading: that of one times n."""
+        at = self.readings.told_again
+        return np.asarray(self.of_seen(self.readings.repeats * np.square(self.white))[at]) if len(at) else np.zeros(0)
+
     def of_seen(self, array: np.ndarray) -> np.ndarray:
-        """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
-        return array.reshape(-1, *array.shape[2:]) if self.seen.all() else array[self.seen]
+        """See `Readings.of_seen`."""
+        return self.readings.of_seen(array)
+
+    @cached_property
+    def seen_variances(self) -> np.ndarray:
+        """Variances of what was seen, shape (m,)."""
+        return np.ascontiguousarray(self.of_seen(self.variances))
 
     def cost(self) -> float:
         """Twice the negative log-likelihood, but for n log(2 pi); infinite where the prediction runs away."""
         with np.errstate(all="ignore"):
             total = float(np.sum(self.costs()))
-        return total if math.isfinite(total) and bool((self.of_seen(self.variances) > 0).all()) else math.inf
+        return total if math.isfinite(total) and bool((self.seen_variances > 0).all()) else math.inf
 
     def costs(self) -> np.ndarray:
         """The cost of every reading that was seen, shape (m,)."""
-        residual, logs = self.whitened()
+        residual, logs = self.whitened
         return np.asarray(residual**2 + logs)
 
-    def _told_again(self) -> np.ndarray:
-        """What the determinant holds of noise that was told before: n equal readings have n logarithms of one error."""
-        again = 1.0 - 1.0 / self.of_seen(self.repeats)
-        return np.asarray(again * np.log(self.of_seen(self.noise)) if again.any() else again)
-
+    @cached_property
     def whitened(self) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals over deviations and logarithms of variances; of what was seen."""
-        logs = np.log(self.variances)
-        for k, ar in enumerate(self.ar):
-            first = np.log(beginning(ar)[1])[: len(logs)]
-            logs[: len(first), k] += first
-        return self.white(self.values), self.of_seen(logs) - self._told_again()
+        """Residuals over deviations and logarithms of variances; of what was seen.
 
-    def white(self, array: np.ndarray) -> np.ndarray:
+        n equal readings have n logarithms of one error: what the determinant holds of noise that was told before is
+        taken off.
+        """
+        logs = np.log(self.seen_variances)
+        if any(self.ar):
+            logs += self.of_seen(self._growth())
+        at = self.readings.told_again
+        logs[at] -= self.readings.again[at] * np.log(self.noise_told_again)
+        return self.over_deviations(self.values), logs
+
+    def _growth(self) -> np.ndarray:
+        """Logarithms of how much more varies what noise foretells of itself where it begins, shape (n, outputs)."""
+        out = np.zeros(self.variances.shape)
+        for k, ar in enumerate(self.ar):
+            first = np.log(beginning(ar)[1])[: len(out)]
+            out[: len(first), k] = first
+        return out
+
+    def over_deviations(self, array: np.ndarray) -> np.ndarray:
         """What is seen of an array of shape (n, outputs, ...) over deviations, less what noise foretells of itself."""
         if not any(self.ar):
-            out = self.of_seen(array) / np.sqrt(self.of_seen(self.variances)).reshape(-1, *[1] * (array.ndim - 2))
-            return np.asarray(out)
+            deviations = self._deviations.reshape(-1, *[1] * (array.ndim - 2))
+            return np.asarray(self.of_seen(array) / deviations)
         scale = np.where(self.seen, 1.0 / np.sqrt(self.variances), 0.0)
         out = array * scale.reshape(*scale.shape, *[1] * (array.ndim - 2))
         for k, ar in enumerate(self.ar):
             if ar:
                 out[:, k] = unforetold(out[:, k], ar)
         return self.of_seen(out)
+
+    @cached_property
+    def _deviations(self) -> np.ndarray:
+        return np.sqrt(self.seen_variances)

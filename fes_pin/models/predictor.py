@@ -11,10 +11,10 @@ import numpy as np
 from fes_pin.data.counts import SAME, count_of, hunts
 from fes_pin.data.trial import Trial
 from fes_pin.models.autoregression import noise_ahead
-from fes_pin.models.compile.layout import WIDTH, doubt_constants
+from fes_pin.models.compile.layout import doubt_constants, widest, width_of
 from fes_pin.models.compile.program import compiled_program
 from fes_pin.models.disturbance import disturbed
-from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial
+from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial, Readings
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import is_delayed, lane_inputs, lane_values, max_step, substeps, timing, total_delay
 
@@ -118,8 +118,9 @@ class Predictor:
             ).append(i)
         for members in groups.values():
             members.sort(key=lambda i: len(self.trials[i]))
-            for start in range(0, len(members), WIDTH):
-                yield members[start : start + WIDTH]
+            most = widest(self.columns)
+            for start in range(0, len(members), most):
+                yield members[start : start + most]
 
     def run(
         self,
@@ -162,12 +163,17 @@ class Predictor:
         return [total_delay(self.model, v) if self._delayed else 0.0 for v in values]
 
 
+def _lanes_first(array: np.ndarray) -> np.ndarray:
+    """An array whose last axis is lanes with that axis first."""
+    return np.ascontiguousarray(np.moveaxis(array, -1, 0))
+
+
 def _measured(model: Model, trial: Trial) -> tuple[str, ...]:
     return tuple(n for n in model.rig.outputs(trial.kind) if n in trial.columns)
 
 
 class _Block:
-    """Up to WIDTH trials that are foretold side by side."""
+    """Trials that are foretold side by side, as many at most as `widest` lets."""
 
     def __init__(
         self,
@@ -187,42 +193,44 @@ class _Block:
         model = disturbed(model.acting(first.kind, rig.input_columns(first)), first.kind, processes)
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         chosen = tuple(c for c in columns if c in available)
-        self.program = compiled_program(model, first.kind, self.inputs, chosen, self.outputs)
-        self.layout = self.program.layout
+        self.program = compiled_program(model, first.kind, self.inputs, chosen, self.outputs, width_of(len(lanes)))
+        self.layout, self.width = self.program.layout, self.program.layout.width
         self.places = [columns.index(n) for n in self.layout.columns]
         self.substeps = substeps(model, first.dt, max_step_s)
         self.trials = [trials[i] for i in lanes]
         self.count = max(len(t) for t in self.trials)
-        padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
+        padded = self.trials + [self.trials[-1]] * (self.width - len(lanes))
         known = [{**rig.constants_of(t), **timing(t, self.substeps)} for t in padded]
-        own = [priors[i] for i in lanes] + [priors[lanes[-1]]] * (WIDTH - len(lanes))
+        own = [priors[i] for i in lanes] + [priors[lanes[-1]]] * (self.width - len(lanes))
         for constants, prior in zip(known, own, strict=True):
             constants.update({f"prior.{n}": prior[n] for n in rig.unknowns(first.kind)})
         self.doubtful = [n for n in doubt_constants(model, first.kind, self.outputs) if not n.startswith("prior.")]
         self.constants = np.array([[c.get(n, 0.0) for c in known] for n in self.layout.constants], dtype=float).reshape(
-            -1, WIDTH
+            -1, self.width
         )
         self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
-        self.seen = np.zeros((self.count, len(self.outputs), WIDTH), dtype=bool)
-        self.judged = self.seen.copy()
-        self.measured = np.zeros((self.count, len(self.outputs), WIDTH))
-        self.repeated = np.ones((self.count, len(self.outputs), WIDTH))
-        self.in_counts = [[count_of(t[n]) > 0.0 for n in self.outputs] for t in self.trials]
+        self.seen = np.zeros((self.count, len(self.outputs), self.width), dtype=bool)
+        self.measured = np.zeros((self.count, len(self.outputs), self.width))
+        self.repeated = np.ones((self.count, len(self.outputs), self.width))
+        self.readings: list[Readings] = []
         for lane, trial in enumerate(self.trials):
             followed = rig.follows(trial) & are_news(trial, lasts_s)
+            judged, repeats = np.zeros((2, len(trial), len(self.outputs)))
             for k, name in enumerate(self.outputs):
                 column = trial[name]
                 finite = np.isfinite(column) & followed
                 self.seen[: len(trial), k, lane] = finite
-                self.judged[: len(trial), k, lane] = finite & ~hunts(column)
+                judged[:, k] = finite & ~hunts(column)
                 self.measured[: len(trial), k, lane] = np.where(finite, column, 0.0)
                 self.repeated[: len(trial), k, lane] = repeated(column)
+                repeats[:, k] = self.repeated[: len(trial), k, lane] if count_of(column) > 0.0 else 1.0
+            self.readings.append(Readings(self.outputs, judged.astype(bool), repeats))
         self._given: tuple[tuple[int, ...], np.ndarray] | None = None
 
     def _driven(self, shift: tuple[int, ...]) -> np.ndarray:
         """Inputs of all lanes, later by whole samples, beside what was measured and whether it was."""
         if self._given is None or self._given[0] != shift:
-            driven = lane_inputs(self.rig, self.trials, self.inputs, self.count, shift)
+            driven = lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.width), shift)
             read = (self.measured, self.seen.astype(float), self.repeated)
             self._given = (shift, np.concatenate([driven, *read], axis=1))
         return self._given[1]
@@ -238,7 +246,7 @@ class _Block:
         p = lane_values(self.layout, [values[i] for i in self.lanes], [unknowns[i] for i in self.lanes])
         shift = tuple(math.floor(delays[i] / t.dt + 1e-9) for i, t in zip(self.lanes, self.trials, strict=True))
         constants, known = self.constants.copy(), [doubts[i] for i in self.lanes]
-        known += [known[-1]] * (WIDTH - len(known))
+        known += [known[-1]] * (self.width - len(known))
         for name in self.doubtful:
             constants[self.layout.constants.index(name)] = [one[name] for one in known]
         constants[self.layout.constants.index("shift"), : len(shift)] = shift
@@ -246,21 +254,19 @@ class _Block:
 
     def innovations(self, y: np.ndarray, s: np.ndarray, width: int, doubts: Sequence[Doubt]) -> Iterator[ForetoldTrial]:
         """The innovations of each lane and under its doubt, with sensitivities to `width` columns."""
-        k, by_lane = len(self.outputs), np.ascontiguousarray(np.moveaxis(s, -1, 0))
-        for lane, trial in enumerate(self.trials):
-            n = len(trial)
-            seen = self.judged[:n, :, lane]
+        k, told, by_lane = len(self.outputs), _lanes_first(y), _lanes_first(s)
+        for lane, readings in enumerate(self.readings):
+            n = len(readings.seen)
             own = by_lane[lane, :n]
             if self.places == list(range(width)):
                 sensitivities = own
             else:
                 sensitivities = np.zeros((n, k, width))
                 sensitivities[..., self.places] = own
-            values = np.where(seen, y[:n, :k, lane], 0.0)
-            repeats = np.where(self.in_counts[lane], self.repeated[:n, :, lane], 1.0)
-            noise = repeats * np.array([doubts[lane].white[o] for o in self.outputs]) ** 2
+            values = told[lane, :n, :k] if readings.all_seen else np.where(readings.seen, told[lane, :n, :k], 0.0)
+            white = tuple(doubts[lane].white[o] for o in self.outputs)
             ar = tuple(doubts[lane].ar.get(o, ()) for o in self.outputs)
-            yield ForetoldTrial(self.outputs, values, y[:n, k:, lane], seen, sensitivities, repeats, noise, ar)
+            yield ForetoldTrial(readings, values, told[lane, :n, k:], sensitivities, white, ar)
 
     def foretold(self, y: np.ndarray, doubt: Doubt) -> Iterator[dict[str, ForetoldOutput]]:
         """What is foretold in each lane, by output: what was given as measured less the innovation.

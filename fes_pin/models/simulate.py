@@ -11,7 +11,7 @@ import numpy as np
 
 from fes_pin.data.imposed import MOTION, driving_values
 from fes_pin.data.trial import Trial
-from fes_pin.models.compile.layout import WIDTH, Layout
+from fes_pin.models.compile.layout import Layout, widest, width_of
 from fes_pin.models.compile.program import Program, compiled_program
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
@@ -57,9 +57,9 @@ class Abreast:
     columns
         The places of the sensitivities among the columns that the simulator was asked for; the others are zero.
     readings
-        Shape (n, outputs, WIDTH); zero after the end of a shorter trial.
+        Shape (n, outputs, lanes); zero after the end of a shorter trial.
     sensitivities
-        Shape (n, outputs, len(columns), WIDTH).
+        Shape (n, outputs, len(columns), lanes).
     """
 
     trials: tuple[int, ...]
@@ -104,8 +104,9 @@ class Simulator:
             groups.setdefault(key, []).append(i)
         for members in groups.values():
             members.sort(key=lambda i: len(self.trials[i]))
-            for start in range(0, len(members), WIDTH):
-                yield members[start : start + WIDTH]
+            most = widest(self.columns)
+            for start in range(0, len(members), most):
+                yield members[start : start + most]
 
     def run(
         self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]] | None = None
@@ -213,7 +214,7 @@ def _first_samples(trial: Trial) -> Trial:
 
 
 class _Block:
-    """Up to WIDTH trials that run side by side."""
+    """Trials that run side by side, as many at most as `widest` lets."""
 
     def __init__(
         self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...], max_step_s: float
@@ -225,15 +226,20 @@ class _Block:
         self.lanes, self.trials = lanes, [trials[i] for i in lanes]
         available = set(model.parameters()) | set(model.unknowns(first.kind))
         self.program: Program = compiled_program(
-            model, first.kind, self.inputs, tuple(c for c in columns if c in available)
+            model,
+            first.kind,
+            self.inputs,
+            tuple(c for c in columns if c in available),
+            width=width_of(len(lanes)),
         )
         self.layout = self.program.layout
         self.places = tuple(columns.index(n) for n in self.layout.columns)
         self.substeps = substeps(model, first.dt, max_step_s)
         self.count = max(len(t) for t in self.trials)
-        padded = self.trials + [self.trials[-1]] * (WIDTH - len(lanes))
+        padded = self.trials + [self.trials[-1]] * (self.layout.width - len(lanes))
         constants = [{**rig.constants_of(t), **timing(t, self.substeps)} for t in padded]
-        self.constants = np.array([[c[n] for c in constants] for n in self.layout.constants]).reshape(-1, WIDTH)
+        self.constants = np.array([[c[n] for c in constants] for n in self.layout.constants])
+        self.constants = self.constants.reshape(-1, self.layout.width)
         self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
         self._shifted: tuple[tuple[int, ...] | None, np.ndarray] = None, np.empty(0)
 
@@ -245,7 +251,7 @@ class _Block:
         known, u = self._shifted
         if known == shift:
             return u
-        u = lane_inputs(self.rig, self.trials, self.inputs, self.count, shift)
+        u = lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.layout.width), shift)
         self._shifted = shift, u
         return u
 
@@ -275,13 +281,13 @@ def substeps(model: Model, dt: float, max_step_s: float) -> int:
 
 
 def lane_inputs(
-    rig: Rig, trials: Sequence[Trial], inputs: Sequence[str], count: int, shift: Sequence[int]
+    rig: Rig, trials: Sequence[Trial], inputs: Sequence[str], size: tuple[int, int], shift: Sequence[int]
 ) -> np.ndarray:
-    """Inputs of trials side by side, shape (count, inputs, WIDTH), each later by whole samples; zero before.
+    """Inputs of trials side by side, shape (count, inputs, width), each later by whole samples; zero before.
 
-    An imposed motion is never late: what is delayed is the answer to a stimulus.
+    `size` is (count, width). An imposed motion is never late: what is delayed is the answer to a stimulus.
     """
-    u = np.zeros((count, len(inputs), WIDTH))
+    u = np.zeros((size[0], len(inputs), size[1]))
     for lane, trial in enumerate(trials):
         for j, name in enumerate(inputs):
             late = 0 if name in MOTION else min(shift[lane], len(trial))
@@ -292,18 +298,18 @@ def lane_inputs(
 def lane_values(
     layout: Layout, values: Mapping[str, float] | Sequence[Mapping[str, float]], unknowns: Sequence[Mapping[str, float]]
 ) -> np.ndarray:
-    """Values of a program's parameters side by side, shape (values, WIDTH); spare lanes are as the last trial.
+    """Values of a program's parameters side by side, shape (values, width); spare lanes are as the last trial.
 
     `values` of all trials, or those of each.
     """
-    p = np.empty((len(layout.values), WIDTH))
+    p = np.empty((len(layout.values), layout.width))
     for k, name in enumerate(layout.values):
         known = unknowns if name in layout.unknowns else values
         if isinstance(known, Mapping):
             p[k] = known[name]
         else:
             own = [u[name] for u in known]
-            p[k] = own + [own[-1]] * (WIDTH - len(own))
+            p[k] = own + [own[-1]] * (layout.width - len(own))
     return p
 
 

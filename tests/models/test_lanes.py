@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from fes_pin.models.compile.layout import WIDTH
+from fes_pin.models.compile.layout import WIDE, WIDTH
 from fes_pin.models.compile.lower import lowered
 from fes_pin.models.compile.machine import MachineCode, compile_object
 
@@ -19,28 +19,28 @@ SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, 1e-300, 5e-324, -1e-300, 1e300, -1e300, ma
 class Compiled:
     """One CasADi function as machine code, called on arrays of any length."""
 
-    def __init__(self, function):
-        made = lowered(function, "external")
-        self.function = function
+    def __init__(self, function, width=WIDTH):
+        made = lowered(function, "external", width=width)
+        self.function, self.width = function, width
         self.code = MachineCode(compile_object("\n".join([*made.declared.values(), made.text])))
         self.call = self.code.function(function.name(), *[ctypes.c_void_p] * (function.n_in() + 1 + function.n_out()))
 
     def __call__(self, *columns):
         columns = [np.asarray(c, dtype=float) for c in np.broadcast_arrays(*columns)]
-        size = len(columns[0])
-        padded = [np.concatenate([c, np.full(-size % WIDTH, 1.0)]) for c in columns]
+        size, width = len(columns[0]), self.width
+        padded = [np.concatenate([c, np.full(-size % width, 1.0)]) for c in columns]
         out = np.empty_like(padded[0])
-        for k in range(0, len(out), WIDTH):
-            block = [np.ascontiguousarray(c[k : k + WIDTH]) for c in padded]
-            y = np.empty(WIDTH)
+        for k in range(0, len(out), width):
+            block = [np.ascontiguousarray(c[k : k + width]) for c in padded]
+            y = np.empty(width)
             self.call(*[b.ctypes.data for b in block], None, y.ctypes.data)
-            out[k : k + WIDTH] = y
+            out[k : k + width] = y
         return out[:size]
 
 
-def compiled(expression, arity=1):
+def compiled(expression, arity=1, width=WIDTH):
     x = [ca.SX.sym(f"x{k}") for k in range(arity)]
-    return Compiled(ca.Function("f", x, [expression(*x)]))
+    return Compiled(ca.Function("f", x, [expression(*x)]), width)
 
 
 def spread(rng, low, high, count=20000):
@@ -191,13 +191,23 @@ def test_an_operation_without_lowering_is_said():
         Compiled(ca.Function("f", [x], [ca.erfinv(x)]))
 
 
-def test_lanes_do_not_mix():
+def mixed(x):
+    return ca.exp(ca.sin(x)) * ca.tanh(x) + ca.log(x * x + 1) + x**3 + ca.atan(x)
+
+
+@pytest.mark.parametrize("width", [WIDTH, WIDE])
+def test_lanes_do_not_mix(width):
     """Each lane's answer is the same bits wherever in a block it stands."""
-    f = compiled(lambda x: ca.exp(ca.sin(x)) * ca.tanh(x) + ca.log(x * x + 1) + x**3)
+    f = compiled(mixed, width=width)
     x = np.random.default_rng(8).uniform(-5, 5, 41)
     whole = f(x)
     for k in range(len(x)):
         assert f(x[k:])[0] == whole[k]
+
+
+def test_more_lanes_give_the_same_bits():
+    x = np.random.default_rng(9).uniform(-5, 5, 41)
+    assert np.array_equal(compiled(mixed, width=WIDE)(x), compiled(mixed)(x))
 
 
 def test_what_is_known_before_a_loop_is_worked_out_before_it():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fes_pin.models.model import Model
@@ -9,6 +10,8 @@ from fes_pin.models.session import PAST
 
 WIDTH = 4
 """Lanes that run side by side: one AVX2 register. With eight, models with sensitivities spill (1.4 times slower)."""
+WIDE = 8
+"""The same without sensitivities: a chain of operations that wait for each other is as long for eight as for four."""
 
 REST_ITERATIONS = 40
 """Newton steps to the static equilibrium; steps are held to REST_STEP, so 40 of them cross any joint's range."""
@@ -35,6 +38,8 @@ class Layout:
     """Parameters of forms that are switched off, with the values that are compiled in: such forms cost nothing."""
     measured: tuple[str, ...] = ()
     """Outputs whose measurement corrects the states; none of a simulation. See `compile.predictor`."""
+    width: int = WIDTH
+    """Lanes that run side by side."""
 
     @property
     def reported(self) -> int:
@@ -50,6 +55,16 @@ class Layout:
     def values(self) -> tuple[str, ...]:
         """Everything that is a parameter to the program."""
         return (*self.parameters, *self.unknowns)
+
+
+def widest(columns: Sequence[str]) -> int:
+    """How many lanes may run side by side with sensitivities to such columns, or with none."""
+    return WIDTH if columns else WIDE
+
+
+def width_of(count: int) -> int:
+    """How many lanes a program has that runs so many trials at most."""
+    return WIDTH if count <= WIDTH else WIDE
 
 
 @dataclass(frozen=True)
@@ -89,6 +104,7 @@ def make_layout(
     inputs: tuple[str, ...],
     columns: tuple[str, ...],
     measured: tuple[str, ...] = (),
+    width: int = WIDTH,
 ) -> Layout:
     """The layout of a model's program for trials of a kind with these input columns."""
     rig = model.rig
@@ -105,4 +121,5 @@ def make_layout(
         columns=columns,
         fixed=tuple(fixed.items()),
         measured=measured,
+        width=width,
     )

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import casadi as ca
 
 from fes_pin.models.compile.lanes import CONTRACT, LaneFunctions
-from fes_pin.models.compile.straight import Lines, Value, splat
+from fes_pin.models.compile.layout import WIDTH
+from fes_pin.models.compile.straight import Lines, Value
 
 ROUNDED = (*CONTRACT, "arcp")
 """Beside fused products: what is divided by the same number several times may be multiplied by its inverse."""
@@ -76,7 +77,9 @@ class Staged:
     kept: int
 
 
-def lowered(function: ca.Function, linkage: str = "internal", known: Sequence[Container[int]] = ()) -> Staged:
+def lowered(
+    function: ca.Function, linkage: str = "internal", known: Sequence[Container[int]] = (), width: int = WIDTH
+) -> Staged:
     """`function` in LLVM assembly; its inputs and outputs are the nonzeros of CasADi's, a vector of lanes each.
 
     Parameters
@@ -86,6 +89,8 @@ def lowered(function: ca.Function, linkage: str = "internal", known: Sequence[Co
     known
         For each earlier stage, numbers of the inputs that do not change from it to the last; by default there is one
         stage alone.
+    width
+        Lanes of a vector.
 
     Raises
     ------
@@ -98,7 +103,7 @@ def lowered(function: ca.Function, linkage: str = "internal", known: Sequence[Co
     for stage in range(last + 1):
         if stage < last and stage not in schedule.stages_kept:
             continue
-        lines = Lines()
+        lines = Lines(width)
         _Lowering(lines, schedule, stage).emit(inputs, outputs)
         parts[stage] = function.name() if stage == last else f"{function.name()}.{stage}"
         texts.append(lines.function(parts[stage], [*inputs, KEPT], outputs if stage == last else [], linkage))
@@ -189,7 +194,7 @@ class _Lowering:
         if k not in self._made:
             node = self.schedule.nodes[k]
             if node.op == ca.OP_CONST:
-                self._made[k] = splat(node.value)
+                self._made[k] = self.lines.splat(node.value)
             elif node.op == ca.OP_INPUT:
                 self._made[k] = self.lines.load(inputs[node.place[0]], node.place[1])
             else:
@@ -197,7 +202,7 @@ class _Lowering:
         return self._made[k]
 
     def _operation(self, op: int, a: list[Value]) -> Value:
-        b, one, zero = self.lines, splat(1.0), splat(0.0)
+        b, one, zero = self.lines, self.lines.splat(1.0), self.lines.splat(0.0)
         if op in _BINARY:
             return b.operation(_BINARY[op], a[0], a[1], ROUNDED)
         if op in _COMPARE:
@@ -228,7 +233,7 @@ class _Lowering:
 
 def _number(b: Lines, mask: Value) -> Value:
     """A mask as 1.0 and 0.0."""
-    return b.select(mask, splat(1.0), splat(0.0))
+    return b.select(mask, b.splat(1.0), b.splat(0.0))
 
 
 def _extreme(b: Lines, relation: str, one: Value, other: Value) -> Value:
@@ -239,11 +244,11 @@ def _extreme(b: Lines, relation: str, one: Value, other: Value) -> Value:
 
 def _sign(b: Lines, value: Value) -> Value:
     """-1, 0 or 1; NaN for NaN."""
-    zero = splat(0.0)
+    zero = b.splat(0.0)
     sign = b.fsub(_number(b, b.ordered(">", value, zero)), _number(b, b.ordered("<", value, zero)))
     return b.select(b.unordered("uno", value, value), value, sign)
 
 
 def _truth(b: Lines, value: Value) -> Value:
     """A number as a mask: true where it is not zero."""
-    return b.unordered("!=", value, splat(0.0))
+    return b.unordered("!=", value, b.splat(0.0))

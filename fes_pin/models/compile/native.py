@@ -1,4 +1,4 @@
-"""Programs as machine code: a whole trial, with sensitivities, WIDTH lanes at a time."""
+"""Programs as machine code: a whole trial, with sensitivities, several lanes at a time."""
 
 from __future__ import annotations
 
@@ -13,18 +13,17 @@ import numpy as np
 from llvmlite import ir
 
 from fes_pin.models.compile.equations import Equations
-from fes_pin.models.compile.layout import REST_ITERATIONS, REST_STEP, WIDTH, Layout, Sizes
+from fes_pin.models.compile.layout import REST_ITERATIONS, REST_STEP, Layout, Sizes
 from fes_pin.models.compile.lower import Staged, lowered
 from fes_pin.models.compile.machine import MachineCode, compile_object
 
 LOOPED = ("sample", "correct", "output", "rates", "follow")
 """Functions that are called again and again."""
 DOUBLE, INT64 = ir.DoubleType(), ir.IntType(64)
-VECTOR = ir.VectorType(DOUBLE, WIDTH)
 
 
 class NativeProgram:
-    """Machine code of one model structure, kind of trial and set of sensitivity columns."""
+    """Machine code of one model structure, kind of trial, set of sensitivity columns and number of lanes."""
 
     def __init__(self, layout: Layout, object_code: bytes) -> None:
         head, _, body = object_code.partition(b"\n")
@@ -36,14 +35,14 @@ class NativeProgram:
     def run(
         self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Simulate WIDTH lanes; see `Program`."""
-        n, lead, channels = inputs.shape[0], self.layout.reported, self.layout.channels
-        out = np.empty((n, self.sizes.reading, WIDTH))
+        """Simulate all lanes; see `Program`."""
+        width, n, lead, channels = self.layout.width, inputs.shape[0], self.layout.reported, self.layout.channels
+        out = np.empty((n, self.sizes.reading, width))
         given = [np.ascontiguousarray(a, dtype=float) for a in (inputs, values, constants)]
-        rest, scratch = np.array(guess, dtype=float), np.zeros((self.sizes.scratch, WIDTH))
+        rest, scratch = np.array(guess, dtype=float), np.zeros((self.sizes.scratch, width))
         memory = (*given, rest, out, scratch)  # a name for each: they must live until the machine code returns
         self._run(n, substeps, *[a.ctypes.data for a in memory])
-        return out[:, :lead], out[:, lead:].reshape(n, channels, len(self.layout.columns), WIDTH)
+        return out[:, :lead], out[:, lead:].reshape(n, channels, len(self.layout.columns), width)
 
 
 def compile_equations(equations: Equations) -> bytes:
@@ -55,7 +54,7 @@ def compile_equations(equations: Equations) -> bytes:
 def emit(equations: Equations) -> tuple[str, Sizes]:
     """LLVM assembly of a program, and its sizes: static equilibrium, then samples of Runge-Kutta steps."""
     functions = equations.functions()
-    made = {n: lowered(f, known=_known(n, f)) for n, f in functions.items()}
+    made = {n: lowered(f, known=_known(n, f), width=equations.layout.width) for n, f in functions.items()}
     sizes = replace(equations.sizes, kept=sum(one.kept for one in made.values()))
     declared = {name: line for one in made.values() for name, line in one.declared.items()}
     loop = _Loop(equations, made, sizes).module
@@ -76,7 +75,8 @@ class _Loop:
 
     def __init__(self, equations: Equations, made: Mapping[str, Staged], sizes: Sizes) -> None:
         self.module, self.equations, self.made, self.sizes = ir.Module(name="fes_pin"), equations, made, sizes
-        double, elsewhere = ir.PointerType(VECTOR), ir.Module()  # the parts are text: here they have but their names
+        self.vector = ir.VectorType(DOUBLE, equations.layout.width)
+        double, elsewhere = ir.PointerType(self.vector), ir.Module()  # the parts are text: here they are names
         self.parts = dict[str, ir.Function]()
         for n, f in equations.functions().items():
             for part in made[n].parts.values():
@@ -103,9 +103,9 @@ class _Loop:
         self._states = [self.b.alloca(both[0].type) for _ in both]
         for where, pointer in zip(self._states, both, strict=True):
             self.b.store(pointer, where)
-        self.t = self.b.alloca(VECTOR)
-        self.since, self.into = self.b.alloca(VECTOR), self.b.alloca(VECTOR)
-        self.g = self.b.alloca(VECTOR, ir.Constant(INT64, 2))
+        self.t = self.b.alloca(self.vector)
+        self.since, self.into = self.b.alloca(self.vector), self.b.alloca(self.vector)
+        self.g = self.b.alloca(self.vector, ir.Constant(INT64, 2))
 
     @property
     def state(self) -> ir.Value:
@@ -159,9 +159,9 @@ class _Loop:
     def _number(self, k: ir.Value) -> ir.Value:
         """An integer as lanes of doubles."""
         one = self.b.insert_element(
-            ir.Constant(VECTOR, ir.Undefined), self.b.sitofp(k, DOUBLE), ir.Constant(ir.IntType(32), 0)
+            ir.Constant(self.vector, ir.Undefined), self.b.sitofp(k, DOUBLE), ir.Constant(ir.IntType(32), 0)
         )
-        mask = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+        mask = ir.Constant(ir.VectorType(ir.IntType(32), self.vector.count), [0] * self.vector.count)
         return self.b.shuffle_vector(one, one, mask)
 
     def _rest(self) -> None:
@@ -170,7 +170,7 @@ class _Loop:
         def newton(_: ir.Value) -> None:
             self._call("rest", [self.z, self.p, self.c], [self.g, self._at(self.g, 1)])
             step = b.fdiv(self._load(self.g), self._load(self.g, 1))
-            for beyond, most in ((">", _splat(REST_STEP)), ("<", _splat(-REST_STEP))):
+            for beyond, most in ((">", self._splat(REST_STEP)), ("<", self._splat(-REST_STEP))):
                 step = b.select(b.fcmp_ordered(beyond, step, most), most, step)
             self._store(b.fsub(self._load(self.z), step), self.z)
 
@@ -208,7 +208,7 @@ class _Loop:
             self._runge_kutta(u, self.state)
             return
         self._runge_kutta(u, self.total)
-        b.store(b.fmul(self.step, _splat(0.5)), self.into, align=8)
+        b.store(b.fmul(self.step, self._splat(0.5)), self.into, align=8)
         times = [self.t, self.since, self.into]
         self._next_state("follow", [self.total, self.memory, u, *times, self.p, self.c])
 
@@ -229,9 +229,9 @@ class _Loop:
             (1 / 3, 1.0, 0.5, self.stage),
             (1 / 6, 0.0, 1.0, self.stage),
         ):
-            b.store(b.fmul(self.step, _splat(at)), self.into, align=8)
+            b.store(b.fmul(self.step, self._splat(at)), self.into, align=8)
             self._call("rates", [source, *fixed], [self.rate])
-            share, forward = b.fmul(self.step, _splat(weight)), b.fmul(self.step, _splat(ahead))
+            share, forward = b.fmul(self.step, self._splat(weight)), b.fmul(self.step, self._splat(ahead))
             self._count(size, partial(self._advance, at=at, share=share, forward=forward, end=end))
 
     def _advance(self, i: ir.Value, at: float, share: ir.Value, forward: ir.Value, end: ir.Value) -> None:
@@ -246,7 +246,6 @@ class _Loop:
         self._store(total, self.total, i)
         self._store(b.fadd(state, b.fmul(forward, rate)), self.stage, i)
 
-
-def _splat(value: float) -> ir.Constant:
-    """The same number in every lane."""
-    return ir.Constant(VECTOR, [value] * WIDTH)
+    def _splat(self, value: float) -> ir.Constant:
+        """The same number in every lane."""
+        return ir.Constant(self.vector, [value] * self.vector.count)

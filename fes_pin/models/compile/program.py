@@ -14,7 +14,7 @@ import numpy as np
 from fes_pin import settings
 from fes_pin.models.compile.disk_cache import read_cached, write_cached
 from fes_pin.models.compile.equations import Equations, derive
-from fes_pin.models.compile.layout import Layout, make_layout
+from fes_pin.models.compile.layout import WIDTH, Layout, make_layout
 from fes_pin.models.compile.predictor import derive_predictor
 from fes_pin.models.compile.virtual import VirtualProgram
 from fes_pin.models.model import Model
@@ -31,25 +31,25 @@ class Program(Protocol):
     def run(
         self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Simulate WIDTH lanes.
+        """Simulate as many lanes as the layout has.
 
         Parameters
         ----------
         inputs
-            Shape (n, number of inputs, WIDTH).
+            Shape (n, number of inputs, width).
         values, constants
-            Shape (number, WIDTH), in the layout's order.
+            Shape (number, width), in the layout's order.
         guess
-            Shape (WIDTH,): where the search for the static equilibrium starts.
+            Shape (width,): where the search for the static equilibrium starts.
         substeps
             Integration steps per sample.
 
         Returns
         -------
         readings
-            Shape (n, outputs, WIDTH); of a predictor (n, 2 measured, WIDTH): innovations, then their variances.
+            Shape (n, outputs, width); of a predictor (n, 2 measured, width): innovations, then their variances.
         sensitivities
-            Shape (n, outputs, columns, WIDTH); of a predictor those of the innovations, for gains as they are.
+            Shape (n, outputs, columns, width); of a predictor those of the innovations, for gains as they are.
         """
 
 
@@ -63,6 +63,7 @@ def compiled_program(
     inputs: tuple[str, ...],
     columns: tuple[str, ...],
     measured: tuple[str, ...] = (),
+    width: int = WIDTH,
 ) -> Program:
     """The program of a model, compiled if it was not before.
 
@@ -76,13 +77,15 @@ def compiled_program(
         Parameters and unknowns to give sensitivities for.
     measured
         Outputs whose measurement corrects the states, for a predictor.
+    width
+        Lanes that run side by side.
 
     Raises
     ------
     InputError
         If FES_PIN_ENGINE names no engine, or FES_PIN_CPU no processor.
     """
-    layout, engine = make_layout(model, kind, inputs, columns, measured), settings.engine()
+    layout, engine = make_layout(model, kind, inputs, columns, measured, width), settings.engine()
     key = (engine, settings.processor(), _classes(model), layout)
     if key not in _PROGRAMS:
         with _LOCK:

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from functools import cache
 from typing import NamedTuple
 
 from fes_pin.models.compile.layout import WIDTH
 
-VECTOR, INTEGERS, MASK = f"<{WIDTH} x double>", f"<{WIDTH} x i64>", f"<{WIDTH} x i1>"
 ORDERED = {"<": "olt", "<=": "ole", "==": "oeq", ">": "ogt"}
 UNORDERED = {"<": "ult", ">": "ugt", "!=": "une", "uno": "uno"}
 
@@ -25,25 +23,25 @@ class Value(NamedTuple):
     text: str
 
 
-@cache
-def splat(value: float) -> Value:
-    """The same number in every lane."""
-    bits = struct.unpack("<Q", struct.pack("<d", value))[0]
-    return Value(VECTOR, f"<{', '.join([f'double 0x{bits:016x}'] * WIDTH)}>")
-
-
-@cache
-def splat_int(value: int) -> Value:
-    """The same integer in every lane."""
-    return Value(INTEGERS, f"<{', '.join([f'i64 {int(value)}'] * WIDTH)}>")
-
-
 class Lines:
-    """The instructions of one function, line by line."""
+    """The instructions of one function on so many lanes, line by line."""
 
-    def __init__(self) -> None:
-        self.lines: list[str] = []
+    def __init__(self, width: int = WIDTH) -> None:
+        self.width, self.lines = width, list[str]()
+        self.vector, self.integers, self._mask = (f"<{width} x {one}>" for one in ("double", "i64", "i1"))
         self.declared: dict[str, str] = {}
+
+    def splat(self, value: float) -> Value:
+        """The same number in every lane."""
+        bits = struct.unpack("<Q", struct.pack("<d", value))[0]
+        return self._everywhere(self.vector, f"double 0x{bits:016x}")
+
+    def splat_int(self, value: int) -> Value:
+        """The same integer in every lane."""
+        return self._everywhere(self.integers, f"i64 {int(value)}")
+
+    def _everywhere(self, kind: str, text: str) -> Value:
+        return Value(kind, f"<{', '.join([text] * self.width)}>")
 
     def _made(self, kind: str, text: str) -> Value:
         name = f"%v{len(self.lines)}"
@@ -76,19 +74,19 @@ class Lines:
 
     def ordered(self, relation: str, one: Value, other: Value) -> Value:
         """Mask: true where a relation holds, false where either is NaN."""
-        return self._made(MASK, f"fcmp {ORDERED[relation]} {one.type} {one.text}, {other.text}")
+        return self._made(self._mask, f"fcmp {ORDERED[relation]} {one.type} {one.text}, {other.text}")
 
     def unordered(self, relation: str, one: Value, other: Value) -> Value:
         """Mask: true where a relation holds or either is NaN; `uno` for the latter alone."""
-        return self._made(MASK, f"fcmp {UNORDERED[relation]} {one.type} {one.text}, {other.text}")
+        return self._made(self._mask, f"fcmp {UNORDERED[relation]} {one.type} {one.text}, {other.text}")
 
     def differs(self, one: Value, other: Value) -> Value:
         """Mask: true where two integers differ."""
-        return self._made(MASK, f"icmp ne {one.type} {one.text}, {other.text}")
+        return self._made(self._mask, f"icmp ne {one.type} {one.text}, {other.text}")
 
     def select(self, mask: Value, yes: Value, no: Value) -> Value:
         """`yes` where the mask holds, else `no`, lane by lane."""
-        return self._made(yes.type, f"select {MASK} {mask.text}, {yes.type} {yes.text}, {no.type} {no.text}")
+        return self._made(yes.type, f"select {self._mask} {mask.text}, {yes.type} {yes.text}, {no.type} {no.text}")
 
     def bits_as(self, one: Value, kind: str) -> Value:
         """The same bits as another type."""
@@ -96,15 +94,15 @@ class Lines:
 
     def intrinsic(self, name: str, args: Sequence[Value]) -> Value:
         """LLVM's own function on lanes."""
-        return self._called(VECTOR, f"llvm.{name}.v{WIDTH}f64", args)
+        return self._called(self.vector, f"llvm.{name}.v{self.width}f64", args)
 
     def per_lane(self, name: str, args: Sequence[Value]) -> Value:
         """A function of the C library, lane by lane."""
-        out = Value(VECTOR, "undef")
-        for lane in range(WIDTH):
+        out = Value(self.vector, "undef")
+        for lane in range(self.width):
             each = [self._made("double", f"extractelement {a.type} {a.text}, i32 {lane}") for a in args]
             value = self._called("double", name, each)
-            out = self._made(VECTOR, f"insertelement {VECTOR} {out.text}, double {value.text}, i32 {lane}")
+            out = self._made(self.vector, f"insertelement {self.vector} {out.text}, double {value.text}, i32 {lane}")
         return out
 
     def _called(self, kind: str, name: str, args: Sequence[Value]) -> Value:
@@ -113,18 +111,18 @@ class Lines:
 
     def load(self, pointer: str, place: int) -> Value:
         """A vector from an array of them."""
-        return self._made(VECTOR, f"load {VECTOR}, {VECTOR}* {self._element(pointer, place)}, align 8")
+        return self._made(self.vector, f"load {self.vector}, {self.vector}* {self._element(pointer, place)}, align 8")
 
     def store(self, value: Value, pointer: str, place: int) -> None:
         """A vector into an array of them."""
         element = self._element(pointer, place)
-        self.lines.append(f"  store {value.type} {value.text}, {VECTOR}* {element}, align 8")
+        self.lines.append(f"  store {value.type} {value.text}, {self.vector}* {element}, align 8")
 
     def _element(self, pointer: str, place: int) -> str:
-        return self._made("", f"getelementptr {VECTOR}, {VECTOR}* {pointer}, i64 {place}").text
+        return self._made("", f"getelementptr {self.vector}, {self.vector}* {pointer}, i64 {place}").text
 
     def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], linkage: str = "internal") -> str:
         """The lines as a function of pointers to lanes, by their names, that returns nothing."""
-        arguments = [f"{VECTOR}* {n}" for n in inputs] + [f"{VECTOR}* noalias {n}" for n in outputs]
+        arguments = [f"{self.vector}* {n}" for n in inputs] + [f"{self.vector}* noalias {n}" for n in outputs]
         head = f'define {linkage} void @"{name}"({", ".join(arguments)})'
         return "\n".join([head, "{", *self.lines, "  ret void", "}", ""])

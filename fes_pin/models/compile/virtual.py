@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from fes_pin.models.compile.equations import Equations
-from fes_pin.models.compile.layout import REST_ITERATIONS, REST_STEP, WIDTH
+from fes_pin.models.compile.layout import REST_ITERATIONS, REST_STEP
 
 
 class VirtualProgram:
@@ -22,17 +22,17 @@ class VirtualProgram:
     def run(
         self, inputs: np.ndarray, values: np.ndarray, constants: np.ndarray, guess: np.ndarray, substeps: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Simulate WIDTH lanes; see `Program`."""
-        n, lead, channels = inputs.shape[0], self.layout.reported, self.layout.channels
-        out = np.empty((n, self.equations.sizes.reading, WIDTH))
-        for lane in range(WIDTH):
+        """Simulate all lanes; see `Program`."""
+        width, n, lead, channels = self.layout.width, inputs.shape[0], self.layout.reported, self.layout.channels
+        out = np.empty((n, self.equations.sizes.reading, width))
+        for lane in range(width):
             p, c = values[:, lane], constants[:, lane]
             state, memory = self.equations.start(self._rest(float(guess[lane]), p, c), p, c)
             trajectory = self._trajectory(n, substeps)
             times = self._times(c, n)
             ended = trajectory(state, memory, inputs[:, :, lane].T, times, ca.repmat(p, 1, n), ca.repmat(c, 1, n))
             out[:, :, lane] = np.array(ended[2]).T
-        return out[:, :lead], out[:, lead:].reshape(n, channels, len(self.layout.columns), WIDTH)
+        return out[:, :lead], out[:, lead:].reshape(n, channels, len(self.layout.columns), width)
 
     def _times(self, constants: np.ndarray, n: int) -> np.ndarray:
         """Time of every sample, shape (1, n)."""
