@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from fes_pin.workers import in_parallel
 AVERAGED_S = 0.05
 """Time over which a random effort is averaged before it is compared, s: what is faster moves no limb, and of what is
 much faster than the rig data tell the intensity 2 std^2 time alone, not deviation and time one by one."""
+
+_Told = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -148,8 +151,21 @@ def _squares(fitted: Fit, floor: Fit, trial: Trial, horizon_s: float) -> np.ndar
     return np.array([p.sum(axis=1) for p in pieces]).T
 
 
-def _told(fitted: Fit, trial: Trial, horizon_s: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """What is foretold over the horizon, and the variance of its errors by noise alone, shape (n,) by output."""
+_TOLD: WeakKeyDictionary[Fit, dict[tuple[int, float], tuple[Trial, _Told]]] = WeakKeyDictionary()
+
+
+def _told(fitted: Fit, trial: Trial, horizon_s: float) -> _Told:
+    """What is foretold over the horizon, and the variance of its errors by noise alone, shape (n,) by output.
+
+    The same is asked where causes are judged and where errors are told: it is kept as long as the fit is.
+    """
+    known, key = _TOLD.setdefault(fitted, {}), (id(trial), horizon_s)
+    if key not in known:
+        known[key] = (trial, _foretold(fitted, trial, horizon_s))  # as long as the trial is here no other has its id
+    return known[key][1]
+
+
+def _foretold(fitted: Fit, trial: Trial, horizon_s: float) -> _Told:
     assert fitted.doubt is not None
     calm = noise_that_is_small(fitted)
     told = forecasts(fitted.model, trial, fitted.doubt, horizon_s)
@@ -179,26 +195,28 @@ def noise_that_is_small(fitted: Fit) -> Doubt:
 
 def errors_ahead(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float, falling: bool) -> Ahead:
     """E of the first output one sample ahead, over the horizon, and free."""
-    missed = {"one_step": 0.0, "horizon": 0.0, "free": 0.0, "noise": 0.0}
-    around = dict.fromkeys(missed, 0.0)
-    for fitted, trials in pairs:
-        assert fitted.doubt is not None
-        for trial in trials:
-            name = fitted.model.rig.output(trial.kind)
-            measured = trial[name]
-            told, noise = _told(fitted, trial, horizon_s)
-            begun = np.arange(len(trial)) < _first(fitted, trial, horizon_s)
-            free = predictions(fitted.model, [trial], fitted.noise)[0][:, 0]
-            errors = {
-                "one_step": one_step(fitted.model, trial, fitted.doubt)[name],
-                "horizon": np.where(begun, np.nan, measured - told[name]),
-                "free": measured - free,
-                "noise": np.where(begun, np.nan, np.sqrt(noise[name])),
-            }
-            spread = (measured - np.nanmean(measured)) ** 2
-            with np.errstate(all="ignore"):
-                for key, values in errors.items():
-                    missed[key] += float(np.nansum(values**2))
-                    around[key] += float(np.nansum(spread[~begun] if key in ("horizon", "noise") else spread))
-    percent = {n: 100.0 * v / max(around[n], 1e-300) for n, v in missed.items()}
-    return replace(Ahead(**percent), free=None if falling else percent["free"])
+    work = [(fitted, trial) for fitted, trials in pairs for trial in trials]
+    missed, around = np.sum(in_parallel(lambda one: _sums(*one, horizon_s), work), axis=0)
+    one_step, horizon, free, noise = (float(v) for v in 100.0 * missed / np.maximum(around, 1e-300))
+    return Ahead(one_step, horizon, None if falling else free, noise)
+
+
+def _sums(fitted: Fit, trial: Trial, horizon_s: float) -> np.ndarray:
+    """Squared errors of the first output of a trial, and what it varies where they are judged, shape (2, 4).
+
+    One sample ahead, over the horizon, free, and over the horizon by noise alone.
+    """
+    assert fitted.doubt is not None
+    name = fitted.model.rig.output(trial.kind)
+    measured, (told, noise) = trial[name], _told(fitted, trial, horizon_s)
+    begun = np.arange(len(trial)) < _first(fitted, trial, horizon_s)
+    errors = (
+        one_step(fitted.model, trial, fitted.doubt)[name],
+        np.where(begun, np.nan, measured - told[name]),
+        measured - predictions(fitted.model, [trial], fitted.noise)[0][:, 0],
+        np.where(begun, np.nan, np.sqrt(noise[name])),
+    )
+    spread = (measured - np.nanmean(measured)) ** 2
+    with np.errstate(all="ignore"):
+        around = [float(np.nansum(spread if k in (0, 2) else spread[~begun])) for k in range(len(errors))]
+        return np.array([[float(np.nansum(e**2)) for e in errors], around])

@@ -36,7 +36,7 @@ GROSS = 10.0
 """Reduced chi-square from which a fit may have ended far from the optimum."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Fit:
     """A model with fitted parameters; it can prove its own quality.
 
