@@ -19,7 +19,7 @@ import scipy.optimize
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import fit
-from fes_pin.models.compile.layout import WIDTH
+from fes_pin.models.compile.layout import WIDE, WIDTH
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle
 from fes_pin.models.simulate import Simulator
@@ -102,13 +102,14 @@ def _simulation() -> list[Row]:
     angle = simulator.run(TRUE)[0].readings[:, 0]
     exact = _scipy(trial, KNOWN | TRUE, method="DOP853", rtol=1e-12, atol=1e-13)
     ours, theirs = _medians(lambda: simulator.run(TRUE), lambda: _scipy(trial, KNOWN | TRUE, method="LSODA", rtol=1e-6))
-    four = Simulator(model, [trial] * WIDTH)
-    packed = _median(lambda: four.run(TRUE), 31) / WIDTH
+    four, eight = (Simulator(model, [trial] * count) for count in (WIDTH, WIDE))
+    packed, wide = (_median(lambda s=s: s.run(TRUE), 31) / len(s.trials) for s in (four, eight))
     bent = Simulator(model, [trial] * WIDTH, tuple(TRUE))
     sensitive = _median(lambda: bent.run(TRUE), 31) / WIDTH
     return [
         ("one simulation, 10 s at 1 kHz, alone in its block of lanes", 1e3 * ours, None, "ms"),
         (f"one of {WIDTH} that fill a block", 1e3 * packed, None, "ms"),
+        (f"one of {WIDE} that fill a wide one", 1e3 * wide, None, "ms"),
         (f"one of {WIDTH}, with sensitivities to 4 parameters", 1e3 * sensitive, None, "ms"),
         ("times faster than solve_ivp LSODA, rtol 1e-6", theirs / ours, 50.0, "x"),
         ("largest angle error", float(np.abs(angle - exact).max()), 1e-6, "rad"),
