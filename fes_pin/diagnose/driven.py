@@ -44,7 +44,7 @@ from fes_pin.diagnose.errors_ahead import (
     errors_ahead,
     random_parts,
 )
-from fes_pin.diagnose.form_errors import FRESH, judged_again
+from fes_pin.diagnose.form_errors import FRESH, beside_what_is_new, judged_again
 from fes_pin.diagnose.remainder.driven import driven_remainder
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosis
@@ -54,7 +54,7 @@ from fes_pin.diagnose.search.simulation_search import Searched
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_reading
-from fes_pin.identify.scatter import as_wide_as_trials_differ, with_honest_intervals
+from fes_pin.identify.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.models.stage import Effect
 
 
@@ -203,11 +203,16 @@ def driven_diagnosis(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
-    judged = judge_driven(search, found, search.sets.trials, trials[1], seed)
-    if (again := judged_again(search, judged.found)) is not None:
+    judged = likeliest = judge_driven(search, found, search.sets.trials, trials[1], seed)
+    fresh = beside_what_is_new(search, judged.found)
+    again = None if fresh is None else judged_again(search, judged.found, fresh)
+    if again is not None:
         judged = _foretelling_more(judge_driven(*again, search.sets.trials, trials[1], seed), judged)
     found, left = judged.found, judged.left
     best = as_wide_as_trials_differ(with_honest_intervals(found.best), judged.again)
+    other = fresh if judged.found is likeliest.found else likeliest.found.best
+    if other is not None and names_of(other) == names_of(best):
+        best = as_wide_as_estimates_differ(best, other)
     searched = Searched(
         nominal=found.nominal,
         best=best,

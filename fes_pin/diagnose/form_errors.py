@@ -42,17 +42,30 @@ class FreshSearch(LikelihoodSearch):
         return self.told(names)
 
 
-def judged_again(search: LikelihoodSearch, found: Found) -> tuple[LikelihoodSearch, Found] | None:
-    """What was found beside random efforts that are new in every sample; None where it gains nothing there.
-
-    It gains where its errors over the horizon are less, by a thousandth of what the nominal model gets wrong: a random
-    effort that lasts is foretold as far as it does, and what takes its place gains nothing. Nothing is claimed by that.
-    """
+def beside_what_is_new(search: LikelihoodSearch, found: Found) -> Fit | None:
+    """What was found, beside random efforts that are new in every sample; None where none that lasts acts."""
     if search.was_stopped or not _may_last(found.best):
         return None
     try:
         with time_limit(search.seconds_left):
-            fresh = beside_fresh_efforts(found.best)
+            return beside_fresh_efforts(found.best)
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
+        return None
+
+
+def judged_again(search: LikelihoodSearch, found: Found, fresh: Fit) -> tuple[LikelihoodSearch, Found] | None:
+    """What was found beside random efforts that are new in every sample; None where it gains nothing there.
+
+    It gains where its errors over the horizon are less, by a thousandth of what the nominal model gets wrong: a random
+    effort that lasts is foretold as far as it does, and what takes its place gains nothing. Nothing is claimed by that.
+
+    Parameters
+    ----------
+    fresh
+        Of `beside_what_is_new`.
+    """
+    try:
+        with time_limit(search.seconds_left):
             if not _foretells_more(fresh, search, found):
                 return None
             again = FreshSearch(search, [fresh, *_beside(found)], search.horizon_s)
@@ -89,4 +102,4 @@ def _may_last(fitted: Fit) -> bool:
     return lasts and all(t.kind != IMPOSED and fitted.model.rig.unknowns(t.kind) for t in fitted.trials)
 
 
-__all__ = ["FRESH", "judged_again"]
+__all__ = ["FRESH", "beside_what_is_new", "judged_again"]

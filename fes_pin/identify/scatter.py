@@ -62,6 +62,29 @@ def as_wide_as_trials_differ(fitted: Fit, again: Sequence[Fit]) -> Fit:
     return replace(fitted, covariance=fitted.covariance * np.outer(wider, wider))
 
 
+def as_wide_as_estimates_differ(fitted: Fit, other: Fit) -> Fit:
+    """The fit with intervals that hold another estimate of the same parameters where chance does not set both apart.
+
+    Both estimate the same where the model is right, and the other no better: their difference varies by less than that
+    does. Where it is unusual beside it, the model is not right, by about as much as both are apart; either may be off
+    by that.
+
+    Source: Hausman, Specification tests in econometrics, Econometrica 46 (1978).
+
+    Parameters
+    ----------
+    other
+        A fit of the same causes to the same trials by what is not the likeliest.
+    """
+    known = dict(zip(other.free, np.diag(with_honest_intervals(other).covariance), strict=True))
+    varies = np.array([known.get(n, np.inf) for n in fitted.free])
+    apart = np.array([other.values[n] - fitted.values[n] for n in fitted.free])
+    with np.errstate(all="ignore"):
+        ratio = np.where(np.isfinite(varies) & (varies > 0.0), apart**2 / varies, 0.0)
+    apart = np.where(ratio > chi2_quantile(1.0 - UNUSUAL_LEVEL, 1), apart, 0.0)
+    return replace(fitted, covariance=fitted.covariance + np.outer(apart, apart))
+
+
 def excess_scatter(larger: Fit, smaller: Fit) -> float:
     """How many times wider than of a right model that is scattered what a larger fit has besides; at least 1."""
     more = [k for k, n in enumerate(larger.free) if n not in smaller.free]

@@ -22,7 +22,7 @@ from fes_pin.identify.covariance import covariance_of, widened
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Linearized, normal_equations, whitened_sse
-from fes_pin.identify.scatter import at_rest, scores_of
+from fes_pin.identify.scatter import at_rest, scores_of, with_honest_intervals
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 
@@ -48,6 +48,8 @@ EARLY = "early_reading.early_s"
 def with_doubt_of_timing(fitted: Fit, row_s: float) -> Fit:
     """A fit by the likelihood, of a joint that an effort drives, with intervals that hold when a reading was taken.
 
+    What those of the fit hold beyond how its scores scatter they go on to hold.
+
     As it is where nothing that is read is a place with a velocity `v`, as of a rig of one's own, or where a reading
     that is a little earlier cannot be foretold.
 
@@ -68,8 +70,16 @@ def with_doubt_of_timing(fitted: Fit, row_s: float) -> Fit:
     hessian[-1, -1] += 12.0 / row_s**2
     known = covariance_of(hessian, free)
     moved = known[:, -1] * min(abs(slope), 0.5 * row_s / known[-1, -1])
-    wide = widened(known, scores_of(parts)) + np.outer(moved, moved)
-    return replace(fitted, covariance=wide[:-1, :-1])
+    wide = (widened(known, scores_of(parts)) + np.outer(moved, moved))[:-1, :-1]
+    return replace(fitted, covariance=wide + _beyond_scatter(fitted))
+
+
+def _beyond_scatter(fitted: Fit) -> np.ndarray:
+    """What the covariance of a fit has more than how its scores scatter, shape (free, free); 0 of parameters that have
+    less."""
+    more = fitted.covariance - with_honest_intervals(fitted).covariance
+    kept = np.nan_to_num(np.diag(more)) > 0.0
+    return np.where(np.isfinite(more) & np.outer(kept, kept), more, 0.0)
 
 
 def _linearized(fitted: Fit, early_s: float) -> Sequence[Linearized]:

@@ -1,5 +1,6 @@
 """When within its row a reading was taken: what no log says, and intervals hold."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,3 +70,15 @@ def test_where_time_is_known_nothing_is_doubted(tmp_path):
     ratios = {n: doubtful.std(n) / plain.std(n) for n in fitted.free}
     assert min(ratios.values()) > 0.999 and max(ratios.values()) > 1.1, ratios
     assert all(sure.std(n) == pytest.approx(plain.std(n), rel=1e-3) for n in fitted.free)
+
+
+def test_what_intervals_hold_beside_is_kept(tmp_path):
+    """As by how much trials differ, or two estimates: it was lost, and with it what folds had told."""
+    fitted = fitted_slide(0, tmp_path)
+    honest = with_honest_intervals(fitted)
+    wider = replace(honest, covariance=honest.covariance * np.outer(*[[4.0, 1.0]] * 2))
+    plain, wide = with_doubt_of_timing(honest, DT), with_doubt_of_timing(wider, DT)
+    first, second = (wide.std(n) ** 2 - plain.std(n) ** 2 for n in fitted.free)
+    assert first == pytest.approx(15.0 * honest.std(fitted.free[0]) ** 2, rel=1e-6)
+    assert second == pytest.approx(0.0, abs=1e-9 * plain.std(fitted.free[1]) ** 2)
+    assert np.allclose(with_doubt_of_timing(fitted, DT).covariance, plain.covariance)

@@ -1,6 +1,6 @@
 """Gains beside errors that are no white noise: as far as the scores of pieces of the data agree on them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +8,12 @@ import pytest
 
 from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.problem import Linearized
-from fes_pin.identify.scatter import as_wide_as_trials_differ, excess_scatter
+from fes_pin.identify.scatter import (
+    as_wide_as_estimates_differ,
+    as_wide_as_trials_differ,
+    excess_scatter,
+    with_honest_intervals,
+)
 
 EACH, TRIALS, DRAWS = 500, 4, 200
 
@@ -133,3 +138,52 @@ def test_a_single_fit_says_nothing_of_how_trials_differ():
     unknown = Means({"steady": 0.0, "own": 0.0}, np.diag([np.inf, 0.0]))
     others = [Means({"steady": x, "own": x}, np.eye(2)) for x in (-9.0, 9.0)]
     assert (as_wide_as_trials_differ(unknown, others).covariance == unknown.covariance).all()
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A level of noisy samples, as far as `as_wide_as_estimates_differ` looks at it."""
+
+    values: dict[str, float]
+    covariance: np.ndarray
+    parts: tuple[Linearized, ...]
+    free: tuple[str, ...] = ("level",)
+    at_bound: tuple[str, ...] = ()
+
+
+def level(samples, weights):
+    """The level by least squares of weighted samples, which have a deviation of 1."""
+    roots = np.sqrt(weights)[:, None]
+    value = float(np.average(samples, weights=weights))
+    one = Estimated({"level": value}, np.eye(1), (Linearized((samples - value) * roots[:, 0], roots, roots[:, :0]),))
+    return with_honest_intervals(one)
+
+
+def off_and_wide(bend, seed):
+    """How far a level of 0 is off, its deviation, and that with another estimate: most samples stand on a bend."""
+    rng, out = np.random.default_rng(seed), []
+    on_bend = np.arange(400) % 4 > 0
+    for _ in range(500):
+        samples = rng.normal(size=400) + bend * on_bend
+        one, other = level(samples, np.ones(400)), level(samples, np.where(on_bend, 0.01, 1.0))
+        wide = as_wide_as_estimates_differ(one, other)
+        out.append((one.values["level"], one.covariance[0, 0] ** 0.5, wide.covariance[0, 0] ** 0.5))
+    return np.array(out).T
+
+
+def test_intervals_hold_what_two_estimates_of_a_right_model_do_by_chance_alone():
+    off, plain, wide = off_and_wide(0.0, 0)
+    assert np.mean(wide > 1.001 * plain) < 0.08
+    assert np.mean(np.abs(off) < 1.96 * wide) == pytest.approx(0.95, abs=0.03)
+
+
+def test_they_hold_the_truth_where_an_error_of_form_sets_both_apart():
+    off, plain, wide = off_and_wide(1.0, 1)
+    assert np.mean(np.abs(off) < 1.96 * plain) < 0.05
+    assert np.mean(np.abs(off) < 1.96 * wide) > 0.95
+
+
+def test_a_parameter_that_the_other_estimate_has_not_keeps_its_interval():
+    one = level(np.random.default_rng(0).normal(size=400), np.ones(400))
+    other = replace(one, values={"level": 9.0}, free=("another",))
+    assert as_wide_as_estimates_differ(one, other).covariance == one.covariance
