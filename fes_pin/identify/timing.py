@@ -77,7 +77,8 @@ def with_doubt_of_timing(fitted: Fit, row_s: float) -> Fit:
 def _beyond_scatter(fitted: Fit) -> np.ndarray:
     """What the covariance of a fit has more than how its scores scatter, shape (free, free); 0 of parameters that have
     less."""
-    more = fitted.covariance - with_honest_intervals(fitted).covariance
+    with np.errstate(invalid="ignore"):  # what the data do not tell
+        more = fitted.covariance - with_honest_intervals(fitted).covariance
     kept = np.nan_to_num(np.diag(more)) > 0.0
     return np.where(np.isfinite(more) & np.outer(kept, kept), more, 0.0)
 

@@ -82,3 +82,6 @@ def test_what_intervals_hold_beside_is_kept(tmp_path):
     assert first == pytest.approx(15.0 * honest.std(fitted.free[0]) ** 2, rel=1e-6)
     assert second == pytest.approx(0.0, abs=1e-9 * plain.std(fitted.free[1]) ** 2)
     assert np.allclose(with_doubt_of_timing(fitted, DT).covariance, plain.covariance)
+    untold = replace(fitted, parts=tuple(replace(p, jacobian=p.jacobian * (1.0, 0.0)) for p in fitted.parts))
+    assert np.isinf(with_honest_intervals(untold).std(fitted.free[1]))
+    assert np.isfinite(with_doubt_of_timing(with_honest_intervals(untold), DT).covariance).all()
