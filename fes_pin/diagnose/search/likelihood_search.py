@@ -158,10 +158,14 @@ class LikelihoodSearch:
         return {n: f for n, f in self.sets.fits.items() if n not in self._unearned and is_possible(f)}
 
     def _worth_extending(self, names: Names) -> bool:
-        """True where the score of a further cause beside a set is not what chance brings."""
+        """True where the score of a further cause beside a set is not what chance brings, or where something is left.
+
+        Scores are slopes at what is random in the set, which a cause that is missed is part of: they promise less than
+        is there.
+        """
         scored = [s for s in self.sets.screen.scores(self.sets.fits[names]).scored if s.gain > 0.0]
         single = min((float(chi2_tail(s.gain, max(len(s.amplitudes), 1))) for s in scored), default=1.0)
-        return self.family.adjusted(single) < UNUSUAL_LEVEL
+        return self.family.adjusted(single) < UNUSUAL_LEVEL or not self._leaves_noise(self.sets.fits[names])
 
     def _extend(self, size: int) -> None:
         """Fit the sets of a size: the best smaller ones with further causes, and pairs that the screen proposes."""
