@@ -15,6 +15,7 @@ from fes_pin.diagnose.search.likelihood_search import Found
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import CERTAIN_LEVEL, NOTHING_PERCENT
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.problem import WORTH
 
 UNMOVED = "the motion is as likely without the recorded input, so something else moves the rig"
 """Why no cause is named where `is_moved_by_what_is_recorded` is False."""
@@ -80,7 +81,7 @@ def is_moved_by_what_is_recorded(fitted: Fit) -> bool:
     assert fitted.doubt is not None
     still = [t.with_columns(**{n: np.zeros(len(t)) for n in inputs[id(t)]}) for t in fitted.trials]
     (without,) = LikelihoodProblem(fitted.model, still, fitted.doubt).bounds([(fitted.values, fitted.unknowns)])
-    return without > fitted.sse
+    return without > fitted.sse + WORTH
 
 
 def with_refused_causes(left: Remainder, random: Sequence[RandomPart], refused: dict[str, Refused]) -> Remainder:
