@@ -87,7 +87,7 @@ LONG = {
         *("test_friction_beside", "test_trials_without_an_effort", "test_what_acted", "no_friction[1830006]"),
     ),
     "driven/test_parts.py": ("test_a_part_that_begins_in_motion",),
-    "driven/test_presliding.py": ("test_a_contact_that_stretches_far",),
+    "driven/test_presliding.py": ("test_a_contact_that_stretches_far", "test_a_lag_beside"),
     "driven/test_products.py": ("[1]", "[2]"),
     "driven/test_rough_cost.py": ("test_a_torque_is_found",),
     "driven/test_smooth_play.py": ("test_a_sensor_that_lags",),

@@ -27,6 +27,8 @@ SINGULAR = 1e-12
 
 STEEPEST = 1e120
 """Sensitivities beyond this, in deviations of the noise per unit, count as infinite: their squares would be."""
+NEXT_TO = 1e-6
+"""Scales from its null that what switches a form with a memory on stays: nothing beside what data tell of it."""
 
 
 @dataclass(frozen=True)
@@ -205,7 +207,11 @@ def answered_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndar
 
 
 def limits_of(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, float]]:
-    """Bounds of every parameter on these trials, by name."""
+    """Bounds of every parameter on these trials, by name.
+
+    Where a form of an effect has a state or a memory of its own, what switches it on stays off its null: a fit that
+    came there would be one of another model, which has not.
+    """
     limits = {n: (i.lower, i.upper) for n, i in model.parameter_info().items()}
     measured = measured_columns(model, trials) if model.effects else {}
     for effect in model.effects:
@@ -214,6 +220,9 @@ def limits_of(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, f
             if name not in limits:  # each trial's own
                 continue
             limits[name] = (max(limits[name][0], low), min(limits[name][1], high))
+        for n in set(effect.of_form.values()) & set(effect.refined()):
+            (low, high), one = limits[f"{effect.name}.{n}"], effect.parameters()[n]
+            limits[f"{effect.name}.{n}"] = (low + NEXT_TO * one.scale if low == one.null else low, high)
     return limits
 
 

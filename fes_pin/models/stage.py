@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from types import SimpleNamespace
 from typing import Any, ClassVar, TypeVar
@@ -246,12 +246,12 @@ def in_order(effects: Iterable[Named]) -> tuple[Named, ...]:
 class Signals(SimpleNamespace):
     """The signals of one instant, by name: what a rig's equations and the effects read.
 
-    `own` holds the states and memories of the effect that is being evaluated; `v_std` is the standard deviation of the
-    velocity, in its unit, where a predictor estimates it and asks for rates; else it is 0. `sensed_rate` is how fast
-    what is read moves when a trial begins: 0 unless the rig says otherwise in `set_rest`.
+    `own` holds the states and memories of the effect that is being evaluated; `std(x)` is the standard deviation of an
+    expression in them, in its unit, where a predictor estimates them and asks for rates; else it is 0. `sensed_rate` is
+    how fast what is read moves when a trial begins: 0 unless the rig says otherwise in `set_rest`.
     """
 
-    v_std: Any = 0.0
+    std: Callable[[Any], Any] = staticmethod(lambda x: 0.0)
     sensed_rate: Any = 0.0
 
     def __init__(self, effects: Sequence[Effect], **signals: Any) -> None:

@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 from driven.bristles import DAMPING, DT, FRICTION, MASS, STIFFNESS, believed, trial
+from driven_rigs.draw import draw
 
+from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
+from fes_pin.diagnose.diagnosis import diagnose_joint
 from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
+from fes_pin.identify.doubts import first_guess
+from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.simulate import simulate
 
@@ -91,3 +96,26 @@ def test_a_contact_that_stretches_far_and_rings_is_no_friction_that_falls_off():
     assert friction.torque_nm == pytest.approx(FRICTION, rel=0.05)
     assert found.values["inertia_scale"] == pytest.approx(1.0, abs=0.02)
     assert found.doubt.std["effort"] < 0.6 * plain.doubt.std["effort"]
+
+
+def test_the_shortest_stretch_that_a_fit_may_come_to_is_still_one():
+    """At none the model has no spring: a fit that ended there was one of another model, with another likelihood."""
+    read, name = [trial(1)], "coulomb_friction.stretch"
+    model = believed() + CoulombFriction(FRICTION, softness=0.5, stretch=STRETCH)
+    problem = LikelihoodProblem(model, read, first_guess(model, read))
+    shortest = {**model.parameters(), name: problem.limits[name][0]}
+    again = LikelihoodProblem(model.with_parameters(shortest), read, problem.doubt)
+    unknowns = problem.start_unknowns()
+    assert again.free == problem.free
+    assert again.cost(shortest, unknowns) == pytest.approx(problem.cost(shortest, unknowns), abs=1e-6)
+    none = model.with_parameters({name: 0.0})
+    without = LikelihoodProblem(none, read, problem.doubt)
+    assert name not in without.free
+    assert abs(without.cost(none.parameters(), unknowns) - problem.cost(shortest, unknowns)) > 10.0
+
+
+def test_a_lag_beside_friction_of_a_contact_that_breaks_away_at_once_is_named(tmp_path):
+    """Held-out trials refused it where friction was of another form in their fits than in that of all."""
+    drawn = draw(("coulomb_friction", "sensor_lag"), 0.3, 6200035, tmp_path, recorded=True)
+    found = diagnose_joint(read_study(drawn.study))
+    assert sorted(c.name for c in found.causes) == sorted(drawn.causes), str(found)

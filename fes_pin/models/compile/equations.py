@@ -66,7 +66,7 @@ class _Symbols:
         self.p, self.c = _symbols("p", layout.values), _symbols("c", layout.constants)
         self.u, self.t, self.z = _symbols("u", layout.inputs), ca.SX.sym("t"), ca.SX.sym("z")
         self.since, self.into = ca.SX.sym("since"), ca.SX.sym("into")
-        self.v_std = ca.SX.sym("v_std") if estimated and "v" in self.states else 0.0
+        self.estimated, self.unsure = estimated, list[tuple[ca.SX, ca.SX]]()
         self.is_late = any(e.signal == "delay" for e in model.effects)
         self.slacks: dict[str, tuple[Any, Any]] = {}
 
@@ -122,6 +122,11 @@ class _Symbols:
         s.delayed = lambda now, past: where(early, past, now)
         return s
 
+    def std_of(self, f: Any) -> Any:
+        """A symbol for the standard deviation of an expression in what is estimated."""
+        self.unsure.append((ca.SX.sym(f"std{len(self.unsure)}"), f))
+        return self.unsure[-1][0]
+
     def rig(self) -> Any:
         nominal: dict[str, Any] = {n: self.p[n] for n in self.layout.parameters if "." not in n}
         return dataclasses.replace(self.model.rig, **nominal)
@@ -153,7 +158,7 @@ class _Symbols:
                 memories[f"{effect.name}.{n}"] = value
             self.slacks |= {f"{effect.name}.{n}": pair for n, pair in effect.slack(s.of(effect)).items()}
         s = self.within_a_sample(self.signals(self.x, self.m))
-        s.v_std = self.v_std
+        s.std = self.std_of if self.estimated else s.std
         rates = dict(rig.rates(s))
         for effect in s.effects:
             rates.update({f"{effect.name}.{n}": v for n, v in effect.rate(s.of(effect)).items()})

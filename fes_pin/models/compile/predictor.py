@@ -9,7 +9,8 @@ follows with A = f_x and B = f_m R + f_p as they are in the middle of each step,
 
 which is exact to the order of h^4 where f is linear and to that of h^2 where it bends.
 
-f may depend on the deviation of an estimated velocity, as dry friction does: sqrt(P_vv), as a step begins.
+f may depend on the deviation of what is estimated, as dry friction does: sqrt(g_x P g_x') of g(x), with P as a step
+begins.
 
 At a sample, for each measured output y_k in turn, with H = dh_k/dx where it was foretold:
 
@@ -69,12 +70,15 @@ class _Doubt:
         return ca.diag(out)
 
     def widened(self, f: Any) -> Any:
-        """An expression with the velocity's standard deviation as it is when a step begins."""
-        sym = self.d.sym
-        if not isinstance(sym.v_std, ca.SX):
-            return f
-        k = sym.states.index("v")
-        return ca.substitute(f, sym.v_std, ca.sqrt(ca.fmax(self.covariance[k, k], 0.0) + LEAST))
+        """Rates with the standard deviations in them."""
+        d, unsure = self.d, self.d.sym.unsure
+        known = [not ca.depends_on(f[k], ca.vertcat(*(one for one, _ in unsure))) for k in range(f.numel())]
+        moved = ca.SX.eye(self.count) + d.into * ca.mtimes(ca.diag(ca.DM(known)), ca.jacobian(f, d.x))
+        for symbol, one in unsure:
+            slope = ca.mtimes(ca.jacobian(one, d.x), moved)
+            variance = ca.mtimes([slope, self.covariance, slope.T])
+            f = ca.substitute(f, symbol, ca.sqrt(ca.fmax(variance, 0.0) + LEAST))
+        return f
 
     def at_start(self, model: Model) -> Any:
         """Covariance of the first states."""

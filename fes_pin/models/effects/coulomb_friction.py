@@ -51,9 +51,9 @@ class CoulombFriction(Effect):
     Far from its corners friction is T but for what falls exponentially: a slower approach would pass for damping. Wide
     corners make it T tanh(v / speed), the commonest smooth form. `load` is the bearing's: see the rig.
     one_way = asymmetry sign(x), x without it.
-    Where v is an estimate of deviation v_std, friction is near its mean over what v may be: corners are rounded over
-    sqrt(pi / 2) k v_std / S as well, and T sign(v) becomes T tanh(v / (sqrt(pi / 2) v_std)), which has the slope of the
-    mean for a Gaussian. The slope at one velocity says nothing of friction at those beside it.
+    Where the motion is an estimate, friction is near its mean over what x may be by it: corners are rounded over
+    sqrt(pi / 2) of that deviation as well. T sign(v) becomes T tanh(v / (sqrt(pi / 2) v_std)), which has the slope of
+    the mean for a Gaussian. The slope at one velocity says nothing of friction at those beside it.
     A contact stretches before it slips. On a joint that is free, with `stretch` of it, what holds the joint at rest is
     a spring to an anchor a that it drags along, and not the torque itself:
 
@@ -194,8 +194,15 @@ class CoulombFriction(Effect):
         stopping = _stopping(s)
         scale = most + stopping * self._creeping(most, s)
         x = self._held(value / scale, s) + stopping * s.v / scale
-        unsure = stopping * s.v_std / scale
+        unsure = self._unsure(stopping / scale, s)
         return _clip(x, sqrt(self.softness * self.softness + 0.5 * math.pi * unsure * unsure))
+
+    def _unsure(self, slope: Any, s: Any) -> Any:
+        """Standard deviation of x by the motion, with `slope` of the velocity."""
+        if not hasattr(s.own, "anchor"):
+            return slope * s.std(s.v)
+        way = self._way(s)
+        return s.std(s.q - s.own.anchor + way * slope * s.v) / way
 
 
 def _stopping(s: Any) -> Any:
