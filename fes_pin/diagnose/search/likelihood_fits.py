@@ -22,6 +22,7 @@ from fes_pin.identify.doubts import first_guess, stilled
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import fresh
 from fes_pin.identify.lasting import with_new_noise
+from fes_pin.identify.levels import SEPARABLE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import normal_equations
 from fes_pin.identify.scoring import LITTLE, WORTH
@@ -183,8 +184,22 @@ class LikelihoodFits:
             Sets that are not asked for.
         """
         while slow := [n for n in self._hopeful(size, without) if n not in self._converged]:
-            self.fits.update(zip(slow, in_parallel(lambda n: self._maxima.go_on(self.fits[n]), slow), strict=True))
-            self._converged.update(slow)
+            self._go_on(slow)
+
+    def _go_on(self, slow: Sequence[Names]) -> None:
+        """Let sets go on until they converge."""
+        self.fits.update(zip(slow, in_parallel(lambda n: self._maxima.go_on(self.fits[n]), slow), strict=True))
+        self._converged.update(slow)
+
+    def converge_rivals(self, base: Names, name: str) -> None:
+        """Let sets converge that hold another cause beside a base, where slopes promise as much of it.
+
+        A spring fell short by 37 of the constant torque that it can be, for its fit had ended on the way.
+        """
+        promised = {n: many[0].gain for n, many in best_by_effect(self.screen.scores(self.fits[base]).scored).items()}
+        least = promised.get(name, math.inf) - SEPARABLE
+        rivals = [tuple(sorted((*base, n))) for n, gain in promised.items() if gain > least]
+        self._go_on([n for n in rivals if n in self.fits and n not in self._converged])
 
     def _hopeful(self, size: int, without: Sequence[Names]) -> list[Names]:
         """The sets of a size that promise to be the best, and those that come near the best."""

@@ -288,6 +288,7 @@ class LikelihoodSearch:
                 rest = tuple(n for n in names if n != name)
                 self.sets.without(names, name)
                 self.sets.extend_all(rest, None if len(names) == 1 else JOINT_FITS)
+                self.sets.converge_rivals(rest, name)
             better = next(n for n in self.sets.ranked(len(names)) if n == names or self._may_be(n, refused))
             if better == names:
                 return self.told(names)
