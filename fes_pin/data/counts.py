@@ -47,6 +47,17 @@ def count_of(column: np.ndarray) -> float:
         reach *= 2.0
 
 
+def begins_of_runs(column: np.ndarray) -> np.ndarray:
+    """Samples that differ from the one before, the first among them; what is missed differs from everything."""
+    return np.flatnonzero(np.diff(column, prepend=np.nan) != 0.0)
+
+
+def lengths_of_runs(column: np.ndarray) -> np.ndarray:
+    """How many samples in a row have the value of each, shape (n,)."""
+    lengths = np.diff(np.append(begins_of_runs(column), len(column)))
+    return np.repeat(lengths, lengths).astype(float)
+
+
 @np.errstate(all="ignore")
 def hunts(column: np.ndarray) -> np.ndarray:
     """Samples of a reading that goes to and fro between two neighbouring counts, shape (n,).
@@ -62,7 +73,7 @@ def hunts(column: np.ndarray) -> np.ndarray:
     count = count_of(column)
     if not count:
         return np.zeros(len(column), dtype=bool)
-    begins = np.flatnonzero(np.diff(column, prepend=np.nan) != 0.0)  # what is missed differs from everything
+    begins = begins_of_runs(column)
     steps = np.diff(column[begins]) / count
     turns = (np.abs(np.abs(steps[:-1]) - 1.0) < WHOLE) & (np.abs(steps[:-1] + steps[1:]) < WHOLE)
     turns = np.concatenate([[False], turns, [False]])[: len(begins)]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fes_pin.data.counts import SAME, count_of, hunts
+from fes_pin.data.counts import SAME, begins_of_runs, count_of, hunts, lengths_of_runs
 from fes_pin.data.trial import Trial
 from fes_pin.models.autoregression import noise_ahead
 from fes_pin.models.compile.layout import doubt_constants, widest, width_of
@@ -217,12 +217,12 @@ class _Block:
             followed = rig.follows(trial) & are_news(trial, lasts_s)
             judged, repeats = np.zeros((2, len(trial), len(self.outputs)))
             for k, name in enumerate(self.outputs):
-                column = trial[name]
+                column, hunting = trial[name], hunts(trial[name])
                 finite = np.isfinite(column) & followed
                 self.seen[: len(trial), k, lane] = finite
-                judged[:, k] = finite & ~hunts(column)
+                judged[:, k] = finite & ~hunting
                 self.measured[: len(trial), k, lane] = np.where(finite, column, 0.0)
-                self.repeated[: len(trial), k, lane] = repeated(column)
+                self.repeated[: len(trial), k, lane] = repeated(column, hunting)
                 repeats[:, k] = self.repeated[: len(trial), k, lane] if count_of(column) > 0.0 else 1.0
             self.readings.append(Readings(self.outputs, judged.astype(bool), repeats))
         self._given: tuple[tuple[int, ...], np.ndarray] | None = None
@@ -304,16 +304,21 @@ def are_news(trial: Trial, lasts_s: float) -> np.ndarray:
     return np.asarray((k % step == 0) & (k >= inner) & (k < len(trial) - inner))
 
 
-def repeated(column: np.ndarray) -> np.ndarray:
+def repeated(column: np.ndarray, hunting: np.ndarray | None = None) -> np.ndarray:
     """How often the value of each sample was read in a row, shape (n,): 1 where its neighbours differ.
 
     Where fewer than `SAME` of them are the same, they are so by chance, of numbers written with so many digits.
+    Samples that hunt between two counts are together one reading.
+
+    Parameters
+    ----------
+    hunting
+        What `hunts` says of the column, if that is known.
     """
-    begins = np.flatnonzero(np.diff(column, prepend=np.nan) != 0.0)  # what is missed differs from everything
-    if len(column) - len(begins) < SAME * len(column):
+    if len(column) - len(begins_of_runs(column)) < SAME * len(column):
         return np.ones(len(column))
-    lengths = np.diff(np.append(begins, len(column)))
-    return np.repeat(lengths, lengths).astype(float)
+    hunting = hunts(column) if hunting is None else hunting
+    return np.where(hunting, lengths_of_runs(hunting), lengths_of_runs(column))
 
 
 def masked(trial: Trial, outputs: Sequence[str], hidden: Sequence[range]) -> Trial:

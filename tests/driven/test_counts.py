@@ -20,11 +20,13 @@ HUNTING = 2230006
 """That hides nothing, and was told friction."""
 MISLED = 2340004
 """That hides cogging, and was told friction."""
+STOPPED = 6350039
+"""That hides nothing, and was told a stop where it stands: hunts were followed as if every sample were a reading."""
 HUMMING = 2270008
 """That hides an offset beside friction, and whose counts are cheapest explained by a hum."""
 
 
-@pytest.mark.parametrize("seed", [*HELD, HUNTING])
+@pytest.mark.parametrize("seed", [*HELD, HUNTING, STOPPED])
 def test_a_count_that_hunts_is_no_friction(seed, tmp_path):
     found = diagnose_joint(read_study(draw_swing_up((), seed, tmp_path).study))
     assert found.verdict == "adequate", str(found)

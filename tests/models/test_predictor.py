@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from fes_pin.data.counts import hunts
 from fes_pin.data.trial import Trial
 from fes_pin.models import predictor
 from fes_pin.models.effects import CoulombFriction, effect_named
@@ -173,6 +174,18 @@ def test_a_rig_that_stands_is_known_no_better_the_longer_it_is_read():
         known[name] = one.variances[-1, 0] - repeated(column)[-1] * white
     assert known["same"] > 0.5 * white
     assert known["noisy"] < 0.1 * white
+
+
+def test_what_hunts_between_two_counts_is_known_no_better_the_longer_it_is_read():
+    """A rig that stands near the edge of two counts, four samples of each in turn: one reading, which errs by half."""
+    still, n = driven(5, n=200, size=0.0), 200
+    doubt, white = Doubt({"position": 2e-3}, {"effort": 1e-9}, {"effort": 0.1}), 2e-3**2
+    column = np.tile(np.repeat([0.0, 7e-3], 4), n // 8)
+    hunting = hunts(column)
+    (one,) = foretold(Model(SLIDE), [still.with_columns(position=column)], doubt, velocity=0.0)
+    assert hunting.mean() > 0.9 and not one.seen[hunting].any()
+    last = np.flatnonzero(hunting)[-1]
+    assert one.variances[last, 0] - hunting.sum() * white > 0.5 * white
 
 
 def discrete(doubt: Doubt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

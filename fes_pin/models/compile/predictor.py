@@ -20,7 +20,8 @@ At a sample, for each measured output y_k in turn, with H = dh_k/dx where it was
 The gains K are taken as they are when sensitivities are formed: what a parameter does to them acts through past
 innovations alone, which are white and independent of what is foretold where the model is right (Ljung, System
 Identification, 2nd ed., section 7.4). A sample that was not seen corrects nothing. The same count n times in a
-row, as of an encoder that stands, is one reading and not n: its error is the same each time. What a trial begins with
+row, as of an encoder that stands, is one reading and not n: its error is the same each time. So are n samples that
+hunt between two counts, which say no more than that what is read is near the edge of both. What a trial begins with
 is known as its unknowns are, and these as their readings are: P = X diag(prior / g)^2 X', X the sensitivities of the
 first states to them and g the slope of the reading: a scale of it that another inertia undoes must not be told from it.
 
