@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -19,6 +20,7 @@ from driven_rigs.draw import Base, urdf
 
 import fes_pin as fp
 from fes_pin.data.study import Study
+from fes_pin.diagnose import long_records
 
 OFFSET = 3.0
 """What the effort is read with too much, N."""
@@ -31,10 +33,21 @@ def run() -> list[tuple[str, float, float | None, str]]:
         study = slide(Path(folder))
         first, found = _diagnosed(study)
         later, _ = _diagnosed(study)
-    values = found.extended.values
+        with mock.patch.object(long_records, "MOST_DRIVEN", sum(map(len, study.trials))):
+            _diagnosed(study)
+            whole, of_every = _diagnosed(study)
     return [
         ("slide, 4 x 25 s at 1 kHz: with what must be compiled", first, None, "s"),
         ("slide, 4 x 25 s at 1 kHz: later", later, 20.0, "s"),
+        *_found(found),
+        ("by every sample", whole, None, "s"),
+        *_found(of_every),
+    ]
+
+
+def _found(found: fp.Diagnosis) -> list[tuple[str, float, float | None, str]]:
+    values = found.extended.values
+    return [
         ("dry friction", values.get("coulomb_friction.torque_nm", 0.0), FRICTION, "N"),
         ("offset of the effort", values.get("effort_offset.offset", 0.0), -OFFSET, "N"),
     ]
