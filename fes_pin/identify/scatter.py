@@ -124,6 +124,11 @@ def _beginnings(part: Linearized, count: int) -> np.ndarray:
     return np.linspace(0, len(part.residual), count, endpoint=False, dtype=int)
 
 
+def in_pieces(values: np.ndarray, trials: int) -> np.ndarray:
+    """Sums of the values of one trial of so many over its pieces."""
+    return np.array([piece.sum() for piece in np.array_split(values, max(1, PIECES // trials)) if len(piece)])
+
+
 def _beside_own(part: Linearized) -> np.ndarray:
     """A trial's sensitivities without what its own unknowns take up, as the information is without it."""
     if not part.local.any():

@@ -10,6 +10,7 @@ from fes_pin.diagnose.experiment import NextExperiment, next_experiment
 from fes_pin.diagnose.remainder.open_set import Remainder
 from fes_pin.diagnose.search.score import best_by_effect
 from fes_pin.diagnose.search.simulation_search import Searched
+from fes_pin.identify.apart import least_apart
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import ABSORBED_BELOW, SEPARABLE
 from fes_pin.identify.per_trial import amplitude
@@ -59,7 +60,7 @@ def alternatives(best: Fit, rivals: Sequence[Fit], name: str) -> tuple[str, ...]
 
 def not_excluded(best: Fit, rivals: Sequence[Fit]) -> list[Fit]:
     """The rivals that are as cheap, or as likely, as far as data tell."""
-    return [f for f in rivals if min(f.price - best.price, f.sse - best.sse) < SEPARABLE]
+    return [f for f in rivals if min(f.price - best.price, f.sse - best.sse) < least_apart(best, f)]
 
 
 def absorbed(searched: Searched, silent: Sequence[str]) -> tuple[str, ...]:

@@ -9,8 +9,8 @@ follows with A = f_x and B = f_m R + f_p as they are in the middle of each step,
 
 which is exact to the order of h^4 where f is linear and to that of h^2 where it bends.
 
-f may depend on the deviation of what is estimated, as dry friction does: sqrt(g_x P g_x') of g(x), with P as a step
-begins.
+f may depend on the deviation of what is estimated, as dry friction does: sqrt(g_x N P N' g_x') of g(x), with P as a
+step begins and N = 1 + t A, t into the step, of the rows of A in which no such deviation is.
 
 At a sample, for each measured output y_k in turn, with H = dh_k/dx where it was foretold:
 
@@ -71,11 +71,14 @@ class _Doubt:
         return ca.diag(out)
 
     def widened(self, f: Any) -> Any:
-        """Rates with the standard deviations in them."""
+        """Rates with the standard deviations in them, of states that go on at those rates which need none."""
         d, unsure = self.d, self.d.sym.unsure
-        known = [not ca.depends_on(f[k], ca.vertcat(*(one for one, _ in unsure))) for k in range(f.numel())]
-        moved = ca.SX.eye(self.count) + d.into * ca.mtimes(ca.diag(ca.DM(known)), ca.jacobian(f, d.x))
-        for symbol, one in unsure:
+        if not unsure:
+            return f
+        symbols = ca.vertcat(*(symbol for symbol, _ in unsure))
+        known = ca.DM([not ca.depends_on(f[k], symbols) for k in range(f.numel())])
+        moved = ca.SX.eye(self.count) + d.into * ca.mtimes(ca.diag(known), ca.jacobian(f, d.x))
+        for symbol, one in reversed(unsure):  # what is asked for later may hold what was before
             slope = ca.mtimes(ca.jacobian(one, d.x), moved)
             variance = ca.mtimes([slope, self.covariance, slope.T])
             f = ca.substitute(f, symbol, ca.sqrt(ca.fmax(variance, 0.0) + LEAST))
