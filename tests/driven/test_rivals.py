@@ -1,9 +1,32 @@
-"""What cannot be told from a cause of a driven rig is said."""
+"""Sets of causes of a driven rig are compared in forms alike, and what cannot be told from a cause is said."""
 
+from driven.bristles import believed, trial
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.models.effects import CoulombFriction, EffortOffset
+
+FRICTION, BOTH = ("coulomb_friction",), ("coulomb_friction", "effort_offset")
+
+
+def test_a_set_is_fitted_again_beside_a_cause_whose_form_has_changed():
+    """An offset beside friction had been told from a spring beside it by what friction's form is worth."""
+    sets = LikelihoodFits(believed(), [trial(1), trial(2)], [CoulombFriction, EffortOffset])
+    sets.nominal()
+    plain = sets.nominal().model + CoulombFriction()
+    sets.fits[FRICTION] = sets._maxima.from_start(plain, sets.nominal().doubt)
+    sets.extend_all(FRICTION)
+    first = sets.fits[BOTH]
+    sets.extend_all(FRICTION)
+    assert sets.fits[BOTH] is first
+    sets.fits[FRICTION] = sets.forms.refined(sets.fits[FRICTION])
+    (form,) = (e.refined() for e in sets.fits[FRICTION].model.effects)
+    assert form and not first.model.effects[0].refined()
+    sets.extend_all(FRICTION)
+    assert sets.fits[BOTH].model.effects[0].refined() == form
+    assert sets.fits[BOTH].price < first.price - 10.0
 
 
 def test_a_spring_that_gravity_and_a_constant_torque_stand_for_is_among_their_rivals(tmp_path):

@@ -43,6 +43,9 @@ AFRESH_SETS = 3
 """Sets that go on from little randomness: the lowest of all that begin there, once what is random has had a turn.
 Before, a muscle's best cause, by 20 000 in twice the log-likelihood, was not among the first eight of twenty."""
 
+Form = tuple[tuple[str, tuple[str, ...]], ...]
+"""Of each cause of a set its name, and which refinements it has."""
+
 
 class LikelihoodFits:
     """Fits of sets of causes to one set of trials, by the names of the causes; `()` is the nominal model.
@@ -72,6 +75,7 @@ class LikelihoodFits:
         self.fits: dict[Names, Fit] = {}
         self._calm: Doubt | None = None
         self._converged: set[Names] = set()
+        self._begun: set[tuple[Names, Form]] = set()
         self._compared: dict[tuple[Names, str], Fit] = {}
         self._maxima = LikelihoodMaxima(trials)
         self.screen = LikelihoodScreen(self.library)
@@ -81,7 +85,7 @@ class LikelihoodFits:
         """The same trials and causes, with some fits to begin with; what is random is timed as in them."""
         other = copy.copy(self)
         other.fits = {names_of(f): f for f in fits}
-        other._converged, other._compared = set(), {}
+        other._converged, other._begun, other._compared = set(), set(), {}
         return other
 
     def nominal(self) -> Fit:
@@ -158,6 +162,7 @@ class LikelihoodFits:
             best = min((*fits, *afresh.get(names, ())), key=lambda f: f.price)
             if names not in self.fits or best.price < self.fits[names].price:
                 self.fits[names] = best
+                self._converged.discard(names)
         for size in sorted({len(n) for n in made}):
             self.converge(size)
 
@@ -224,14 +229,24 @@ class LikelihoodFits:
         return [n for n in ranked if n == ranked[0] or self.fits[n].price < half]
 
     def extend_all(self, base: Names, most: int | None = None) -> list[Names]:
-        """Fit a set with each further cause beside it, or with those of largest score; returns their names."""
+        """Fit a set with each further cause beside it, or with those of largest score; returns their names.
+
+        Those that are fitted begin once more where the causes of the base have another form in them: it may have had
+        another, and each begins with that of its base.
+        """
         fitted = self.fits[base]
         by_effect = best_by_effect(self.screen.scores(fitted).scored)
         chosen = sorted(by_effect, key=lambda n: (-by_effect[n][0].gain, n))[:most]
         keys = {tuple(sorted((*base, n))): by_effect[n] for n in chosen}
-        missing = {k: v for k, v in keys.items() if k not in self.fits}
+        form = _form(fitted)
+        missing = {k: v for k, v in keys.items() if (k, form) not in self._begun and not self._has(k, form)}
+        self._begun.update((k, form) for k in missing)
         self.add(fitted, {k: lambda v=v: self.extend(fitted, v) for k, v in missing.items()})  # type: ignore[misc]
         return list(keys)
+
+    def _has(self, names: Names, form: Form) -> bool:
+        """Whether a set is fitted with some causes in a form."""
+        return names in self.fits and set(form) <= set(_form(self.fits[names]))
 
     def without(self, names: Names, name: str) -> Fit:
         """The fit of a set less one cause, from the set's own values where that is better."""
@@ -269,3 +284,7 @@ class LikelihoodFits:
         """Sets of a size, cheapest first; those that have converged to what cannot be come last."""
         absurd = {n for n in self._converged if not is_possible(self.fits[n])}
         return sorted((n for n in self.fits if len(n) == size), key=lambda n: (n in absurd, self.fits[n].price, n))
+
+
+def _form(fitted: Fit) -> Form:
+    return tuple((e.name, e.refined()) for e in fitted.model.effects)
