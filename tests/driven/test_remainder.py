@@ -15,7 +15,9 @@ from fes_pin.models.predictor import Doubt
 
 END = {"inertia_scale": 1.0014, "damping": 0.018945, "gravity_scale": 1.0007, "backlash.half_width": 0.0064904}
 """Where a fit ended on one computer, 6e-5 rad beside what is hidden; on another it ends elsewhere."""
-THERE = Doubt({"position": 3.0143e-4}, {"effort": 3.9363e-3}, {"effort": 0.02378})
+THERE = Doubt({"position": 3.0424e-4}, {"effort": 3.9652e-3}, {"effort": 0.023385})
+BESIDE = (0.99, 1.0, 1.01)
+"""Random efforts about that: the likelihood jumps by some 500 between them, and a fit ends where it is high."""
 
 
 class Promised(driven._Featured):
@@ -30,8 +32,10 @@ class Promised(driven._Featured):
 def beside_a_play(tmp_path_factory):
     """A rig of `scripts/driven --count 60 --seed 1118000 --recorded`, at `END`: no step is taken from there."""
     study = read_study(draw(("backlash",), 0.3, 1118025, tmp_path_factory.mktemp("play"), recorded=True).study)
-    problem = LikelihoodProblem(nominal_model(study) + LinearPlay(), study.trials, THERE)
-    return replace(fit_problem(problem, END, max_iterations=0), doubt=THERE)
+    doubts = [THERE.with_values({"std.effort": k * THERE.std["effort"]}) for k in BESIDE]
+    problems = [LikelihoodProblem(nominal_model(study) + LinearPlay(), study.trials, doubt) for doubt in doubts]
+    fits = [replace(fit_problem(p, END, max_iterations=0), doubt=p.doubt) for p in problems]
+    return min(fits, key=lambda fitted: fitted.sse)
 
 
 def test_slopes_promise_that_something_is_left(beside_a_play, monkeypatch):
