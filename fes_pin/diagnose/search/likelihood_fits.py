@@ -43,7 +43,7 @@ AFRESH_SETS = 3
 """Sets that go on from little randomness: the lowest of all that begin there, once what is random has had a turn.
 Before, a muscle's best cause, by 20 000 in twice the log-likelihood, was not among the first eight of twenty."""
 
-Form = tuple[tuple[str, tuple[str, ...]], ...]
+_Refined = tuple[tuple[str, tuple[str, ...]], ...]
 """Of each cause of a set its name, and which refinements it has."""
 
 
@@ -75,7 +75,7 @@ class LikelihoodFits:
         self.fits: dict[Names, Fit] = {}
         self._calm: Doubt | None = None
         self._converged: set[Names] = set()
-        self._begun: set[tuple[Names, Form]] = set()
+        self._begun: set[tuple[Names, _Refined]] = set()
         self._compared: dict[tuple[Names, str], Fit] = {}
         self._maxima = LikelihoodMaxima(trials)
         self.screen = LikelihoodScreen(self.library)
@@ -244,7 +244,7 @@ class LikelihoodFits:
         self.add(fitted, {k: lambda v=v: self.extend(fitted, v) for k, v in missing.items()})  # type: ignore[misc]
         return list(keys)
 
-    def _has(self, names: Names, form: Form) -> bool:
+    def _has(self, names: Names, form: _Refined) -> bool:
         """Whether a set is fitted with some causes in a form."""
         return names in self.fits and set(form) <= set(_form(self.fits[names]))
 
@@ -286,5 +286,5 @@ class LikelihoodFits:
         return sorted((n for n in self.fits if len(n) == size), key=lambda n: (n in absurd, self.fits[n].price, n))
 
 
-def _form(fitted: Fit) -> Form:
+def _form(fitted: Fit) -> _Refined:
     return tuple((e.name, e.refined()) for e in fitted.model.effects)
