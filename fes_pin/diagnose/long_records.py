@@ -16,8 +16,8 @@ MOST_SAMPLES = 120_000
 sample, and a computer of 4 GB must do. Ten minutes of motion at 200 Hz, or four trials of 30 s at 1 kHz."""
 MOST_DRIVEN = 60_000
 """The same of a rig whose effort answers its reading, before samples are averaged: a search by the likelihood predicts
-them some thousand times, and a step of 4 ms tells what one of 1 ms does: dry friction of 20 N as 20.08 N or 20.06 N, an
-offset of -3 N as -3.24 N or -3.32 N, in under half the time (`scripts/benchmark slide`)."""
+them some thousand times, and a step of 4 ms tells what one of 1 ms does: dry friction of 20 N as 20.09 N or 20.06 N, an
+offset of -3 N as -3.24 N or -3.34 N, in a quarter of the time (`scripts/benchmark slide`)."""
 
 
 def searched_part(
