@@ -222,7 +222,7 @@ def limits_of(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, f
             limits[name] = (max(limits[name][0], low), min(limits[name][1], high))
         for n in set(effect.of_form.values()) & set(effect.refined()):
             (low, high), one = limits[f"{effect.name}.{n}"], effect.parameters()[n]
-            limits[f"{effect.name}.{n}"] = (low + NEXT_TO * one.scale if low == one.null else low, high)
+            limits[f"{effect.name}.{n}"] = (min(low + NEXT_TO * one.scale, high) if low == one.null else low, high)
     return limits
 
 
