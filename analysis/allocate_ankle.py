@@ -14,8 +14,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.allocate.allocate import Allocator
-from fes_pin.allocate.horizon import Horizon, invert_lag
+from fes_pin.allocation.allocate import Allocator
+from fes_pin.allocation.horizon import Horizon, invert_lag
 from fes_pin.muscles.recruitment import Hysteresis, LinearRecruitment
 
 RATE_HZ, LAG_S, TORQUE_NM, PLAY_US, STEPS = 45.0, 0.05, 0.034 * 60.0, 25.0, 10

@@ -19,9 +19,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.allocate.allocate import Allocator, allocate
-from fes_pin.allocate.attainable_torques import AttainableTorques
-from fes_pin.allocate.walk import allocate_walk, clipped, direction_error, rescaled
+from fes_pin.allocation.allocate import Allocator, allocate
+from fes_pin.allocation.attainable_torques import AttainableTorques
+from fes_pin.allocation.walk import allocate_walk, clipped, direction_error, rescaled
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.measured_walk import read_walk
 from fes_pin.body.passive import PassiveLegs

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.fit import fit
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model

@@ -24,14 +24,14 @@ ROOMS = {
     "data": "Studies, trials, readers",
     "models": "Models: rigs, effects, simulation",
     "identify": "Fits, noise",
-    "diagnose": "Diagnosis",
-    "contrast": "What changed",
-    "compare": "Models of the literature, ranked",
+    "diagnosis": "Diagnosis",
+    "contrasts": "What changed",
+    "comparison": "Models of the literature, ranked",
     "paper": "The paper's ankle",
     "body": "The walking body",
     "walk": "Measured walking",
     "muscles": "Muscles and nerves",
-    "allocate": "Allocation",
+    "allocation": "Allocation",
     "control": "Position control",
     "view": "Reports and pictures",
     "verdict": "One question for every study",
@@ -222,7 +222,7 @@ def public_text() -> str:
     return table(("name", "what it is"), rows)
 
 
-REASONED = ("diagnose", "identify", "contrast")
+REASONED = ("diagnosis", "identify", "contrasts")
 """Rooms whose numbers are listed with their reasons."""
 DECIDING = {
     "UNUSUAL_LEVEL",

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 from fes_pin.data.schema import rigs_from
 
 if TYPE_CHECKING:  # the same names for type checkers; a test holds the two together
-    from fes_pin.allocate.allocate import allocate as allocate
+    from fes_pin.allocation.allocate import allocate as allocate
     from fes_pin.body.build import Body as Body
     from fes_pin.body.linearize import linearize as linearize
     from fes_pin.body.minimal_sets import minimal_sets as minimal_sets
-    from fes_pin.compare.compare import compare as compare
-    from fes_pin.compare.result import Comparison as Comparison
-    from fes_pin.contrast.contrast import contrast as contrast
-    from fes_pin.contrast.result import Contrast as Contrast
+    from fes_pin.comparison.compare import compare as compare
+    from fes_pin.comparison.result import Comparison as Comparison
+    from fes_pin.contrasts.contrast import contrast as contrast
+    from fes_pin.contrasts.result import Contrast as Contrast
     from fes_pin.data.errors import InputError as InputError
     from fes_pin.data.study import Study as Study
     from fes_pin.data.study import read_study as read_study
@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.data.trial import Trial as Trial
     from fes_pin.data.trial import read_trial as read_trial
     from fes_pin.data.trial import write_trial as write_trial
-    from fes_pin.diagnose.result import Diagnosis as Diagnosis
+    from fes_pin.diagnosis.result import Diagnosis as Diagnosis
     from fes_pin.identify.fit import Fit as Fit
     from fes_pin.identify.fit import fit as fit
     from fes_pin.models import effects as effects
@@ -63,18 +63,18 @@ _WHERE = {
     "fit": "fes_pin.identify.fit",
     "Fit": "fes_pin.identify.fit",
     "diagnose": "fes_pin.verdict.ask",
-    "Diagnosis": "fes_pin.diagnose.result",
-    "compare": "fes_pin.compare.compare",
-    "Comparison": "fes_pin.compare.result",
-    "contrast": "fes_pin.contrast.contrast",
-    "Contrast": "fes_pin.contrast.result",
+    "Diagnosis": "fes_pin.diagnosis.result",
+    "compare": "fes_pin.comparison.compare",
+    "Comparison": "fes_pin.comparison.result",
+    "contrast": "fes_pin.contrasts.contrast",
+    "Contrast": "fes_pin.contrasts.result",
     "diagnose_walk": "fes_pin.walk.diagnosis",
     "report": "fes_pin.view.report",
     "Body": "fes_pin.body.build",
     "linearize": "fes_pin.body.linearize",
     "minimal_sets": "fes_pin.body.minimal_sets",
     "controllability": "fes_pin.muscles.nerve_inputs",
-    "allocate": "fes_pin.allocate.allocate",
+    "allocate": "fes_pin.allocation.allocate",
     "Nerves": "fes_pin.muscles.nerves",
 }
 _CHAPTERS = {"effects": "fes_pin.models.effects", "rigs": "fes_pin.models.rigs"}

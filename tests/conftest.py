@@ -7,14 +7,14 @@ from fes_pin.body.build import Body
 
 REPOSITORY = Path(__file__).parents[1]
 ROUNDING = {
-    "allocate": "active sets, and certificates to the last digit",
+    "allocation": "active sets, and certificates to the last digit",
     "body/test_controllability.py": "eigen-decompositions",
     "body/test_linearize.py": "eigen-decompositions",
     "body/test_minimal_sets.py": "least sets, chosen by comparing sums",
     "body/test_modes.py": "eigen-decompositions",
-    "diagnose/test_claims.py": "verdicts at their critical values",
-    "diagnose/test_found.py::coulomb_friction": "verdicts of whole diagnoses",
-    "diagnose/test_held_out.py": "verdicts at their critical values",
+    "diagnosis/test_claims.py": "verdicts at their critical values",
+    "diagnosis/test_found.py::coulomb_friction": "verdicts of whole diagnoses",
+    "diagnosis/test_held_out.py": "verdicts at their critical values",
     "driven/test_forms_again.py": "where fits of friction end",
     "identify": "fits to the last digits",
     "paper/test_kalman.py": "factors of nearly singular covariances",
@@ -22,40 +22,40 @@ ROUNDING = {
 """Files and folders whose tests get the mark `rounding`, after :: by a part of their name; and why."""
 
 LONG = {
-    "allocate/test_walk.py": ("[allocate_walking-with what paralysed",),
+    "allocation/test_walk.py": ("[allocate_walking-with what paralysed",),
     "body/test_body_viewer.py": ("test_a_live_viewer_shows", "test_a_nerve_paints"),
     "confusion/test_matrix.py": ("test_slice_from_end",),
     "confusion/test_named.py": ("[ankle-joint_stop", "[joint-sensor_lag", "[muscle-potentiation"),
-    "contrast/test_contrast.py": (
+    "contrasts/test_contrast.py": (
         *("test_a_misread_trial_is_told_as_such[changes1]", "test_a_common_cause_is_no_change"),
         *("test_strokes_that_are_repeated", "test_a_band_that_was_tightened"),
     ),
-    "contrast/test_counted_groups.py": ("test_counts_are_no_common_cause",),
-    "contrast/test_late_groups.py": ("test_what_changed", "test_a_slow_log"),
-    "contrast/test_long_groups.py": ("thinned_alike", "change_nothing"),
-    "contrast/test_noisy_groups.py": ("test_nothing_changed", "test_it_is_said"),
+    "contrasts/test_counted_groups.py": ("test_counts_are_no_common_cause",),
+    "contrasts/test_late_groups.py": ("test_what_changed", "test_a_slow_log"),
+    "contrasts/test_long_groups.py": ("thinned_alike", "change_nothing"),
+    "contrasts/test_noisy_groups.py": ("test_nothing_changed", "test_it_is_said"),
     "control/test_control.py": ("test_five_minutes",),
     "control/test_tuning.py": ("test_the_delay_margin_that_is_stated",),
     "data/test_spikes.py": ("test_a_clean_study_is_left_alone[ankle]",),
-    "diagnose/test_adequate.py": (
+    "diagnosis/test_adequate.py": (
         "test_nothing_hidden[joint-process]",
         "test_a_slide[False]",
         "off[ankle",
         "off[joint",
     ),
-    "diagnose/test_doubts.py": ("test_two_real_trials",),
-    "diagnose/test_driven_far.py": ("_gain]", "_damping]", "_hum]", "test_a_twin_is_found", "one_muscle[12]"),
-    "diagnose/test_found.py": (
+    "diagnosis/test_doubts.py": ("test_two_real_trials",),
+    "diagnosis/test_driven_far.py": ("_gain]", "_damping]", "_hum]", "test_a_twin_is_found", "one_muscle[12]"),
+    "diagnosis/test_found.py": (
         *("test_intervals_hold", "-1-True", "-2-True", "-5-True", "-6-False", "-9-True", "-10-True", "-11-True"),
         *("test_friction_of_a_slide[False]", "far_away[1]", "('coulomb_friction',)-ar1-4-True"),
         "test_both_of_two",
     ),
-    "diagnose/test_gaps.py": ("[joint-names2", "[ankle-names", "lack[without"),
-    "diagnose/test_low_passed.py": ("test_nothing_hidden_is_adequate",),
-    "diagnose/test_misread.py": ("test_a_cause_that_shows_at_one_load",),
-    "diagnose/test_one_trial.py": ("test_a_real_swing", "test_friction_is_found_beneath"),
-    "diagnose/test_outside.py": ("a_detent",),
-    "diagnose/test_per_trial_phase.py": (
+    "diagnosis/test_gaps.py": ("[joint-names2", "[ankle-names", "lack[without"),
+    "diagnosis/test_low_passed.py": ("test_nothing_hidden_is_adequate",),
+    "diagnosis/test_misread.py": ("test_a_cause_that_shows_at_one_load",),
+    "diagnosis/test_one_trial.py": ("test_a_real_swing", "test_friction_is_found_beneath"),
+    "diagnosis/test_outside.py": ("a_detent",),
+    "diagnosis/test_per_trial_phase.py": (
         "[ankle-breath-process]",
         "[joint-breath-white]",
         "[ankle-hum-white]",

@@ -187,7 +187,7 @@ def test_the_benchmarks_that_are_listed_are_those_that_can_be_run():
 
 def test_the_study_format_has_every_key_of_a_diagnosis():
     text = (DOCS / "study_format.md").read_text()
-    made = ast.walk(ast.parse((ROOT / "fes_pin" / "diagnose" / "record.py").read_text()))
+    made = ast.walk(ast.parse((ROOT / "fes_pin" / "diagnosis" / "record.py").read_text()))
     keys = {
         key.value for node in made if isinstance(node, ast.Dict) for key in node.keys if isinstance(key, ast.Constant)
     }

@@ -1,4 +1,4 @@
-"""The imports run one way: view -> diagnose -> identify -> models -> data; control -> allocate -> muscles -> body.
+"""The imports run one way: view -> diagnosis -> identify -> models -> data; control -> allocation -> muscles -> body.
 
 The controller takes eq. (1) from paper. Measured walking (walk) reads the body, and the parameters and stages of models
 for its causes.
@@ -17,20 +17,20 @@ ALLOWED = {
     "data": set(),
     "models": {"data"},
     "identify": {"models", "data"},
-    "diagnose": {"identify", "models", "data"},
-    "contrast": {"diagnose", "identify", "models", "data"},
-    "compare": {"diagnose", "identify", "models", "data"},
+    "diagnosis": {"identify", "models", "data"},
+    "contrasts": {"diagnosis", "identify", "models", "data"},
+    "comparison": {"diagnosis", "identify", "models", "data"},
     "paper": {"identify", "models", "data"},
     "body": {"data"},
     "walk": {"body", "models", "data"},
     "muscles": {"body", "models", "data"},
-    "allocate": {"muscles", "body", "data"},
-    "control": {"paper", "allocate", "muscles", "identify", "models", "data"},
-    "verdict": {"walk", "diagnose", "models", "data"},
-    "cohort": {"view", "walk", "diagnose", "models", "data"},
+    "allocation": {"muscles", "body", "data"},
+    "control": {"paper", "allocation", "muscles", "identify", "models", "data"},
+    "verdict": {"walk", "diagnosis", "models", "data"},
+    "cohort": {"view", "walk", "diagnosis", "models", "data"},
     "view": {
-        *("paper", "contrast", "diagnose", "identify", "models", "data"),
-        *("control", "allocate", "muscles", "body", "walk"),
+        *("paper", "contrasts", "diagnosis", "identify", "models", "data"),
+        *("control", "allocation", "muscles", "body", "walk"),
     },
 }
 
@@ -79,7 +79,7 @@ def test_files_import_one_way(chapter):
 
 def test_what_some_rigs_need_alone_is_not_imported_for_all():
     """scipy.signal and scipy.stats take half a second, a sixth of a diagnosis."""
-    wanted = "import sys, fes_pin.diagnose.diagnosis, fes_pin.models.catalogue, fes_pin.view.report"
+    wanted = "import sys, fes_pin.diagnosis.diagnosis, fes_pin.models.catalogue, fes_pin.view.report"
     told = f"{wanted}; print([n for n in ('scipy.signal', 'scipy.stats') if n in sys.modules])"
     run = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 
 pytestmark = pytest.mark.shared
 

@@ -5,7 +5,7 @@ import pytest
 
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.models.predict import predict
 from fes_pin.models.store import load_model, save_model
 

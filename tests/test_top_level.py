@@ -1,6 +1,10 @@
 """The public names, however and whenever they are first used."""
 
 import ast
+import importlib
+import inspect
+import pickle
+import pkgutil
 from pathlib import Path
 
 import pytest
@@ -15,11 +19,35 @@ def test_every_public_name_can_be_had():
         assert getattr(fp, name) is not None
 
 
-def test_diagnose_can_be_called_after_its_chapter_was_imported():
-    import fes_pin.diagnose.diagnosis  # noqa: F401
+def every_module():
+    return [module.name for module in pkgutil.walk_packages(fp.__path__, "fes_pin.")]
 
-    assert callable(fp.diagnose)
-    assert callable(fp.diagnose)
+
+def test_no_module_shares_a_name_with_a_public_function():
+    assert {name.rpartition(".")[2] for name in every_module() if name.count(".") == 1} & set(fp._WHERE) == set()
+
+
+def test_public_names_stay_what_they_are_after_every_module_was_imported():
+    """Importing a module binds its name in the package above it: no public function may be hidden by that."""
+    for name in every_module():
+        importlib.import_module(name)
+    for name, where in fp._WHERE.items():
+        for _ in range(2):
+            assert getattr(fp, name) is getattr(importlib.import_module(where), name)
+            assert not inspect.ismodule(getattr(fp, name))
+
+
+def test_allocate_twice_and_imported():
+    from fes_pin import allocate
+
+    nerves = fp.Nerves(["left_femoral"])
+    first, again = (fp.allocate({"left_knee_flexion": -40.0}, nerves) for _ in range(2))
+    assert allocate({"left_knee_flexion": -40.0}, nerves).pulse_widths_us == first.pulse_widths_us == again.pulse_widths_us
+
+
+def test_public_functions_can_be_sent_to_a_pool_and_say_their_arguments():
+    assert pickle.loads(pickle.dumps(fp.diagnose)) is fp.diagnose
+    assert "study" in inspect.signature(fp.diagnose).parameters
 
 
 def test_type_checkers_see_the_same_names():

@@ -82,7 +82,7 @@ def allocate(
     """Pulse widths for wanted joint torques, what is short, and why."""
     from math import degrees, radians
 
-    from fes_pin.allocate.allocate import allocate as solve
+    from fes_pin.allocation.allocate import allocate as solve
     from fes_pin.body.joints import joint_limits
     from fes_pin.muscles.nerves import STRONGEST, Nerves
     from fes_pin.muscles.recruitment import LinearRecruitment
@@ -134,7 +134,7 @@ def walk_table(folder: Path, nerves, passive: float = 0.0) -> str:
     """Per joint of the measured walk: peak torque, rms shortfall, share of samples within 10 % of the peak."""
     import numpy as np
 
-    from fes_pin.allocate.walk import allocate_walk
+    from fes_pin.allocation.walk import allocate_walk
     from fes_pin.body.joints import JOINT_NAMES
     from fes_pin.body.measured_walk import read_walk
     from fes_pin.body.passive import PassiveLegs

@@ -33,9 +33,9 @@ def compare(
     library: Libraries = None,
 ) -> None:
     """Rank models from the literature by their errors on whole trials left out."""
-    from fes_pin.compare.compare import compare as find
-    from fes_pin.compare.record import FILE, comparison_json
-    from fes_pin.compare.result import comparison_text
+    from fes_pin.comparison.compare import compare as find
+    from fes_pin.comparison.record import FILE, comparison_json
+    from fes_pin.comparison.result import comparison_text
     from fes_pin.data.files import check_folder, write_files
     from fes_pin.data.study import read_study
 

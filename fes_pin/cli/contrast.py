@@ -27,9 +27,9 @@ def contrast(
     library: Libraries = None,
 ) -> None:
     """Say what differs between groups of trials, by how much, and what did not change."""
-    from fes_pin.contrast.contrast import contrast as find
-    from fes_pin.contrast.record import FILE, contrast_json
-    from fes_pin.contrast.result import contrast_text
+    from fes_pin.contrasts.contrast import contrast as find
+    from fes_pin.contrasts.record import FILE, contrast_json
+    from fes_pin.contrasts.result import contrast_text
     from fes_pin.data.errors import InputError
     from fes_pin.data.files import check_folder, write_files
     from fes_pin.data.study import read_study

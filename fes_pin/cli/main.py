@@ -22,7 +22,7 @@ from fes_pin.cli.walk import diagnose_walking, print_effects
 
 if TYPE_CHECKING:
     from fes_pin.data.trial import Trial
-    from fes_pin.diagnose.result import Diagnosis
+    from fes_pin.diagnosis.result import Diagnosis
     from fes_pin.models.model import Model
 
 app = typer.Typer(cls=Commands, pretty_exceptions_enable=False)
@@ -103,9 +103,9 @@ def diagnose(
         typer.echo(f"{verdict}\nreport: {out / 'report.html'}")
         return
     from fes_pin.data.provenance import this_command
-    from fes_pin.diagnose.diagnosis import diagnose_joint as find
-    from fes_pin.diagnose.record import NEXT_FILE, by_command, diagnosis_files
-    from fes_pin.diagnose.trajectories import trajectories
+    from fes_pin.diagnosis.diagnosis import diagnose_joint as find
+    from fes_pin.diagnosis.record import NEXT_FILE, by_command, diagnosis_files
+    from fes_pin.diagnosis.trajectories import trajectories
     from fes_pin.view.report import report_html
 
     with progress() as tell:
@@ -203,7 +203,7 @@ def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
 @app.command()
 def effects(library: Libraries = None) -> None:
     """List the causes it knows, with stage, equation and parameters."""
-    from fes_pin.diagnose.misread import DESCRIBED as MISREAD
+    from fes_pin.diagnosis.misread import DESCRIBED as MISREAD
     from fes_pin.models.describe import describe
 
     catalogue = catalogue_with(library)
@@ -242,7 +242,7 @@ def _print_verdict(diagnosis: Diagnosis) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from fes_pin.diagnose.text import cause_columns, cause_row
+    from fes_pin.diagnosis.text import cause_columns, cause_row
 
     console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=not sys.stdout.isatty(), highlight=False)
     console.print(Text(f"{diagnosis.study.name}: {diagnosis.headline()}", style="bold"))

@@ -119,7 +119,7 @@ def check(
 ) -> None:
     """Say what is odd about a study before anything is looked for, and what its trials can and cannot show."""
     from fes_pin.data.study import read_study
-    from fes_pin.diagnose.testable import testable_causes
+    from fes_pin.diagnosis.testable import testable_causes
     from fes_pin.models.catalogue import load_library
 
     catalogue = load_library(*(library or []))
@@ -161,8 +161,8 @@ def _say(study: Study, warnings: Sequence[str]) -> None:
 
 
 def _checked(study: Study, catalogue: Catalogue) -> list[str]:
-    from fes_pin.diagnose.diagnosis import measured_study
-    from fes_pin.diagnose.plausibility import check_study
+    from fes_pin.diagnosis.diagnosis import measured_study
+    from fes_pin.diagnosis.plausibility import check_study
     from fes_pin.models.nominal import nominal_model
 
     if study.schema.owner is None:

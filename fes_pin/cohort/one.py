@@ -98,8 +98,8 @@ def _files(work: Work) -> dict[str, str | bytes]:
     study = read_study(work.folder, rigs=catalogue.schemas())
     if study.rig == "body":
         return _walking(study, work.seed)
-    from fes_pin.diagnose.diagnosis import diagnose_joint  # noqa: PLC0415
-    from fes_pin.diagnose.record import by_command, diagnosis_files  # noqa: PLC0415
+    from fes_pin.diagnosis.diagnosis import diagnose_joint  # noqa: PLC0415
+    from fes_pin.diagnosis.record import by_command, diagnosis_files  # noqa: PLC0415
     from fes_pin.view.report import report_html  # noqa: PLC0415
 
     found = by_command(diagnose_joint(study, library=catalogue, seed=work.seed, limit=work.limit), work.command)

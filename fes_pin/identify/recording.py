@@ -24,7 +24,7 @@ from fes_pin.models.model import Model
 
 SMOOTH = 0.3
 """Noise from sample to sample as a share of all that the nominal model leaves, from which a record is as it was read.
-Of ten samples' averages it is below 0.15, of a sensor's noise above 0.5 (`tests/diagnose/test_low_passed.py`)."""
+Of ten samples' averages it is below 0.15, of a sensor's noise above 0.5 (`tests/diagnosis/test_low_passed.py`)."""
 PERIODS, MOST = 10.0, 0.2
 """Cut-offs that are tried: from so many periods in the shortest trial, of which the ends are one or two, to this share
 of the sampling rate."""

@@ -10,7 +10,7 @@ from fes_pin.data.study import Study
 from fes_pin.models.catalogue import Source
 
 if TYPE_CHECKING:
-    from fes_pin.diagnose.result import Diagnosis
+    from fes_pin.diagnosis.result import Diagnosis
     from fes_pin.walk.result import WalkDiagnosis
 
 
@@ -52,6 +52,6 @@ def diagnose(
         if library is not None and library != []:
             raise InputError("a library brings causes of rigs; walking has none but its own", file=study.folder)
         return diagnose_walk(study, seed=seed, limit=limit, progress=progress)
-    from fes_pin.diagnose.diagnosis import diagnose_joint as of_a_rig  # noqa: PLC0415
+    from fes_pin.diagnosis.diagnosis import diagnose_joint as of_a_rig  # noqa: PLC0415
 
     return of_a_rig(study, library=library, seed=seed, limit=limit, progress=progress)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from fes_pin.contrast.result import Change, Contrast, contrast_headline, contrast_notes
-from fes_pin.diagnose.cause import ParameterEstimate
-from fes_pin.diagnose.text import probability
+from fes_pin.contrasts.result import Change, Contrast, contrast_headline, contrast_notes
+from fes_pin.diagnosis.cause import ParameterEstimate
+from fes_pin.diagnosis.text import probability
 from fes_pin.identify.levels import CONFIDENCE_95
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.diagnose.cause import Cause
-from fes_pin.diagnose.result import Diagnosis
+from fes_pin.diagnosis.cause import Cause
+from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.levels import SEPARABLE
 from fes_pin.models.catalogue import Catalogue
 from fes_pin.view.chart import Panel, svg

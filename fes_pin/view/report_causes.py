@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fes_pin.diagnose.cause import Cause
-from fes_pin.diagnose.result import EACH_TRIAL, Diagnosis
-from fes_pin.diagnose.text import probability
+from fes_pin.diagnosis.cause import Cause
+from fes_pin.diagnosis.result import EACH_TRIAL, Diagnosis
+from fes_pin.diagnosis.text import probability
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import CONFIDENCE_95
 from fes_pin.models.describe import equation, remark, sentence

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from fes_pin.diagnose.text import percent, probability
+from fes_pin.diagnosis.text import percent, probability
 from fes_pin.models.describe import sentence
 from fes_pin.view.page import Content, Markup, element, figure, html_table, joined, key, page, section
 from fes_pin.view.style import EXTENDED, FAINT, MEASURED, NOMINAL

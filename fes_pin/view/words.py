@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 
-from fes_pin.diagnose.cause import Cause
-from fes_pin.diagnose.errors_ahead import Ahead
-from fes_pin.diagnose.record import NEXT_FILE
-from fes_pin.diagnose.result import Diagnosis
-from fes_pin.diagnose.text import LEAST_P, percent, probability, quantity
+from fes_pin.diagnosis.cause import Cause
+from fes_pin.diagnosis.errors_ahead import Ahead
+from fes_pin.diagnosis.record import NEXT_FILE
+from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.diagnosis.text import LEAST_P, percent, probability, quantity
 from fes_pin.models.describe import sentence
 from fes_pin.models.stage import Effect
 from fes_pin.view.page import Content, Markup, element, joined, unit_text

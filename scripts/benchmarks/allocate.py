@@ -18,9 +18,9 @@ if __name__ == "__main__":
 
 import numpy as np
 
-from fes_pin.allocate.allocate import Allocator, allocate
-from fes_pin.allocate.horizon import Horizon, StrengthFatigue
-from fes_pin.allocate.walk import allocate_walk, clipped, direction_error, rescaled
+from fes_pin.allocation.allocate import Allocator, allocate
+from fes_pin.allocation.horizon import Horizon, StrengthFatigue
+from fes_pin.allocation.walk import allocate_walk, clipped, direction_error, rescaled
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.measured_walk import read_walk
 from fes_pin.data.errors import InputError

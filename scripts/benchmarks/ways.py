@@ -23,10 +23,10 @@ from confusion_matrix.noise import FAMILIES
 from confusion_matrix.plan import FORMS, Item
 
 from fes_pin.data.study import Study
-from fes_pin.diagnose.decide.rivals import alternatives
-from fes_pin.diagnose.diagnosis import split
-from fes_pin.diagnose.search.likelihood_search import Found
-from fes_pin.diagnose.searches import Searches
+from fes_pin.diagnosis.decide.rivals import alternatives
+from fes_pin.diagnosis.diagnosis import split
+from fes_pin.diagnosis.search.likelihood_search import Found
+from fes_pin.diagnosis.searches import Searches
 from fes_pin.models.catalogue import shipped
 from fes_pin.models.nominal import nominal_model
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from confusion_matrix.generator import Made
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.result import Diagnosis
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.per_trial import predictions
 
 

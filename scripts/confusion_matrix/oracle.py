@@ -12,10 +12,10 @@ from typing import Any
 from confusion_matrix.generator import Made, noise_as_it_is
 from confusion_matrix.judge import known
 from confusion_matrix.plan import DISTANCES, Item
-from fes_pin.diagnose.decide.rivals import alternatives
-from fes_pin.diagnose.decide.significance import Family
-from fes_pin.diagnose.search.score import Scored, best_by_effect
-from fes_pin.diagnose.search.simulation_fits import SimulationFits
+from fes_pin.diagnosis.decide.rivals import alternatives
+from fes_pin.diagnosis.decide.significance import Family
+from fes_pin.diagnosis.search.score import Scored, best_by_effect
+from fes_pin.diagnosis.search.simulation_fits import SimulationFits
 from fes_pin.identify.fit import MAX_ITERATIONS, Fit, fit_multistart, fit_problem
 from fes_pin.models.nominal import nominal_model
 

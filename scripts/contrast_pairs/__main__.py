@@ -19,7 +19,7 @@ from contrast_pairs.driven import NOMINAL as DRIVEN_NOMINAL
 from contrast_pairs.driven import driven_pair
 from contrast_pairs.free import CAUSES, NOMINAL, free_pair
 from contrast_pairs.practice import EXACT, practice_pair
-from fes_pin.contrast.contrast import contrast
+from fes_pin.contrasts.contrast import contrast
 from fes_pin.data.study import Study, read_study
 
 RIGS = ("ankle", "ankle", "driven", "muscle", "ankle", "joint", "driven", "ankle")

@@ -19,8 +19,8 @@ from driven_rigs import stimulated as ankles
 from driven_rigs import swing_up as pendulums
 from driven_rigs.draw import CAUSES, OUTSIDE, Drawn, draw
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.result import Diagnosis
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.levels import CONFIDENCE_95
 
 PAIRS = (

@@ -44,7 +44,7 @@ def main() -> None:
 
 
 def _run(job: tuple[list[int], int, bool, bool]) -> tuple[dict[int, int], int, float]:
-    import fes_pin.diagnose.diagnosis  # noqa: PLC0415
+    import fes_pin.diagnosis.diagnosis  # noqa: PLC0415
     import fes_pin.view.report  # noqa: F401, PLC0415
     from fuzz_inputs.cases import run_case  # noqa: PLC0415
     from fuzz_inputs.check import warm_up  # noqa: PLC0415

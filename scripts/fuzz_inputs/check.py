@@ -35,7 +35,7 @@ NO_FOLDER = -1
 """Stands for the descriptor of the folder that a removed path is relative to, where none was given."""
 PARTIAL = ".fes_pin-"
 """What is not whole yet has a name that begins so, beside its destination."""
-IMPORTED = ("scipy.signal", "fes_pin.data.new_study", "fes_pin.data.new_body_study", "fes_pin.diagnose.testable")
+IMPORTED = ("scipy.signal", "fes_pin.data.new_study", "fes_pin.data.new_body_study", "fes_pin.diagnosis.testable")
 """What commands import once they are asked."""
 SPARE = 97
 """Exit code for an exception that the command let through."""

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.replay import replayed_trials
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.view.plots import trial_drawing
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 from going_on import results_of
 
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 from imposed_rigs import ankle, joint, muscle
 
 RIGS = {"joint": joint, "muscle": muscle, "ankle": ankle}

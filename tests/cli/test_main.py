@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from data import studies, test_bad_studies
-from diagnose.hidden import study_of
+from diagnosis.hidden import study_of
 
 from fes_pin.cli import main
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import read_trial, write_trial
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.record import NEXT_FILE, diagnosis_files, diagnosis_record
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.record import NEXT_FILE, diagnosis_files, diagnosis_record
 from fes_pin.identify.noise import estimate_noise
 from fes_pin.identify.stored import load_random
 from fes_pin.models.effects import EFFECTS
@@ -207,7 +207,7 @@ def test_a_failed_write_leaves_the_old_answer(made, diagnosis, monkeypatch, caps
     old = {name: f"old {name}" for name in FILES}
     for name, text in old.items():
         (out / name).write_text(text)
-    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose_joint", lambda *_, **__: diagnosis)
+    monkeypatch.setattr("fes_pin.diagnosis.diagnosis.diagnose_joint", lambda *_, **__: diagnosis)
     usual, count = os.replace, []
 
     def replace(source, target):
@@ -225,14 +225,14 @@ def test_a_failed_write_leaves_the_old_answer(made, diagnosis, monkeypatch, caps
 def test_what_an_earlier_diagnosis_proposed_does_not_stay(made, diagnosis, monkeypatch, tmp_path):
     (tmp_path / NEXT_FILE).write_text("of another study")
     decided = replace(diagnosis, next_experiment=None)
-    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose_joint", lambda *_, **__: decided)
+    monkeypatch.setattr("fes_pin.diagnosis.diagnosis.diagnose_joint", lambda *_, **__: decided)
     run(monkeypatch, "diagnose", made / "study", "--out", tmp_path)
     assert (tmp_path / "diagnosis.json").exists() and not (tmp_path / NEXT_FILE).exists()
 
 
 def test_a_killed_report_leaves_no_folder(made, diagnosis, monkeypatch, tmp_path):
     """What ends the work before the files are complete leaves nothing."""
-    monkeypatch.setattr("fes_pin.diagnose.diagnosis.diagnose_joint", lambda *_, **__: diagnosis)
+    monkeypatch.setattr("fes_pin.diagnosis.diagnosis.diagnose_joint", lambda *_, **__: diagnosis)
     monkeypatch.setattr("fes_pin.view.report.report_html", _killed)
     monkeypatch.setattr(sys, "argv", ["fes-pin", "diagnose", str(made / "study"), "--out", str(tmp_path / "out")])
     with pytest.raises((KeyboardInterrupt, SystemExit)):

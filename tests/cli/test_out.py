@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from cli.test_own import fails, german, recordings, run  # noqa: F401
 from data import studies
-from diagnose.hidden import study_of
+from diagnosis.hidden import study_of
 
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import read_trial

@@ -4,7 +4,7 @@ import pytest
 from confusion_matrix import generator
 from confusion_matrix.plan import Item
 
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 
 
 @pytest.mark.parametrize(

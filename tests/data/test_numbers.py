@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from fes_pin.allocate.allocator import Allocator
-from fes_pin.allocate.horizon import Horizon, StrengthFatigue
+from fes_pin.allocation.allocator import Allocator
+from fes_pin.allocation.horizon import Horizon, StrengthFatigue
 from fes_pin.control.limits import StimulationLimits
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import as_number, between, number, positive_number, whole

@@ -8,12 +8,12 @@ import pytest
 from driven_rigs.arm import CAUSES, draw_arm
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.driven import Judged, _foretelling_more
-from fes_pin.diagnose.errors_ahead import Ahead, errors_ahead
-from fes_pin.diagnose.form_errors import beside_what_is_new
-from fes_pin.diagnose.remainder.open_set import Remainder
-from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.driven import Judged, _foretelling_more
+from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
+from fes_pin.diagnosis.form_errors import beside_what_is_new
+from fes_pin.diagnosis.remainder.open_set import Remainder
+from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts, fresh
 from fes_pin.identify.levels import CONFIDENCE_95

@@ -6,9 +6,9 @@ from driven_rigs.swing_up import draw_swing_up
 
 from fes_pin.data.counts import count_of
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
 from fes_pin.identify.lasting import words_of_reading
 from fes_pin.models import predictor
 from fes_pin.models.effects import Cogging, CoulombFriction

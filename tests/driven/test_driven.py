@@ -7,9 +7,9 @@ import pytest
 from driven_rigs.draw import BASES, draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.driven_refused import UNMOVED
-from fes_pin.diagnose.record import diagnosis_record
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.driven_refused import UNMOVED
+from fes_pin.diagnosis.record import diagnosis_record
 
 
 def found_in(causes, seed, folder, size=0.3):

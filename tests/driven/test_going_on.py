@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from driven.bristles import believed, trial
 
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
-from fes_pin.diagnose.search.score import Scores
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnosis.search.score import Scores
 from fes_pin.models.effects import CoulombFriction, SensorOffset
 
 

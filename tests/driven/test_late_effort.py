@@ -12,9 +12,9 @@ from fes_pin.data.log import Log, advanced
 from fes_pin.data.study import read_study
 from fes_pin.data.table import read_csv
 from fes_pin.data.trial import Trial, trial_csv
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.record import diagnosis_files
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.record import diagnosis_files
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.ahead import foretell
 from fes_pin.identify.lateness import lateness_of
 from fes_pin.identify.stored import load_log, log_table

@@ -9,8 +9,8 @@ from driven_rigs import swing_up
 from driven_rigs.swing_up import SwingUp, draw_swing_up
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.record import diagnosis_files
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.record import diagnosis_files
 from fes_pin.identify.stored import load_log
 
 NOISY = (1830000, 1830006)

@@ -7,8 +7,8 @@ import pytest
 from driven_rigs.draw import BASES, draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnose.search.possible import is_possible
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem

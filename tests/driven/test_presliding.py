@@ -7,9 +7,9 @@ from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnose.search.likelihood_maxima import LikelihoodMaxima
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.effects import CoulombFriction

@@ -7,7 +7,7 @@ from driven.linear_play import LinearPlay
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.remainder import driven
+from fes_pin.diagnosis.remainder import driven
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.nominal import nominal_model

@@ -4,8 +4,8 @@ from driven.bristles import believed, trial
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.models.effects import CoulombFriction, EffortOffset
 
 FRICTION, BOTH = ("coulomb_friction",), ("coulomb_friction", "effort_offset")

@@ -6,11 +6,11 @@ import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.decide.chosen_again import ChosenAgain
-from fes_pin.diagnose.decide.held_out import folds_of
-from fes_pin.diagnose.driven_held_out import as_random_as_in_all
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnose.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnosis.decide.chosen_again import ChosenAgain
+from fes_pin.diagnosis.decide.held_out import folds_of
+from fes_pin.diagnosis.driven_held_out import as_random_as_in_all
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
 from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.scatter import with_honest_intervals

@@ -10,8 +10,8 @@ from fes_pin.data.answered import answer_of
 from fes_pin.data.log import Log
 from fes_pin.data.study import Study, read_study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose_joint
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.simultaneous import cost_of_answers
 from fes_pin.models.nominal import nominal_model
 

@@ -6,7 +6,7 @@ from driven.linear_play import LinearPlay
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.model import Model
 

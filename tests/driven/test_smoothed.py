@@ -4,7 +4,7 @@ import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 
 
 @pytest.mark.parametrize("cutoff_hz", [40.0, 15.0])

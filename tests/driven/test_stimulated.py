@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnose.hidden import study_of
+from diagnosis.hidden import study_of
 from oracle.rigs import Ankle
 from oracle.studies import ANGLE_NOISE_RAD, PROCESS_TORQUE_NM, RATE_HZ, SATURATION_US, THRESHOLD_US, ankle_rig
 from scipy.integrate import odeint
 
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.feedback import is_stimulus_fed_back
 from fes_pin.models.nominal import nominal_model
 

@@ -5,7 +5,7 @@ import pytest
 from driven_rigs.swing_up import CAUSES, draw_swing_up
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.models.nominal import nominal_model
 
 FINE = 1800005

@@ -8,7 +8,7 @@ import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
 from fes_pin.models.effects import CoulombFriction, EffortGain, PeriodicTorque

@@ -9,8 +9,8 @@ from fuzz_inputs.studies import RIGS, small_study
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
-from fes_pin.diagnose.diagnosis import measured_study
-from fes_pin.diagnose.plausibility import check_study
+from fes_pin.diagnosis.diagnosis import measured_study
+from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.models.compile.disk_cache import cache_folder
 from fes_pin.models.nominal import nominal_model
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnose.hidden import study_of
+from diagnosis.hidden import study_of
 from scipy.signal import lfilter
 
 from fes_pin.data.errors import InputError

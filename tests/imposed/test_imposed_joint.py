@@ -11,8 +11,8 @@ from imposed_rigs.motion import drawn
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
-from fes_pin.diagnose import logged
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis import logged
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.catalogue import Catalogue, shipped

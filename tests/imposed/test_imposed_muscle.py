@@ -11,7 +11,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.plausibility import implausible
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study, read_study, write_study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.models.effects import Fatigue, Potentiation
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.session import PAST, past_of, session_of

@@ -8,7 +8,7 @@ from driven_rigs.draw import draw
 from imposed_rigs import joint
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 
 
 def turned(study):

@@ -8,7 +8,7 @@ import pytest
 from cases import JOINT
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnose.search.simulation_fits import SimulationFits
+from fes_pin.diagnosis.search.simulation_fits import SimulationFits
 from fes_pin.identify.fit import rough_noise
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.model import Model

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 import fes_pin as fp
 from fes_pin.cli.main import main
-from fes_pin.diagnose.search.starts import refinements
+from fes_pin.diagnosis.search.starts import refinements
 from fes_pin.models import rigs
 from fes_pin.models.catalogue import installed, shipped
 from fes_pin.models.disturbance import disturbed

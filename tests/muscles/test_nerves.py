@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fes_pin.allocate.allocate import allocate
+from fes_pin.allocation.allocate import allocate
 from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, joint_limits
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.fibres import active_force, tendon_force

@@ -7,7 +7,7 @@ import pytest
 import scipy.optimize
 
 from fes_pin.data.errors import InputError
-from fes_pin.diagnose.diagnosis import diagnose_joint
+from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from view.reported import ankle_diagnosis, ankle_study, joint_study
 
-from fes_pin.diagnose.replay import replayed_trials
+from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate

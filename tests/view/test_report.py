@@ -18,8 +18,8 @@ import pytest
 from view.reported import NASTY, ankle_diagnosis, ankle_study, diagnosed, joint_study, muscle_study
 
 import fes_pin as fp
-from fes_pin.diagnose.errors_ahead import Ahead, AheadErrors, RandomPart
-from fes_pin.diagnose.record import diagnosis_record
+from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
+from fes_pin.diagnosis.record import diagnosis_record
 from fes_pin.models.describe import equation
 from fes_pin.models.effects import effect_named
 from fes_pin.models.predictor import Doubt

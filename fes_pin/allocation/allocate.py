@@ -1,0 +1,86 @@
+"""From wanted joint torques to recruitments and pulse widths, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Set
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from fes_pin.allocation.allocation import Allocation
+from fes_pin.allocation.allocator import Allocator
+
+__all__ = ["Allocator", "allocate"]
+
+
+def allocate(
+    torque: Any, nerves: Any, q: Any = None, previous: Any = None, *, solver: str = "daqp", **options: Any
+) -> Allocation:
+    """Pulse widths for a wanted joint torque.
+
+    Parameters
+    ----------
+    torque
+        Wanted joint torque, N m, by joint name (absent: 0) or (joints,).
+    nerves, q
+        `Nerves` and the posture, or an array (joints, n) of torque at full recruitment, N m.
+    previous
+        Recruitments in force until now, (n,), for `rate` and `change`; 0 by default.
+    solver
+        See `Allocator.__call__`.
+    options
+        See `fes_pin.allocation.problem.Options`.
+
+    Raises
+    ------
+    InputError
+        Bad input of any kind, in one line.
+
+    Examples
+    --------
+    >>> from fes_pin.muscles.nerves import Nerves
+    >>> print(allocate({"left_ankle_dorsiflexion": -400.0}, Nerves(["left_tibial"])))
+    """
+    program = allocator_for(nerves, q, options)
+    return program(torque, program.at_rest if previous is None else previous, solver=solver)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Moment arms and options, told apart by their values."""
+
+    key: Any
+    nerves: Any = field(compare=False)
+    q: Any = field(compare=False)
+    options: Any = field(compare=False)
+
+
+def allocator_for(nerves: Any, q: Any, options: Mapping[str, Any]) -> Allocator:
+    """The program for these moment arms and options, made anew only if it is not among the recent ones."""
+    asked = Asked((frozen(nerves), frozen(q), frozen(options)), nerves, q, options)
+    try:
+        hash(asked)
+    except TypeError:
+        return Allocator(nerves, q, **options)
+    return recent(asked)
+
+
+@lru_cache(maxsize=16)
+def recent(asked: Asked) -> Allocator:
+    """The last programs, so that the next torque of the same kind starts where the last one ended."""
+    return Allocator(asked.nerves, asked.q, **asked.options)
+
+
+def frozen(value: Any) -> Any:
+    """What tells two arguments apart, hashable: equal values, equal keys."""
+    if isinstance(value, np.ndarray):
+        return value.shape, value.dtype.str, value.tobytes()
+    if isinstance(value, Mapping):
+        return tuple((key, frozen(value[key])) for key in sorted(value, key=str))
+    if isinstance(value, (list, tuple)):
+        return tuple(frozen(item) for item in value)
+    if isinstance(value, Set):
+        return frozenset(value)
+    return value

@@ -1,0 +1,229 @@
+"""What an allocation says: pulse widths, what torque they make, what is short, why, and the proof."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fes_pin.allocation.certificate import Certificate
+from fes_pin.allocation.problem import AllocationProblem
+
+REPORTED_NM = 0.5
+"""A shortfall is put in words from this size on, N m."""
+NEGLIGIBLE = 1e-7
+"""A multiplier smaller than this is 0 (of a cost whose largest curvature is about 1)."""
+WORTH_NAMING = 0.1
+"""A channel is named as a reason if it makes at least this fraction of what the most helpful limited one makes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Allocation:
+    """Pulse widths for a wanted torque.
+
+    Attributes
+    ----------
+    recruitment, pulse_width_us
+        (n,) fraction 0 to 1 and us, per channel in the order of `names`.
+    wanted, achieved
+        (joints,) N m.
+    gradient
+        (n,) slope of the cost over recruitment: negative at a limit that holds a channel down.
+    lower, upper
+        (n,) limits of recruitment that applied.
+    previous
+        (n,) recruitments that were in force before.
+    certificate
+        Recomputed from the moment arms; None where the choice is not convex (then `gap` speaks).
+    gap
+        No choice costs less than this one minus `gap` (of the cost divided by the certificate's scale).
+    problem
+        Names, moment arms, weights, prices.
+    """
+
+    recruitment: np.ndarray
+    pulse_width_us: np.ndarray
+    wanted: np.ndarray
+    achieved: np.ndarray
+    gradient: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    previous: np.ndarray
+    certificate: Certificate
+    gap: float
+    problem: AllocationProblem
+    note: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Channels."""
+        return self.problem.names
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints."""
+        return self.problem.joints
+
+    @property
+    def shortfall(self) -> np.ndarray:
+        """Wanted minus achieved torque, (joints,) N m."""
+        return self.wanted - self.achieved
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """One sentence per joint whose moment arms were taken at another angle than asked (`Nerves.held`)."""
+        return self.problem.held
+
+    @property
+    def achieved_band(self) -> tuple[np.ndarray, np.ndarray]:
+        """Torque of these pulse widths with the weakest and the strongest muscles that are likely, (joints,) N m."""
+        low, high = self.problem.band
+        return low * self.achieved, high * self.achieved
+
+    @property
+    def pulse_widths_us(self) -> dict[str, float]:
+        """Pulse width per channel by name, us."""
+        return dict(zip(self.names, self.pulse_width_us.tolist(), strict=True))
+
+    @property
+    def multipliers(self) -> dict[str, float]:
+        """Price of every limit that binds, (N m)^2 per unit of recruitment: + for an upper limit, - for a lower one."""
+        price = -self.gradient * self.certificate.scale
+        binds = (self.lower < self.upper) & (np.abs(self.gradient) > NEGLIGIBLE)
+        return {name: float(p) for name, p, b in zip(self.names, price, binds, strict=True) if b}
+
+    @property
+    def active(self) -> dict[str, str]:
+        """What holds each channel at a limit: `off`, `saturated`, `rising`, `falling`, `least`, `dead`, `limited`."""
+        return {name: word for i, name in enumerate(self.names) if (word := self.limit(i))}
+
+    def limit(self, i: int) -> str:
+        """What holds channel i, empty if nothing does."""
+        r, problem = self.recruitment[i], self.problem
+        if problem.upper[i] == 0.0 or not problem.matrix[:, i].any():
+            return "dead"
+        if r >= self.upper[i]:
+            return "saturated" if r >= 1.0 else "limited" if r >= problem.upper[i] else "rising"
+        if r <= self.lower[i] and r > problem.lower[i]:
+            return "falling"
+        if r <= 0.0:
+            return "off"
+        return "least" if problem.least is not None and r <= problem.least[i] else ""
+
+    @property
+    def reasons(self) -> list[str]:
+        """One sentence per joint whose torque misses by `REPORTED_NM` or more, the worst first."""
+        weighed = np.abs(self.shortfall) * (self.problem.weights > 0.0)
+        return [self.reason(int(j)) for j in np.argsort(-weighed) if weighed[j] >= REPORTED_NM]
+
+    def reason(self, j: int) -> str:
+        """Why the torque of joint j misses."""
+        short, wanted = self.shortfall[j], self.wanted[j]
+        word = "short" if short * wanted > 0.0 else "too much"
+        joint = self.joints[j].replace("_", " ")
+        return f"{joint} {abs(short):.1f} N m {word}: {self.cause(j, np.sign(short))}"
+
+    def cause(self, j: int, direction: float) -> str:
+        """What keeps joint j from more torque in a direction."""
+        problem = self.problem
+        help_ = problem.nominal[j] * direction
+        by_name = [name.replace("_", " ") for name in self.names]
+        words = [self.limit(i) for i in range(len(self.names))]
+        if not help_.any():
+            weak = [name for name, column in zip(by_name, problem.nominal.T, strict=True) if not column.any()]
+            return "no stimulated nerve turns it" + (f" ({', '.join(weak)} without strength)" if weak else "")
+        stuck = {"saturated", "limited", "rising", "dead"}
+        held = [int(i) for i in np.argsort(-help_) if help_[i] > 0.0 and words[i] in stuck]
+        held += [int(i) for i in np.argsort(help_) if help_[i] < 0.0 and words[i] == "falling"]
+        if held:
+            strongest = max(abs(help_[i]) for i in held)
+            named = [i for i in held if abs(help_[i]) >= WORTH_NAMING * strongest]
+            return ", ".join(f"{by_name[i]} {words[i]}" for i in named[:3])
+        if not (help_ > 0.0).any():
+            return "no stimulated nerve pulls that way"
+        return self.conflict(j, int(np.argmax(help_)), by_name)
+
+    def conflict(self, j: int, i: int, by_name: list[str]) -> str:
+        """What a little more of channel i, which would help joint j, would spoil."""
+        problem = self.problem
+        if problem.least is not None and self.recruitment[i] == 0.0:
+            return f"{by_name[i]} off: its least recruitment would be too much"
+        costs = -problem.weights * self.shortfall * problem.matrix[:, i] / problem.scale
+        k = int(np.argmax(costs))
+        if k == j or costs[k] < float(problem.prices[i] * self.recruitment[i]):
+            return f"more {by_name[i]} is not worth its effort"
+        return f"more {by_name[i]} would spoil {self.joints[k].replace('_', ' ')}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """The answer in plain types, by name: pulse widths us, recruitments, torques N m with their band, reasons."""
+        low, high = self.achieved_band
+        return {
+            "pulse_width_us": self.pulse_widths_us,
+            "recruitment": dict(zip(self.names, self.recruitment.tolist(), strict=True)),
+            "torque_nm": {
+                joint: {
+                    "wanted": float(self.wanted[j]),
+                    "achieved": float(self.achieved[j]),
+                    "band": sorted((float(low[j]), float(high[j]))),
+                }
+                for j, joint in enumerate(self.joints)
+                if self.wanted[j] or self.achieved[j]
+            },
+            "reasons": self.reasons,
+            "held": list(self.held),
+            "residual": float(self.certificate.residual),
+            "gap": float(self.gap),
+        }
+
+    def band_lines(self) -> list[str]:
+        """What these pulse widths make of the wanted torques if the muscles are weaker or stronger than assumed."""
+        low, high = self.achieved_band
+        shown = [j for j in range(len(self.joints)) if self.wanted[j] and abs(self.achieved[j]) >= REPORTED_NM]
+        weak, strong = self.problem.band
+        if weak == strong or not shown:
+            return []
+        parts = [f"{self.joints[j].replace('_', ' ')} {low[j]:.1f} to {high[j]:.1f} N m" for j in shown]
+        return [f"with {weak:.2g} to {strong:.2g} of the strength assumed: {', '.join(parts)}"]
+
+    def __str__(self) -> str:
+        on = [
+            f"{name.replace('_', ' ')} {width:.0f} us"
+            for name, width in zip(self.names, self.pulse_width_us, strict=True)
+            if width > 0.0
+        ]
+        lines = [", ".join(on) or "nothing stimulated", *(self.reasons or ["every torque within 0.5 N m"])]
+        lines += [*self.band_lines(), *self.held]
+        proof = (
+            f"optimal to {max(self.certificate.residual, 0.0):.0e}"
+            if self.problem.least is None
+            else f"gap {self.gap:.0e}"
+        )
+        return "\n".join([*lines, f"{proof}{'; ' + self.note if self.note else ''}"])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AllocationSequence:
+    """Allocations of a torque over time, as arrays.
+
+    Attributes
+    ----------
+    recruitment, pulse_width_us, gradient
+        (samples, n).
+    wanted, achieved
+        (samples, joints), N m.
+    residual
+        (samples,) recomputed greatest residual of the optimality conditions (see `Certificate`).
+    """
+
+    recruitment: np.ndarray
+    pulse_width_us: np.ndarray
+    wanted: np.ndarray
+    achieved: np.ndarray
+    residual: np.ndarray
+    problem: AllocationProblem
+
+    @property
+    def shortfall(self) -> np.ndarray:
+        """Wanted minus achieved torque, (samples, joints), N m."""
+        return self.wanted - self.achieved

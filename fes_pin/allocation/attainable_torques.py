@@ -1,0 +1,145 @@
+"""The joint torques that a set of nerves can make at a posture: sums of one-sided columns, a zonotope."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linprog
+
+from fes_pin.allocation.bounded import BoundedProgram
+from fes_pin.allocation.inputs import torque_matrix
+from fes_pin.allocation.walk import allocate_walk
+from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import by_name
+
+INSIDE_NM = 1e-6
+"""A torque nearer to the set than this counts as inside, N m."""
+STEPS, SETTLED = 60, 1e-12
+"""Proximal steps at most, and the move of a recruitment at which they have settled."""
+MET_NM = 1.0
+"""Default tolerance for a gait's torque to count as attained, N m per joint."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearest:
+    """The attainable torque nearest to a wanted one.
+
+    Attributes
+    ----------
+    torque, recruitment
+        (joints,) N m and (n,), one that makes it.
+    distance
+        Euclidean distance from the wanted torque over the joints that count, N m.
+    """
+
+    torque: np.ndarray
+    recruitment: np.ndarray
+    distance: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether the wanted torque is attainable."""
+        return self.distance <= INSIDE_NM
+
+
+class AttainableTorques:
+    """All torques `R r`, 0 <= r <= upper, seen on the joints that count.
+
+    Parameters
+    ----------
+    nerves, q
+        `Nerves` and the posture, or an array (joints, n).
+    joints
+        Names of the joints that count; all by default.
+    upper
+        Greatest recruitment, by name or (n,).
+
+    Raises
+    ------
+    InputError
+        Unknown joint, or a matrix that is not finite or out of any body's range.
+    """
+
+    def __init__(self, nerves: Any, q: Any = None, joints: Sequence[str] | None = None, upper: Any = 1.0) -> None:
+        whole, names = torque_matrix(nerves, q)
+        known = JOINT_NAMES if len(whole) == len(JOINT_NAMES) else tuple(f"joint_{j + 1}" for j in range(len(whole)))
+        self.joints = tuple(joints) if joints is not None else known
+        unknown = [name for name in self.joints if name not in known]
+        if unknown:
+            raise InputError(f"unknown joint {unknown[0]!r}; the joints are {', '.join(known)}")
+        self.names, self.upper = names, by_name(upper, names, "upper limits", 1.0)
+        self.columns = whole[[known.index(name) for name in self.joints]] * self.upper
+
+    def support(self, direction: Any) -> float:
+        """Greatest component of attainable torque along a direction (by joint name or array), times its length, N m."""
+        return float(np.maximum(by_name(direction, self.joints, "direction", 0.0) @ self.columns, 0.0).sum())
+
+    def range(self, joint: str) -> tuple[float, float]:
+        """Least and greatest torque of one joint, whatever the others do, N m."""
+        return -self.support({joint: -1.0}), self.support({joint: 1.0})
+
+    def nearest(self, torque: Any) -> Nearest:
+        """The attainable torque nearest to one wanted (by joint name, absent 0, or array over those that count)."""
+        wanted = by_name(torque, self.joints, "torque", 0.0)
+        scale = float((self.columns**2).sum(0).max(initial=0.0)) or 1.0
+        squares, n = self.columns.T @ self.columns / scale, self.columns.shape[1]
+        near, r, off, full = 1e-7, np.zeros(n), np.zeros(n), np.ones(n)
+        program = BoundedProgram(squares + near * np.eye(n))
+        for _ in range(STEPS):  # proximal steps: they settle on a point of the set nearest to the torque
+            before, r = r, program.solve(-wanted @ self.columns / scale - near * r, off, full)
+            if np.abs(r - before).max(initial=0.0) <= SETTLED:
+                break
+        return Nearest(self.columns @ r, r * self.upper, float(np.linalg.norm(self.columns @ r - wanted)))
+
+    def contains(self, torque: Any) -> bool:
+        """Whether the torque is attainable, to 1e-6 N m."""
+        return self.nearest(torque).inside
+
+    def share(self, torque: Any) -> float:
+        """Greatest multiple of the torque that is attainable, infinite for no torque (a linear program)."""
+        wanted = by_name(torque, self.joints, "torque", 0.0)
+        if not wanted.any():
+            return np.inf
+        n, size = self.columns.shape[1], float(np.abs(wanted).max())
+        equal = np.column_stack([self.columns, -wanted / size])
+        result = linprog(
+            np.r_[np.zeros(n), -1.0], A_eq=equal, b_eq=np.zeros(len(wanted)), bounds=[(0, 1)] * n + [(0, None)]
+        )
+        return float(result.x[-1] / size) if result.success else 0.0
+
+    def outline(self, first: str, second: str) -> np.ndarray:
+        """Corners of the set seen on two joints, counter-clockwise, (corners, 2) N m: what to draw."""
+        index = [self.joints.index(name) if name in self.joints else -1 for name in (first, second)]
+        if -1 in index:
+            raise InputError(f"{first} and {second} must be among {', '.join(self.joints)}")
+        columns = self.columns[index].T
+        columns = columns[(columns != 0.0).any(1)]
+        if not len(columns):
+            return np.zeros((1, 2))
+        upward = np.where((columns[:, 1] < 0.0) | ((columns[:, 1] == 0.0) & (columns[:, 0] < 0.0)), -1.0, 1.0)
+        edges = columns * upward[:, None]
+        edges = edges[np.argsort(np.arctan2(edges[:, 1], edges[:, 0]))]
+        lowest = columns[upward < 0.0].sum(0)
+        path = lowest + np.vstack([np.zeros(2), np.cumsum(edges, 0)])
+        return np.vstack([path, path[-1] + lowest - path[1:-1]])
+
+
+def gait_share(torques: Any, nerves: Any, q: Any, joints: Sequence[str], tolerance_nm: float = MET_NM) -> float:
+    """Fraction of a gait's samples whose torque is attained on all the given joints within a tolerance.
+
+    Each sample is allocated with the error of these joints only; attained means that none misses by more.
+
+    Parameters
+    ----------
+    torques, q
+        (samples, 19), N m and rad.
+    joints
+        The joints that count.
+    """
+    weights = by_name({name: 1.0 for name in joints}, JOINT_NAMES, "joints", 0.0)
+    walk = allocate_walk(torques, nerves, q, weights=weights, effort=1e-8)
+    return float((np.abs(walk.shortfall[:, weights > 0.0]) <= tolerance_nm).all(1).mean())

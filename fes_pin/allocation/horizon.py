@@ -1,0 +1,287 @@
+"""Allocation through time: muscles that lag, pulses that may not jump, strength that tires."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fes_pin.allocation.allocator import Allocator
+from fes_pin.allocation.bounded import known_solver
+from fes_pin.allocation.horizon_program import NO_ROOM, HorizonProgram
+from fes_pin.allocation.inputs import wanted_torques
+from fes_pin.allocation.problem import within_rate
+from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import between, positive_number, whole
+
+ROUNDED = 1e-13
+"""A plan may exceed the rate by so much: its steps are sums, and solvers round; a pulse width by 1e-10 us."""
+LONGEST = 1000
+"""Steps ahead or under way, beyond which a horizon is no horizon: half a minute of pulses."""
+
+
+@dataclass(frozen=True)
+class StrengthFatigue:
+    """Strength falls with use, comes back with rest (Riener, Quintern and Schmidt 1996, J. Biomech. 29:1157-1167).
+
+        d left / dt = (least - left) act / fatigue_s + (1 - left) (1 - act) / recovery_s
+
+    Time constants differ between muscles and people by more than a factor of two; the defaults are a middle of that.
+    """
+
+    fatigue_s: float = 20.0
+    recovery_s: float = 40.0
+    least: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name in ("fatigue_s", "recovery_s"):
+            positive_number(getattr(self, name), name, infinite=True)
+        between(self.least, 0.0, 1.0, "least")
+
+    def after(self, left: np.ndarray, act: np.ndarray, step_s: float) -> np.ndarray:
+        """Strength left (n,) after a step with activation act (n,), exact for constant activation."""
+        down, up = act / self.fatigue_s, (1.0 - act) / self.recovery_s
+        settled = (self.least * down + up) / (down + up)
+        return settled + (left - settled) * np.exp(-(down + up) * step_s)
+
+
+def invert_lag(
+    recruitment: np.ndarray, step_s: float, time_constant_s: float, start: np.ndarray | None = None
+) -> np.ndarray:
+    """Commands that make a first-order lag follow recruitments as far as commands within 0 and 1 can.
+
+    Parameters
+    ----------
+    recruitment
+        (samples, n) wanted activation at the end of each step.
+    step_s, time_constant_s
+        Time between pulses, and of the lag, s.
+    start
+        (n,) activation at the beginning; by default that of the first sample.
+    """
+    keep = np.exp(-step_s / time_constant_s)
+    act = np.array(recruitment[0] if start is None else start, dtype=float)
+    commands = np.empty_like(np.asarray(recruitment, dtype=float))
+    for k, wanted in enumerate(recruitment):
+        commands[k] = np.clip((wanted - keep * act) / (1.0 - keep), 0.0, 1.0)
+        act = keep * act + (1.0 - keep) * commands[k]
+    return commands
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """Stimulation over the horizon; only its first step is meant to be applied.
+
+    Attributes
+    ----------
+    recruitment, pulse_width_us
+        (steps, n); within the limits and the rate.
+    achieved
+        (steps, joints) torque that the muscles will make, N m.
+    primal, dual
+        Residuals, recomputed: distance of the solver's answer from the limits, slope that no limit explains.
+    gap
+        No plan costs less than this one by more (of the cost divided by `scale`).
+    iterations, rounds
+        Of the interior-point method; guesses at what is active until one was exact, 0 if none was.
+    """
+
+    recruitment: np.ndarray
+    pulse_width_us: np.ndarray
+    achieved: np.ndarray
+    primal: float
+    dual: float
+    gap: float
+    iterations: int
+    rounds: int
+
+
+@dataclass
+class Horizon:
+    """Receding horizon at the pulse rate for one posture.
+
+        act' = keep act + (1 - keep) recruitment `delay_steps` ago
+
+    Parameters
+    ----------
+    program
+        An `Allocator`: moment arms, weights, limits, curves, prices of effort and of change, rate (per pulse).
+    step_s
+        Time between pulses.
+    time_constant_s
+        Of the muscles' lag; the paper's 0.05 s.
+    delay_steps
+        Pulses between a pulse and the beginning of its effect.
+    steps
+        Length of the horizon.
+    fatigue
+        How strength falls with use; None: it does not.
+
+    Raises
+    ------
+    InputError
+        Times not positive, counts that are no whole numbers, least recruitments, cubes or lexicographic.
+    """
+
+    program: Allocator
+    step_s: float = 1.0 / 30.0
+    time_constant_s: float = 0.05
+    delay_steps: int = 0
+    steps: int = 10
+    fatigue: StrengthFatigue | None = None
+    act: np.ndarray = field(init=False)
+    left: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        for name in ("step_s", "time_constant_s"):
+            positive_number(getattr(self, name), name)
+        self.delay_steps = whole(self.delay_steps, "delay_steps", 0, LONGEST - 1)
+        self.steps = whole(self.steps, "steps", 1, LONGEST - 1)
+        _check(self.program)
+        n = self.program.n
+        self.keep = float(np.exp(-self.step_s / self.time_constant_s))
+        self.act, self.left, self.before = np.zeros(n), np.ones(n), np.zeros(n)
+        self.queue = np.zeros((self.delay_steps, n))
+        self._assemble()
+
+    def _assemble(self, like: HorizonProgram | None = None) -> None:
+        p, steps = self.program.problem, self.steps
+        self.matrix = p.matrix * self.left
+        strength = np.sqrt(p.weights / p.scale)[:, None] * self.matrix
+        self.exact = HorizonProgram(strength, p.prices, p.change, self.keep, steps, p.rate < 1.0, like)
+        self.response = self.exact.response
+        self.G = (self.matrix.T * p.weights) @ self.matrix / p.scale
+        step = np.eye(steps) - np.eye(steps, k=-1)
+        self.S, self.T = self.response.T @ self.response, p.change * step.T @ step
+
+    def plan(self, torques: Any, *, solver: str = "piqp") -> Plan:
+        """Stimulation for the torques ahead, from the present state.
+
+        Parameters
+        ----------
+        torques
+            (steps, joints) N m: wanted at the pulses `delay_steps` + 1 ... `delay_steps` + steps ahead.
+        solver
+            `piqp`, whose plan is made exact, or any solver that qpsolvers knows (`osqp`, `daqp` ...).
+
+        Raises
+        ------
+        InputError
+            Wrong shape, a torque that is not a number, unknown solver.
+        """
+        p = self.program.problem
+        known_solver(solver, "piqp", "a horizon")
+        wanted = wanted_torques(torques, p.joints, f"{self.steps} steps")
+        if len(wanted) != self.steps:
+            raise InputError(f"torques must be {self.steps} steps x {len(p.joints)}, got shape {wanted.shape}")
+        free = self.keep ** np.arange(1, self.steps + 1)[:, None] * self.act_when_pulses_act()
+        error = (free @ self.matrix.T - wanted) * p.weights / p.scale
+        f = self.response.T @ (error @ self.matrix)
+        f[0] -= p.change * self.before
+        low, high = self.limits()
+        found = self.exact.solve(f, low, high) if solver == "piqp" else self.exact.solve_by(solver, f, low, high)
+        u = self.feasible(found.u, low, high)
+        primal = float(np.abs(u - found.u).max())
+        u, dual, gap = self._at_limits(u, found.y, f, low, high, wanted)
+        achieved = (free + self.response @ u) @ self.matrix.T
+        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, found.iterations, found.rounds)
+
+    def _at_limits(
+        self, u: np.ndarray, y: np.ndarray, f: np.ndarray, low: np.ndarray, high: np.ndarray, wanted: np.ndarray
+    ) -> tuple[np.ndarray, float, float]:
+        """The plan, off where the proof cannot tell it from off, dual residual, gap; see `Certifier.at_limits`."""
+        dual, gap = self.proof(u, y, f, low, high)
+        certify = self.program.certify
+        rounding = self.steps * certify.rounding(wanted)
+        least, most = low[: self.steps], high[: self.steps]
+        limit = np.where(u - least <= most - u, least, most)
+        slack = np.abs(u - limit)
+        near = (slack > 0.0) & (slack <= certify.room(rounding))
+        if near.any():
+            moved = self.feasible(np.where(near, limit, u), low, high)
+            dual_then, gap_then = self.proof(moved, y, f, low, high)
+            if dual_then <= max(dual, rounding) and gap_then <= max(gap, u.size * rounding):
+                return moved, dual_then, gap_then
+        return u, dual, gap
+
+    def limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """Limits (2 steps - 1, n) of the steps, the first also by the rate, then of the changes."""
+        p, steps, n = self.program.problem, self.steps, self.program.n
+        low, high = np.empty((2 * steps - 1, n)), np.empty((2 * steps - 1, n))
+        low[:steps], high[:steps] = p.lower, p.upper
+        low[0], high[0] = within_rate(self.before, p.rate, p.lower, p.upper)
+        low[steps:], high[steps:] = -min(p.rate, 1.0), min(p.rate, 1.0)
+        return low, high
+
+    def feasible(self, near: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """A solver's answer, moved into limits and rate step by step."""
+        u, rate = near.copy(), min(self.program.problem.rate, 1.0) + ROUNDED
+        np.clip(u[0], low[0], high[0], out=u[0])
+        for k in range(1, self.steps):
+            np.clip(u[k], np.maximum(low[k], u[k - 1] - rate), np.minimum(high[k], u[k - 1] + rate), out=u[k])
+        return u
+
+    def proof(
+        self, u: np.ndarray, y: np.ndarray, f: np.ndarray, low: np.ndarray, high: np.ndarray
+    ) -> tuple[float, float]:
+        """Dual residual and a bound on the gap, from the plan and a solver's multipliers."""
+        slope = self.S @ u @ self.G + self.T @ u + u * self.program.problem.prices + f
+        rows = np.vstack([u, np.diff(u, axis=0)])
+        pull = y[: self.steps].copy()
+        pull[1:] += y[self.steps :]
+        pull[:-1] -= y[self.steps :]
+        unexplained = slope + pull
+        stuck = high[: self.steps] - low[: self.steps] <= NO_ROOM  # its multiplier is whatever its slope asks for
+        y = y.copy()
+        y[: self.steps][stuck] -= unexplained[stuck]
+        unexplained[stuck] = 0.0
+        gap = np.maximum(y * (high - rows), y * (low - rows)).sum() + np.abs(unexplained).sum()
+        return float(np.abs(unexplained).max()), float(gap)
+
+    def act_when_pulses_act(self) -> np.ndarray:
+        """Activation when the next pulse begins to act: after what is still under way."""
+        act = self.act
+        for command in self.queue:
+            act = self.keep * act + (1.0 - self.keep) * command
+        return act
+
+    def advance(self, torques: Any) -> Plan:
+        """Plan, apply the first step, and carry activation, fatigue and the pulses under way on to the next pulse."""
+        plan = self.plan(torques)
+        command = plan.recruitment[0]
+        acting = self.queue[0] if self.delay_steps else command
+        if self.delay_steps:
+            self.queue = np.vstack([self.queue[1:], command])
+        self.act = self.keep * self.act + (1.0 - self.keep) * acting
+        self.before = command
+        if self.fatigue is not None:
+            self.left = self.fatigue.after(self.left, self.act, self.step_s)
+            self._assemble(self.exact)
+        return plan
+
+    def carry_on(self, program: Allocator) -> None:
+        """Go on with another program (a dead channel, other limits): activation, strength, pulses under way stay.
+
+        Raises
+        ------
+        InputError
+            Other channels, or what a horizon cannot take.
+        """
+        if program.names != self.program.names:
+            raise InputError("a horizon can only be carried on with the same channels")
+        _check(program)
+        self.program = program
+        self._assemble()
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Torque that the muscles make now, (joints,) N m."""
+        return self.matrix @ self.act
+
+
+def _check(program: Allocator) -> None:
+    if not isinstance(program, Allocator):
+        raise InputError(f"a horizon needs an Allocator, got {type(program).__name__}")
+    if not program.problem.plain:
+        raise InputError("a horizon takes effort squares or fatigue, and no least recruitment")

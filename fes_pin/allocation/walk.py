@@ -1,0 +1,126 @@
+"""Allocation over a motion: another posture, so other moment arms, at every sample; the rules of thumb beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fes_pin.allocation.allocation import Allocation
+from fes_pin.allocation.bounded import solve_sequence
+from fes_pin.allocation.certificate import Certifier, residuals
+from fes_pin.allocation.inputs import in_range, wanted_torques
+from fes_pin.allocation.problem import AllocationProblem, Options, problem_of
+from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import numbers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WalkAllocation:
+    """Allocations along a motion.
+
+    Attributes
+    ----------
+    recruitment, pulse_width_us
+        (samples, n).
+    wanted, achieved
+        (samples, joints), N m.
+    residual
+        (samples,) greatest residual of the optimality conditions, recomputed from the moment arms.
+    matrices
+        (samples, joints, n) torque at full recruitment, N m.
+    problem
+        The options; its own moment arms are those of the first sample.
+    scale
+        (N m)^2, what prices are of along the whole motion.
+    """
+
+    recruitment: np.ndarray
+    pulse_width_us: np.ndarray
+    wanted: np.ndarray
+    achieved: np.ndarray
+    residual: np.ndarray
+    matrices: np.ndarray
+    problem: AllocationProblem
+    scale: float
+
+    @property
+    def shortfall(self) -> np.ndarray:
+        """Wanted minus achieved torque, (samples, joints), N m."""
+        return self.wanted - self.achieved
+
+    def at(self, k: int) -> Allocation:
+        """Sample k with its reasons in words."""
+        p, matrix = self.problem, self.matrices[k]
+        scale = float((p.weights @ matrix**2).max()) or 1.0
+        same = self.scale / scale  # one scale of prices for the whole motion
+        here = replace(p, matrix=matrix, nominal=matrix, scale=scale, prices=p.prices * same, change=p.change * same)
+        r, wanted, before = self.recruitment[k], self.wanted[k], self.recruitment[k - 1] if k else np.zeros(p.n)
+        proof, achieved, gradient = Certifier(here)(before, wanted, r, p.lower, p.upper)
+        width = self.pulse_width_us[k]
+        return Allocation(r, width, wanted, achieved, gradient, p.lower, p.upper, before, proof, proof.gap, here)
+
+
+def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: Any) -> WalkAllocation:
+    """Allocate torques along a motion, each sample starting from the last.
+
+    Parameters
+    ----------
+    torques, q, v
+        (samples, joints) N m, rad, and rad/s; without rates muscles pull as at rest.
+    nerves
+        `Nerves`, or their matrices (samples, joints, n) (then `q` is not read).
+    options
+        See `Allocator`; no least recruitments, cubes or lexicographic, no rate.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, numbers that are not finite, or such an option.
+    """
+    named = hasattr(nerves, "torque_matrix")
+    matrices = np.array(nerves.torque_matrix(q, v) if named else numbers(nerves, "moment arms"), dtype=float)
+    if matrices.ndim != 3 or not len(matrices):
+        raise InputError(f"moment arms along a motion must be samples x joints x channels, got {matrices.shape}")
+    in_range(matrices, "moment arms along the motion")
+    if not named and v is not None:
+        raise InputError("a velocity goes with nerves: matrices hold what muscles make at theirs")
+    q0, v0 = (None if a is None or not named else np.asarray(a)[0] for a in (q, v))
+    p = problem_of(nerves if named else matrices[0], q0, v0, Options.of(options))
+    wanted = wanted_torques(torques, p.joints)
+    if len(wanted) != len(matrices):
+        raise InputError(f"torques of shape {wanted.shape} do not fit moment arms of shape {matrices.shape}")
+    if not p.plain or p.rate < np.inf:
+        raise InputError("least recruitments, cubes, lexicographic and rate are allocated one torque at a time")
+    matrices = matrices * (p.upper > 0.0)
+    weighed = np.swapaxes(matrices, 1, 2) * p.weights
+    H = weighed @ matrices
+    scale = float(np.einsum("kii->ki", H).max()) or 1.0
+    H /= scale
+    H[:, range(p.n), range(p.n)] += p.prices + p.change
+    F = -np.einsum("knj,kj->kn", weighed, wanted) / scale
+    r = solve_sequence(H, F, p.lower, p.upper, keep=p.change)
+    achieved = np.einsum("kjn,kn->kj", matrices, r)
+    before = np.vstack([np.zeros(p.n), r[:-1]])
+    gradient = np.einsum("knj,kj->kn", weighed, achieved - wanted) / scale + p.prices * r + p.change * (r - before)
+    residual = np.maximum.reduce(residuals(gradient, r, p.lower, p.upper)[:3])
+    return WalkAllocation(r, p.curves.pulse_width_us(r), wanted, achieved, residual, matrices, p, scale)
+
+
+def clipped(matrix: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """Rule of thumb: least-squares recruitment without limits, then cut to 0 and 1."""
+    return np.clip(np.linalg.lstsq(matrix, torque, rcond=None)[0], 0.0, 1.0)
+
+
+def rescaled(matrix: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """Rule of thumb: the same, negatives to 0, then all divided by the largest if that exceeds 1."""
+    r = np.maximum(np.linalg.lstsq(matrix, torque, rcond=None)[0], 0.0)
+    return r / max(1.0, r.max(initial=0.0))
+
+
+def direction_error(wanted: np.ndarray, achieved: np.ndarray) -> np.ndarray:
+    """Angle between wanted and achieved torque, rad, over the last axis; a quarter turn where nothing is achieved."""
+    product = (wanted * achieved).sum(-1)
+    size = np.linalg.norm(wanted, axis=-1) * np.linalg.norm(achieved, axis=-1)
+    return np.arccos(np.clip(np.where(size > 0.0, product / np.where(size > 0.0, size, 1.0), 0.0), -1.0, 1.0))

@@ -1,0 +1,1 @@
+"""Models of the literature on a study's trials, ranked."""

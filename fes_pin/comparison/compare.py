@@ -1,0 +1,211 @@
+"""Models from the literature ranked by what they foretell of trials that took no part in their fits."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fes_pin.comparison.held_out import Parting, fits_of, left_out_errors, partings, spreads
+from fes_pin.comparison.literature import NOMINAL, RIGS, possible, published_model
+from fes_pin.comparison.result import Apart, Compared, Comparison, apart_from
+from fes_pin.data.errors import InputError
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.diagnosis import measured_study, split
+from fes_pin.identify.ahead import default_horizon
+from fes_pin.identify.fit import fit_multistart
+from fes_pin.identify.noise import Noise
+from fes_pin.identify.problem import Problem
+from fes_pin.models.catalogue import Source
+from fes_pin.models.model import Model
+from fes_pin.models.nominal import nominal_model
+from fes_pin.models.store import load_model
+from fes_pin.workers import Progress, one_thread_each
+
+
+def compare(
+    study: Study,
+    models: Sequence[str] | None = None,
+    *,
+    extended: Mapping[str, Model | str | Path] | None = None,
+    horizon_s: float | None = None,
+    given_s: float | None = None,
+    library: Source | Sequence[Source] | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Rank models by their errors on held-out trials.
+
+    Parameters
+    ----------
+    study
+        Of a stimulated muscle or ankle. Trials with the role "held_out" are foretold; without such roles each trial is
+        foretold by fits without it.
+    models
+        Names as in `literature.LITERATURE`, and "nominal"; by default all that the study's trials allow.
+    extended
+        Models of one's own by name, as `diagnose` finds them: from memory or `model.toml`. They are fitted anew without
+        the trials that they foretell.
+    horizon_s
+        How far ahead, s; by default that of a diagnosis.
+    given_s
+        Also foretell the rest of each trial from its first seconds.
+    library
+        Where causes of `extended` come from that are not written here.
+    progress
+        Called with a share done and a few words.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        For another rig, one trial, a name that no model has, a model of another rig, or times that are not within a
+        trial.
+    """
+    began = time.perf_counter()
+    tell = progress or (lambda _share, _words: None)
+    if study.rig not in RIGS:
+        raise InputError(f"expected a study of a rig {' or '.join(RIGS)}, found {study.rig}", file=study.folder)
+    measured = measured_study(study)
+    joined = measured.study
+    nominal = nominal_model(joined)
+    fitted, held = split(joined)
+    if len(fitted) + len(held) < 2:
+        raise InputError("expected at least two trials: whole trials are left out", file=study.folder)
+    every = [*fitted, *held]
+    horizon = _horizon(study, every, horizon_s)
+    if given_s is not None:
+        _check_time(given_s, every, "--given")
+    chosen = _chosen(models, extended, nominal, every, library)
+    parts = partings(fitted, held)
+    scale = spreads(nominal, every)
+    told = []
+    with one_thread_each():
+        for k, one in enumerate(chosen):
+            tell(k / len(chosen), one.name)
+            told.append(_compared(one, parts, fitted, scale, horizon, given_s))
+    tell(1.0, "done")
+    ranked = sorted(told, key=lambda m: m.percent["free"])
+    return Comparison(
+        study=study,
+        models=tuple(_with_apart(ranked, 1 if held else len(parts))),
+        held_out=tuple(t.name for p in parts for t in p.held),
+        by="role" if held else "folds",
+        horizon_s=horizon,
+        given_s=given_s,
+        warnings=(*measured.warnings, *_warnings(ranked, given_s)),
+        wall_s=time.perf_counter() - began,
+    )
+
+
+class _Chosen:
+    """A model that is compared, before it is fitted."""
+
+    def __init__(self, name: str, model: Model, words: str = "", source: str = "", unfelt: tuple[str, ...] = ()):
+        self.name, self.model, self.words, self.source, self.unfelt = name, model, words, source, unfelt
+
+
+def _chosen(
+    models: Sequence[str] | None,
+    extended: Mapping[str, Model | str | Path] | None,
+    nominal: Model,
+    trials: Sequence[Trial],
+    library: Source | Sequence[Source] | None,
+) -> list[_Chosen]:
+    out = []
+    for name in dict.fromkeys(possible(trials) if models is None else models):
+        if name == NOMINAL:
+            out.append(_Chosen(name, nominal))
+            continue
+        one = published_model(name)
+        model = one.model(nominal, trials)
+        out.append(_Chosen(name, model, one.words, one.source, one.unfelt(nominal, trials)))
+    for name, given in (extended or {}).items():
+        own = given if isinstance(given, Model) else load_model(given, library=library)
+        if own.rig.name != nominal.rig.name:
+            raise InputError(f"expected a model of the rig {nominal.rig.name}, found one of {own.rig.name}: {name}")
+        if any(name == c.name for c in out):
+            raise InputError(f"expected one model of the name {name}, found two")
+        rig = replace(own.rig, constants=nominal.rig.constants)
+        out.append(_Chosen(name, Model(rig, own.effects)))
+    if not out:
+        raise InputError("expected at least one model to compare", column="--models")
+    return out
+
+
+def _compared(
+    one: _Chosen,
+    parts: Sequence[Parting],
+    fitted: Sequence[Trial],
+    scale: Mapping[str, float],
+    horizon_s: float,
+    given_s: float | None,
+) -> Compared:
+    fits = fits_of(one.model, parts, scale)
+    errors = left_out_errors(fits, parts, scale, horizon_s, given_s)
+    white = {n: Noise(s, (), s) for n, s in scale.items()}
+    whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(one.model, fitted, white), one.model.parameters())
+    columns = np.array([one.model.rig.output(t.kind) for p in parts for t in p.held])
+    kinds = {n: e for n in ("free", "horizon", "begun", "free_rest") if (e := getattr(errors, n)) is not None}
+    unit = np.array([scale[c] ** 2 for c in columns])
+    squares = {n: 100.0 * e / unit for n, e in kinds.items()}
+    return Compared(
+        name=one.name,
+        words=one.words,
+        source=one.source,
+        parameters=len(whole.free),
+        unfelt=one.unfelt,
+        rmse={
+            str(c): {n: math.sqrt(float(e[columns == c].mean())) for n, e in kinds.items()}
+            for c in dict.fromkeys(columns)
+        },
+        percent={n: float(e.mean()) for n, e in squares.items()},
+        squares=squares,
+        apart={},
+        fit=whole,
+        converged=all(f.converged for f in (*fits, whole)),
+    )
+
+
+def _with_apart(ranked: Sequence[Compared], folds: int) -> list[Compared]:
+    """The models, each held against the best by either kind of error."""
+    apart: dict[str, dict[str, Apart | None]] = {m.name: {} for m in ranked}
+    for kind in ("free", "horizon"):
+        best = min(ranked, key=lambda m: m.percent[kind])
+        for one in ranked:
+            same = one is best
+            apart[one.name][kind] = (
+                None if same else apart_from(best.squares[kind], one.squares[kind], len(ranked) - 1, folds)
+            )
+    return [replace(m, apart=apart[m.name]) for m in ranked]
+
+
+def _horizon(study: Study, trials: Sequence[Trial], asked: float | None) -> float:
+    if asked is None:
+        return study.horizon_s or default_horizon(trials)
+    _check_time(asked, trials, "--horizon")
+    return asked
+
+
+def _check_time(value: float, trials: Sequence[Trial], option: str) -> None:
+    shortest = min(t.duration for t in trials)
+    if not 0.0 < value < shortest:
+        raise InputError(
+            f"expected seconds between 0 and {shortest:.4g}, the shortest trial; found {value:g}", column=option
+        )
+
+
+def _warnings(ranked: Sequence[Compared], given_s: float | None) -> list[str]:
+    if given_s is not None and any("begun" not in m.percent for m in ranked):
+        return ["too few trials tell how much trials differ: the beginning of one says nothing of its rest"]
+    return []
+
+
+__all__ = ["compare"]

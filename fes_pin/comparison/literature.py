@@ -1,0 +1,213 @@
+"""Models of stimulated muscle from the literature, as compositions of effects beside the nominal model.
+
+A composition keeps the nominal recruitment and the rig; what a publication has beyond that is named, and so is what it
+has not in common with it. Start values are the publication's where it has any; all parameters are fitted.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.comparison.ding import Ding2003
+from fes_pin.data.errors import InputError
+from fes_pin.data.schema import IMPOSED
+from fes_pin.data.trial import Trial
+from fes_pin.models.effects.electromechanical_delay import ElectromechanicalDelay
+from fes_pin.models.effects.fatigue import Fatigue
+from fes_pin.models.effects.force_length import ForceLength
+from fes_pin.models.effects.force_velocity import ForceVelocity
+from fes_pin.models.effects.pulse_summation import PulseSummation
+from fes_pin.models.effects.recruitment_curvature import RecruitmentCurvature
+from fes_pin.models.effects.rise_fall_asymmetry import RiseFallAsymmetry
+from fes_pin.models.effects.second_order_activation import SecondOrderActivation
+from fes_pin.models.effects.series_elasticity import SeriesElasticity
+from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
+
+NOMINAL = "nominal"
+"""Name of the study's own believed model."""
+RIGS = ("muscle", "ankle")
+"""Rigs that a stimulated muscle drives."""
+HILL = 4.0
+"""F_0 / a of Hill's hyperbola: Hill, Proc. R. Soc. B 126 (1938)."""
+CALCIUM_S = 0.04
+"""Time constant of calcium, s: Riener and Fuhr 1998."""
+DELAY_S = 0.025
+"""From pulse to force, s: Riener and Fuhr 1998."""
+RECOVERY_S = 30.0
+"""Of fatigue, s: Riener and Fuhr 1998."""
+
+Made = Callable[[Sequence[Trial]], tuple[Effect, ...]]
+
+
+@dataclass(frozen=True)
+class Published:
+    """A model of the literature.
+
+    Attributes
+    ----------
+    name
+        What it is asked for by.
+    words
+        What it is made of, one line.
+    source
+        Where it was published.
+    effects
+        Makes them with start values, for these trials.
+    pulses
+        True if single pulses must have been recorded.
+    fixed
+        Nominal parameters that are held, with their values.
+    """
+
+    name: str
+    words: str
+    source: str
+    effects: Made
+    pulses: bool = False
+    fixed: tuple[tuple[str, float], ...] = ()
+
+    def model(self, nominal: Model, trials: Sequence[Trial]) -> Model:
+        """The model on a rig, with the effects that these trials can feel.
+
+        Raises
+        ------
+        InputError
+            If it needs pulses, and they were not recorded.
+        """
+        if self.pulses and not all("stim" in t for t in trials):
+            raise InputError(f"{self.name} needs single pulses: expected a column stim in every trial")
+        rig = nominal.rig
+        if self.fixed:
+            held = dict(self.fixed)
+            left = tuple(n for n in rig.fitted_parameters() if n not in held)
+            rig = dataclasses.replace(rig, fitted=left, **held)  # type: ignore[arg-type]
+        model = Model(rig)
+        for effect in self.effects(trials):
+            if is_felt(model, effect, trials):
+                model = model + effect
+        return model
+
+    def unfelt(self, nominal: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
+        """Names of its effects that none of these trials can feel."""
+        return tuple(e.name for e in self.effects(trials) if not is_felt(nominal, e, trials))
+
+
+def is_felt(model: Model, effect: Effect, trials: Sequence[Trial]) -> bool:
+    """True if an effect is of the rig, and acts in some of the trials."""
+    rig = model.rig
+    return rig.takes(effect) and any(effect.signal in rig.changeable(t.kind, rig.input_columns(t)) for t in trials)
+
+
+def _second_order(_: Sequence[Trial]) -> tuple[Effect, ...]:
+    return (SecondOrderActivation(second_s=0.02),)
+
+
+def _hammerstein(_: Sequence[Trial]) -> tuple[Effect, ...]:
+    return (RecruitmentCurvature(), SecondOrderActivation(second_s=0.02))
+
+
+def _hill(trials: Sequence[Trial]) -> tuple[Effect, ...]:
+    return (RiseFallAsymmetry(), *_contractile(trials))
+
+
+def _riener(trials: Sequence[Trial]) -> tuple[Effect, ...]:
+    return (
+        ElectromechanicalDelay(delay_s=DELAY_S),
+        SecondOrderActivation(second_s=CALCIUM_S),
+        *(e for e in _contractile(trials) if e.name != SeriesElasticity.name),
+        Fatigue(recovery_s=RECOVERY_S),
+    )
+
+
+def _bobet_stein(_: Sequence[Trial]) -> tuple[Effect, ...]:
+    return (PulseSummation(saturation=1.0, cooperation=1.0), SecondOrderActivation(second_s=0.03))
+
+
+def _ding(_: Sequence[Trial]) -> tuple[Effect, ...]:
+    return (Ding2003(),)
+
+
+def _contractile(trials: Sequence[Trial]) -> tuple[Effect, ...]:
+    """Force over length and velocity and the tendon; of a lever in sizes that its way and the force suggest."""
+    levered = [t for t in trials if t.kind == IMPOSED and "length_m" in t]
+    if not levered:
+        return (ForceLength(), ForceVelocity(), SeriesElasticity())
+    length = np.concatenate([t["length_m"] for t in levered])
+    speed = np.concatenate([np.abs(np.gradient(t["length_m"], t.dt)) for t in levered])
+    force = max(float(np.nanmax([np.nanmax(t["force_n"]) for t in levered])), 1e-9)
+    way = max(float(np.ptp(length)), 1e-9)
+    fastest = max(float(np.quantile(speed, 0.99)), 1e-9)
+    return (
+        ForceLength(slope_per_rad=0.0, curvature_per_rad2=1.0 / way**2),
+        ForceVelocity(slope_s_per_rad=1.0 / fastest, hill=HILL),
+        SeriesElasticity(compliance=0.05 * way / force),
+    )
+
+
+LITERATURE: tuple[Published, ...] = (
+    Published(
+        "second_order",
+        "two lags in series",
+        "Baratta and Solomonow, IEEE Trans. Biomed. Eng. 37 (1990) 109",
+        _second_order,
+    ),
+    Published(
+        "hammerstein",
+        "a curve of recruitment before two lags in series",
+        "Durfee and MacLean, IEEE Trans. Biomed. Eng. 36 (1989) 292",
+        _hammerstein,
+    ),
+    Published(
+        "hill",
+        "activation that rises and falls with different times; force-length, force-velocity, tendon",
+        "Zajac, Crit. Rev. Biomed. Eng. 17 (1989) 359; Hill, Proc. R. Soc. B 126 (1938) 136",
+        _hill,
+    ),
+    Published(
+        "riener",
+        "delay, two lags of calcium, force-length, force-velocity, fatigue that recovers; the nominal recruitment",
+        "Riener and Fuhr, IEEE Trans. Rehab. Eng. 6 (1998) 113",
+        _riener,
+    ),
+    Published(
+        "bobet_stein",
+        "a lag, a saturating power of it, a second lag whose rate here does not depend on the force",
+        "Bobet and Stein, IEEE Trans. Biomed. Eng. 45 (1998) 1010",
+        _bobet_stein,
+    ),
+    Published(
+        "ding2003",
+        "calcium of each pulse, troponin, a force whose decay it slows; without its fatigue between trains",
+        "Ding, Wexler and Binder-Macleod, J. Electromyogr. Kinesiol. 13 (2003) 575",
+        _ding,
+        pulses=True,
+        fixed=(("time_constant_s", 0.02),),
+    ),
+)
+"""In the order in which they are listed."""
+
+
+def published_model(name: str) -> Published:
+    """The model of that name.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    for one in LITERATURE:
+        if one.name == name:
+            return one
+    known = ", ".join((NOMINAL, *(m.name for m in LITERATURE)))
+    raise InputError(f"no model {name!r}; expected some of {known}", column="--models")
+
+
+def possible(trials: Sequence[Trial]) -> tuple[str, ...]:
+    """Names of the models that can be fitted to these trials, the nominal first."""
+    pulsed = all("stim" in t for t in trials)
+    return (NOMINAL, *(m.name for m in LITERATURE if pulsed or not m.pulses))

@@ -1,0 +1,143 @@
+"""What is claimed of a change: against the noise, against the spread between trials, over the whole library.
+
+x_i is what the larger of two sets adds to trial i, r_i what it leaves there; x_i' r_i / |x_i| has a variance phi, 1
+where repeats differ by their noise alone. phi is estimated with the trials' shares of the gain as weights; fewer than
+six trials are cut into pieces, which know less of how repeats differ. Few trials tell little of it along one x, but
+they tell it along every cause of the library: with ln phi scattered among those no more than f degrees of freedom would
+have it, phi is one and the same for all; else so many degrees f0 stand behind the usual phi0 as that scatter leaves.
+Both together are
+
+    phi = max(phi, (f0 phi0 + f phi) / (f0 + f)),
+
+f0 less the more significantly phi is above phi0, and gain / (degrees phi) is compared with Fisher's F of f0 + f. Of
+the scatter of repeats few trials tell little as well: where a share q of the gain rests on it, the degrees are
+1 / (1 / (f0 + f) + q^2 / f).
+Sources: Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004), article 3, sections 3 and 6.2; for q Satterthwaite, Biometrics
+Bulletin 2 (1946).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize, special
+
+from fes_pin.contrasts.fits import Fits
+from fes_pin.contrasts.grouped import Grouped
+from fes_pin.contrasts.promises import UNFELT, Promise, units
+from fes_pin.contrasts.repeats import Repeats
+from fes_pin.diagnosis.decide.significance import Family
+from fes_pin.identify.distributions import f_tail
+from fes_pin.identify.levels import CLAIM_LEVEL, UNUSUAL_LEVEL
+from fes_pin.identify.scatter import excess_scatter
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A variance between trials in units of what the noise explains, and the degrees of freedom behind it."""
+
+    phi: float
+    free: float
+
+    def beside(self, usual: Spread) -> Spread:
+        """What this and the usual spread say together, as far as they agree."""
+        if not usual.free > 0.0:
+            return self
+        agree = min(1.0, f_tail(self.phi / usual.phi, self.free, usual.free) / UNUSUAL_LEVEL)
+        more = agree * usual.free
+        total = more + self.free
+        return Spread(max(self.phi, (more * usual.phi + self.free * self.phi) / total), total)
+
+
+def p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> float:
+    """Family-wise p-value of what a set has more than another: the larger of that against the noise and of that against
+    the spread between trials. A repeat that differs by more than its noise is no change.
+    """
+    degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
+    noise = noise_p_value(family, larger, smaller)
+    if not noise < CLAIM_LEVEL:
+        return noise
+    return max(noise, family.adjusted(between_trials(fits, larger, fits.weighed_as(smaller, larger), degrees)))
+
+
+def noise_p_value(family: Family, larger: Grouped, smaller: Grouped) -> float:
+    """Family-wise p-value against the noise alone: of a cause of all groups, which claims no change.
+
+    Gains count as far as pieces of the data agree on them.
+    """
+    degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
+    scatter = excess_scatter(larger.fit, smaller.fit)
+    return family.p_value((smaller.fit.sse - larger.fit.sse) / scatter, degrees)
+
+
+def between_trials(fits: Fits, larger: Grouped, smaller: Grouped, degrees: int) -> float:
+    """p-value of a gain against its spread between trials; both sets under the same weights."""
+    spread, gain = inflation(fits, larger, smaller), smaller.fit.sse - larger.fit.sse
+    if spread.free < 1 or gain <= 0.0:
+        return 1.0
+    return float(f_tail(gain / (degrees * max(spread.phi, 1e-12)), degrees, spread.free))
+
+
+def inflation(fits: Fits, larger: Grouped, smaller: Grouped) -> Spread:
+    """phi beside what is usual in the library; the mean of all trials and that of one group are fitted."""
+    left = np.concatenate([p.residual for p in larger.fit.parts])
+    moved = np.concatenate([p.residual for p in smaller.fit.parts]) - left
+    cuts = units(larger.fit.parts)
+    sizes = np.array([float(moved[c] @ moved[c]) for c in cuts])
+    along = np.array([float(moved[c] @ left[c]) for c in cuts])
+    felt = sizes > UNFELT * max(float(sizes.max()), 1e-300)
+    free = int(felt.sum()) - 1 - max(1, len(larger.changes))
+    if free < 1:
+        return Spread(1.0, free)
+    own = _clustered(sizes, along)
+    both = own.beside(usual_spread(fits.promises(larger)[0]))
+    share = _leaning(larger, moved) / float(sizes.sum())
+    return Spread(both.phi, 1.0 / (1.0 / both.free + share**2 / free))
+
+
+def _clustered(sizes: np.ndarray, along: np.ndarray) -> Spread:
+    """phi with each trial's share of the gain as its weight, corrected for what the trial itself has drawn the change
+    to; fewer degrees of freedom the fewer trials carry it. Source: Bell and McCaffrey, Survey Methodology 28 (2002).
+    """
+    shares = sizes / sizes.sum()
+    weights = shares / np.maximum(1.0 - shares, 1e-9)
+    beside = np.eye(len(shares)) - np.sqrt(np.outer(shares, shares))
+    form = beside * weights @ beside
+    return Spread(
+        float(np.sum(weights * along**2 / np.maximum(sizes, 1e-300))), float(np.trace(form) ** 2 / np.sum(form**2))
+    )
+
+
+def _leaning(one: Grouped, moved: np.ndarray) -> float:
+    """What of the squares that move the trials rests on how much repeats scatter."""
+    pieces = np.split(moved, np.cumsum([len(p.residual) for p in one.fit.parts])[:-1])
+    total, at = 0.0, 0
+    for weight in one.weights.values():
+        if isinstance(weight, Repeats):
+            total += weight.leaning(pieces[at : at + len(weight.along)])
+            at += len(weight.along)
+    return total
+
+
+def usual_spread(promises: Sequence[Promise]) -> Spread:
+    """The spread that is usual among the causes of a library; no more degrees stand behind it than it has causes."""
+    told = np.array([(p.spread, p.spread_degrees) for p in promises if p.spread_degrees > 0 and p.spread > 0.0])
+    if len(told) < 2:
+        return Spread(1.0, 0.0)
+    phi, half = told[:, 0], 0.5 * told[:, 1]
+    logs = np.log(phi) - special.digamma(half) + np.log(half)
+    free = _degrees(float(logs.var(ddof=1) - np.mean(special.polygamma(1, half))), len({p.item.name for p in promises}))
+    shift = special.digamma(0.5 * free) - np.log(0.5 * free)
+    return Spread(float(np.exp(logs.mean() + shift)), free)
+
+
+def _degrees(variance: float, most: float) -> float:
+    """Degrees of freedom f0 of a variance whose logarithm has trigamma(f0 / 2) as its own."""
+    if variance <= special.polygamma(1, 0.5 * most):
+        return most
+    least = 1e-3
+    if variance >= special.polygamma(1, 0.5 * least):
+        return least
+    return float(optimize.brentq(lambda f: special.polygamma(1, 0.5 * f) - variance, least, most))

@@ -1,0 +1,333 @@
+"""One model for several groups of trials, in which some parameters have a value of their own in one group."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fes_pin.contrasts.repeats import RepeatedProblem, Repeats
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import PARAMETER_PRICE
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.noise import Noise, NoiseModel
+from fes_pin.identify.problem import Linearized, Problem, Unknowns
+from fes_pin.identify.scoring import Point, Told
+from fes_pin.models.model import Model
+from fes_pin.models.parameters import ParameterInfo
+from fes_pin.models.predictor import Doubt
+from fes_pin.models.rigs.base import Rig
+from fes_pin.models.stage import Effect
+
+Weight = NoiseModel | Repeats | Doubt
+"""What weighs the residuals of a group: the noise of simulations, perhaps beside the scatter of repeats, or what is
+random about predictions."""
+
+
+def group_problem(model: Model, trials: Sequence[Trial], weight: Weight, free: tuple[str, ...] | None = None) -> Any:
+    """A model on the trials of one group, as their weight demands."""
+    if isinstance(weight, Doubt):
+        return LikelihoodProblem(model, trials, weight)
+    kind = RepeatedProblem if isinstance(weight, Repeats) else Problem
+    return kind(model, trials, weight, free)  # type: ignore[arg-type]
+
+
+def noise_in(weight: Weight) -> NoiseModel:
+    """The noise alone."""
+    assert not isinstance(weight, Doubt)
+    return weight.noise if isinstance(weight, Repeats) else weight
+
+
+@dataclass(frozen=True)
+class Item:
+    """Something that a grouped model has beside the nominal one.
+
+    Attributes
+    ----------
+    name
+        A cause, or a nominal parameter.
+    group
+        The group that differs; None for a cause that acts in all groups alike.
+    """
+
+    name: str
+    group: str | None = None
+
+
+@dataclass(frozen=True)
+class GroupedModel:
+    """A model for each group; a parameter of the same name is the same in all, but for those in `own`.
+
+    A parameter's name is its path, with "@group" behind it where the group has a value of its own.
+
+    Attributes
+    ----------
+    models
+        By group, in order.
+    own
+        Pairs of path and group.
+    """
+
+    models: Mapping[str, Model]
+    own: frozenset[tuple[str, str]] = frozenset()
+
+    @property
+    def rig(self) -> Rig:
+        """The rig of the first group: all are of one kind."""
+        return next(iter(self.models.values())).rig
+
+    def path(self, name: str, group: str) -> str:
+        """What a parameter of a group's model is called here."""
+        return f"{name}@{group}" if (name, group) in self.own else name
+
+    def parameters(self) -> dict[str, float]:
+        """The value of every parameter, by its path here."""
+        return {self.path(n, g): v for g, m in self.models.items() for n, v in m.parameters().items()}
+
+    def parameter_info(self) -> dict[str, ParameterInfo]:
+        """Unit, null, bounds and scale, by path."""
+        return {self.path(n, g): i for g, m in self.models.items() for n, i in m.parameter_info().items()}
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """What a fit moves."""
+        return tuple(dict.fromkeys(self.path(n, g) for g, m in self.models.items() for n in m.fitted_parameters()))
+
+    def own_unknowns(self) -> tuple[str, ...]:
+        """Unknowns of trials that effects bring: none, amplitudes are each group's here."""
+        return ()
+
+    def of(self, group: str, values: Mapping[str, float]) -> dict[str, float]:
+        """The values of one group's model."""
+        return {n: values[self.path(n, group)] for n in self.models[group].parameters()}
+
+    def with_parameters(self, values: Mapping[str, float]) -> GroupedModel:
+        """The same with other values."""
+        full = {**self.parameters(), **values}
+        return GroupedModel({g: m.with_parameters(self.of(g, full)) for g, m in self.models.items()}, self.own)
+
+    def structure(self) -> tuple[str, ...]:
+        """The rig, and the effects of each group."""
+        return tuple(f"{g}: {n}" for g, m in self.models.items() for n in m.structure())
+
+    def with_item(self, item: Item, effect: Effect | None = None) -> GroupedModel:
+        """The same with one thing more: a parameter or a cause of its own in one group, or a cause in all.
+
+        Parameters
+        ----------
+        effect
+            The cause with its start values, where the group's model does not have it yet.
+        """
+        models, own = dict(self.models), set(self.own)
+        for group in models if item.group is None else (item.group,):
+            if effect is not None and item.name not in (e.name for e in models[group].effects):
+                models[group] = models[group] + effect
+        if item.group is not None:
+            own |= {(n, item.group) for n in models[item.group].parameters() if self._differs(n, item, models)}
+        return GroupedModel(models, frozenset(own))
+
+    @staticmethod
+    def _differs(path: str, item: Item, models: Mapping[str, Model]) -> bool:
+        """True of what an item gives a group of its own: of a cause that others have as well its amplitudes alone."""
+        cause, _, name = path.rpartition(".")
+        if item.name != cause:
+            return item.name == path
+        shared = any(item.name == e.name for g, m in models.items() if g != item.group for e in m.effects)
+        (effect,) = (e for e in models[str(item.group)].effects if e.name == item.name)
+        return not shared or name in effect.amplitudes()
+
+    def with_common(self, name: str, groups: Sequence[str]) -> GroupedModel:
+        """The same with a cause that every group has of its own as one of all, whose amplitudes differ in some."""
+        out = GroupedModel(self.models, frozenset((n, g) for n, g in self.own if n.rpartition(".")[0] != name))
+        for group in groups:
+            out = out.with_item(Item(name, group))
+        return _agreed(out)
+
+    def without(self, item: Item, items: Sequence[Item]) -> GroupedModel:
+        """The same without one of its items."""
+        models, own = dict(self.models), set(self.own)
+        rest = [i for i in items if i != item]
+        if item.group is not None:
+            own -= {(n, g) for n, g in own if g == item.group and item.name in (n, n.split(".")[0])}
+        for group, model in models.items():
+            if item.name in (e.name for e in model.effects) and not any(
+                i.name == item.name and i.group in (None, group) for i in rest
+            ):
+                models[group] = model - item.name
+        left = {(n, g) for n, g in own if n in models[g].parameters()}
+        return _agreed(GroupedModel(models, frozenset(left)))
+
+
+def _agreed(model: GroupedModel) -> GroupedModel:
+    """The same with one value of every parameter that groups share: that of the first group that has it."""
+    values: dict[str, float] = {}
+    for group, one in model.models.items():
+        for name, value in one.parameters().items():
+            values.setdefault(model.path(name, group), value)
+    return model.with_parameters(values)
+
+
+class GroupedProblem:
+    """A grouped model on the trials of all groups; a `Problem` to `Descent`.
+
+    Parameters
+    ----------
+    model
+        Its structure.
+    trials
+        By group, in the order of the model's groups.
+    weights
+        By group: noise, or what is random. Groups have their own: a noisier day is no change of the rig.
+    """
+
+    def __init__(
+        self, model: GroupedModel, trials: Mapping[str, Sequence[Trial]], weights: Mapping[str, Weight]
+    ) -> None:
+        self.model, self.free = model, model.free
+        self.parts: dict[str, Any] = {g: group_problem(m, trials[g], weights[g]) for g, m in model.models.items()}
+        self.trials = tuple(t for p in self.parts.values() for t in p.trials)
+        self.unknown_names = tuple(dict.fromkeys(n for p in self.parts.values() for n in p.unknown_names))
+        self.limits = {model.path(n, g): v for g, p in self.parts.items() for n, v in p.limits.items()}
+
+    @property
+    def noise(self) -> dict[str, Noise]:
+        """Noise by column and group."""
+        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.noise.items()}
+
+    def start_unknowns(self) -> Unknowns:
+        """The unknowns of each trial as its first samples suggest."""
+        return [u for p in self.parts.values() for u in p.start_unknowns()]
+
+    def completed(self, unknowns: Unknowns) -> Unknowns:
+        """Unknowns of another model on these trials with what this one has besides."""
+        both = zip(self.start_unknowns(), unknowns, strict=True)
+        return [{n: known.get(n, value) for n, value in start.items()} for start, known in both]
+
+    def by_group(self, rows: Sequence[Any]) -> dict[str, list[Any]]:
+        """What belongs to each trial, cut into groups."""
+        out, at = {}, 0
+        for group, part in self.parts.items():
+            out[group] = list(rows[at : at + len(part.trials)])
+            at += len(part.trials)
+        return out
+
+    @property
+    def randomness(self) -> dict[str, float]:
+        """What is random, by name and group. Of driven rigs, as all that has to do with it."""
+        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.randomness.items()}
+
+    @property
+    def randomness_limits(self) -> dict[str, tuple[float, float]]:
+        """How small and how large that may become."""
+        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.randomness_limits.items()}
+
+    def become(self, randomness: Mapping[str, float]) -> None:
+        """Change what is random, in place."""
+        for g, p in self.parts.items():
+            p.become(_of_group(randomness, g))
+
+    def told(self, points: Sequence[Point]) -> list[Told]:
+        """Every trial as foretold at each of several points, group after group."""
+        cut = [self.by_group(unknowns) for _, unknowns, _ in points]
+        each = [
+            p.told([(self.model.of(g, v), own[g], _of_group(r, g)) for (v, _, r), own in zip(points, cut, strict=True)])
+            for g, p in self.parts.items()
+        ]
+        return [Told.joined(one) for one in zip(*each, strict=True)]
+
+    def score(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Improve what is random in each group, in place; returns by how much that lowers the cost. Of driven rigs."""
+        own = self.by_group(unknowns)
+        return sum(p.score(self.model.of(g, values), own[g]) for g, p in self.parts.items())
+
+    @property
+    def is_final(self) -> bool:
+        """True where no other slopes lead on from the end of a descent."""
+        return all(p.is_final for p in self.parts.values())
+
+    @property
+    def abreast(self) -> int:
+        """How many points `bounds` takes at once."""
+        return max(p.abreast for p in self.parts.values())
+
+    def bounds(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
+        """What the cost is at least at several parameter values."""
+        cut = [self.by_group(unknowns) for _, unknowns in points]
+        each = [
+            part.bounds([(self.model.of(g, values), own[g]) for (values, _), own in zip(points, cut, strict=True)])
+            for g, part in self.parts.items()
+        ]
+        return [sum(costs) for costs in zip(*each, strict=True)]
+
+    def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
+        """Whitened residuals and sensitivities of all trials, group after group."""
+        out: list[Linearized] = []
+        cut = self.by_group(unknowns)
+        for group, part in self.parts.items():
+            at = [self.free.index(self.model.path(n, group)) for n in part.free]
+            own = [self.unknown_names.index(n) for n in part.unknown_names]
+            for one in part.linearize(self.model.of(group, values), cut[group]):
+                jacobian = np.zeros((len(one.residual), len(self.free)))
+                local = np.zeros((len(one.residual), len(self.unknown_names)))
+                jacobian[:, at], local[:, own] = one.jacobian, one.local
+                out.append(dataclasses.replace(one, jacobian=jacobian, local=local))
+        return out
+
+
+def _of_group(randomness: Mapping[str, float], group: str) -> dict[str, float]:
+    """What is random in a group, by name."""
+    split = ((name.rpartition("@"), v) for name, v in randomness.items())
+    return {name: v for (name, _, g), v in split if g == group}
+
+
+@dataclass(frozen=True)
+class Grouped:
+    """A fitted grouped model.
+
+    Attributes
+    ----------
+    items
+        What it has beside the nominal model, in the order in which it was found.
+    fit
+        Its `model` is the grouped one; `sse` twice the negative log-likelihood, but for a constant.
+    weights
+        By group.
+    """
+
+    items: tuple[Item, ...]
+    fit: Fit
+    weights: Mapping[str, Weight]
+
+    @property
+    def model(self) -> GroupedModel:
+        """The grouped model, fitted."""
+        return self.fit.model  # type: ignore[return-value]
+
+    @property
+    def price(self) -> float:
+        """What the set costs, with what each parameter must earn."""
+        return self.fit.sse + PARAMETER_PRICE * len(self.fit.free)
+
+    @property
+    def changes(self) -> tuple[Item, ...]:
+        """The items that differ in one group."""
+        return tuple(i for i in self.items if i.group is not None)
+
+    @property
+    def is_driven(self) -> bool:
+        """True if predictions are judged, beside everything that is random."""
+        return any(isinstance(w, Doubt) for w in self.weights.values())
+
+    @property
+    def repeats(self) -> dict[str, float]:
+        """How much nominal parameters scatter between trials, as a share of the first group's value."""
+        weight = next(iter(self.weights.values()))
+        if not isinstance(weight, Repeats):
+            return {}
+        values = next(iter(self.model.models.values())).parameters()
+        return {n: s / abs(values[n]) for n, s in weight.deviations.items() if values[n]}

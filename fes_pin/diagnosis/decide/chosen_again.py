@@ -1,0 +1,124 @@
+"""Which set of causes would have been chosen without some of the trials, of all that were fitted to all.
+
+Of each set that was fitted the cost of the other trials is known to second order about its fit. With g and H the slope
+and the curvature of half that cost, each trial's own unknowns eliminated,
+
+    cost(others) = |r|^2 - g' H^-1 g
+
+is where one Gauss-Newton step ends. Of a fit by the likelihood, whose slopes are those for gains as they are, what
+others gain by the step that all trials promise together is none: no step has kept that. Sets are compared by the rule
+that the search goes by: the cheapest of a size takes the place of the best smaller one if what it adds earns its place.
+No trial that is held out has a say in it. What the others tell counts as if there were as many of them as of all: asked
+is whether they say the same, not whether fewer say as much.
+
+Source: Stone, Cross-validatory choice and assessment of statistical predictions, J. R. Stat. Soc. B 36 (1974);
+Giordano, Stephenson, Liu, Jordan and Broderick, A Swiss army infinitesimal jackknife, AISTATS 2019.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.diagnosis.search.cause_sets import Names
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import PARAMETER_PRICE
+from fes_pin.identify.problem import normal_equations
+from fes_pin.identify.scatter import at_rest
+from fes_pin.identify.scoring import LITTLE
+
+Worthwhile = Callable[[Fit, Fit, float, float], bool]
+"""Whether a set is worth more than a smaller one where it gains so much in twice the log-likelihood, and all its causes
+together so much."""
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """How many readings a trial has, and what it adds to a fit's cost, to half its slope and to half its curvature."""
+
+    readings: int
+    cost: float
+    slope: np.ndarray
+    curvature: np.ndarray
+
+
+class ChosenAgain:
+    """Sets to choose among, each fitted to the same trials.
+
+    Parameters
+    ----------
+    fits
+        By names; the nominal model by none.
+    earns
+        The rule of the search.
+    """
+
+    def __init__(self, fits: Mapping[Names, Fit], earns: Worthwhile) -> None:
+        self._fits = {n: f for n, f in fits.items() if math.isfinite(f.sse)}
+        self._earns = earns
+        self._trials = {n: _by_trial(f) for n, f in self._fits.items()}
+
+    def without(self, held: Sequence[int]) -> Fit:
+        """The fit, to all trials, of the set that is chosen without some of them."""
+        costs = {n: self._cost(n, held) for n in self._fits}
+        best: Names = ()
+        for size in sorted({len(n) for n in costs} - {0}):
+            of_size = [n for n in costs if len(n) == size]
+            first = min(of_size, key=lambda n: (costs[n] + PARAMETER_PRICE * self._fits[n].degrees, n))
+            sets = self._fits[first], self._fits[best]
+            if not self._earns(*sets, costs[best] - costs[first], costs[()] - costs[first]):
+                break
+            best = first
+        return self._fits[best]
+
+    def _cost(self, names: Names, held: Sequence[int]) -> float:
+        """The cost of the other trials at the end of one step, as if there were as many of them as of all."""
+        every = self._trials[names]
+        others = [t for i, t in enumerate(every) if i not in held]
+        many = sum(t.readings for t in every) / sum(t.readings for t in others)
+        slope, curvature, step = _step(others)
+        gained = float(slope @ step)
+        if self._fits[names].doubt is not None:  # what all promise together no step has kept
+            _, _, kept = _step(every)
+            gained -= float(2.0 * slope @ kept - kept @ curvature @ kept)
+        return many * (sum(t.cost for t in others) - gained)
+
+
+def _step(trials: Sequence[_Trial]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Slope and curvature of half the cost of some trials, and the Gauss-Newton step to take away to its minimum."""
+    slope, curvature = np.sum([t.slope for t in trials], axis=0), np.sum([t.curvature for t in trials], axis=0)
+    return slope, curvature, np.linalg.lstsq(curvature, slope, rcond=1e-12)[0]
+
+
+def _by_trial(fitted: Fit) -> list[_Trial]:
+    """Each trial's part; of parameters that do not lie at a bound, which would not move, scaled to the size of each."""
+    moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
+    has_ended = fitted.together and fitted.gradient_norm < LITTLE
+    each = [(p, normal_equations([p])) for p in (at_rest(fitted.parts) if has_ended else fitted.parts)]
+    size = np.sqrt(np.maximum(sum(np.diag(e.hessian)[moving] for _, e in each), 1e-300))
+    return [
+        _Trial(
+            len(p.residual),
+            e.sse - e.local_gain + p.log_determinant,
+            e.gradient[moving] / size,
+            e.hessian[np.ix_(moving, moving)] / np.outer(size, size),
+        )
+        for p, e in each
+    ]
+
+
+def share_of(chosen: Sequence[Fit], names: Sequence[str]) -> tuple[int, int] | None:
+    """In how many folds a cause was chosen, or what cannot be told from it, and of how many; None without folds."""
+    found = sum(any(e.name in names for e in fitted.model.effects) for fitted in chosen)
+    return (found, len(chosen)) if chosen else None
+
+
+def is_chosen(share: tuple[int, int] | None) -> bool:
+    """False if most folds choose something else: what is chosen is then an accident of a few trials.
+
+    Source: Meinshausen and Buehlmann, Stability selection, J. R. Stat. Soc. B 72 (2010).
+    """
+    return share is None or 2 * share[0] >= share[1]

@@ -1,0 +1,64 @@
+"""What causes of driven rigs gain over a horizon: of its errors above the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.decide.held_out import Errors, Gain, held_out_gain
+from fes_pin.diagnosis.errors_ahead import errors_over_horizon
+from fes_pin.identify.fit import Fit
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Fits without some trials, and those trials."""
+
+    nominal: Fit
+    best: Fit
+    without: dict[str, Fit]
+    test: tuple[Trial, ...]
+    within: bool = True
+    """False if the trials were held out by the study itself, and are in no fit."""
+    chosen: Fit | None = None
+    """What is chosen anew without the trials, fitted to the others; None where `best` is not to be doubted."""
+
+
+def gains_of(folds: Sequence[Fold], without: Mapping[str, Fit], horizon_s: float, seed: int) -> dict[str, Gain]:
+    """What each cause gains over the horizon.
+
+    Where that is nothing, over as long as the random effort lasts that stands for the cause in the fit without it: a
+    filter follows what is slow, as a spring's torque, and foretells it for so long.
+
+    Parameters
+    ----------
+    folds
+        Trials, and fits that they are foretold by.
+    without
+        By cause, the fit to all trials without it.
+    horizon_s, seed
+        How far ahead errors look, s; of the bootstrap of their intervals.
+    """
+    found_over = _gains_over(folds, tuple(without), horizon_s, seed)
+    shortest = min(t.duration for f in folds for t in f.test)
+    for name, gain in found_over.items():
+        doubt = without[name].doubt
+        assert doubt is not None
+        lasts = min(max(doubt.time.values(), default=0.0), shortest)
+        if not gain.is_material and lasts > horizon_s:
+            longer = _gains_over(folds, (name,), lasts, seed)[name]
+            found_over[name] = replace(longer, ahead_s=lasts) if longer.is_material else gain
+    return found_over
+
+
+def _gains_over(folds: Sequence[Fold], names: Sequence[str], horizon_s: float, seed: int) -> dict[str, Gain]:
+    """What causes gain on the trials of the folds, so far ahead."""
+
+    def errors(of: Callable[[Fold], Fit]) -> Errors:
+        return errors_over_horizon([(of(f), f.best, f.test) for f in folds], horizon_s)
+
+    if not names:
+        return {}
+    nominal, best = errors(lambda f: f.nominal), errors(lambda f: f.best)
+    return {n: held_out_gain(nominal, errors(lambda f, n=n: f.without[n]), best, seed) for n in names}  # type: ignore[misc]

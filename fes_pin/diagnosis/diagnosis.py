@@ -1,0 +1,294 @@
+"""What the nominal model of a study gets wrong: the study is prepared, its causes searched, what is found judged."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fes_pin.data.derived import without_derived
+from fes_pin.data.errors import InputError
+from fes_pin.data.log import EFFORT, Log
+from fes_pin.data.provenance import provenance_now
+from fes_pin.data.spikes import without_spikes
+from fes_pin.data.stuck import without_stuck
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.driven import driven_diagnosis
+from fes_pin.diagnosis.free import judge_free, unfitted
+from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
+from fes_pin.diagnosis.long_records import searched_part, thinned
+from fes_pin.diagnosis.misread import NAME as MISREAD
+from fes_pin.diagnosis.parts import in_parts
+from fes_pin.diagnosis.plausibility import check_study
+from fes_pin.diagnosis.restate import restated_study, search_with_conditions, with_misread
+from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnosis.search.simulation_search import NominalFitError, SimulationSearch
+from fes_pin.diagnosis.searches import Result, Search, Searches
+from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
+from fes_pin.identify.recording import earns, low_pass_of
+from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
+from fes_pin.models.nominal import nominal_model
+from fes_pin.models.rigs.base import Rig
+from fes_pin.workers import OutOfTime, Progress, one_thread_each, time_limit
+
+
+def diagnose_joint(
+    study: Study,
+    *,
+    library: Source | Sequence[Source] | None = None,
+    seed: int = 0,
+    limit: float | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Find out what the nominal model of a study gets wrong.
+
+    Parameters
+    ----------
+    study
+        Rig, start values and trials. Trials with the role "held_out" take no part but in the gain; without such roles
+        the gain is cross-validated over all trials.
+    library
+        Causes beside those written here and installed: files, modules, classes or what `load_library` made of them.
+    seed
+        Of what is simulated: critical values and bootstrap intervals.
+    limit
+        Seconds that the search may take; then it stops at the best set so far, and says so. What is done with that set,
+        and the first fit of the nominal model, come on top.
+    progress
+        Called with a share done and a few words.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    InputError
+        If the study has no trial to fit, a rig without a model of trials, or numbers that no verdict could follow
+        from; see `plausibility.check_study`.
+    """
+    began = time.perf_counter()
+    tell = progress or (lambda _share, _words: None)
+    catalogue, made = catalogue_of(library), provenance_now(study, seed)
+    measured = measured_study(study)
+    warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
+    work = _Work(catalogue, seed, tell, math.inf if limit is None else began + limit)
+    with one_thread_each():
+        diagnosis = work.diagnosis_of_log(measured.study)
+    tell(1.0, "done")
+    warnings += diagnosis.warnings
+    if work.was_stopped:
+        warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
+    found = replace(diagnosis, left_out=measured.left_out, warnings=tuple(warnings), catalogue=catalogue)
+    return replace(found, provenance=made, wall_s=time.perf_counter() - began)
+
+
+class _Work:
+    """What turns a study that was measured into a diagnosis.
+
+    Parameters
+    ----------
+    catalogue, seed, tell
+        As of `diagnose_joint`.
+    end
+        When searches must have ended, of `time.perf_counter`.
+
+    Attributes
+    ----------
+    was_stopped
+        True if one had to.
+    """
+
+    def __init__(self, catalogue: Catalogue, seed: int, tell: Progress, end: float) -> None:
+        self.catalogue, self.seed, self.tell, self.end, self.was_stopped = catalogue, seed, tell, end, False
+
+    def diagnosis_of_log(self, study: Study) -> Diagnosis:
+        """The diagnosis of a study as its log wrote it down, with what that did to its trials undone if it can be."""
+        nominal, (train, _) = nominal_model(study), split(study)
+        driven = _is_answered(nominal.rig, train)
+        logged = all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
+        faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
+        log = Log(effort_noise=faults.noise_beside_nominal(nominal)) if driven and logged else Log()
+        found = self._logged(study, log)
+        if not self.was_stopped and (passed := _low_passed(found, self.end)) is not None:
+            found = _likelier(self.diagnosis(passed), found)
+        if found.extended.doubt is None or not logged:
+            return found
+        if not self.was_stopped and (noise := faults.noise_beside(found)) != found.log.effort_noise:
+            found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
+        late = None if self.was_stopped else faults.lateness(found)
+        if late is not None:
+            recorded, log = found, with_timing_of(found.log, late.log)
+            found = likelier(self._logged(study, log), recorded)
+            late = None if found is recorded else late
+        return with_words(faults.with_doubt_of_timing(found, late))
+
+    def _logged(self, study: Study, log: Log) -> Diagnosis:
+        """The diagnosis of a study with what a log did to its trials undone."""
+        found = self.diagnosis(replace(study, trials=tuple(log.applied(t) for t in study.trials)))
+        return replace(found, log=log)
+
+    def diagnosis(self, study: Study) -> Diagnosis:
+        """Search the causes of one study, and judge what is found."""
+        nominal = nominal_model(study)
+        train, test = split(study)
+        driven = _is_answered(nominal.rig, train)
+        train, spared, said = searched_part(train, study.schema, driven)
+        test = test or spared
+        recorded = train if said else [t for t in study.trials if t.role != "held_out"]
+        effects = self.catalogue.effects_for(nominal.rig)
+        searches = Searches(nominal, train, recorded, test, driven, effects, self.seed, self.tell, study.horizon_s)
+        try:
+            found = self._judged(study, searches, train, test)
+        except NominalFitError as problem:
+            found = unfitted(study, problem.nominal, str(problem), test)
+        except (ArithmeticError, np.linalg.LinAlgError) as problem:
+            reason = f"the search met numbers that cannot be calculated with ({problem})"
+            assert searches.last is not None
+            found = unfitted(study, searches.last.nominal(), reason, test)
+        self.was_stopped |= searches.last is not None and searches.last.was_stopped
+        return replace(found, warnings=(*said, *found.warnings))
+
+    def _judged(self, study: Study, searches: Searches, train: list[Trial], test: list[Trial]) -> Diagnosis:
+        with time_limit(self.end - time.perf_counter()):
+            search, searched, again = search_with_conditions(searches.nominal, train, searches.run)
+        self.tell(0.88, "held-out gain")
+        whole, stated = study, train
+        if again is not None:
+            train, whole = again.trials, restated_study(study, searches.nominal, again.misread)
+        diagnosis = _judged(whole, search, searched, (train, test), self.seed)
+        if _may_be_driven(diagnosis, search, train):
+            with time_limit(self.end - time.perf_counter()):
+                search, searched = searches.by_likelihood(train)
+            diagnosis = _judged(whole, search, searched, (train, test), self.seed)
+        return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
+
+
+def _is_answered(rig: Rig, trials: Sequence[Trial]) -> bool:
+    """True if what drives a rig answers its reading: noise, and what acts at random, come back as an input."""
+    return is_fed_back(rig, trials) or is_stimulus_fed_back(rig, trials)
+
+
+def _searched(study: Study, trials: Sequence[Trial], driven: bool) -> list[Trial]:
+    """What a search by the likelihood fits of the trials of a study."""
+    train, _ = split(replace(study, trials=tuple(trials)))
+    return in_parts(nominal_model(study).rig, searched_part(train, study.schema, driven)[0])
+
+
+def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
+    """The study with the low pass that its readings seem to have gone through; None where nothing speaks for one.
+
+    Only where something is left is it asked for. Of rigs that are judged by the likelihood, `identify.lasting` finds
+    how long noise lasts instead.
+    """
+    restated = any(c.name == MISREAD for c in diagnosis.causes)
+    if not diagnosis.remainder.unexplained or diagnosis.extended.doubt is not None or restated:
+        return None
+    nominal, study = diagnosis.nominal, diagnosis.study
+    try:
+        with time_limit(end - time.perf_counter()):
+            cutoff = low_pass_of(nominal.model, nominal.trials)
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
+        return None
+    log = Log(low_pass_hz=cutoff)
+    return None if cutoff is None else replace(study, trials=tuple(log.applied(t) for t in study.trials))
+
+
+def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:
+    """The diagnosis of readings as low-passed, if what it leaves is the likelier noise by what a low pass must earn."""
+    fits = passed.extended, recorded.extended
+    if passed.extended.doubt is not None or not earns(*fits):
+        return recorded
+    trials = passed.extended.trials
+    names = " and ".join(dict.fromkeys(n for t in trials for n in passed.extended.model.rig.outputs(t.kind) if n in t))
+    cutoff = trials[0].low_pass_hz
+    said = f"{names} seems low-passed at {cutoff:.2g} Hz: what is simulated was low-passed there as well"
+    return replace(passed, log=replace(passed.log, low_pass_hz=cutoff), warnings=(said, *passed.warnings))
+
+
+def _judged(
+    study: Study, search: Search, searched: Result, trials: tuple[list[Trial], list[Trial]], seed: int
+) -> Diagnosis:
+    """The verdict on what a search found."""
+    if isinstance(search, LikelihoodSearch):
+        return driven_diagnosis(study, search, searched, trials, seed)  # type: ignore[arg-type]
+    return judge_free(study, search, searched, trials[1], seed)  # type: ignore[arg-type]
+
+
+def _may_be_driven(diagnosis: Diagnosis, search: Search, trials: Sequence[Trial]) -> bool:
+    """True where free simulation explains nothing of a rig that an effort drives.
+
+    A controller's answer is not seen where a record was smoothed or interpolated before it was stored. Before it is
+    said that no cause of the library explains the rig, the likelihood is asked, which takes such an answer for what it
+    is.
+    """
+    free = isinstance(search, SimulationSearch) and not search.was_stopped
+    return free and diagnosis.verdict == "unexplained" and diagnosis.nominal.model.rig.is_driven(trials)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A study without what its sensors did not measure.
+
+    Attributes
+    ----------
+    study
+        Spikes replaced, stretches of stuck sensors cut out.
+    left_out
+        Which samples were spikes, by trial and column.
+    warnings
+        What was cut out, a line each.
+    """
+
+    study: Study
+    left_out: dict[str, dict[str, tuple[int, ...]]]
+    warnings: list[str]
+
+
+def measured_study(study: Study) -> Measured:
+    """A study without spikes of its measured columns and without stretches in which a sensor was stuck.
+
+    A sample that its neighbours replace is no evidence of its own: intervals are too narrow by half the share of such
+    samples, half a percent where one in a hundred is a spike.
+
+    Raises
+    ------
+    InputError
+        If nothing else is left.
+    """
+    rig, trials, found, warnings = nominal_model(study).rig, [], {}, []
+    for trial in study.trials:
+        pieces, said = without_stuck(trial, rig.outputs(trial.kind), bool(rig.unknowns(trial.kind)))
+        warnings += said
+        for piece in pieces:
+            clean, spikes = without_spikes(piece, rig.outputs(piece.kind))
+            trials.append(clean)
+            if spikes:
+                found[piece.name] = spikes
+    if not trials:
+        raise InputError(f"no trial has a reading that is not stuck: {warnings[0]}", file=study.folder)
+    for rate, position in rig.rate_of.items():
+        trials, said = without_derived(trials, position, rate)
+        warnings += said
+    return Measured(replace(study, trials=tuple(trials)) if found or warnings else study, found, warnings)
+
+
+def split(study: Study) -> tuple[list[Trial], list[Trial]]:
+    """Trials to fit and trials that the study holds out.
+
+    Free motion is fitted at the rate that its noise is modelled at: without an input there is nothing faster to follow.
+    """
+    test = [t for t in study.trials if t.role == "held_out"]
+    schema, fitted = study.schema, [t for t in study.trials if t.role != "held_out"]
+    train = [t if set(schema.inputs) & set(t.columns) else thinned(t, schema) for t in fitted]
+    if not train:
+        raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)
+    return train, test
+
+
+__all__ = ["diagnose_joint", "split"]

@@ -1,0 +1,139 @@
+"""Trials held out of the diagnosis of a driven rig: what its causes add to their likelihood, and to errors ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.decide.gains_ahead import Fold
+from fes_pin.diagnosis.decide.held_out import Evidence, folds_of
+from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
+from fes_pin.diagnosis.search.likelihood_search import Found
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.problem import Unknowns, normal_equations
+from fes_pin.identify.scatter import at_rest
+from fes_pin.identify.turns import maximise, together
+from fes_pin.workers import in_parallel
+
+WIDE = 10.0
+"""Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size. Of what
+the data tell it cancels between the trials and their folds."""
+
+
+class Again:
+    """Fits made again to other trials, each once: a set less a cause that is refused is the next set.
+
+    Parameters
+    ----------
+    refitted
+        Makes a fit to other trials from one.
+    """
+
+    def __init__(self, refitted: Callable[[Fit, Sequence[Trial]], Fit]) -> None:
+        self._refitted = refitted
+        self._kept: dict[tuple[int, tuple[int, ...]], tuple[Fit, Fit]] = {}
+
+    def __call__(self, wanted: Sequence[tuple[Fit, Sequence[Trial]]]) -> list[Fit]:
+        keys = [(id(fitted), tuple(map(id, trials))) for fitted, trials in wanted]
+        missing = {k: w for k, w in zip(keys, wanted, strict=True) if k not in self._kept}
+        made = in_parallel(lambda w: self._refitted(*w), list(missing.values()))
+        self._kept |= {k: (w[0], one) for (k, w), one in zip(missing.items(), made, strict=True)}
+        return [self._kept[k][1] for k in keys]
+
+
+def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refitted: Again) -> list[Fold]:
+    """The study's own held-out trials, or every trial in its turn; none where there is but one."""
+    if test:
+        return [Fold(found.nominal, found.best, found.without, tuple(test), within=False)]
+    if len(train) < 2:
+        return []
+    held = folds_of(train)
+    fits = {"": found.nominal, "+": found.best, **found.without}
+    others = [[t for i, t in enumerate(found.best.trials) if i not in out] for out in held]
+    wanted = [(k, n) for k in range(len(held)) for n in fits]
+    again = dict(zip(wanted, refitted([(fits[n], others[k]) for k, n in wanted]), strict=True))
+    return [
+        Fold(again[k, ""], again[k, "+"], {n: again[k, n] for n in found.without}, tuple(train[i] for i in out))
+        for k, out in enumerate(held)
+    ]
+
+
+def with_choices(folds: Sequence[Fold], chosen: Sequence[Fit], refitted: Again) -> list[Fold]:
+    """The folds with what each chooses anew.
+
+    Parameters
+    ----------
+    chosen
+        For each fold, the fit to all trials of the set that is chosen without its own.
+    """
+    again = refitted([(one, fold.best.trials) for one, fold in zip(chosen, folds, strict=True)])
+    return [replace(fold, chosen=one) for fold, one in zip(folds, again, strict=True)]
+
+
+def afresh(fitted: Fit, trials: Sequence[Trial]) -> Fit:
+    """A fit again, to other trials, with what is random in these."""
+    problem, unknowns = _problem(fitted, trials)
+    return maximise(problem, fitted.values, unknowns, near=True)
+
+
+def as_random_as_in_all(fitted: Fit, trials: Sequence[Trial]) -> Fit:
+    """A fit again, to other trials, at what was random in its own."""
+    problem, unknowns = _problem(fitted, trials)
+    found = together(problem, fitted.values, unknowns, random=False)
+    return replace(found, doubt=fitted.doubt)
+
+
+def _problem(fitted: Fit, trials: Sequence[Trial]) -> tuple[LikelihoodProblem, Unknowns]:
+    """The problem of a fit on other trials, and where their unknowns begin."""
+    assert fitted.doubt is not None
+    known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
+    problem = LikelihoodProblem(fitted.model, trials, fitted.doubt)
+    return problem, [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
+
+
+def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, Evidence]:
+    """What each cause adds to twice the log-likelihood of held-out trials, foretold by fits to the others.
+
+    By Bayes' rule p(held | others) = p(all) / p(others), each the integral over the parameters about its fit (Laplace):
+
+        -2 log p(trials) = cost + log det(1 + H S^2),   H the information, S the widths of a prior,
+
+    so that what the others leave in doubt of a parameter is doubt about the held trials as well. What is random is as
+    in all trials: learned without one that is unlike the others, it made that one so unlikely that no cause could
+    speak for itself. The ratio of likelihoods of a true cause scatters by twice the root of its mean.
+    """
+    foretold = {n: 0.0 for n in ("", *found.without)}
+    for fold in folds:
+        whole = part = {"": found.best, **found.without}
+        if fold.within:
+            part = dict(zip(whole, alike([(f, fold.best.trials) for f in whole.values()]), strict=True))
+        else:
+            whole = dict(zip(part, alike([(f, (*f.trials, *fold.test)) for f in part.values()]), strict=True))
+        for n in foretold:
+            foretold[n] += _weight(whole[n]) - _weight(part[n])
+    gains = {n: foretold[n] - foretold[""] for n in found.without}
+    return {n: Evidence(g, max(g, 0.0)) if np.isfinite(g) else Evidence(0.0, 0.0) for n, g in gains.items()}
+
+
+@np.errstate(all="ignore")
+def _weight(fitted: Fit) -> float:
+    """Twice the negative log of the probability of a fit's trials; see `evidence_of`."""
+    system = normal_equations(at_rest(fitted.parts))
+    info = fitted.model.parameter_info()
+    widths = [WIDE * max(abs(fitted.values[n]), info[n].scale) for n in fitted.free]
+    scaled = system.hessian * np.outer(widths, widths)
+    return fitted.sse + float(np.linalg.slogdet(np.eye(len(widths)) + scaled)[1])
+
+
+def held_errors_ahead(folds: Sequence[Fold], horizon_s: float, falling: bool) -> tuple[Ahead, Ahead] | None:
+    """Errors ahead of the nominal model and of what each fold chooses, on trials held out; None where none are."""
+    if not folds:
+        return None
+    return (
+        errors_ahead([(f.nominal, f.test) for f in folds], horizon_s, falling),
+        errors_ahead([(f.chosen or f.best, f.test) for f in folds], horizon_s, falling),
+    )

@@ -1,0 +1,222 @@
+"""How far ahead a model foretells what a rig reads, and what acts on a driven rig at random."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.decide.held_out import Errors
+from fes_pin.identify.ahead import SquaredErrors, forecast_errors, forecasts, one_step, own_noise, reach_of
+from fes_pin.identify.doubts import driving_size
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import SMALL_SHARE
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.per_trial import predictions
+from fes_pin.models.predictor import Doubt
+from fes_pin.workers import in_parallel
+
+AVERAGED_S = 0.05
+"""Time over which a random effort is averaged before it is compared, s: what is faster moves no limb, and of what is
+much faster than the rig data tell the intensity 2 std^2 time alone, not deviation and time one by one."""
+
+_Told = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class RandomPart:
+    """What acts at random on a rig.
+
+    Attributes
+    ----------
+    name
+        "effort" or "force".
+    std
+        Stationary standard deviation, in the rig's unit of effort.
+    time_constant_s
+        s.
+    share
+        Deviation of its means over `AVERAGED_S`, over the root mean square of what drives the rig.
+    """
+
+    name: str
+    std: float
+    time_constant_s: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """Errors E of one model, percent: one sample ahead, over the horizon, free (None where the rig falls).
+
+    `noise` is what noise alone leaves over the horizon, see `noise_that_is_small`; None of one simulated freely.
+    """
+
+    one_step: float
+    horizon: float
+    free: float | None
+    noise: float | None = None
+
+    @classmethod
+    def of(cls, total: SquaredErrors) -> Ahead:
+        """From squared errors."""
+        share = 100.0 / max(total.around, 1e-300)
+        return cls(share * total.one_step, share * total.horizon, share * total.free)
+
+
+@dataclass(frozen=True)
+class AheadErrors:
+    """Errors over time, of both models: on the trials that were fitted, and on trials held out if there were any."""
+
+    horizon_s: float
+    nominal: Ahead
+    extended: Ahead
+    nominal_held_out: Ahead | None
+    extended_held_out: Ahead | None
+
+
+def random_parts(fitted: Fit) -> tuple[RandomPart, ...]:
+    """The random efforts that act in a fit, with their share of what drives the rig."""
+    assert fitted.doubt is not None
+    sizes, still = driving_size(fitted.model, fitted.trials), fitted.doubt.still
+    parts = ((n, std, fitted.doubt.time[n]) for n, std in fitted.doubt.std.items() if n in sizes and n not in still)
+    return tuple(RandomPart(n, std, time, _averaged(std, time) / sizes[n]) for n, std, time in parts)
+
+
+def are_large(random: Sequence[RandomPart]) -> bool:
+    """Whether what acts at random is more than small beside what drives the rig."""
+    return any(r.share > SMALL_SHARE for r in random)
+
+
+def _averaged(std: float, time: float) -> float:
+    """Deviation of the means over `AVERAGED_S` of a first-order process.
+
+    With x = time / AVERAGED_S, std sqrt(2 x (1 - x (1 - exp(-1 / x)))).
+    """
+    x = time / AVERAGED_S
+    return std * float(np.sqrt(max(2.0 * x * (1.0 - x * (1.0 - np.exp(-1.0 / x))), 0.0)))
+
+
+def free_errors(
+    nominal: Fit,
+    extended: Fit,
+    floor: NoiseModel,
+    horizon_s: float,
+    held_out: tuple[SquaredErrors, SquaredErrors] | None,
+) -> AheadErrors:
+    """Errors over time of two models that are simulated freely.
+
+    Parameters
+    ----------
+    floor
+        Noise whose deviations weigh the channels.
+    held_out
+        Squared errors of both on trials that took no part, if there are such.
+    """
+    inside = [Ahead.of(forecast_errors(f.model, f.trials, own_noise(f), floor, horizon_s)) for f in (nominal, extended)]
+    outside = [Ahead.of(total) for total in held_out] if held_out else [None, None]
+    return AheadErrors(horizon_s, inside[0], inside[1], outside[0], outside[1])
+
+
+def errors_over_horizon(pairs: Sequence[tuple[Fit, Fit, Sequence[Trial]]], horizon_s: float) -> Errors:
+    """Squared errors over the horizon, by seconds of each trial.
+
+    Parameters
+    ----------
+    pairs
+        A fit, the one whose white noise is the unit of its errors, so that models can be compared, and trials.
+    """
+    work = [(fitted, floor, trial) for fitted, floor, trials in pairs for trial in trials]
+    found = in_parallel(lambda w: _squares(*w, horizon_s), work)
+    return Errors(*np.concatenate(found, axis=1))
+
+
+def _squares(fitted: Fit, floor: Fit, trial: Trial, horizon_s: float) -> np.ndarray:
+    """`Errors` of a trial by its seconds, shape (4, seconds); errors of as long as the horizon have one origin."""
+    assert floor.doubt is not None
+    told, noise = _told(fitted, trial, horizon_s)
+    lines = np.zeros((4, len(trial)))
+    for name, values in told.items():
+        variance, measured = floor.doubt.white[name] ** 2, trial[name]
+        squares = noise[name] / variance
+        lines[0] += np.nan_to_num(measured - values, posinf=0.0, neginf=0.0) ** 2 / variance
+        lines[1] += np.nan_to_num(measured - np.nanmean(measured)) ** 2 / variance
+        lines[2] += squares
+        lines[3] += 2.0 * squares**2 * max(1.0, horizon_s / trial.dt)
+    lines[:, : _first(fitted, trial, horizon_s)] = 0.0
+    pieces = np.array_split(lines, max(1, round(trial.duration)), axis=1)
+    return np.array([p.sum(axis=1) for p in pieces]).T
+
+
+_TOLD: WeakKeyDictionary[Fit, dict[tuple[int, float], tuple[Trial, _Told]]] = WeakKeyDictionary()
+
+
+def _told(fitted: Fit, trial: Trial, horizon_s: float) -> _Told:
+    """What is foretold over the horizon, and the variance of its errors by noise alone, shape (n,) by output.
+
+    The same is asked where causes are judged and where errors are told: it is kept as long as the fit is.
+    """
+    known, key = _TOLD.setdefault(fitted, {}), (id(trial), horizon_s)
+    if key not in known:
+        known[key] = (trial, _foretold(fitted, trial, horizon_s))  # as long as the trial is here no other has its id
+    return known[key][1]
+
+
+def _foretold(fitted: Fit, trial: Trial, horizon_s: float) -> _Told:
+    assert fitted.doubt is not None
+    calm = noise_that_is_small(fitted)
+    told = forecasts(fitted.model, trial, fitted.doubt, horizon_s)
+    alone = told if calm is fitted.doubt else forecasts(fitted.model, trial, calm, horizon_s)
+    noise = {n: np.where(np.isfinite(trial[n]), np.nan_to_num(one.variances), 0.0) for n, one in alone.items()}
+    return {n: one.values for n, one in told.items()}, noise
+
+
+def _first(fitted: Fit, trial: Trial, horizon_s: float) -> int:
+    """The first sample that is foretold from more than the first; 0 where the trial ends before, or where nothing of
+    its start is unknown."""
+    first = sum(reach_of(trial, horizon_s)) if fitted.model.rig.unknowns(trial.kind) else 0
+    return first if first < len(trial) else 0
+
+
+def noise_that_is_small(fitted: Fit) -> Doubt:
+    """What is random about a rig and its readings that is noise.
+
+    A random effort as far as it is small beside what drives the rig: what is more than `SMALL_SHARE` of that, is
+    something that the model misses.
+    """
+    assert fitted.doubt is not None
+    less = {r.name: SMALL_SHARE / r.share for r in random_parts(fitted) if r.share > SMALL_SHARE}
+    std = {n: value * less.get(n, 1.0) for n, value in fitted.doubt.std.items()}
+    return replace(fitted.doubt, std=std) if less else fitted.doubt
+
+
+def errors_ahead(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float, falling: bool) -> Ahead:
+    """E of the first output one sample ahead, over the horizon, and free."""
+    work = [(fitted, trial) for fitted, trials in pairs for trial in trials]
+    missed, around = np.sum(in_parallel(lambda one: _sums(*one, horizon_s), work), axis=0)
+    one_step, horizon, free, noise = (float(v) for v in 100.0 * missed / np.maximum(around, 1e-300))
+    return Ahead(one_step, horizon, None if falling else free, noise)
+
+
+def _sums(fitted: Fit, trial: Trial, horizon_s: float) -> np.ndarray:
+    """Squared errors of the first output of a trial, and what it varies where they are judged, shape (2, 4).
+
+    One sample ahead, over the horizon, free, and over the horizon by noise alone.
+    """
+    assert fitted.doubt is not None
+    name = fitted.model.rig.output(trial.kind)
+    measured, (told, noise) = trial[name], _told(fitted, trial, horizon_s)
+    begun = np.arange(len(trial)) < _first(fitted, trial, horizon_s)
+    errors = (
+        one_step(fitted.model, trial, fitted.doubt)[name],
+        np.where(begun, np.nan, measured - told[name]),
+        measured - predictions(fitted.model, [trial], fitted.noise)[0][:, 0],
+        np.where(begun, np.nan, np.sqrt(noise[name])),
+    )
+    spread = (measured - np.nanmean(measured)) ** 2
+    with np.errstate(all="ignore"):
+        around = [float(np.nansum(spread if k in (0, 2) else spread[~begun])) for k in range(len(errors))]
+        return np.array([[float(np.nansum(e**2)) for e in errors], around])

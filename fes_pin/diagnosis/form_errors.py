@@ -1,0 +1,105 @@
+"""What was found, judged again where errors of form passed for a random effort that lasts: `identify.fresh_efforts`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from fes_pin.data.schema import IMPOSED
+from fes_pin.diagnosis.decide.held_out import held_out_gain
+from fes_pin.diagnosis.decide.rivals import not_excluded
+from fes_pin.diagnosis.errors_ahead import errors_over_horizon
+from fes_pin.diagnosis.search.cause_sets import Names, names_of
+from fes_pin.diagnosis.search.likelihood_search import Found, LikelihoodSearch
+from fes_pin.diagnosis.search.simulation_search import NominalFitError
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.fresh_efforts import beside_fresh_efforts, step_s
+from fes_pin.identify.levels import NOTHING_PERCENT
+from fes_pin.workers import OutOfTime, in_parallel, time_limit
+
+FRESH = "what acts at random was taken for new in every sample: beside what lasts, the model foretold less"
+"""What is told of it."""
+
+
+class FreshSearch(LikelihoodSearch):
+    """What was found, its parts and what cannot be told from it, beside random efforts that are new in every sample.
+
+    No cause is sought there: what is left has a colour that such efforts have not, and a likelihood without it tells
+    causes apart that it should not.
+    """
+
+    def __init__(self, search: LikelihoodSearch, fits: Sequence[Fit], horizon_s: float) -> None:
+        super().__init__(search.sets.begun_with(fits), search.seed, search.progress, horizon_s)
+        self._names = names_of(fits[0])
+
+    def _search(self) -> Found:
+        return self.settle(self._backward(self._names))
+
+    def settle(self, names: Names, refused: Iterable[str] = ()) -> Found:
+        """A set, once it has the form that the data demand."""
+        self._refine(names)
+        return self.told(names)
+
+
+def beside_what_is_new(search: LikelihoodSearch, found: Found) -> Fit | None:
+    """What was found, beside random efforts that are new in every sample; None where none that lasts acts."""
+    if search.was_stopped or not _may_last(found.best):
+        return None
+    try:
+        with time_limit(search.seconds_left):
+            return beside_fresh_efforts(found.best)
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
+        return None
+
+
+def judged_again(search: LikelihoodSearch, found: Found, fresh: Fit) -> tuple[LikelihoodSearch, Found] | None:
+    """What was found beside random efforts that are new in every sample; None where it gains nothing there.
+
+    It gains where its errors over the horizon are less, by a thousandth of what the nominal model gets wrong: a random
+    effort that lasts is foretold as far as it does, and what takes its place gains nothing. Nothing is claimed by that.
+
+    Parameters
+    ----------
+    fresh
+        Of `beside_what_is_new`.
+    """
+    try:
+        with time_limit(search.seconds_left):
+            if not _foretells_more(fresh, search, found):
+                return None
+            again = FreshSearch(search, [fresh, *_beside(found)], search.horizon_s)
+        with time_limit(search.seconds_left):
+            other = again.run()
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime, NominalFitError):
+        return None
+    return None if again.was_stopped else (again, other)
+
+
+def _foretells_more(fresh: Fit, search: LikelihoodSearch, found: Found) -> bool:
+    """Whether errors over the horizon are less beside efforts that are new."""
+    many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, fresh)]
+    nominal, lasting, new = (errors_over_horizon(one, search.horizon_s) for one in many)
+    return held_out_gain(nominal, lasting, new, search.seed).percent > NOTHING_PERCENT
+
+
+def _beside(found: Found) -> list[Fit]:
+    """The parts of what was found, and what cannot be told from it, beside efforts that are new."""
+    parts = {names_of(f): f for f in (*found.without.values(), found.nominal)}
+    parts |= {names_of(f): f for many in found.rivals.values() for f in not_excluded(found.best, many)}
+    parts.pop(names_of(found.best), None)
+    return in_parallel(beside_fresh_efforts, list(parts.values()))
+
+
+def _may_last(fitted: Fit) -> bool:
+    """Whether something acts at random on a rig whose starts are unknown, and lasts longer than a reading.
+
+    Where the motion is imposed effort itself is read, and a reading of it lasts as it does; where a rig begins at rest
+    noise that foretells itself is told from a random effort (`LikelihoodFits.nominal`).
+    """
+    assert fitted.doubt is not None
+    lasts = any(fitted.doubt.time[n] > step_s(fitted.doubt, fitted.trials) for n in fitted.doubt.acting)
+    return lasts and all(t.kind != IMPOSED and fitted.model.rig.unknowns(t.kind) for t in fitted.trials)
+
+
+__all__ = ["FRESH", "beside_what_is_new", "judged_again"]

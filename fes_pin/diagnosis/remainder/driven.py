@@ -1,0 +1,167 @@
+"""What is left beside a model in which the rig is driven at random: efforts and readings that follow its own state.
+
+The innovations of the predictor are white where the model is right. Some forty functions of state, input and time, each
+as an effort at the joint (or a force), and some as a part of the reading, are scored against them beside everything
+that was fitted. The random effort that was found is part of the model: what is left must stand out of it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fes_pin.diagnosis.decide.significance import level_of
+from fes_pin.diagnosis.remainder.open_set import SIGN_DRAWS, Remainder, beside_smooth
+from fes_pin.diagnosis.search.score import Projection
+from fes_pin.identify.distributions import chi2_tail
+from fes_pin.identify.fit import Fit, fit
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.problem import limits_of
+from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
+from fes_pin.models.stage import Effect
+
+TRIED = (1.0, 0.5, 0.25, 0.1)
+"""Shares of the step to where slopes promise the most at which the cost is looked at."""
+KEPT = 1e-3
+"""Share of a feature's norm that what was fitted must leave for it to be judged."""
+
+
+def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
+    """Test whether a fit by the likelihood leaves anything but noise.
+
+    A rig that begins at rest can be simulated freely as well: what the same causes leave then is tested as elsewhere,
+    see `remainder.open_set`, for a random effort would take bursts, detents and slips. The p-value is that of the most
+    significant of the tests, times their number.
+    """
+    featured = _features_left(fitted, seed)
+    assert fitted.doubt is not None
+    free = fit(fitted.model, fitted.trials) if fitted.doubt.ar else None
+    others = beside_smooth(free, seed) if free is not None and math.isfinite(free.sse) else []
+    found = [(featured.p_value, featured.where), *others]
+    p_value, where = min(found, key=lambda f: f[0])
+    p_value = min(1.0, len(found) * p_value)
+    unexplained = p_value < level_of(fitted)
+    return Remainder(unexplained, p_value, where if unexplained else None)
+
+
+def _features_left(fitted: Fit, seed: int) -> Remainder:
+    """Test whether any feature stands out of what a fit leaves.
+
+    A remainder is claimed at the level that a cause is. Half of it goes to the largest single feature, half to all
+    together. The chi-square is divided by its inflation under random signs of the trials, where there are enough.
+    What slopes promise counts as far as the likelihood keeps it: those of a filter are an approximation, worst of
+    what bends sharply. Not where effort is read: there fits follow such slopes to their end, and leave promises that
+    none keeps.
+    """
+    featured = _Featured(fitted)
+    projection = Projection(fitted.parts)
+    left = projection(featured.columns)
+    before, after = np.linalg.norm(featured.columns, axis=0), np.linalg.norm(left, axis=0)
+    good = np.flatnonzero(after > KEPT * np.where(before > 0, before, 1.0))
+    if not len(good):
+        return Remainder(False, 1.0, None)
+    left = left[:, good] / after[good]
+    by_trial = _by_trial(left, projection.residual, fitted)
+    values, vectors = np.linalg.eigh(left.T @ left)
+    kept = values > 1e-4 * values.max()
+    shares = by_trial @ vectors[:, kept] / np.sqrt(values[kept])
+    rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
+    inflation = _inflation(shares, rank, seed)
+    single = by_trial.sum(axis=0)
+    best = int(np.argmax(np.abs(single)))
+
+    def p_value(all_of_them: float, one: float) -> float:
+        p_values = (float(chi2_tail(all_of_them / inflation, rank)), rank * float(chi2_tail(one / inflation, 1)))
+        return min(1.0, 2.0 * min(p_values))
+
+    p = p_value(statistic, float(single[best] ** 2))
+    if p < level_of(fitted) and featured.can_keep:
+        alone, together = np.zeros((2, len(featured.names)))
+        alone[good[best]] = single[best] / after[good[best]]
+        together[good] = vectors[:, kept] @ (shares.sum(axis=0) / np.sqrt(values[kept])) / after[good]
+        p = max(p, p_value(featured.gained(together), featured.gained(alone)))
+    return Remainder(p < level_of(fitted), p, featured.names[good[best]].split(":")[0])
+
+
+class _Featured:
+    """A fit beside the features.
+
+    Attributes
+    ----------
+    names
+        Of the features.
+    columns
+        The innovations' sensitivities to them in their deviations, all trials end to end, shape (m, features).
+    can_keep
+        False where fits followed slopes for gains as they are to the end.
+    """
+
+    def __init__(self, fitted: Fit) -> None:
+        assert fitted.doubt is not None
+        signals = {s for t in fitted.trials for s in fitted.model.rig.signals(t.kind)}
+        kinds = [EffortFeatures if "torque" in signals else ForceFeatures]
+        kinds += [ReadingFeatures] if "reading" in signals else []
+        self.fitted, self._model = fitted, fitted.model
+        for kind in kinds:
+            self._model = self._model + _scaled(kind(), fitted)
+        self.names = [n for kind in kinds for n in kind.functions]
+        free = tuple(f"{kind.name}.a{k:02d}" for kind in kinds for k in range(len(kind.functions)))
+        self._problem = LikelihoodProblem(self._model, fitted.trials, fitted.doubt, free)
+        self.can_keep = not self._problem.is_final
+        run = self._problem.innovations(self._model.parameters(), fitted.unknowns)
+        columns = [-i.over_deviations(i.sensitivities[..., : len(free)]) for i in run]
+        self.columns = np.nan_to_num(np.concatenate(columns))
+
+    def gained(self, amplitudes: np.ndarray) -> float:
+        """By how much the cost falls along a step of the features, and of what was fitted with them; 0 where it rises.
+
+        Parameters
+        ----------
+        amplitudes
+            Shape (features,).
+        """
+        fitted, values = self.fitted, self._model.parameters()
+        rows, residual = (np.concatenate([getattr(p, n) for p in fitted.parts]) for n in ("jacobian", "residual"))
+        beside = np.linalg.lstsq(rows, residual - self.columns @ amplitudes, rcond=1e-10)[0]
+        moves = dict(zip((*fitted.free, *self._problem.free), (*beside, *amplitudes), strict=True))
+        limits = limits_of(self._model, fitted.trials)
+        tried = [{n: float(np.clip(values[n] + t * m, *limits[n])) for n, m in moves.items()} for t in (0.0, *TRIED)]
+        points = [({**values, **one}, fitted.unknowns) for one in tried]
+        now, *costs = self._problem.bounds(points)
+        return max(0.0, now - min(costs))
+
+
+def _scaled(effect: Effect, fitted: Fit) -> Effect:
+    """Features whose variables run from about -1 to 1 in these trials."""
+    rig, trials = fitted.model.rig, fitted.trials
+    moved = [t[(*rig.schema.motion(t.kind), rig.output(t.kind))[0]] for t in trials]
+    low, high = float(np.nanmin(np.concatenate(moved))), float(np.nanmax(np.concatenate(moved)))
+    lag = [min(max(1, round(0.05 / t.dt)), len(t) - 1) for t in trials]
+    rates = [np.abs(q[k:] - q[:-k]) / (k * t.dt) for q, t, k in zip(moved, trials, lag, strict=True)]
+    drives = [np.abs(t[n]) for t in trials for n in rig.input_columns(t)]
+    scales: dict[str, Any] = {
+        "centre": 0.5 * (low + high),
+        "reach": max(0.5 * (high - low), 1e-9),
+        "speed": max(float(np.nanmax(np.concatenate(rates))), 1e-9),
+        "drive": max((float(np.nanmax(d)) for d in drives), default=0.0) or 1.0,
+        "duration": max(t.duration for t in trials),
+    }
+    return replace(effect, **scales)
+
+
+def _by_trial(columns: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.ndarray:
+    """Each trial's part of the inner products of columns and residual, shape (trials, columns)."""
+    ends = np.cumsum([0, *(len(p.residual) for p in fitted.parts)])
+    return np.array([columns[a:b].T @ residual[a:b] for a, b in itertools.pairwise(ends)])
+
+
+def _inflation(shares: np.ndarray, rank: int, seed: int) -> float:
+    """How much larger than its rank the statistic is with random signs of the trials; 1 with fewer than 4 trials."""
+    if len(shares) < 4 or not rank:
+        return 1.0
+    signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(SIGN_DRAWS, len(shares)))
+    return max(1.0, float(np.mean(np.sum((signs @ shares) ** 2, axis=1))) / rank)

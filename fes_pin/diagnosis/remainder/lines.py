@@ -1,0 +1,82 @@
+"""Spectral lines: ripple at the rate of the pulses, hum, a fan; steady, or as strong as the muscle is active."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.fft
+import scipy.ndimage
+
+from fes_pin.diagnosis.remainder.innovations import CLIP, Innovations, driven
+from fes_pin.identify.distributions import chi2_quantile, f_tail
+
+LOWEST_HZ = 2.0
+"""Slower oscillations are the smooth features' and the library's."""
+HIGHEST = 0.96
+"""Highest frequency, as a share of half the sampling rate."""
+NEIGHBOURS = 201
+"""Frequencies, half a resolution apart, whose median is the level that a line stands out from; half as many at the ends
+of the spectrum, where they are mirrored."""
+LONGEST_NOISE = 4
+"""Order of the noise that lines are looked for under: enough that its slope does not matter between neighbouring
+frequencies, and too little to take a line for noise."""
+MEDIAN_EFFICIENCY = 0.64
+"""Of a median against a mean as a measure of level: 2 / pi."""
+
+
+def line_p_value(pieces: Sequence[Innovations]) -> tuple[float, str]:
+    """p-value of the strongest line in one channel, and what it goes with: "time" or "stimulus".
+
+    A line of frequency f and amplitude g_t (1, or the activation) has in the innovations e of trial i the Fourier
+    coefficient F_i(f) = sum_t g_t e_t exp(-2 pi i f t). Under the null 2 |sum F_i|^2 / sum g^2, for lines of the same
+    phase in every trial, is chi-square of 2 degrees and sum_i 2 |F_i|^2 / sum_t g_t^2, for lines of any phase, of twice
+    the number of trials; both are compared with the median of the latter around f, by Fisher's F. The smallest of all
+    p-values is corrected for the number of frequencies and for these four tests.
+    """
+    found = [
+        (p, where) for where in ("time", "stimulus") for p in _lines([(e, _amplitude(e, where)) for e in pieces]) if p
+    ]
+    if not found:
+        return 1.0, "time"
+    p, where = min(found)
+    return min(1.0, len(found) * p), where
+
+
+def _amplitude(one: Innovations, where: str) -> np.ndarray | None:
+    if where == "time":
+        return np.ones(len(one.values))
+    act = driven(one)
+    return act if len(act) and np.ptp(act) > 0 else None
+
+
+def _lines(rows: Sequence[tuple[Innovations, np.ndarray | None]]) -> tuple[float, ...]:
+    """p-values of the strongest line of one phase, and of the strongest of any phase in each trial."""
+    used = [(e, g) for e, g in rows if g is not None and len(e.values) > NEIGHBOURS and g @ g > 0]
+    if not used:
+        return ()
+    dt, size = used[0][0].dt, scipy.fft.next_fast_len(2 * max(len(e.values) for e, _ in used), real=True)
+    frequency = np.fft.rfftfreq(size, dt)
+    together, apart, power = np.zeros(len(frequency), dtype=complex), np.zeros(len(frequency)), 0.0
+    for one, g in used:
+        own = float(g @ g)
+        begun = len(one.trial) * one.trial.dt - len(one.values) * dt
+        f = np.fft.rfft(np.clip(one.values, -CLIP, CLIP) * g, size) * np.exp(-2j * np.pi * frequency * begun)
+        together, apart, power = together + f, apart + 2.0 * np.abs(f) ** 2 / own, power + own
+    inside = (frequency > LOWEST_HZ) & (frequency < HIGHEST * 0.5 / dt)
+    if inside.sum() < NEIGHBOURS:
+        return ()
+    degrees = 2 * len(used)
+    median = chi2_quantile(0.5, degrees)
+    level = np.maximum(scipy.ndimage.median_filter(apart, NEIGHBOURS, mode="reflect") / median, 1e-12)[inside]
+    one_phase = float(np.max(np.abs(together[inside]) ** 2 / power / level))
+    any_phase = float(np.max(apart[inside] / level)) / degrees
+    known = MEDIAN_EFFICIENCY * degrees * 0.25 * NEIGHBOURS * _fullness([g for _, g in used])
+    count = int(inside.sum())
+    return tuple(min(1.0, count * f_tail(x, k, known)) for x, k in ((one_phase, 2), (any_phase, degrees)))
+
+
+def _fullness(amplitudes: Sequence[np.ndarray]) -> float:
+    """Share of the samples that carry the power; neighbouring frequencies are as much fewer."""
+    g = np.concatenate(amplitudes) ** 2
+    return float(g.sum() ** 2 / (len(g) * (g @ g)))

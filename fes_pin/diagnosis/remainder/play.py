@@ -1,0 +1,90 @@
+"""Play in a sensor: a reading that depends on the side from which it was reached."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from fes_pin.diagnosis.remainder.innovations import Stretch, stretches
+from fes_pin.diagnosis.search.score import Projection
+from fes_pin.identify.distributions import f_tail
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import ABSORBED_BELOW
+from fes_pin.models.simulate import Simulator
+
+WIDTHS = (0.003, 0.01, 0.03, 0.1)
+"""Half widths of the play that are tried, as shares of the largest range of a trial's reading. Below the least of them
+only the direction of the last motion counts."""
+UNITS = 32
+"""Pieces of trials that the spread of the evidence is judged on, at least."""
+
+
+def play_p_value(fitted: Fit, projection: Projection) -> float:
+    """p-value of readings not lagging behind where the motion turns; corrected for widths and channels.
+
+    The deviation that a play of half width w makes in the simulated reading y, p_t - y_t with
+    p_t = min(max(p_(t-1), y_t - w), y_t + w), is whitened as the residual and freed of what the fit takes up. With c_i
+    and r_i its part and the residual's in one piece of a trial, x_i = c_i' r_i, n_i = c_i' c_i and a = sum x / sum n,
+    the gain (sum x)^2 / sum n is compared with the spread between pieces, sum (x_i - a n_i)^2 / n_i / k, by Fisher's F
+    of 1 and k degrees: noise that is not quite whitened, or another deviation, is in both. With b_i the orthonormal
+    vectors that the fit takes up, cut to the piece, k = sum (1 - |b_i' c_i|^2 / n_i) - 1 is what the spread is of white
+    noise: fewer than pieces less one, for the fit has taken its part out of each.
+
+    Source of the operator: Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
+    """
+    simulated = Simulator(fitted.model, fitted.trials).run(fitted.values, fitted.unknowns)
+    groups: dict[str, list[Stretch]] = {}
+    for one in stretches(fitted):
+        groups.setdefault(one.channel, []).append(one)
+    found: list[float] = []
+    for group in groups.values():
+        readings = [simulated[s.number].readings[:, s.output] for s in group]
+        columns = np.zeros((len(projection.residual), len(WIDTHS)))
+        for one, deviation in zip(group, _deviations(readings), strict=True):
+            columns[one.rows] = one.noise.whiten(deviation, one.trial.dt)
+        left = projection(columns)
+        felt = np.linalg.norm(left, axis=0) > ABSORBED_BELOW * np.linalg.norm(columns, axis=0)
+        found += [_one(c, projection, group) for c in left.T[felt]]
+    return min([1.0, *(len(found) * p for p in found)])
+
+
+def _deviations(readings: list[np.ndarray]) -> list[np.ndarray]:
+    """What a play of each width does to each trial's reading, in half widths, shapes (n, widths)."""
+    half = max(float(np.ptp(y)) for y in readings) * np.array(WIDTHS)
+    if not half[0] > 0:
+        return [np.zeros((len(y), len(WIDTHS))) for y in readings]
+    longest = max(map(len, readings))
+    y = np.stack([np.pad(one, (0, longest - len(one)), mode="edge") for one in readings], axis=1)[:, :, None]
+    low, high, out = y - half, y + half, np.empty((longest, len(readings), len(WIDTHS)))
+    follower = np.repeat(y[0], len(WIDTHS), axis=1)
+    for t in range(longest):
+        follower = np.minimum(np.maximum(follower, low[t]), high[t])
+        out[t] = follower
+    out = (out - y) / half
+    return [out[: len(one), k] for k, one in enumerate(readings)]
+
+
+def _one(column: np.ndarray, projection: Projection, group: list[Stretch]) -> float:
+    """p-value of one width in one channel."""
+    units = []
+    for rows in _pieces(group):
+        c = column[rows]
+        taken = sum(float(np.sum((b.T @ c) ** 2)) for b in projection.taken(rows))
+        units.append((float(c @ projection.residual[rows]), float(c @ c), taken))
+    x, n, taken = np.array(units).T
+    felt = n > 1e-4 * n.max()
+    x, n, taken = x[felt], n[felt], taken[felt]
+    degrees = float(np.sum(1.0 - taken / n)) - 1.0
+    if degrees < 1.0:
+        return 1.0
+    amplitude = x.sum() / n.sum()
+    spread = float(np.sum((x - amplitude * n) ** 2 / n)) / degrees
+    return f_tail(float(amplitude * x.sum()) / max(spread, 1e-12), 1, degrees)
+
+
+def _pieces(group: list[Stretch]) -> list[slice]:
+    """Rows of each trial, cut into equal pieces."""
+    count = -(-UNITS // len(group))
+    edges = [np.linspace(s.rows.start, s.rows.stop, count + 1).round().astype(int) for s in group]
+    return [slice(a, b) for one in edges for a, b in itertools.pairwise(one.tolist())]

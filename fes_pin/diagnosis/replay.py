@@ -1,0 +1,87 @@
+"""Every trial of a study beside what the nominal and the extended model say of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.decide.held_out import within
+from fes_pin.diagnosis.errors_ahead import AheadErrors
+from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.identify.ahead import over_horizon
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.levels import RUNAWAY
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.per_trial import predictions
+
+
+@dataclass(frozen=True)
+class Replay:
+    """One trial, measured and as both models predict it from its inputs.
+
+    Attributes
+    ----------
+    measured, nominal, extended
+        The same time and inputs; `nominal` and `extended` hold the predicted outputs.
+    outputs
+        The measured columns that both models predict.
+    nominal_error, extended_error
+        E of eq. (2) of this trial alone, percent; all channels in units of their noise.
+    """
+
+    measured: Trial
+    nominal: Trial
+    extended: Trial
+    outputs: tuple[str, ...]
+    nominal_error: float
+    extended_error: float
+
+
+def replayed_trials(diagnosis: Diagnosis) -> tuple[Replay, ...]:
+    """Every trial of the study as both models of a diagnosis predict it, in the order of the study."""
+    trials, noise = diagnosis.study.trials, diagnosis.extended.noise
+    nominal = _predicted(diagnosis.nominal, trials, noise, diagnosis.over_horizon)
+    extended = _predicted(diagnosis.extended, trials, noise, diagnosis.over_horizon)
+    made = []
+    for trial, before, after in zip(trials, nominal, extended, strict=True):
+        outputs = tuple(n for n in diagnosis.model.rig.outputs(trial.kind) if n in trial)
+        errors = (trial_error_percent(trial, one, outputs, noise) for one in (before, after))
+        made.append(Replay(trial, before, after, outputs, *errors))
+    return tuple(made)
+
+
+def _predicted(fitted: Fit, trials: Sequence[Trial], noise: NoiseModel, ahead: AheadErrors | None) -> list[Trial]:
+    """Trials as predicted from their inputs; where the effort answers the reading, over the horizon.
+
+    A free simulation of such a rig integrates its errors, or falls: it says little of the model, or nothing.
+    """
+    model, out = fitted.model, []
+    if ahead is not None:
+        assert fitted.doubt is not None
+        return [t.with_columns(**over_horizon(model, t, fitted.doubt, ahead.horizon_s)) for t in trials]
+    for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
+        names = model.rig.outputs(trial.kind)
+        out.append(trial.with_columns(**{n: _shown(readings[:, k], trial, n) for k, n in enumerate(names)}))
+    return out
+
+
+def _shown(readings: np.ndarray, trial: Trial, name: str) -> np.ndarray:
+    """A prediction that runs away stays where it counts as lost; see `levels.RUNAWAY`."""
+    most = RUNAWAY * float(np.abs(trial[name]).max()) if name in trial else np.inf
+    return within(readings, most if most > 0.0 else 1.0)
+
+
+def trial_error_percent(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> float:
+    """E of eq. (2): squared error over the measurement's squares about its mean, percent.
+
+    With more than one output each is taken in units of its noise.
+    """
+    squares = spread = 0.0
+    for name in outputs:
+        variance = noise[name].std ** 2 if name in noise else 1.0
+        squares += float(np.sum(measured.residual(simulated, name) ** 2)) / variance
+        spread += float(np.sum((measured[name] - measured[name].mean()) ** 2)) / variance
+    return 100.0 * squares / max(spread, 1e-300)

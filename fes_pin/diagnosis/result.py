@@ -1,0 +1,216 @@
+"""The answer of a diagnosis: which causes are named, how sure, with what gain, what stays open; and it in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fes_pin.data.log import Log
+from fes_pin.data.provenance import Provenance
+from fes_pin.data.show import explaining, frame, from_to, table_html
+from fes_pin.data.study import Study
+from fes_pin.diagnosis.cause import Cause, Ranked
+from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
+from fes_pin.diagnosis.experiment import NextExperiment
+from fes_pin.diagnosis.remainder.open_set import Remainder
+from fes_pin.diagnosis.text import (
+    ahead_notes,
+    cause_columns,
+    cause_row,
+    cause_table,
+    left_out_text,
+    percent,
+    probability,
+)
+from fes_pin.identify.fit import Fit
+from fes_pin.models.catalogue import Catalogue, installed
+from fes_pin.models.model import Model
+
+if TYPE_CHECKING:
+    import pandas
+
+HEADLINES = {
+    "adequate": "the model is adequate: these data justify no extension of it.",
+    "unexplained": "the model misses something, and nothing in the library explains it.",
+}
+
+EACH_TRIAL = (
+    "size and phase are each trial's own; in a held-out trial its other parts tell them, and a prediction from inputs "
+    "alone leaves the effect out"
+)
+"""What is said of effects whose amplitudes are each trial's own."""
+
+CROSS_VALIDATED = "cross-validation over trials"
+SEPARATE = "the study's held-out trials"
+NOTHING = "nothing: every gain is that on what was fitted"
+"""What trials are held out by: `Diagnosis.held_out_by`."""
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis:
+    """What a simulation gets wrong.
+
+    Attributes
+    ----------
+    verdict
+        "adequate", "causes_found" or "unexplained".
+    causes
+        By held-out gain, largest first.
+    model
+        The extended model: it can be simulated, fitted and diagnosed again.
+    absorbed
+        Causes that these data could not show.
+    ranking
+        For each cause, its rivals by shortfall in twice the log-likelihood.
+    left_out
+        Samples taken for spikes, by trial and column; in `study` they hold what their neighbours say.
+    warnings
+        What is odd about the study, and what could not be done, one line each.
+    reason
+        Why something is unexplained, where it is no test of the remainder that says so: nothing could be fitted, or an
+        error stays that is no noise.
+    catalogue
+        The causes that were looked for, of which the rig can have some.
+    random, ahead
+        Of a rig that a recorded effort drives: what acts on it at random, and its errors over time.
+    log
+        What was found that the log of the study does to its trials; in `study` it is undone, where it can be.
+    provenance
+        When, by which versions, from which files it was made.
+    """
+
+    study: Study
+    verdict: str
+    causes: tuple[Cause, ...]
+    remainder: Remainder
+    absorbed: tuple[str, ...]
+    nominal: Fit
+    extended: Fit
+    nominal_error: tuple[float | None, float | None]
+    extended_error: tuple[float | None, float | None]
+    ceiling_percent: float
+    next_experiment: NextExperiment | None
+    ranking: dict[str, tuple[Ranked, ...]]
+    held_out_by: str
+    left_out: dict[str, dict[str, tuple[int, ...]]]
+    wall_s: float = field(compare=False)
+    warnings: tuple[str, ...] = ()
+    reason: str | None = None
+    catalogue: Catalogue = field(default_factory=installed, compare=False)
+    random: tuple[RandomPart, ...] = ()
+    ahead: AheadErrors | None = None
+    log: Log = field(default_factory=Log)
+    provenance: Provenance | None = field(default=None, compare=False)
+
+    @property
+    def was_held_out(self) -> bool:
+        """False where there was nothing to hold out: then every gain is that on the trials that were fitted."""
+        return self.held_out_by != NOTHING
+
+    @property
+    def gain_name(self) -> str:
+        """What the gains of its causes are, in two words."""
+        return "held-out gain" if self.was_held_out else "fitted gain"
+
+    @property
+    def is_driven(self) -> bool:
+        """True of a rig whose effort answers what is read: it is judged by what is foretold one sample ahead."""
+        return self.extended.doubt is not None
+
+    @property
+    def over_horizon(self) -> AheadErrors | None:
+        """Errors that a driven rig is judged by; None of one that is simulated freely."""
+        return self.ahead if self.is_driven else None
+
+    @property
+    def model(self) -> Model:
+        """The extended model."""
+        return self.extended.model
+
+    def explained_percent(self) -> float:
+        """Share of the nominal model's squared error above the noise that all causes together remove, 0 to 100.
+
+        On trials that took no part, where there are such; of a driven rig of the errors over the horizon.
+        """
+        if (ahead := self.over_horizon) is not None:
+            one, other = ahead.nominal_held_out or ahead.nominal, ahead.extended_held_out or ahead.extended
+            return _explained(one.horizon, other.horizon, other.noise or 0.0)
+        outside = self.nominal_error[1] is not None and self.extended_error[1] is not None
+        before, after = (e[1] if outside else e[0] for e in (self.nominal_error, self.extended_error))
+        assert before is not None
+        assert after is not None
+        return _explained(before, after, self.ceiling_percent)
+
+    def headline(self) -> str:
+        """The verdict in one sentence, with how much is explained and how much is not."""
+        count = len(self.causes)
+        if not count:
+            return HEADLINES[self.verdict].removesuffix(".") + (f": {self.reason}." if self.reason else ".")
+        share = self.explained_percent()
+        rest = ", and something is left" if self.remainder.unexplained else ""
+        return f"{explaining(count)} {share:.0f} % of what the model gets wrong, {100.0 - share:.0f} % stays{rest}."
+
+    def footnotes(self) -> list[str]:
+        """What stands beneath the table."""
+        shown = from_to(self.nominal_error, self.extended_error, ("fitted", "held out"))
+        lines = [f"error E {shown}; noise floor {percent(self.ceiling_percent)}"] if shown else []
+        lines += ahead_notes(self.ahead, self.random, self.model.rig.units().get("effort", ""))
+        left = self.remainder
+        where = f", most on {left.where}" if left.where else ""
+        if self.reason is None:
+            state = "something is" if left.unexplained else "nothing"
+            lines.append(f"{state} left unexplained ({probability(left.p_value)}{where})")
+        elif self.causes:
+            lines.append(f"something is left unexplained: {self.reason}")
+        if self.left_out:
+            lines.append(f"left out as spikes: {left_out_text(self.left_out, self.study.trials)}")
+        some = {c.name: c.chosen_in_some for c in self.causes}
+        lines += [f"{n} is chosen in {k[0]} of {k[1]} folds without their trials" for n, k in some.items() if k]
+        own = [e.name for e in self.model.effects if e.each_trial]
+        if own:
+            lines.append(f"{', '.join(own)}: {EACH_TRIAL}")
+        for where, names in self.catalogue.origins().items():
+            lines.append(f"looked for as well: {', '.join(names)}, code of {Path(where).name}")
+        if self.absorbed:
+            lines.append(f"not testable here: {', '.join(self.absorbed)}")
+        if self.next_experiment:
+            lines.append(f"next experiment: {self.next_experiment.why}")
+        return [*lines, *(f"warning: {words}" for words in self.warnings)]
+
+    def __repr__(self) -> str:
+        names = f" ({', '.join(c.name for c in self.causes)})" if self.causes else ""
+        return f"Diagnosis of {self.study.name}: {self.verdict}{names}"
+
+    def _repr_html_(self) -> str:
+        title = f"{self.study.name}: {self.headline()}"
+        return table_html(title, cause_columns(self.gain_name), [cause_row(c) for c in self.causes], self.footnotes())
+
+    def to_frame(self) -> pandas.DataFrame:
+        """One row a parameter of each cause as a frame of pandas; see `data.show.frame`. No row without a cause."""
+        rows = [(c, n, one) for c in self.causes for n, one in c.parameters.items()]
+        columns = {
+            "cause": [c.name for c, _, _ in rows],
+            "stage": [c.stage for c, _, _ in rows],
+            "parameter": [n for _, n, _ in rows],
+            "value": [one.value for _, _, one in rows],
+            "std": [one.std for _, _, one in rows],
+            "unit": [one.unit for _, _, one in rows],
+            "p_value": [c.p_value for c, _, _ in rows],
+            "gain_percent": [c.gain_held_out.percent for c, _, _ in rows],
+            "gain_low": [c.gain_held_out.low for c, _, _ in rows],
+            "gain_high": [c.gain_held_out.high for c, _, _ in rows],
+            "equivalents": [", ".join(c.equivalents) for c, _, _ in rows],
+        }
+        return frame(columns)
+
+    def __str__(self) -> str:
+        lines = [f"{self.study.name}: {self.headline()}", *cause_table(self.causes, self.gain_name)]
+        return "\n".join(lines + [f" {note}" for note in self.footnotes()])
+
+
+def _explained(before: float, after: float, noise: float) -> float:
+    """Share of an error above that of noise alone which is gone, 0 to 100 percent."""
+    return float(np.clip(100.0 * (before - after) / max(before - noise, before - after, 1e-300), 0.0, 100.0))

@@ -1,0 +1,119 @@
+"""The candidate causes near a fitted model: sensitivities to each effect at its null, over its shapes."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.search.starts import near_null
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.problem import Problem, answered_columns, measured_columns
+from fes_pin.models.catalogue import installed
+from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
+from fes_pin.workers import in_parallel
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One effect with one choice of shapes, linearized at its null.
+
+    Attributes
+    ----------
+    effect
+        The effect at (or next to) its null, with its shapes.
+    columns
+        Shape (m, amplitudes): whitened sensitivities, all trials end to end.
+    """
+
+    effect: Effect
+    columns: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """Of the cause."""
+        return self.effect.name
+
+
+class Library:
+    """The causes that a rig can have, ready to be linearized on trials.
+
+    Parameters
+    ----------
+    effects
+        Those that are looked for; by default all that are known of the rig.
+    answered
+        Whether an effort, if there is one, answers what is read; see `answered_columns`.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        effects: Sequence[type[Effect]] | None = None,
+        answered: bool = False,
+    ) -> None:
+        self.effects = tuple(installed().effects_for(model.rig) if effects is None else effects)
+        self.model, self.trials = Model(model.rig), tuple(trials)
+        self.measured = (answered_columns if answered else measured_columns)(model, trials)
+        self._problems: dict[tuple, Problem] = {}
+
+    def grid(self, effect: type[Effect]) -> list[Effect]:
+        """The effect at its null with every combination of its shapes, in every form that a screen tries."""
+        grids = effect.grids(self.measured)
+        shapes = effect.shapes()
+        start: dict[str, Any] = {n: near_null(effect, n) for n in effect.amplitudes()}
+        return [
+            effect(**{**start, **dict(zip(shapes, values, strict=True)), **form})
+            for form in effect.forms(self.measured)
+            for values in itertools.product(*(grids[n] for n in shapes))
+        ]
+
+    def probes(self, fitted: Fit, noise: NoiseModel, exclude: Sequence[str] = ()) -> list[Probe]:
+        """Every effect, linearized at the nominal parameters of a fit.
+
+        The effects that the fit has already are left out of the linearization, as `exclude` is of the result: their
+        influence on another effect's sensitivity is of second order.
+        """
+        nominal = Model(fitted.model.rig)
+        wanted = [e for e in self.effects if e.name not in exclude and self.felt(e)]
+        return [p for group in in_parallel(lambda e: self._probe(e, nominal, fitted, noise), wanted) for p in group]
+
+    def silent(self) -> tuple[str, ...]:
+        """Names of the effects that act in none of the trials: of a joint, where all are isometric."""
+        return tuple(e.name for e in self.effects if not self.felt(e))
+
+    def felt(self, effect: type[Effect]) -> list[int]:
+        """The trials in which an effect acts."""
+        rig = self.model.rig
+        return [i for i, t in enumerate(self.trials) if effect.signal in rig.changeable(t.kind, rig.input_columns(t))]
+
+    def _probe(self, effect: type[Effect], nominal: Model, fitted: Fit, noise: NoiseModel) -> list[Probe]:
+        """The effect with every choice of its shapes; only the trials in which it acts are simulated."""
+        felt, out = self.felt(effect), []
+        for one in self.grid(effect):
+            problem = self._problem(nominal + one, noise)
+            ends = np.cumsum([0, *(problem.rows(t) for t in self.trials)])
+            columns = np.zeros((ends[-1], len(problem.free)))
+            parts = problem.linearize((nominal + one).parameters(), [fitted.unknowns[i] for i in felt])
+            for i, part in zip(felt, parts, strict=True):
+                columns[ends[i] : ends[i + 1]] = part.jacobian
+            out.append(Probe(one, columns))
+        return out
+
+    def _problem(self, model: Model, noise: NoiseModel) -> Problem:
+        """The problem of one effect beside the nominal model, in its form, on the trials that feel it."""
+        (one,) = model.effects
+        key = (one.name, tuple(one.unused().items()))
+        if key not in self._problems:
+            free = tuple(f"{one.name}.{n}" for n in one.amplitudes())
+            trials = [self.trials[i] for i in self.felt(type(one))]
+            self._problems[key] = Problem(model, trials, noise, free)
+        self._problems[key].noise = noise
+        return self._problems[key]

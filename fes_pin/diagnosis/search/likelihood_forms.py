@@ -1,0 +1,93 @@
+"""Forms of the causes of a set that is fitted: one refinement more, one fewer, all of one begun anew."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fes_pin.diagnosis.decide.significance import level_of
+from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
+from fes_pin.diagnosis.search.refined_forms import is_identified
+from fes_pin.diagnosis.search.starts import STARTS, begun_anew, forms_beside, refinements
+from fes_pin.identify.distributions import chi2_quantile, chi2_tail
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.scoring import WORTH
+from fes_pin.models.stage import Effect
+from fes_pin.workers import in_parallel
+
+
+class LikelihoodForms:
+    """Fits of a set in other forms than it has.
+
+    Parameters
+    ----------
+    maxima
+        Fits of single models.
+    measured
+        Columns by name, of all trials end to end.
+    """
+
+    def __init__(self, maxima: LikelihoodMaxima, measured: Mapping[str, np.ndarray]) -> None:
+        self._maxima, self._measured = maxima, measured
+
+    def refined(self, base: Fit, barred: str | None = None) -> Fit | None:
+        """The best fit of a set with the form of one of its effects refined; None where the data demand no form.
+
+        What is not half way to what is demanded once its parameters were fitted, beside randomness as it was, is not
+        gone on with.
+
+        Parameters
+        ----------
+        barred
+            A refinement that is not tried.
+        """
+        models = [refinements(base.model, effect, self._measured, barred) for effect in base.model.effects]
+        looks = in_parallel(lambda s: self._maxima.look(s, base), [s for many in models for s in many])
+        looks = sorted(looks, key=lambda f: f.price)
+        demanded = chi2_quantile(1.0 - level_of(base) / forms_beside(base.model, base.model.effects), 1)
+        worth = [f for f in looks[:STARTS] if base.sse - f.sse > 0.5 * max(demanded, base.sse - looks[0].sse)]
+        found = [f for f in in_parallel(self._maxima.go_on, worth) if is_identified(f, base)]
+        best = min(found, key=lambda f: f.price, default=None)
+        return best if best is not None and _is_demanded(best, base) else None
+
+    def otherwise(self, base: Fit) -> Fit | None:
+        """The best fit of a set whose form lacks one of several refinements, grown from none; None if none is cheaper.
+
+        Refinements are adopted one after another, the one that explains most first; two others may explain more.
+        """
+        each = [(e, [n for n, *_ in e.refinements() if n in e.refined()]) for e in base.model.effects]
+        found = (self._grown(base, e, n) for e, adopted in each if len(adopted) > 1 for n in adopted)
+        best = min(found, key=lambda f: f.price, default=base)
+        return best if best.price < base.price - WORTH else None
+
+    def _grown(self, base: Fit, effect: Effect, barred: str) -> Fit:
+        """A set with one of its effects in the form that the data demand if one refinement of it is barred."""
+        adopted = [n for n, *_ in effect.refinements() if n in effect.refined()]
+        fitted = self._maxima.go_on(self._maxima.look(self._maxima.less(base, adopted, effect), base))
+        while (better := self.refined(fitted, barred)) is not None:
+            fitted = better
+        return fitted
+
+    def simplified(self, base: Fit) -> Fit | None:
+        """The best fit of a set with one refinement of a form fewer; None where none is cheaper.
+
+        A form that was demanded beside fewer causes may have stood for one that has been found since.
+        """
+        both = ((e, n) for e in base.model.effects for n, *_ in e.refinements() if n in e.refined())
+        starts = in_parallel(lambda one: self._maxima.less(base, one[1:], one[0]), list(both))
+        return self._maxima.cheaper(starts, base, base.price)
+
+    def reformed(self, base: Fit) -> Fit | None:
+        """A set with several refinements of a form, all begun anew at once; None where that is no better.
+
+        They were adopted one after another, and the first may have bent to what a later one says.
+        """
+        starts = [s for effect in base.model.effects for s in begun_anew(base.model, effect, self._measured)]
+        return self._maxima.cheaper(starts, base, base.price - WORTH)
+
+
+def _is_demanded(refined: Fit, base: Fit) -> bool:
+    degrees = max(refined.degrees - base.degrees, 1)
+    p_value = float(chi2_tail(max(base.sse - refined.sse, 0.0), degrees))
+    return p_value * forms_beside(base.model, base.model.effects) < level_of(base)

@@ -1,0 +1,87 @@
+"""The likelihood's maximum of one model on the trials of a search: from anywhere, from another fit, in a few steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.search.starts import STARTS
+from fes_pin.identify.covariance import moved_with
+from fes_pin.identify.fit import Fit, fit_problem
+from fes_pin.identify.levels import PARAMETER_PRICE
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.problem import limits_of
+from fes_pin.identify.turns import ROUNDS, maximise
+from fes_pin.models.model import Model
+from fes_pin.models.predictor import Doubt
+from fes_pin.models.stage import Effect
+from fes_pin.workers import in_parallel
+
+SCREEN_ITERATIONS = 4
+"""Steps of a first fit of a set, at what is random in a smaller one."""
+
+
+class LikelihoodMaxima:
+    """Fits of models to one set of trials."""
+
+    def __init__(self, trials: Sequence[Trial]) -> None:
+        self.trials = tuple(trials)
+
+    def from_start(
+        self,
+        model: Model,
+        doubt: Doubt,
+        unknowns: list[dict[str, float]] | None = None,
+        rounds: int = ROUNDS,
+        near: bool = False,
+    ) -> Fit:
+        """The maximum from a model's own values and from what is taken for random; see `maximise`."""
+        return maximise(LikelihoodProblem(model, self.trials, doubt), model.parameters(), unknowns, rounds, near)
+
+    def go_on(self, fitted: Fit, rounds: int = ROUNDS) -> Fit:
+        """The maximum from where a fit has come to."""
+        assert fitted.doubt is not None
+        return self.from_start(fitted.model, fitted.doubt, fitted.unknowns, rounds, fitted.together)
+
+    def look(self, start: Model, base: Fit) -> Fit:
+        """A few steps from a start, at what is random in another fit."""
+        assert base.doubt is not None
+        problem = LikelihoodProblem(start, self.trials, base.doubt)
+        found = fit_problem(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)  # type: ignore[arg-type]
+        return replace(found, doubt=base.doubt, together=base.together)
+
+    def cheaper(self, starts: Sequence[Model], base: Fit, price: float) -> Fit | None:
+        """The best fit from some starts; None where none is below a price.
+
+        Those that look best go on, if what they cost beside randomness as it was is within a parameter's price.
+        """
+        looks = sorted(in_parallel(lambda s: self.look(s, base), starts), key=lambda f: f.price)
+        worth = [f for f in looks[:STARTS] if f.price < base.price + PARAMETER_PRICE]
+        best = min(in_parallel(self.go_on, worth), key=lambda f: f.price, default=None)
+        return best if best is not None and best.price < price else None
+
+    def less(self, whole: Fit, gone: Sequence[str], effect: Effect) -> Model:
+        """The model of a fit with some parameters of an effect at their nulls; without the effect if these are all.
+
+        The others are where the fit's covariance takes them, or where they were: whichever is likelier. An effort's
+        gain stands for an inertia that is another without it.
+        """
+        info, shared = effect.parameters(), [n for n in gone if n in effect.common()]
+        nulls = {f"{effect.name}.{n}": float(info[n].null) for n in shared}  # type: ignore[arg-type]
+        moving = [n for n in nulls if n in whole.free]
+        here = np.array([whole.values[n] for n in whole.free])
+        change = np.array([nulls[n] - whole.values[n] for n in moving])
+        there = here + moved_with(whole.covariance, [whole.free.index(n) for n in moving], change)
+        limits = limits_of(whole.model, self.trials)
+        values = {n: float(np.clip(v, *limits[n])) for n, v in zip(whole.free, there, strict=True)}
+        off = whole.model.with_parameters(nulls)
+        left = off - effect.name if set(gone) >= set(effect.amplitudes()) else off
+        assert whole.doubt is not None
+        problem = LikelihoodProblem(left, self.trials, whole.doubt)
+        unknowns = problem.completed(whole.unknowns)
+        moved = left.with_parameters({n: v for n, v in values.items() if n in left.parameters()})
+        costs = problem.bounds([(one.parameters(), unknowns) for one in (left, moved)])
+        return moved if costs[1] < costs[0] else left

@@ -1,0 +1,254 @@
+"""Score tests of causes beside a fit, one at a time and in pairs: what each would gain if it were linear.
+
+C. R. Rao, Math. Proc. Camb. Phil. Soc. 44:50 (1948).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fes_pin.diagnosis.search.library import Probe
+from fes_pin.identify.levels import PARAMETER_PRICE
+from fes_pin.identify.problem import Linearized
+from fes_pin.workers import in_parallel
+
+RIDGE = 1e-8
+"""Added to the scaled Gram matrix of two probes, which may be the same."""
+LARGEST = float(np.finfo(float).max) ** 0.25
+"""Largest entry of a column: products of inner products stay floating-point numbers. What runs away tells nothing."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A probe, measured against a fit.
+
+    Attributes
+    ----------
+    gain
+        Score: drop in the sum of squares by the linearized effect; where its amplitudes are each trial's own, less
+        the price of each that it has beyond those of a common effect.
+    amplitudes
+        The linear estimate of its amplitudes.
+    kept
+        Share of the sensitivity's norm that the fitted parameters do not take up.
+    """
+
+    probe: Probe
+    gain: float
+    amplitudes: dict[str, float]
+    kept: float
+
+
+class Projection:
+    """What is left of whitened vectors beside a fit's own parameters and its trials' unknowns."""
+
+    def __init__(self, parts: Sequence[Linearized]) -> None:
+        ends = np.cumsum([0, *(len(p.residual) for p in parts)])
+        self._trials = [slice(a, b) for a, b in itertools.pairwise(ends)]
+        self._own = [np.linalg.qr(_scaled(p.local[:, p.local.any(axis=0)]))[0] for p in parts]
+        self._basis = _basis(self._without_locals(np.concatenate([p.jacobian for p in parts])))
+        self.residual = self(np.concatenate([p.residual for p in parts])[:, None])[:, 0]
+
+    def _without_locals(self, columns: np.ndarray) -> np.ndarray:
+        out = np.array(columns, dtype=float)
+        for own, rows in zip(self._own, self._trials, strict=True):
+            out[rows] -= own @ (own.T @ out[rows])
+        return out
+
+    def __call__(self, columns: np.ndarray) -> np.ndarray:
+        """Columns of shape (m, k) without the part that the fit could take up."""
+        partly = self._without_locals(columns)
+        return partly - self._basis @ (self._basis.T @ partly)
+
+    def taken(self, rows: slice) -> list[np.ndarray]:
+        """Orthonormal vectors, cut to rows of one trial, that are taken from columns which are zero elsewhere."""
+        own = [
+            basis[rows.start - where.start : rows.stop - where.start]
+            for basis, where in zip(self._own, self._trials, strict=True)
+            if where.start <= rows.start and rows.stop <= where.stop
+        ]
+        return [*own, self._basis[rows]]
+
+    def score(self, probes: Sequence[Probe]) -> Scores:
+        """The scores of probes, and the Gram matrix of what is left of them, trial by trial.
+
+        Those that can be other in each trial are scored both ways.
+        """
+        if not probes:
+            return Scores([], np.zeros((0, 0)), np.zeros(0), [])
+        begun = in_parallel(lambda k: self._partly(probes, k), range(len(self._trials)))
+        before, shared = (np.sum([b[j] for b in begun], axis=0) for j in (1, 2))
+        left = in_parallel(lambda k: self._left(begun[k][0], shared, k), range(len(self._trials)))
+        gram, along = (np.sum([one[j] for one in left], axis=0) for j in (0, 1))
+        ends = np.cumsum([0, *(p.columns.shape[1] for p in probes)])
+        blocks = [slice(a, b) for a, b in itertools.pairwise(ends)]
+        out = [
+            _score(replace(p, columns=p.columns[:0]), gram[b, b], along[b], float(before[b].sum()))
+            for p, b in zip(probes, blocks, strict=True)
+        ]
+        if len(self._trials) > 1:
+            varying = [(p, b) for p, b in zip(probes, blocks, strict=True) if p.effect.varies]
+            out += [self._each(p, [one[0][:, b] for one in begun], float(before[b].sum())) for p, b in varying]
+        return Scores(out, gram, along, blocks)
+
+    def _partly(self, probes: Sequence[Probe], k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """One trial's part of all columns without what its own unknowns take up; what it was, squared; its share in
+        the inner products with the basis of what all trials share."""
+        rows, own = self._trials[k], self._own[k]
+        columns = np.concatenate([p.columns[rows] for p in probes], axis=1)
+        columns[~(np.abs(columns) < LARGEST)] = 0.0
+        before = np.einsum("mi,mi->i", columns, columns)
+        columns -= own @ (own.T @ columns)
+        return columns, before, self._basis[rows].T @ columns
+
+    def _left(self, partly: np.ndarray, shared: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
+        """One trial's part of the Gram matrix of what is left, and of its inner products with the residual."""
+        left = partly - self._basis[self._trials[k]] @ shared
+        return left.T @ left, left.T @ self.residual[self._trials[k]]
+
+    def _each(self, probe: Probe, partly: Sequence[np.ndarray], before: float) -> Scored:
+        """A probe with amplitudes of each trial's own: its columns, cut into trials, side by side.
+
+        With c_i the columns of trial i beside its own unknowns and B the basis of what all trials share, the Gram
+        matrix of what is left is diag(c_i' c_i) - (c_i' B_i) (c_j' B_j)'.
+        """
+        count = probe.columns.shape[1]
+        gram = np.zeros((count * len(partly),) * 2)
+        for k, columns in enumerate(partly):
+            own = slice(count * k, count * (k + 1))
+            gram[own, own] = columns.T @ columns
+        trials = list(zip(partly, self._trials, strict=True))
+        shared = np.concatenate([columns.T @ self._basis[rows] for columns, rows in trials])
+        gram -= shared @ shared.T
+        along = np.concatenate([columns.T @ self.residual[rows] for columns, rows in trials])
+        after = float(np.trace(gram))
+        effect = type(probe.effect).of_each_trial(**{n: getattr(probe.effect, n) for n in probe.effect.shapes()})
+        probe = Probe(effect, probe.columns[:0])
+        felt = np.diag(gram) > 1e-12 * np.diag(gram).max(initial=1e-300)
+        if not after > 1e-18 * max(before, 1e-300) or not felt.any():
+            return Scored(probe, 0.0, {}, 0.0)
+        gram, along = gram[np.ix_(felt, felt)], along[felt]
+        scale = 1.0 / np.sqrt(np.diag(gram))
+        x = np.linalg.lstsq(gram * np.outer(scale, scale), along * scale, rcond=1e-10)[0]
+        gain = float((along * scale) @ x) - PARAMETER_PRICE * max(len(along) - count, 0)
+        return Scored(probe, gain, {}, float(np.sqrt(after / before)))
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Probes, scored together.
+
+    Attributes
+    ----------
+    scored
+        One for each probe, whose columns are dropped, and after those one for each that can be other in each trial.
+    gram
+        Shape (k, k): inner products of what the fit leaves of all columns.
+    along
+        Shape (k,): their inner products with the residual.
+    blocks
+        The rows of `gram` that belong to each probe.
+    """
+
+    scored: list[Scored]
+    gram: np.ndarray
+    along: np.ndarray
+    blocks: list[slice]
+
+
+def _score(probe: Probe, gram: np.ndarray, along: np.ndarray, before: float) -> Scored:
+    names, info = probe.effect.amplitudes(), probe.effect.parameters()
+    after = float(np.trace(gram))
+    if not after > 1e-18 * max(before, 1e-300):
+        return Scored(probe, 0.0, {n: float(info[n].null or 0.0) for n in names}, 0.0)
+    nulls = np.array([info[n].null for n in names], dtype=float)
+    lower, upper = np.array([[info[n].lower, info[n].upper] for n in names]).T
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    amplitudes = scale * np.linalg.lstsq(gram * np.outer(scale, scale), along * scale, rcond=1e-10)[0]
+    amplitudes = np.clip(amplitudes, lower - nulls, upper - nulls)
+    gain = float(2.0 * along @ amplitudes - amplitudes @ gram @ amplitudes)
+    values = dict(zip(names, (float(a) for a in amplitudes + nulls), strict=True))
+    return Scored(probe, gain, values, float(np.sqrt(after / before)))
+
+
+def _scaled(columns: np.ndarray) -> np.ndarray:
+    norms = np.linalg.norm(columns, axis=0)
+    return columns / np.where(norms > 0, norms, 1.0)
+
+
+def _basis(columns: np.ndarray, tolerance: float = 1e-7) -> np.ndarray:
+    """Orthonormal basis of the span of columns, shape (m, rank)."""
+    if not columns.shape[1]:
+        return columns
+    scaled = _scaled(columns)
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    good = values > tolerance**2 * max(values[-1], 1e-300) * 1e4
+    rough = (scaled @ vectors[:, good]) / np.sqrt(values[good])
+    return np.linalg.qr(rough)[0] if good.any() else columns[:, :0]
+
+
+def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:
+    """For each effect its scored shapes, best first."""
+    out: dict[str, list[Scored]] = {}
+    for s in scored:
+        out.setdefault(s.probe.name, []).append(s)
+    return {n: sorted(v, key=lambda s: -s.gain) for n, v in out.items()}
+
+
+def best_pairs(scores: Scores, count: int) -> list[tuple[Scored, Scored]]:
+    """Pairs of effects of largest score together, best first, each pair of names once."""
+    found: dict[tuple[str, str], tuple[Scored, Scored]] = {}
+    first, second, gains = _pair_gains(scores)
+    for k in np.argsort(-gains, kind="stable"):
+        i, j = int(first[k]), int(second[k])
+        one, other = scores.scored[i], scores.scored[j]
+        key = (other.probe.name, one.probe.name)
+        if key in found or one.probe.name == other.probe.name or not (one.kept > 0 and other.kept > 0):
+            continue
+        inside = _inside(scores, i, j)
+        if inside is not None:
+            found[key] = (replace(one, amplitudes=inside[0]), replace(other, amplitudes=inside[1]))
+            if len(found) == count:
+                break
+    return list(found.values())
+
+
+def _pair_gains(scores: Scores) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Every pair of probes and what both gain together, bounds aside; each of shape (pairs,).
+
+    Blocks are filled up to one size with rows of the identity, which gain nothing.
+    """
+    size, rows = max(b.stop - b.start for b in scores.blocks), len(scores.along)
+    gram = np.eye(rows + 2 * size)
+    gram[:rows, :rows] = scores.gram
+    along = np.concatenate([scores.along, np.zeros(2 * size)])
+    spare = [np.arange(rows + k * size, rows + (k + 1) * size) for k in range(2)]
+    where = [np.stack([np.r_[b, fill][:size] for b in scores.blocks]) for fill in spare]
+    first, second = np.tril_indices(len(scores.blocks), -1)
+    at = np.concatenate([where[0][first], where[1][second]], axis=1)
+    inner, toward = gram[at[:, :, None], at[:, None, :]], along[at]
+    scale = 1.0 / np.sqrt(np.maximum(np.einsum("kii->ki", inner), 1e-300))
+    scaled = inner * scale[:, :, None] * scale[:, None, :] + RIDGE * np.eye(2 * size)
+    x = scale * np.linalg.solve(scaled, (toward * scale)[:, :, None])[:, :, 0]
+    return first, second, 2.0 * np.einsum("ki,ki->k", toward, x) - np.einsum("ki,kij,kj->k", x, inner, x)
+
+
+def _inside(scores: Scores, i: int, j: int) -> tuple[dict[str, float], dict[str, float]] | None:
+    """Amplitudes at which two probes together explain most; None if they lie outside their bounds."""
+    rows = np.r_[scores.blocks[i], scores.blocks[j]]
+    gram, along = scores.gram[np.ix_(rows, rows)], scores.along[rows]
+    keys = [(k, n) for k in (i, j) for n in scores.scored[k].probe.effect.amplitudes()]
+    info = [scores.scored[k].probe.effect.parameters()[n] for k, n in keys]
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    scaled = gram * np.outer(scale, scale) + RIDGE * np.eye(len(rows))
+    x = scale * np.linalg.solve(scaled, along * scale)
+    nulls = np.array([f.null or 0.0 for f in info])
+    if any(not f.lower <= v + z <= f.upper for f, v, z in zip(info, x, nulls, strict=True)):
+        return None
+    values = {key: float(v + z) for key, v, z in zip(keys, x, nulls, strict=True)}
+    one, other = ({n: v for (k, n), v in values.items() if k == which} for which in (i, j))
+    return one, other

@@ -1,0 +1,190 @@
+"""What a study's trials can show and what they cannot, before any cause is looked for; and what a fit gives away.
+
+A cause is linearized beside the fitted nominal model, as the search does: what of its sensitivity the nominal
+parameters and the initial states take up, these trials cannot show, whatever its size.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.data.study import Study
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.long_records import searched_part
+from fes_pin.diagnosis.search.library import Library
+from fes_pin.diagnosis.search.score import Projection, Scores
+from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
+from fes_pin.identify.levels import ABSORBED_BELOW
+from fes_pin.identify.problem import Problem
+from fes_pin.models.catalogue import Catalogue, installed
+from fes_pin.models.model import Model
+from fes_pin.models.nominal import nominal_model
+from fes_pin.models.simulate import simulate
+from fes_pin.workers import one_thread_each
+
+ALIKE = 0.99
+"""Cosine of two causes' sensitivities from which they look alike: to tell them apart at 95 % either must then stand out
+by 23 standard deviations (1.645 sqrt(2 / (1 - cosine)))."""
+LONGEST_SHIFT = 0.25
+"""Share of a trial that it is tried to be shifted by, either way."""
+MOST_LOOKED_AT = 8
+"""Trials that are looked at for a shift, the worst fitted first: each takes a fit of the others."""
+LEAST_SHIFT_S = 0.1
+"""Seconds by which a trial must be shifted beyond the others: muscles answer within a tenth of a second, and dry
+friction delays a motion by some hundredths."""
+SHIFTED = 0.1
+"""Share of its squared error that a shifted trial must be left with to be called so."""
+REVERSED = 0.3
+"""Share of the squared error that must be left with an effort that counts the other way."""
+
+
+@dataclass(frozen=True)
+class Testable:
+    """What trials can show.
+
+    Attributes
+    ----------
+    shown
+        Causes that would show, by name, with the share of their sensitivity that nothing else takes up.
+    absorbed
+        Causes that the nominal parameters take up.
+    silent
+        Causes that act in none of the trials.
+    alike
+        Groups of causes that look alike on these trials.
+    unexplained
+        Share of the readings' variance that the fitted nominal model leaves: where it is most of it, the causes are
+        linearized far from what was measured.
+    warnings
+        What the fitted nominal model gives away: a trial shifted in time, an effort that counts the other way.
+    """
+
+    shown: Mapping[str, float]
+    absorbed: tuple[str, ...]
+    silent: tuple[str, ...]
+    alike: tuple[tuple[str, ...], ...]
+    unexplained: float
+    warnings: tuple[str, ...]
+
+
+def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testable | str:
+    """What the trials of a study can show, of the causes that its rig can have.
+
+    Returns
+    -------
+    Testable, or why it cannot be told before a diagnosis, in words
+    """
+    nominal = nominal_model(study)
+    trials = [t for t in study.trials if t.role != "held_out"] or list(study.trials)
+    trials, _, _ = searched_part(trials, study.schema)
+    effects = (catalogue or installed()).effects_for(nominal.rig)
+    with one_thread_each():
+        try:
+            fitted = _fitted(nominal, trials)
+            if not math.isfinite(fitted.sse):
+                return "the nominal model runs away when it is simulated from its start values"
+            library = Library(nominal, trials, effects)
+            scores = Projection(fitted.parts).score(library.probes(fitted, fitted.noise))
+            warnings = (*_reversed(nominal, trials, fitted), *_shifted(nominal, trials, fitted))
+        except (ArithmeticError, np.linalg.LinAlgError) as problem:
+            return f"the nominal model cannot be fitted ({problem})"
+    kept: dict[str, float] = {}
+    for one in scores.scored:
+        kept[one.probe.name] = max(kept.get(one.probe.name, 0.0), one.kept)
+    return Testable(
+        shown={n: k for n, k in sorted(kept.items()) if k >= ABSORBED_BELOW},
+        absorbed=tuple(sorted(n for n, k in kept.items() if k < ABSORBED_BELOW)),
+        silent=library.silent(),
+        alike=_alike(scores, kept),
+        unexplained=_unexplained(fitted),
+        warnings=tuple(warnings),
+    )
+
+
+def _fitted(model: Model, trials: Sequence[Trial]) -> Fit:
+    return fit_multistart(Problem(model, trials, rough_noise(model, trials)), model.parameters())
+
+
+def _unexplained(fitted: Fit) -> float:
+    """The largest share of a column's variance that a fit leaves."""
+    left: dict[str, float] = {}
+    there: dict[str, float] = {}
+    residuals = Problem(fitted.model, fitted.trials, fitted.noise).residuals(fitted.values, fitted.unknowns)
+    for trial, columns in zip(fitted.trials, residuals, strict=True):
+        for name, residual in columns.items():
+            left[name] = left.get(name, 0.0) + float(residual @ residual)
+            there[name] = there.get(name, 0.0) + len(trial) * float(np.var(trial[name]))
+    return max((left[n] / max(there[n], 1e-300) for n in left), default=0.0)
+
+
+def _alike(scores: Scores, kept: Mapping[str, float]) -> tuple[tuple[str, ...], ...]:
+    """Causes of one amplitude, joined where shapes of them can be found whose sensitivities point the same way."""
+    single = [
+        (one.probe.name, block.start)
+        for one, block in zip(scores.scored, scores.blocks, strict=False)
+        if block.stop - block.start == 1 and kept[one.probe.name] >= ABSORBED_BELOW and one.kept >= ABSORBED_BELOW
+    ]
+    groups: list[set[str]] = []
+    for (name, i), (other, j) in itertools.combinations(single, 2):
+        size = math.sqrt(scores.gram[i, i] * scores.gram[j, j])
+        if name == other or not size > 0.0 or abs(scores.gram[i, j]) < ALIKE * size:
+            continue
+        if not any({name, other} <= group for group in groups):
+            groups.append({name, other})
+    return tuple(sorted(tuple(sorted(group)) for group in groups))
+
+
+def _reversed(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
+    """An effort that explains the motion far better the other way round."""
+    if not any("effort" in t and "position" in t for t in trials):
+        return []
+    turned = [t.with_columns(effort=-t["effort"]) if "effort" in t else t for t in trials]
+    other = _fitted(model, turned)
+    if not (math.isfinite(other.sse) and other.sse < REVERSED * fitted.sse):
+        return []
+    share = 100.0 * other.sse / fitted.sse
+    return [
+        f"with the effort the other way round the nominal model is left with {share:.2g} % of its squared error: "
+        "does a positive effort push towards positive positions?"
+    ]
+
+
+def _shifted(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
+    """Trials whose readings the model of the others foretells far better a while earlier or later than the others'."""
+    if len(trials) < 3:
+        return []
+    sums = [float(p.residual @ p.residual) / len(p.residual) for p in fitted.parts]
+    worst = [trials[i] for i in np.argsort(sums)[::-1][:MOST_LOOKED_AT]]
+    shifts = [_shift(_fitted(model, [t for t in trials if t is not one]).model, one) for one in worst]
+    usual = float(np.median([shift if share < SHIFTED else 0.0 for shift, share in shifts]))
+    out = []
+    for trial, (shift, share) in zip(worst, shifts, strict=True):
+        if share < SHIFTED and abs(shift - usual) > LEAST_SHIFT_S:
+            way = "later" if shift > usual else "earlier"
+            out.append(
+                f"trial {trial.name} answers {abs(shift - usual):.2g} s {way} than the others: is it shifted in time?"
+            )
+    return out
+
+
+def _shift(model: Model, trial: Trial) -> tuple[float, float]:
+    """By how many seconds a trial's reading lags behind its simulation, and the share of its error left with that."""
+    name = model.rig.output(trial.kind)
+    if name not in trial or not model.rig.input_columns(trial):
+        return 0.0, 1.0
+    measured, simulated = trial[name], simulate(model, trial)[name]
+    most = int(LONGEST_SHIFT * len(trial))
+    lags = np.arange(-most, most + 1, max(1, most // 200))
+    inside = simulated[most : len(trial) - most]
+    errors = np.array([np.mean((measured[most + k : len(trial) - most + k] - inside) ** 2) for k in lags])
+    if not np.isfinite(errors).all():
+        return 0.0, 1.0
+    best, none = int(np.argmin(errors)), int(np.argmin(np.abs(lags)))
+    if errors[best] > SHIFTED * np.var(measured):  # a rig that falls over is foretold at no time
+        return 0.0, 1.0
+    return float(lags[best] * trial.dt), float(errors[best] / max(errors[none], 1e-300))

@@ -1,0 +1,132 @@
+"""A twin of one model ranks that model first, equal models are not told apart, bad questions are refused."""
+
+import json
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import twins
+from data import studies
+
+import fes_pin as fp
+from fes_pin.cli import main
+from fes_pin.comparison.literature import LITERATURE, published_model
+from fes_pin.comparison.own_part import own_part
+from fes_pin.comparison.result import apart_from
+from fes_pin.data.errors import InputError
+
+
+def test_ding_is_the_published_equations():
+    """Against the sums over pulses written out, by another integrator."""
+    study = twins.study("ding", 1, noise=0.0, scatter=0.0)
+    model = published_model("ding2003").model(fp.nominal_model(study), study.trials)
+    values = {"gain": 1500.0 * 0.050957, "ding2003.half_saturation": 0.3}
+    model = model.with_parameters({**values, "ding2003.tau_1_s": 0.04, "ding2003.tau_2_s": 0.08})
+    for trial in study.trials[:4]:
+        apart = trial.residual(fp.simulate(model, trial), "force_n")
+        step = np.gradient(trial["force_n"], trial.dt)  # a pulse is held for a sample: half a sample late
+        assert np.abs(apart - 0.5 * trial.dt * step).max() < 5e-3 * trial["force_n"].max()
+
+
+def test_a_twin_of_one_model_ranks_it_first():
+    found = fp.compare(twins.study("ding", 2), ["nominal", "hill", "bobet_stein", "ding2003"])
+    assert found.models[0].name == "ding2003"
+    assert found.best() == ("ding2003",)
+    assert all(m.apart["free"].told for m in found.models[1:])
+    fitted = found.models[0].fit.values
+    assert fitted["ding2003.tau_1_s"] == pytest.approx(0.04, rel=0.1)
+    assert "ding2003 foretells 12 held-out trials best" in str(found)
+
+
+def test_equal_models_are_not_told_apart():
+    """Each of them holds the truth, a single lag, as a special case."""
+    found = fp.compare(twins.study("lag", 3), ["nominal", "second_order", "hill"])
+    assert set(found.best()) == {"nominal", "second_order", "hill"}
+    assert "do not tell" in str(found)
+
+
+def test_trials_that_the_study_holds_out_are_the_judges():
+    study = twins.study("lag", 4, count=8)
+    trials = [replace(t, role="held_out" if k > 4 else "fit") for k, t in enumerate(study.trials)]
+    found = fp.compare(replace(study, trials=tuple(trials)), ["nominal"])
+    assert (found.by, found.held_out) == ("role", ("05", "06", "07"))
+
+
+def test_the_beginning_of_a_trial_tells_its_rest():
+    """Where strength differs between trials the beginning says by how much; where it does not, it says nothing."""
+    differing = fp.compare(twins.study("lag", 5, scatter=0.3), ["nominal"], given_s=0.3).models[0].percent
+    assert differing["begun"] < 0.3 * differing["free_rest"]
+    same = fp.compare(twins.study("lag", 5, scatter=0.0), ["nominal"], given_s=0.3).models[0].percent
+    assert same["begun"] < 1.1 * same["free_rest"]
+
+
+def test_few_trials_do_not_tell_how_much_they_differ():
+    assert own_part([(np.ones(9), np.ones((9, 1)))] * 3, [3] * 3) is None
+    study = twins.study("lag", 5, count=3)
+    found = fp.compare(study, ["nominal"], given_s=0.3)
+    assert "begun" not in found.models[0].percent
+    assert found.warnings
+
+
+def test_a_difference_by_chance_is_told_in_one_of_twenty():
+    rng = np.random.default_rng(0)
+    pairs = rng.standard_normal((2000, 2, 10)) ** 2
+    told = [apart_from(a, b, 1, 1).told for a, b in pairs]
+    assert np.mean(told) < 0.035  # one side of a 95 % interval
+    assert apart_from(np.zeros(10), np.linspace(0.9, 1.1, 10), 1, 5).told
+    assert not apart_from(np.zeros(1), np.ones(1), 1, 1).told
+
+
+@pytest.mark.parametrize("one", LITERATURE, ids=lambda m: m.name)
+def test_every_model_has_a_source_and_starts_within_its_bounds(one):
+    assert any(c.isdigit() for c in one.source)
+    study = twins.study("lag", 6, count=2)
+    model = one.model(fp.nominal_model(study), study.trials)
+    info = model.parameter_info()
+    assert all(info[n].lower <= v <= info[n].upper for n, v in model.parameters().items())
+
+
+def _run(monkeypatch, *words):
+    monkeypatch.setattr(sys, "argv", ["fes-pin", "compare", *map(str, words)])
+    with pytest.raises(SystemExit) as ended:
+        main.main()
+    return ended.value.code or 0
+
+
+def test_the_command_writes_its_answer(tmp_path, monkeypatch):
+    fp.write_study(twins.study("lag", 7, count=5), tmp_path / "study")
+    own = tmp_path / "model.toml"
+    nominal = fp.nominal_model(fp.read_study(tmp_path / "study"))
+    fp.save_model(nominal + fp.effects.SecondOrderActivation(), own)
+    out, asked = tmp_path / "out", ("--models", "nominal,hill", "--model", own, "--given", "0.3")
+    assert _run(monkeypatch, tmp_path / "study", *asked, "--out", out) == 0
+    record = json.loads((out / "compare.json").read_text())
+    assert {m["name"] for m in record["models"]} == {"nominal", "hill", str(own)}
+    assert len(record["models"][0]["of_each_trial"]["free"]) == 5
+    assert set(record["best"]) == {"free", "horizon"}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--models", "dong2003"), "no model 'dong2003'; expected some of nominal"),
+        (("--models", ","), "at least one model"),
+        (("--models", "ding2003"), "column stim"),
+        (("--horizon", "99"), "--horizon"),
+        (("--given", "-1"), "--given"),
+        (("--model", "nowhere.toml"), "nowhere.toml"),
+    ],
+)
+def test_bad_questions_are_one_line(tmp_path, monkeypatch, capsys, words, said):
+    out = tmp_path / "out"
+    assert _run(monkeypatch, studies.ankle(tmp_path / "s"), *words, "--out", out) == 2
+    printed = capsys.readouterr()
+    assert printed.out == "" and printed.err.count("\n") == 1
+    assert said in printed.err
+    assert not out.exists()
+
+
+def test_another_rig_is_refused(tmp_path):
+    with pytest.raises(InputError, match="muscle or ankle"):
+        fp.compare(fp.read_study(studies.joint(tmp_path / "s")))

@@ -1,0 +1,97 @@
+"""Repeats that differ: the scatter of nominal parameters between trials, and what stands out beside it."""
+
+import numpy as np
+import pytest
+from contrast_pairs.free import free_pair
+
+import fes_pin as fp
+from fes_pin.contrasts.decide import Spread, usual_spread
+from fes_pin.contrasts.grouped import Item
+from fes_pin.contrasts.promises import Promise
+from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, scatter, without_locals, without_scatter
+from fes_pin.identify.fit import fit
+from fes_pin.identify.problem import Linearized, Problem
+from fes_pin.models.nominal import nominal_model
+
+
+def drawn(deviation, seed, trials=60):
+    """Trials of a straight line whose slope scatters about one mean, with noise 1."""
+    rng = np.random.default_rng(seed)
+    x = np.linspace(0.0, 10.0, 80)
+    out = []
+    for _ in range(trials):
+        residual = x * deviation * rng.standard_normal() + rng.standard_normal(len(x))
+        out.append(Linearized(residual, x[:, None], np.ones((len(x), 1))))
+    return out
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_scatter_is_found_at_its_size(seed):
+    parts = drawn(0.5, seed)
+    found = scatter(parts, [without_locals(p, p.jacobian) for p in parts], ["slope"])
+    assert found["slope"] == pytest.approx(0.5, rel=3.0 / np.sqrt(2.0 * len(parts)))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_trials_alike_do_not_scatter(seed):
+    parts = drawn(0.0, seed)
+    found = scatter(parts, [without_locals(p, p.jacobian) for p in parts], ["slope"])
+    assert found.get("slope", 0.0) < 0.03
+
+
+def test_the_squares_are_those_of_the_covariance(tmp_path):
+    """r' (I + V D^2 V')^-1 r and its log-determinant, as dense matrices have them; and back again."""
+    study = free_pair("muscle", (), 80.0, 3, tmp_path)
+    fitted = fit(nominal_model(study), study.trials)
+    problem = Problem(fitted.model, study.trials, fitted.noise)
+    plain = problem.linearize(fitted.values, fitted.unknowns)
+    along = tuple(without_locals(p, p.jacobian * [0.01, 0.002]) for p in plain)
+    weight = Repeats(fitted.noise, {"gain": 0.01, "time_constant_s": 0.002}, along)
+    weighed = RepeatedProblem(fitted.model, study.trials, weight).linearize(fitted.values, fitted.unknowns)
+    for one, two, back, v in zip(plain, weighed, without_scatter(weighed, weight), along, strict=True):
+        covariance = np.eye(len(one.residual)) + v @ v.T
+        assert two.residual @ two.residual == pytest.approx(one.residual @ np.linalg.solve(covariance, one.residual))
+        assert two.log_determinant == pytest.approx(np.linalg.slogdet(covariance)[1])
+        assert two.jacobian.T @ two.jacobian == pytest.approx(
+            one.jacobian.T @ np.linalg.solve(covariance, one.jacobian), rel=1e-6
+        )
+        assert back.residual == pytest.approx(one.residual, abs=1e-9)
+        assert back.log_determinant == pytest.approx(0.0, abs=1e-9)
+
+
+def spreads(values, free=4):
+    return [
+        Promise(Item(f"cause{k}"), None, 0.0, 1, 1.0, 1.0, {}, spread=float(v), spread_degrees=free)
+        for k, v in enumerate(values)
+    ]
+
+
+def test_a_spread_that_all_causes_share_stands_behind_each():
+    rng = np.random.default_rng(1)
+    usual = usual_spread(spreads(2.0 * rng.chisquare(4, 200) / 4.0))
+    assert usual.phi == pytest.approx(2.0, rel=0.2)
+    assert usual.free > 30.0
+    assert Spread(1.0, 4.0).beside(usual).free == pytest.approx(usual.free + 4.0)
+    assert Spread(1.0, 4.0).beside(usual).phi == pytest.approx(2.0, rel=0.25)
+
+
+def test_a_spread_of_its_own_stands_alone():
+    """Repeats that differ in one thing say nothing of it by what they share."""
+    usual = Spread(1.0, 30.0)
+    odd = Spread(30.0, 4.0).beside(usual)
+    assert odd.phi == 30.0
+    assert odd.free == pytest.approx(4.0, abs=0.1)
+
+
+def test_spreads_that_differ_stand_behind_little():
+    rng = np.random.default_rng(2)
+    assert usual_spread(spreads(np.exp(2.0 * rng.standard_normal(200)))).free < 2.0
+
+
+def test_a_change_shows_through_trials_that_scatter(tmp_path):
+    """The threshold of a muscle whose strength differs from trial to trial, six trials in all."""
+    found = fp.contrast(free_pair("muscle", ("threshold_shift",), 80.0, 999083, tmp_path))
+    (change,) = found.changes
+    assert change.name == "threshold_shift"
+    assert found.repeats["gain"] == pytest.approx(0.003, rel=1.0)
+    assert "repeats scatter by themselves: gain" in str(found)

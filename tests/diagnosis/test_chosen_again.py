@@ -1,0 +1,91 @@
+"""What each fold would have chosen without its trials, of all sets that were fitted."""
+
+from dataclasses import replace
+
+import pytest
+from diagnosis.hidden import study_of
+
+from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, share_of
+from fes_pin.diagnosis.decide.held_out import folds_of
+from fes_pin.identify.distributions import chi2_tail
+from fes_pin.identify.fit import fit, fit_problem
+from fes_pin.identify.levels import PARAMETER_PRICE
+from fes_pin.identify.problem import Problem
+from fes_pin.models.effects import effect_named
+from fes_pin.models.nominal import nominal_model
+from fes_pin.models.predictor import Doubt
+
+NAMES = ("coulomb_friction", "effort_offset", "quadratic_damping")
+
+
+def earns(larger, smaller, gain, _explained):
+    return len(NAMES) * float(chi2_tail(max(gain, 0.0), larger.degrees - smaller.degrees)) < 0.01
+
+
+@pytest.fixture(scope="module")
+def fits():
+    """The nominal model and single causes on a joint that hides dry friction."""
+    study = study_of("joint", ("coulomb_friction",))
+    nominal = fit(nominal_model(study), study.trials)
+    others = {(n,): fit(nominal.model + effect_named(n)(), study.trials, nominal.noise) for n in NAMES}
+    return {(): nominal, **others}
+
+
+@pytest.mark.parametrize("name", [(), *((n,) for n in NAMES)], ids=str)
+def test_a_step_ends_where_a_fit_to_the_other_trials_does(fits, name):
+    whole, again = fits[name], ChosenAgain(fits, earns)
+    for held in folds_of(whole.trials):
+        others = [t for i, t in enumerate(whole.trials) if i not in held]
+        refitted = fit_problem(Problem(whole.model, others, whole.noise), whole.values)
+        many = sum(map(len, whole.trials)) / sum(map(len, others))
+        assert again._cost(name, held) == pytest.approx(many * refitted.sse, abs=PARAMETER_PRICE)
+
+
+def test_the_true_cause_is_chosen_without_any_of_the_trials(fits):
+    again = ChosenAgain(fits, earns)
+    chosen = [again.without(held) for held in folds_of(fits[()].trials)]
+    assert share_of(chosen, ["coulomb_friction"]) == (len(chosen), len(chosen))
+    assert share_of(chosen, ["effort_offset"]) == (0, len(chosen))
+
+
+def test_what_one_trial_alone_speaks_for_is_not_chosen_without_it(fits):
+    """The innovations of one trial are moved along what an offset would do to it, and to no other."""
+    nominal, offset = fits[()], fits["effort_offset",]
+    odd = 0
+
+    def moved(fitted):
+        part = fitted.parts[odd]
+        push = 8.0 * offset.std("effort_offset.offset") * len(offset.parts) ** 0.5
+        along = offset.parts[odd].jacobian[:, offset.free.index("effort_offset.offset")]
+        parts = [*fitted.parts]
+        parts[odd] = replace(part, residual=part.residual + push * along)
+        return replace(fitted, parts=tuple(parts), sse=sum(float(p.residual @ p.residual) for p in parts))
+
+    again = ChosenAgain({(): moved(nominal), ("effort_offset",): moved(offset)}, earns)
+    others = [i for i in range(len(nominal.trials)) if i != odd]
+    assert again.without([others[0]]).model.effects
+    assert not again.without([odd]).model.effects
+
+
+def test_without_folds_nothing_is_said():
+    assert share_of([], ["coulomb_friction"]) is None
+
+
+def test_what_all_trials_promise_together_and_no_step_has_kept_counts_for_no_fold(fits):
+    """Slopes of a filter for gains as they are promise that; those of a free simulation keep it."""
+    offset = fits["effort_offset",]
+    k, push = offset.free.index("effort_offset.offset"), 20.0 * offset.std("effort_offset.offset")
+    parts = tuple(replace(p, residual=p.residual + push * p.jacobian[:, k]) for p in offset.parts)
+    free = replace(offset, parts=parts)
+    doubt = Doubt({"position": 1.0})
+
+    def gained(fitted, held):
+        again = ChosenAgain({(): fitted}, earns)
+        others = [t for i, t in enumerate(again._trials[()]) if i not in held]
+        many = sum(t.readings for t in again._trials[()]) / sum(t.readings for t in others)
+        return many * sum(t.cost for t in others) - again._cost((), held)
+
+    for held in folds_of(offset.trials):
+        assert gained(free, held) > gained(offset, held) + 100.0
+        same = gained(replace(offset, doubt=doubt), held)
+        assert gained(replace(free, doubt=doubt), held) == pytest.approx(same, abs=1e-3)

@@ -1,0 +1,77 @@
+"""One trial alone: sets of causes cannot be compared by trials left out, and something acts in the rig besides."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.integrate
+
+from fes_pin.data.study import Study, read_study
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.record import diagnosis_record
+from fes_pin.view.report import report_html
+
+INERTIA, WEIGHT, DAMPING, DT = 0.02, 1.0, 0.002, 0.004
+URDF = """<robot name="swing">
+<link name="base"/>
+<link name="arm"><inertial>
+<origin xyz="0 0 -0.15"/><mass value="{mass}"/><inertia ixx="0.0047" iyy="0.0047" izz="0.0047" ixy="0" ixz="0" iyz="0"/>
+</inertial></link>
+<joint name="joint" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/></joint>
+</robot>"""
+
+
+def swing(seed: int, friction: float) -> Trial:
+    """Three seconds of free swing under a random torque, by an integrator of SciPy's; friction ~ tanh."""
+    rng = np.random.default_rng(seed)
+    n = 750
+    e = np.zeros(n)
+    for k in range(1, n):
+        e[k] = 0.95 * e[k - 1] + 0.003 * rng.normal()
+
+    def rate(t, x):
+        torque = e[min(int(t / DT), n - 1)] - DAMPING * x[1] - friction * np.tanh(x[1] / 0.02) - WEIGHT * np.sin(x[0])
+        return [x[1], torque / INERTIA]
+
+    time = np.arange(n) * DT
+    run = scipy.integrate.solve_ivp(rate, (0.0, time[-1]), [1.2, 0.0], t_eval=time, max_step=DT / 2, rtol=1e-8)
+    return Trial("swing", "motion", {"position": run.y[0] + 3e-5 * rng.normal(size=n)}, time)
+
+
+def study(folder, seed: int, friction: float) -> Study:
+    (folder / "rig.urdf").write_text(URDF.format(mass=WEIGHT / 9.81 / 0.15))
+    start = {"damping": 0.003, "gravity_scale": 0.9}
+    return Study(
+        "swing", "joint", {"inertia_scale": 1.0}, start, (swing(seed, friction),), folder, {"urdf": folder / "rig.urdf"}
+    )
+
+
+def test_friction_is_found_beneath_a_random_torque(tmp_path):
+    found = diagnose_joint(study(tmp_path, 0, 0.02))
+    (cause,) = found.causes
+    assert cause.name == "coulomb_friction"
+    assert len(cause.equivalents) <= 1, cause.equivalents
+    estimate = cause.parameters["torque_nm"]
+    assert abs(estimate.value - 0.02) < 4.0 * estimate.std < 0.02
+    assert not found.was_held_out  # and nobody is told that it was
+    assert "fitted gain" in str(found) and "held-out" not in str(found)
+    gains = diagnosis_record(found)["causes"][0]["gain_percent"]
+    assert gains["held_out"] is None and gains["ci95"][0] <= gains["ci95"][1]
+    page = report_html(found)
+    assert "gain on held-out trials" not in page.lower() and "there was nothing to hold out" in page
+
+
+def test_a_random_torque_alone_has_no_name(tmp_path):
+    assert not diagnose_joint(study(tmp_path, 2, 0.0)).causes
+
+
+@pytest.mark.shared
+def test_a_real_swing_of_under_three_seconds_names_friction(shared):
+    whole = read_study(shared / "data/free_pendulum")
+    first = next(t for t in whole.trials if t.name == "fit_1")
+    rows = slice(0, 2700)
+    cut = Trial("swing", "motion", {"position": first["position"][rows]}, first.time[rows])
+    found = diagnose_joint(replace(whole, trials=(cut,)))
+    assert "coulomb_friction" in {c.name for c in found.causes}
+    assert max(len(c.equivalents) for c in found.causes) <= 3

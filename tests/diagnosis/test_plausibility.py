@@ -1,0 +1,152 @@
+# ruff: noqa: E501  (tables, one case a line)
+"""What is said of a study before anything is fitted."""
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis.hidden import slide
+from diagnosis.hidden import study_of as made
+
+from fes_pin.data.errors import InputError
+from fes_pin.diagnosis.diagnosis import diagnose_joint
+from fes_pin.diagnosis.plausibility import check_study
+from fes_pin.diagnosis.record import diagnosis_record
+from fes_pin.models.nominal import nominal_model
+from fes_pin.view.report import report_html
+
+OUTPUTS = ("angle_rad", "force_n", "position", "velocity")
+INPUTS = ("pulse_width_us", "stim", "effort")
+
+
+@functools.cache
+def study_of(rig):
+    return made(rig)
+
+
+def changed(study, names, change, only=None):
+    """The study with some columns changed, in all trials or one."""
+    trials = [
+        t.with_columns(**{n: change(t[n]) for n in names if n in t}) if only is None or k == only else t
+        for k, t in enumerate(study.trials)
+    ]
+    return replace(study, trials=tuple(trials))
+
+
+def timed(study, factor):
+    return replace(study, trials=tuple(replace(t, time=factor * t.time) for t in study.trials))
+
+
+def said(study):
+    return check_study(study, nominal_model(study))
+
+
+def dropout(values):
+    out = values.copy()
+    out[300:400] = out[300]
+    return out
+
+
+def coarse(values):
+    """As an encoder of 0.01 rad reads it: equal neighbours are common then."""
+    return 0.01 * np.rint(values / 0.01)
+
+
+def to_and_fro(values):
+    """As an encoder reads what moves by less than one of its counts, five samples here and five there."""
+    return 0.01 * (np.arange(len(values)) // 5 % 2)
+
+
+def free(position):
+    """Joint studies that nobody drives, with these positions over time."""
+    study = made("joint", driven=False)
+    trials = [
+        replace(t.without("velocity") if "velocity" in t else t, columns={"position": position(t.time)})
+        for t in study.trials
+    ]
+    return replace(study, trials=tuple(trials))
+
+
+REFUSED = {  # rig, what was done, words
+    "never_stimulated": ("ankle", lambda s: changed(s, INPUTS, np.zeros_like), "never above the threshold of 180 us in all"),
+    "faint": ("muscle", lambda s: changed(s, INPUTS, lambda u: 0.1 * u), "never above the threshold"),
+    "constant": ("joint", lambda s: changed(s, OUTPUTS, lambda y: 0.0 * y + 1.0), "no output changes in any trial"),
+    "hunting": ("joint", lambda s: changed(s, OUTPUTS, to_and_fro), "only goes to and fro between two counts"),
+    "degrees": ("ankle", lambda s: changed(s, ("angle_rad",), np.degrees), "is it in degrees"),
+    "pulse_widths_in_ms": ("ankle", lambda s: changed(s, INPUTS, lambda u: 1e-3 * u), "is it in ms"),
+    "milliseconds": ("ankle", lambda s: timed(s, 1e3), "is time_s in ms"),
+    "milliseconds_of_a_swing": ("joint", lambda s: timed(s, 1e3), "is time_s in ms"),
+    "few_rows": ("muscle", lambda s: replace(s, trials=tuple(t.first(3) for t in s.trials)), "at least 20 samples"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_no_verdict_could_follow_from_it(case):
+    rig, change, words = REFUSED[case]
+    with pytest.raises(InputError, match=words) as caught:
+        diagnose_joint(change(study_of(rig)))
+    assert len(str(caught.value).splitlines()) == 1
+
+
+WARNED = {
+    "one_without_stimulus": ("muscle", lambda s: changed(s, INPUTS, np.zeros_like, 2), "threshold of 180 us in trial 02"),
+    "one_constant": ("ankle", lambda s: changed(s, OUTPUTS, lambda y: 0.0 * y + 1.0, 1), "does not change at all in trial 01"),
+    "clipped": ("joint", lambda s: changed(s, OUTPUTS, lambda y: np.minimum(y, np.quantile(y, 0.8))), "(clipping?)"),
+    "dropout": ("ankle", lambda s: changed(s, OUTPUTS, dropout, 0), "for 100 samples from 1.5 s on in trial 00"),
+    "dropout_of_a_coarse_encoder": ("joint", lambda s: changed(s, OUTPUTS, lambda y: coarse(dropout(y)), 0), "and then jumps in trial 00: a dropout, its last value held?"),
+    "counts": ("muscle", lambda s: changed(s, OUTPUTS, lambda y: np.rint(20.0 * y)), "are they an encoder's counts?"),
+    "pulse_widths_in_ms": ("ankle", lambda s: changed(s, INPUTS, lambda u: 1e-3 * u, 1), "threshold of 180 us in trial 01"),
+    "held": ("muscle", lambda s: changed(s, OUTPUTS, lambda y: np.repeat(y[::4], 4), 0), "changes only every 4 samples"),
+    "force_in_mN": ("muscle", lambda s: changed(s, OUTPUTS, lambda y: 1e3 * y), "is it in mN"),
+    "swing_in_degrees": ("joint", lambda s: changed(s, OUTPUTS, np.degrees), "is it in degrees"),
+    "minutes": ("ankle", lambda s: timed(s, 1 / 600), "is time_s in another unit"),
+    "not_driven": ("joint", lambda s: changed(s, INPUTS, np.zeros_like), "no trial is driven: effort is zero throughout"),
+    "grams": ("ankle", lambda s: replace(s, trials=tuple(replace(t, conditions={n: 1e3 * v if n == "load_kg" else v for n, v in t.conditions.items()}) for t in s.trials)), "is it in g"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WARNED)
+def test_a_warning_says_what_is_odd(case):
+    rig, change, words = WARNED[case]
+    (found,) = said(change(study_of(rig)))
+    assert words in found
+
+
+def test_what_no_pendulum_does_by_itself():
+    rng = np.random.default_rng(0)
+    noise = lambda t: 1e-3 * rng.standard_normal(len(t))  # noqa: E731
+    swing = free(lambda t: 20.0 * np.exp(-0.1 * t) * np.cos(6.0 * t) + noise(t))
+    assert "position swings back by more than a turn, and nothing drives it, in trial 00: is it in degrees?" in said(
+        swing
+    )
+    settled = free(lambda t: 1.2 + 0.5 * np.exp(-3.0 * t) * np.cos(6.0 * t) + noise(t))
+    assert any("comes to rest at 1.2 rad, and by the URDF it hangs at" in words for words in said(settled))
+    fine = free(lambda t: 0.5 * np.exp(-3.0 * t) * np.cos(6.0 * t) + noise(t))
+    assert len(said(fine)) == 1  # that it is not driven
+
+
+def test_slides():
+    study = slide(1, {})
+    assert said(study) == []
+    assert "is it in mm" in said(changed(study, ("position", "velocity"), lambda y: 1e3 * y))[0]
+    assert "velocity is not the slope" in said(changed(study, ("velocity",), np.degrees))[0]
+    assert said(slide(1, {}, driven=False)) == [
+        "no trial is driven: there is no column effort, and the motion is taken for free"
+    ]
+
+
+@pytest.mark.parametrize("rig", ["ankle", "joint", "muscle"])
+def test_nothing_is_said_of_what_is_right(rig):
+    assert said(study_of(rig)) == []
+    assert said(made(rig, noise="process" if rig != "muscle" else "ar1", seed=1)) == []
+
+
+def test_a_warning_stands_in_all_that_is_written():
+    study = changed(study_of("muscle"), INPUTS, np.zeros_like, 2)
+    diagnosis = diagnose_joint(study)
+    (words,) = diagnosis.warnings
+    assert words == "pulse_width_us is never above the threshold of 180 us in trial 02"
+    assert diagnosis_record(diagnosis)["warnings"] == [words]
+    assert f"warning: {words}" in str(diagnosis)
+    assert words in report_html(diagnosis)

@@ -1,0 +1,49 @@
+"""Parts of a diagnosis in words: what stands beneath the table."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
+from fes_pin.diagnosis.text import ahead_notes, left_out_text, quantity
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "words"),
+    [
+        (0.04123, 0.0021, "0.0412 +- 0.0021 N"),
+        (123.4, 7.0, "123.4 +- 7.0 N"),
+        (2.0, math.inf, "2 N (not identified)"),
+        (0.25, 0.0, "0.25 N (held)"),
+        (2.5e6, 4e5, "2.5e+06 +- 4e+05 N"),
+        (1e-9, 2e-10, "1e-09 +- 2e-10 N"),
+    ],
+)
+def test_a_quantity_is_rounded_to_what_it_means(value, std, words):
+    assert quantity(value, std, "N") == words
+
+
+def test_a_driven_rigs_errors_and_what_acts_at_random_are_told():
+    before, after = Ahead(0.5, 20.0, 80.0), Ahead(0.1, 2.0, 5.0)
+    wind = RandomPart("effort", 0.12, 0.3, 0.04)
+    notes = ahead_notes(AheadErrors(0.3, before, after, before, Ahead(0.2, 4.0, 9.0)), (wind,), "N m")
+    assert notes == [
+        "error E 0.3 s ahead 20 -> 2 %, one sample ahead 0.5 -> 0.1 % fitted",
+        "error E 0.3 s ahead 20 -> 4 %, one sample ahead 0.5 -> 0.2 % held out",
+        "a random effort of 0.12 N m acts, 4 % of what drives the rig, changing within 0.3 s",
+    ]
+    falling = ahead_notes(AheadErrors(0.3, Ahead(0.5, 20.0, None), Ahead(0.1, 2.0, None), None, None), (), "N m")
+    noisy = ahead_notes(AheadErrors(0.3, before, Ahead(0.1, 2.0, 5.0, 1.9), None, None), (), "N m")
+    assert noisy == ["error E 0.3 s ahead 20 -> 2 % (noise alone 1.9 %), one sample ahead 0.5 -> 0.1 % fitted"]
+    assert falling[1:] == ["the rig falls by itself: a free simulation of it says nothing of the model"]
+    assert ahead_notes(None, (wind,), "N m") == []
+
+
+def test_spikes_are_counted_by_column_and_trials_are_named_if_they_are_few():
+    trials = [Trial(n, "motion", {}, np.arange(10.0), {}) for n in ("a", "b", "c", "d")]
+    two = {"a": {"angle_rad": (3,)}, "c": {"angle_rad": (1, 5), "force_n": (2,)}}
+    assert left_out_text(two, trials) == "3 of 20 samples of angle_rad in a and c, 1 of 10 samples of force_n in c"
+    three = {n: {"angle_rad": (3,)} for n in ("a", "b", "d")}
+    assert left_out_text(three, trials) == "3 of 30 samples of angle_rad in 3 trials"
