@@ -26,6 +26,7 @@ import numpy as np
 from fes_pin.body.joints import SIDES
 from fes_pin.body.skeleton import Segment, Skeleton
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import as_number, one_of, shortened
 
 ANKLE_HEIGHT = 0.039
 HIP_SPACING = 0.095
@@ -109,13 +110,12 @@ class Subject:
             ("mass_kg", self.mass_kg, "kg", MASS_RANGE_KG),
             ("height_m", self.height_m, "m", HEIGHT_RANGE_M),
         ):
-            number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-            if not (number and low <= value <= high):
-                raise InputError(
-                    f"must be between {low:g} and {high:g} {unit} (an adult's), got {value!r}", column=label
-                )
-        if self.sex not in _DE_LEVA:
-            raise InputError(f"must be 'male' or 'female' (the two segment tables), got {self.sex!r}", column="sex")
+            number = as_number(value)
+            if number is None or not low <= number <= high:
+                wanted = f"must be between {low:g} and {high:g} {unit} (an adult's)"
+                raise InputError(f"{wanted}, got {shortened(value)}", column=label)
+            object.__setattr__(self, label, number)
+        one_of(self.sex, _DE_LEVA, "sex")
 
 
 def skeleton_of_subject(subject: Subject) -> Skeleton:

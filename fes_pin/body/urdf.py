@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.body.joints import JOINTS, SIDES, BodyJoint, axis_of, joint_limits
 from fes_pin.body.skeleton import Skeleton
-from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import in_full, one_of
 
 EFFORT_NM, VELOCITY_RADPS = 500.0, 30.0
 """URDF asks for them; above what walking needs, and never used here."""
@@ -35,8 +35,7 @@ def write_urdf(skeleton: Skeleton, stance: str, title: str, provenance: str) -> 
     InputError
         Another stance.
     """
-    if stance not in SIDES:
-        raise InputError(f"must be 'left' or 'right', got {stance!r}", column="stance")
+    one_of(stance, SIDES, "stance")
     lines = ['<?xml version="1.0"?>', f"<!-- {provenance.replace('--', '-')} -->", f"<robot name={quoteattr(title)}>"]
     root = f"{stance}_forefoot"
     origin = skeleton.centres[f"{stance}_mtp"] * [1.0, 1.0, 0.0]
@@ -71,14 +70,10 @@ def origin_of(segment: str, skeleton: Skeleton, stance: str) -> np.ndarray:
     return next(skeleton.centres[joint.name] for joint, _, child in tree(stance) if child == segment)
 
 
-def _numbers(values: np.ndarray) -> str:
-    return " ".join(repr(float(value)) for value in values)
-
-
 def _fixed(name: str, parent: str, child: str, xyz: np.ndarray) -> list[str]:
     return [
         f'  <joint name="{name}" type="fixed">',
-        f'    <parent link="{parent}"/><child link="{child}"/><origin xyz="{_numbers(xyz)}"/>',
+        f'    <parent link="{parent}"/><child link="{child}"/><origin xyz="{in_full(*xyz)}"/>',
         "  </joint>",
     ]
 
@@ -95,8 +90,9 @@ def _joint(joint: BodyJoint, parent: str, child: str, xyz: np.ndarray) -> list[s
         lines += [
             f'  <joint name="{name}" type="revolute">',
             f'    <parent link="{links[k]}"/><child link="{links[k + 1]}"/>',
-            f'    <origin xyz="{_numbers(xyz if k == 0 else np.zeros(3))}"/><axis xyz="{_numbers(axis + 0.0)}"/>',
-            f'    <limit lower="{low!r}" upper="{high!r}" effort="{EFFORT_NM}" velocity="{VELOCITY_RADPS}"/>',
+            f'    <origin xyz="{in_full(*(xyz if k == 0 else np.zeros(3)))}"/><axis xyz="{in_full(*axis + 0.0)}"/>',
+            f'    <limit lower="{in_full(low)}" upper="{in_full(high)}" effort="{EFFORT_NM}" '
+            f'velocity="{VELOCITY_RADPS}"/>',
             "  </joint>",
         ]
         if k < len(names) - 1:
@@ -108,7 +104,7 @@ def _link(name: str, skeleton: Skeleton, origin: np.ndarray) -> list[str]:
     segment = skeleton.segments[name]
     i = segment.inertia
     moments = " ".join(
-        f'{key}="{float(value)!r}"'
+        f'{key}="{in_full(value)}"'
         for key, value in zip(
             ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
             (i[0, 0], i[0, 1], i[0, 2], i[1, 1], i[1, 2], i[2, 2]),
@@ -117,7 +113,7 @@ def _link(name: str, skeleton: Skeleton, origin: np.ndarray) -> list[str]:
     )
     return [
         f'  <link name="{name}">',
-        f'    <inertial><origin xyz="{_numbers(segment.com - origin)}"/><mass value="{segment.mass!r}"/>',
+        f'    <inertial><origin xyz="{in_full(*segment.com - origin)}"/><mass value="{in_full(segment.mass)}"/>',
         f"      <inertia {moments}/></inertial>",
         *(_visual(shape, origin) for shape in shapes_of(name, skeleton)),
         "  </link>",

@@ -26,6 +26,7 @@ from fes_pin.data.study_text import (
     source_from_option,
     source_in_words,
     toml_table,
+    toml_value,
 )
 from fes_pin.data.units import known_unit, own_unit, quantities_of
 from fes_pin.data.wanted import Wanted
@@ -104,7 +105,7 @@ class _Making:
         ]
         for place, kind, conditions in zip(places, kinds, trials, strict=True):
             text += ["", "[[trial]]", f"file = {quoted(place)}", f"kind = {quoted(kind)}"]
-            text += [f"{key} = {value!r}" for key, value in conditions.items()]
+            text += [f"{key} = {toml_value(value)}" for key, value in conditions.items()]
         contents["study.toml"] = "\n".join([*HEADER, *text]) + "\n"
         taken = tuple(
             (c, s.get("name", "from its rate"), source_in_words(s, c, self.wanted.revolute)) for c, s in sources.items()

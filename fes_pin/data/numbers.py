@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from numbers import Real
 from typing import Any
 
@@ -29,6 +29,14 @@ def as_number(value: object) -> float | None:
 def printed(value: float | None, digits: int) -> float | None:
     """A number with so many significant digits, as results are written; None for what is not finite."""
     return None if value is None or not math.isfinite(value) else float(f"{value:.{digits}g}")
+
+
+def in_full(*values: float) -> str:
+    """Numbers as files hold them, apart by blanks: as many digits as give them back, whatever type of number they are.
+
+    Everything that writes numbers into URDF or TOML calls it: `repr` of a numpy number is no number there.
+    """
+    return " ".join(repr(float(value)) for value in values)
 
 
 def number(value: object, name: str, infinite: bool = False) -> float:
@@ -109,6 +117,20 @@ def numbers(values: Any, name: str) -> np.ndarray:
         return np.array(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise InputError("must be numbers in rows of one length", column=name) from None
+
+
+def one_of(value: object, allowed: Collection[str], name: str) -> str:
+    """One of some words.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    if not isinstance(value, str) or value not in allowed:
+        words = [repr(word) for word in allowed]
+        raise InputError(f"must be {', '.join(words[:-1])} or {words[-1]}, got {shortened(value)}", column=name)
+    return value
 
 
 def by_name(values: Any, names: Sequence[str], what: str, default: float) -> np.ndarray:

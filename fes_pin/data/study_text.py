@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import in_full
 from fes_pin.data.recorded.columns import SOURCE_KEYS
 from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.units import own_unit
@@ -29,7 +30,7 @@ def toml_table(
 
 def toml_value(value: Any) -> str:
     """A string or a number as TOML."""
-    return quoted(value) if isinstance(value, str) else repr(value)
+    return quoted(value) if isinstance(value, str) else repr(value) if isinstance(value, int) else in_full(value)
 
 
 def quoted(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import in_full
 
 _URDF = """<?xml version="1.0"?>
 <!-- {what} Position 0: {zero}. {axis}
@@ -11,9 +12,9 @@ _URDF = """<?xml version="1.0"?>
   <link name="base"/>
   <link name="{link}">
     <inertial>
-      <origin xyz="0 0 {height!r}"/>
-      <mass value="{mass!r}"/>
-      <inertia ixx="{across!r}" ixy="0" ixz="0" iyy="{across!r}" iyz="0" izz="{along!r}"/>
+      <origin xyz="0 0 {height}"/>
+      <mass value="{mass}"/>
+      <inertia ixx="{across}" ixy="0" ixz="0" iyy="{across}" iyz="0" izz="{along}"/>
     </inertial>
   </link>
   <joint name="{joint}" type="{kind}">
@@ -78,10 +79,10 @@ def slide(mass_kg: float) -> str:
         joint="rail",
         kind="prismatic",
         direction="1 0 0",
-        height=0.0,
-        mass=float(mass_kg),
-        across=0.0,
-        along=0.0,
+        height=in_full(0.0),
+        mass=in_full(mass_kg),
+        across=in_full(0.0),
+        along=in_full(0.0),
         limit=LIMIT,
     )
 
@@ -97,10 +98,10 @@ def _turning(name: str, what: str, mass: float, centre: float, about_centre: flo
         kind="continuous",
         direction="0 1 0",
         limit="",
-        height=float(centre if upright else -centre),
-        mass=float(mass),
-        across=float(about_centre),
-        along=0.0,
+        height=in_full(centre if upright else -centre),
+        mass=in_full(mass),
+        across=in_full(about_centre),
+        along=in_full(0.0),
     )
 
 

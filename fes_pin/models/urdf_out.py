@@ -10,6 +10,7 @@ import pinocchio as pin
 from defusedxml import ElementTree
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import in_full
 from fes_pin.data.urdf import check_one_joint, mechanics
 from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.model import Model
@@ -56,8 +57,8 @@ def extended_urdf(model: Model, urdf: str | Path) -> tuple[str, tuple[str, ...],
     friction = next((e for e in model.effects if isinstance(e, CoulombFriction)), None)
     dynamics = joint.find("dynamics")
     dynamics = SubElement(joint, "dynamics") if dynamics is None else dynamics
-    dynamics.set("damping", repr(float(rig.damping)))
-    dynamics.set("friction", repr(0.0 if friction is None else float(friction.torque_nm)))
+    dynamics.set("damping", in_full(rig.damping))
+    dynamics.set("friction", in_full(0.0 if friction is None else friction.torque_nm))
     left_out = tuple(e.name for e in model.effects if e is not friction)
     indent(root)
     return tostring(root, encoding="unicode") + "\n", left_out, changed
@@ -116,9 +117,9 @@ def _multiply(root: Element, moving: list[str], mass: float, length: float) -> N
             continue
         weight, inertia = inertial.find("mass"), inertial.find("inertia")
         assert weight is not None and inertia is not None
-        weight.set("value", repr(mass * float(weight.get("value", "0"))))
+        weight.set("value", in_full(mass * float(weight.get("value", "0"))))
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"):
-            inertia.set(key, repr(mass * length**2 * float(inertia.get(key, "0"))))
+            inertia.set(key, in_full(mass * length**2 * float(inertia.get(key, "0"))))
         _lengthen(inertial.find("origin"), length)
     for joint in root.findall("joint"):
         parent = joint.find("parent")
@@ -128,7 +129,7 @@ def _multiply(root: Element, moving: list[str], mass: float, length: float) -> N
 
 def _lengthen(origin: Element | None, factor: float) -> None:
     if origin is not None and origin.get("xyz") and factor != 1.0:
-        origin.set("xyz", " ".join(repr(factor * float(x)) for x in origin.get("xyz", "").split()))
+        origin.set("xyz", in_full(*(factor * float(x) for x in origin.get("xyz", "").split())))
 
 
 def _add(root: Element, joint: Element, moving: list[str], extra: float, urdf: str | Path) -> bool:
@@ -154,5 +155,5 @@ def _add(root: Element, joint: Element, moving: list[str], extra: float, urdf: s
     if np.linalg.eigvalsh(tensor)[0] < -1e-9 * abs(tensor).max():
         return False
     for key, i, j in keys:
-        inertia.set(key, repr(float(tensor[i, j])))
+        inertia.set(key, in_full(tensor[i, j]))
     return True

@@ -9,6 +9,7 @@ from defusedxml.ElementTree import fromstring
 
 from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import in_full
 from fes_pin.walk.effect import central
 from fes_pin.walk.fits import Set, WalkFits
 
@@ -57,12 +58,12 @@ def with_segments(body: Body, parameters: dict[str, np.ndarray]) -> Body:
             raise InputError("the link has no inertial element", column=name)
         for child in list(inertial):
             if child.tag == "origin":
-                child.set("xyz", " ".join(repr(float(c)) for c in centre))
+                child.set("xyz", in_full(*centre))
             elif child.tag == "mass":
-                child.set("value", repr(float(mass)))
+                child.set("value", in_full(mass))
             elif child.tag == "inertia":
                 for key, (i, k) in {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2),
                                     "izz": (2, 2)}.items():  # fmt: skip
-                    child.set(key, repr(float(inertia[i, k])))
+                    child.set(key, in_full(inertia[i, k]))
     text = '<?xml version="1.0"?>\n' + tostring(tree, encoding="unicode") + "\n"
     return Body(text, body.stance, body.height_m, f"{body.label}, extended")

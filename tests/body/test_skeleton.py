@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fes_pin.body import build, urdf
 from fes_pin.body.anthropometry import Subject, combined, skeleton_of_subject
 from fes_pin.body.build import Body
 from fes_pin.body.joints import JOINT_NAMES, SEGMENT_NAMES, axis_of, joint_limits, mirrored
-from fes_pin.body.skeleton import read_segments
+from fes_pin.body.skeleton import Segment, read_segments
 from fes_pin.data.errors import InputError
 
 REPOSITORY = Path(__file__).parents[2]
@@ -37,6 +39,58 @@ def test_mass_and_height_are_the_subjects(person, stance):
     assert abs(pin.computeTotalMass(free) - mass) < 1e-9
     assert body.joint_names == tuple(body.model.names[1:])
     assert set(body.joint_names) == set(JOINT_NAMES)
+
+
+@pytest.mark.parametrize("number", [np.float64, np.float32, np.int64, int, np.array])
+def test_a_subject_in_numbers_of_any_type_is_the_same_body(number):
+    body = Body.from_subject(number(70), number(2))
+    assert body == Body.from_subject(70.0, 2.0)
+    assert abs(body.mass_kg - 70.0) < 1e-9
+    assert abs(body.placement("vertex", "neutral")[1][2] - 2.0) < 1e-9
+
+
+def test_the_numbers_of_a_segment_may_be_of_any_type():
+    skeleton = skeleton_of_subject(Subject(70.0, 1.8))
+    same = {n: Segment(np.float64(s.mass), s.com, s.inertia) for n, s in skeleton.segments.items()}
+    assert Body.from_segments(replace(skeleton, segments=same)) == Body.from_segments(skeleton)
+
+
+@pytest.mark.parametrize("spoiled", ["mass", "xyz"])
+def test_a_body_that_is_not_as_asked_for_is_refused(monkeypatch, spoiled):
+    """Whatever writes the URDF wrongly: the built body is compared with the subject."""
+    right = urdf.write_urdf
+
+    def wrong(*given):
+        text = right(*given)
+        return (
+            text.replace('<mass value="', '<mass value="1', 1) if spoiled == "mass" else text.replace("0.", "0.0", 99)
+        )
+
+    monkeypatch.setattr(build, "write_urdf", wrong)
+    with pytest.raises(InputError, match="not what was asked for"):
+        Body.from_subject(70.0, 1.8)
+
+
+def test_the_centre_of_mass_is_that_of_all_ten_segments():
+    skeleton = skeleton_of_subject(Subject(70.0, 1.8))
+    whole, body = combined(list(skeleton.segments.values())), Body.from_subject(70.0, 1.8, stance="left")
+    origin = skeleton.centres["left_mtp"] * [1.0, 1.0, 0.0]
+    assert np.allclose(body.centre_of_mass("neutral"), whole.com - origin, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "stance", "says"),
+    [
+        ("<robot", "right", "cannot be read as a URDF"),
+        (3, "right", "cannot be read as a URDF"),
+        (None, "left", "rooted at the other foot"),
+        (None, "both", "stance: must be 'left' or 'right'"),
+        (None, ["right"], "stance: must be 'left' or 'right'"),
+    ],
+)
+def test_a_body_checks_its_urdf_when_it_is_built(body, text, stance, says):
+    with pytest.raises(InputError, match=says):
+        Body(body.urdf if text is None else text, stance)
 
 
 @settings(max_examples=25, deadline=None)
@@ -154,6 +208,9 @@ def test_limits_hold_zero_and_are_in_the_urdf(body):
         (("heavy", 1.8), "mass_kg"),
         ((True, 1.8), "mass_kg"),
         ((72.6, 1.8, "robot"), "sex: must be 'male' or 'female'"),
+        ((72.6, 1.8, ["male"]), "sex: must be 'male' or 'female'"),
+        ((72.6, np.array([1.8])), "height_m: must be between 1 and 2.4 m"),
+        ((72.6, 1.8, "male", ["left"]), "stance: must be 'left' or 'right'"),
         ((72.6, 1.8, "male", "both"), "stance: must be 'left' or 'right'"),
     ],
 )
@@ -162,6 +219,13 @@ def test_subjects_that_no_one_is(arguments, says):
         Body.from_subject(*arguments)
     assert says in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("path", ["none/body.urdf", ".", 3])
+def test_a_body_that_cannot_be_written_says_so(body, tmp_path, monkeypatch, path):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="cannot be written"):
+        body.write(path)
 
 
 @pytest.mark.parametrize(

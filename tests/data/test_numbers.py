@@ -1,6 +1,7 @@
 """Numbers of callers: one rule for every room, one line where they are none."""
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.horizon import Horizon, StrengthFatigue
 from fes_pin.control.limits import StimulationLimits
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import as_number, between, number, positive_number, whole
+from fes_pin.data.numbers import as_number, between, in_full, number, positive_number, whole
+from fes_pin.data.study_text import toml_value
 from fes_pin.muscles.nerves import Nerves
 
 NONE = ["5", b"5", True, None, [1.0], np.array([1.0]), 1j, np.bool_(True)]
@@ -52,3 +54,9 @@ def test_a_number_too_large_is_infinite():
 def test_whole_numbers_have_ends(value, most):
     with pytest.raises(InputError, match="x: must be"):
         whole(value, "x", 0, most)
+
+
+@pytest.mark.parametrize("value", [0.1, 1e-300, -2.5, np.float64(0.1), np.float32(0.5), np.array(0.3), np.int8(3), 7])
+def test_a_number_in_a_file_gives_itself_back(value):
+    assert float(in_full(value)) == float(value)
+    assert tomllib.loads(f"x = {toml_value(value)}") == {"x": float(value)}

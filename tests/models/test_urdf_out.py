@@ -60,6 +60,17 @@ def test_a_slide(tmp_path):
     assert after.damping[0] == 3.0
 
 
+@pytest.mark.parametrize("scale", [1.7, 0.1])
+def test_numpy_numbers_are_written_as_numbers(tmp_path, scale):
+    path = tmp_path / "a.urdf"
+    path.write_text(TURNED)
+    plain = {"inertia_scale": scale, "gravity_scale": 1.2, "damping": 0.03}
+    of_numpy = {name: np.float64(value) for name, value in plain.items()}
+    model = fitted(path, **of_numpy) + CoulombFriction(torque_nm=np.float64(0.2))
+    assert extended_urdf(model, path) == extended_urdf(fitted(path, **plain) + CoulombFriction(torque_nm=0.2), path)
+    assert rod(np.float64(0.4), np.float32(1.5)) == rod(0.4, 1.5)
+
+
 def test_what_no_rigid_body_has_is_refused(tmp_path):
     path, other = tmp_path / "a.urdf", tmp_path / "b.urdf"
     path.write_text(RIGS["pendulum"])
