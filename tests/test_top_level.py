@@ -42,7 +42,9 @@ def test_allocate_twice_and_imported():
 
     nerves = fp.Nerves(["left_femoral"])
     first, again = (fp.allocate({"left_knee_flexion": -40.0}, nerves) for _ in range(2))
-    assert allocate({"left_knee_flexion": -40.0}, nerves).pulse_widths_us == first.pulse_widths_us == again.pulse_widths_us
+    assert (
+        allocate({"left_knee_flexion": -40.0}, nerves).pulse_widths_us == first.pulse_widths_us == again.pulse_widths_us
+    )
 
 
 def test_public_functions_can_be_sent_to_a_pool_and_say_their_arguments():
