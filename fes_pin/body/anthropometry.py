@@ -26,7 +26,7 @@ import numpy as np
 from fes_pin.body.joints import SIDES
 from fes_pin.body.skeleton import Segment, Skeleton
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import as_number, one_of, shortened
+from fes_pin.data.numbers import as_number, known_word, shortened
 
 ANKLE_HEIGHT = 0.039
 HIP_SPACING = 0.095
@@ -115,7 +115,7 @@ class Subject:
                 wanted = f"must be between {low:g} and {high:g} {unit} (an adult's)"
                 raise InputError(f"{wanted}, got {shortened(value)}", column=label)
             object.__setattr__(self, label, number)
-        one_of(self.sex, _DE_LEVA, "sex")
+        known_word(self.sex, _DE_LEVA, "sex")
 
 
 def skeleton_of_subject(subject: Subject) -> Skeleton:

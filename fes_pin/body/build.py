@@ -17,7 +17,7 @@ from fes_pin.body.skeleton import Skeleton, read_segments
 from fes_pin.body.urdf import origin_of, write_urdf
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
-from fes_pin.data.numbers import one_of, positive_number
+from fes_pin.data.numbers import known_word, positive_number
 from fes_pin.data.urdf import moving_joints
 
 GRAVITY = 9.80665
@@ -65,7 +65,7 @@ class Body:
     label: str = ""
 
     def __post_init__(self) -> None:
-        one_of(self.stance, SIDES, "stance")
+        known_word(self.stance, SIDES, "stance")
         model = _parsed(self.urdf)
         if self.stance != _stance_of(model):
             raise InputError(f"the URDF is rooted at the other foot than {self.stance!r}", column="stance")

@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.body.joints import JOINTS, SIDES, BodyJoint, axis_of, joint_limits
 from fes_pin.body.skeleton import Skeleton
-from fes_pin.data.numbers import in_full, one_of
+from fes_pin.data.numbers import in_full, known_word
 
 EFFORT_NM, VELOCITY_RADPS = 500.0, 30.0
 """URDF asks for them; above what walking needs, and never used here."""
@@ -35,7 +35,7 @@ def write_urdf(skeleton: Skeleton, stance: str, title: str, provenance: str) -> 
     InputError
         Another stance.
     """
-    one_of(stance, SIDES, "stance")
+    known_word(stance, SIDES, "stance")
     lines = ['<?xml version="1.0"?>', f"<!-- {provenance.replace('--', '-')} -->", f"<robot name={quoteattr(title)}>"]
     root = f"{stance}_forefoot"
     origin = skeleton.centres[f"{stance}_mtp"] * [1.0, 1.0, 0.0]

@@ -119,7 +119,7 @@ def numbers(values: Any, name: str) -> np.ndarray:
         raise InputError("must be numbers in rows of one length", column=name) from None
 
 
-def one_of(value: object, allowed: Collection[str], name: str) -> str:
+def known_word(value: object, allowed: Collection[str], name: str) -> str:
     """One of some words.
 
     Raises
