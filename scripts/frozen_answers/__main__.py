@@ -1,0 +1,75 @@
+"""Freeze the answers of some 300 studies, or show what differs from the frozen ones."""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from frozen_answers.answers import answer, differences
+from frozen_answers.studies import Frozen, studies
+
+TABLE = Path(__file__).with_name("answers.jsonl")
+REPOSITORY = Path(__file__).parents[2]
+
+
+def read(table: Path) -> dict[str, dict[str, Any]]:
+    """Rows of a table by kind and key."""
+    if not table.exists():
+        return {}
+    rows = (json.loads(line) for line in table.read_text(encoding="utf-8").splitlines())
+    return {f"{row['kind']} {row['key']}": row for row in rows}
+
+
+def freeze(wanted: list[Frozen], table: Path) -> None:
+    """Answer the studies that the table does not hold, and add them to it as they come."""
+    done = read(table)
+    for one in wanted:
+        if f"{one.kind} {one.key}" not in done:
+            with table.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(answer(one)) + "\n")
+
+
+def compare(wanted: list[Frozen], table: Path, loosely: bool) -> int:
+    """Print what differs, study by study, and the ratio of processor times; the number of studies that differ."""
+    frozen, odd, ratios = read(table), 0, []
+    known = [one for one in wanted if f"{one.kind} {one.key}" in frozen]
+    for one in known:
+        old, new = frozen[f"{one.kind} {one.key}"], answer(one)
+        if lines := differences(old, new, loosely):
+            odd += 1
+            typer.echo(f"{one.kind} {one.key} (hidden: {', '.join(one.hidden or ()) or '-'})")
+            typer.echo("\n".join(f"    {line}" for line in lines))
+        if "cpu_s" in old and "cpu_s" in new:
+            ratios.append(new["cpu_s"] / max(old["cpu_s"], 0.1))
+    median = f"; processor time {statistics.median(ratios):.2f} of the frozen in the median" if ratios else ""
+    typer.echo(f"{len(known) - odd} of {len(known)} the same{median}")
+    return odd
+
+
+def main(
+    count: Annotated[int, typer.Option(help="How many studies: the first of all kinds in turn.")] = 40,
+    every: Annotated[bool, typer.Option("--all", help="Every study.")] = False,
+    kind: Annotated[str | None, typer.Option(help="Of one kind alone.")] = None,
+    new: Annotated[bool, typer.Option("--freeze", help="Add to the table what it does not hold.")] = False,
+    loosely: Annotated[
+        bool, typer.Option("--loosely", help="Verdicts, sets, and values beyond 0.3 of their deviation.")
+    ] = False,
+    table: Annotated[Path, typer.Option(help="The table.")] = TABLE,
+) -> None:
+    """Freeze the answers of some 300 studies, or show what differs from the frozen ones."""
+    shared = Path(os.environ.get("FES_PIN_DATA") or REPOSITORY.parent / "shared")
+    wanted = [one for one in studies(shared) if kind in (None, one.kind)]
+    wanted = wanted if every else wanted[:count]
+    if new:
+        freeze(wanted, table)
+    elif compare(wanted, table, loosely):
+        raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    typer.run(main)
