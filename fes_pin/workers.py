@@ -80,8 +80,30 @@ def in_parallel(function: Callable[[In], Out], items: Iterable[In]) -> list[Out]
         return list(pool.map(lambda context, item: context.run(beside_others, item), contexts, work))
 
 
+_STOPS: ContextVar[list[float] | None] = ContextVar("stops", default=None)
+
+
 class OutOfTime(Exception):
-    """Raised by work that was begun within a limit of time, once that has passed."""
+    """Raised by work that was begun within a limit of time, once that has passed.
+
+    The innermost `noting_stops` notes it.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("a limit of time has passed")
+        if (stops := _STOPS.get()) is not None:
+            stops.append(time.monotonic())
+
+
+@contextmanager
+def noting_stops() -> Iterator[list[float]]:
+    """The times at which a limit of time ended work that is done within, in a list that grows; empty where none did."""
+    stops: list[float] = []
+    token = _STOPS.set(stops)
+    try:
+        yield stops
+    finally:
+        _STOPS.reset(token)
 
 
 _END: ContextVar[float] = ContextVar("end", default=math.inf)

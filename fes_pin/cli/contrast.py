@@ -24,6 +24,9 @@ def contrast(
     ] = None,
     groups: Annotated[str | None, typer.Option(help="Which groups, with commas between them.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values.")] = 0,
+    limit: Annotated[
+        float | None, typer.Option(min=0.0, help="Seconds of search; then the best set of changes so far.")
+    ] = None,
     library: Libraries = None,
 ) -> None:
     """Say what differs between groups of trials, by how much, and what did not change."""
@@ -44,7 +47,9 @@ def contrast(
     check_folder(out)  # what cannot be read or written is said before any work
     wanted = [g.strip() for g in groups.split(",") if g.strip()] if groups is not None else None
     with progress() as tell:
-        found = find(before, now, by=by or "group", groups=wanted, library=catalogue, seed=seed, progress=tell)
+        found = find(
+            before, now, by=by or "group", groups=wanted, library=catalogue, seed=seed, limit=limit, progress=tell
+        )
     write_files(out, {FILE: contrast_json(found), "report.html": contrast_html(found)})
     say_whose_code(catalogue)
     typer.echo(f"{contrast_text(found)}\nreport: {out / 'report.html'}")

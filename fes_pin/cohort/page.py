@@ -54,8 +54,10 @@ def _head(studies: Sequence[PageRow], good: Sequence[PageRow], prevalence: Seque
     rows = [
         ("A cause was named", f"in {counts['causes_found']} of {len(good)} studies"),
         ("The model is adequate", f"in {counts['adequate']}"),
-        ("Something stays unexplained", f"in {sum(r['unexplained'] for r in good)}"),
+        ("Something stays unexplained", f"in {sum(bool(r['unexplained']) for r in good)}"),
     ]
+    if counts["stopped"]:
+        rows.append(("The search was stopped", f"in {counts['stopped']}: the causes are the best set so far"))
     if failed:
         rows.append(("Could not be diagnosed", f"{failed}: see the table of studies"))
     made = [element("div", element("dt", q), element("dd", a)) for q, a in rows]

@@ -14,7 +14,7 @@ from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.groups import BY_GROUP, grouped_study
 from fes_pin.contrasts.late import is_cheaper, late_in_groups
 from fes_pin.contrasts.left import left_in_groups
-from fes_pin.contrasts.result import Contrast
+from fes_pin.contrasts.result import STOPPED, Contrast
 from fes_pin.contrasts.search import ContrastFound, ContrastSearch
 from fes_pin.data.log import EFFORT, Log
 from fes_pin.data.schema import IMPOSED
@@ -33,7 +33,7 @@ from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predictor import Doubt
-from fes_pin.workers import Progress, one_thread_each
+from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
 
 
 def contrast(
@@ -44,6 +44,7 @@ def contrast(
     groups: Sequence[str] | None = None,
     library: Source | Sequence[Source] | None = None,
     seed: int = 0,
+    limit: float | None = None,
     progress: Progress | None = None,
 ) -> Contrast:
     """Find out what differs between groups of trials of one rig.
@@ -62,6 +63,9 @@ def contrast(
         Causes beside those written here and installed; see `diagnose`.
     seed
         Of simulated critical values.
+    limit
+        Seconds that the search may take; then it stops at the best set so far, and the verdict is "stopped". The fit of
+        the model that all groups share comes on top.
     progress
         Called with a share done and a few words.
 
@@ -82,18 +86,20 @@ def contrast(
     joined, nominal = measured.study, nominal_model(measured.study)
     names = tuple(dict.fromkeys(t.group for t in joined.trials if t.group is not None))
     noted = [*measured.warnings, *check_study(joined, nominal)]
-    with one_thread_each():
+    end = math.inf if limit is None else began + limit
+    with one_thread_each(), noting_stops() as stops:
         effects = catalogue.effects_for(nominal.rig)
-        joined, words = _quieted(joined, names, nominal)
+        joined, words = _quieted(joined, names, nominal, end)
         trials, driven, said = _by_group(joined, names, nominal)
         said = [*noted, *words, *said]
 
         def run(those: Trials) -> tuple[Fits, ContrastFound]:
             made = Fits(nominal, those, effects, driven)
-            return made, ContrastSearch(made, seed, tell).run()
+            with time_limit(end - time.perf_counter()):
+                return made, ContrastSearch(made, seed, tell).run()
 
         searched = contrast_with_conditions(nominal, trials, run)
-        if (late_s := late_in_groups(searched)) is not None:
+        if not stops and (late_s := late_in_groups(searched)) is not None:
             log = Log(effort_late_s=late_s)
             moved = {g: [log.applied(t) for t in many] for g, many in trials.items()}
             timed = contrast_with_conditions(nominal, moved, run)
@@ -104,6 +110,9 @@ def contrast(
     said += [*words, *_smoothed(searched.found.best, trials)]
     tell(1.0, "done")
     answer = _answer(joined, searched, left, catalogue, said)
+    if stops:
+        stop = (*answer.warnings, f"the search was stopped at its limit of {limit:g} s: best set so far")
+        answer = replace(answer, verdict=STOPPED, unchanged={}, excluded={}, warnings=stop)
     return replace(answer, wall_s=time.perf_counter() - began)
 
 
@@ -149,7 +158,7 @@ def _by_group(study: Study, names: Sequence[str], nominal: Model) -> tuple[dict[
     return trials, fed_back or any(t.kind == IMPOSED for t in train), warnings
 
 
-def _quieted(study: Study, names: Sequence[str], nominal: Model) -> tuple[Study, list[str]]:
+def _quieted(study: Study, names: Sequence[str], nominal: Model, end: float) -> tuple[Study, list[str]]:
     """The study without noise that the efforts of all groups were recorded with, and what is to be said of it."""
     train, _ = split(study)
     logged = all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
@@ -160,7 +169,7 @@ def _quieted(study: Study, names: Sequence[str], nominal: Model) -> tuple[Study,
         by_group, _, _ = _by_group(replace(study, trials=tuple(trials)), names, nominal)
         return [t for many in by_group.values() for t in many]
 
-    noise = LogFaults(study.trials, prepared, math.inf).noise_beside_nominal(nominal)
+    noise = LogFaults(study.trials, prepared, end).noise_beside_nominal(nominal)
     if not noise:
         return study, []
     log = Log(effort_noise=noise)

@@ -11,6 +11,9 @@ from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.text import probability, quantity
 from fes_pin.identify.fit import Fit
 
+STOPPED = "stopped"
+"""The verdict where a limit of time ended the search: the changes are the best set so far."""
+
 
 @dataclass(frozen=True)
 class Change:
@@ -53,7 +56,7 @@ class Contrast:
     Attributes
     ----------
     verdict
-        "nothing_changed", "changed" or "unexplained".
+        "nothing_changed", "changed", "unexplained", or "stopped": a limit of time ended the search.
     changes
         Surest first.
     common
@@ -94,12 +97,15 @@ class Contrast:
 def contrast_headline(found: Contrast) -> str:
     """The answer in one sentence."""
     between = " and ".join(found.groups)
+    so_far = "stopped: best set so far: " if found.verdict == STOPPED else ""
     if found.verdict == "unexplained":
         return f"something differs between {between}, and nothing in the library explains it."
     if not found.changes:
+        if so_far:
+            return f"{so_far}no change between {between}."
         return f"nothing changed between {between} that these data show."
     many = "one thing" if len(found.changes) == 1 else f"{len(found.changes)} things"
-    return f"{many} changed between {between}."
+    return f"{so_far}{many} changed between {between}."
 
 
 def change_row(change: Change) -> tuple[str, str, str, str, str]:

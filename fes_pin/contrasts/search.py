@@ -7,6 +7,7 @@ turn up as a change: of two that explain as much the common one is taken.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from fes_pin.contrasts.promises import Promise
 from fes_pin.diagnosis.decide.significance import Family
 from fes_pin.diagnosis.search.starts import STARTS
 from fes_pin.identify.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
-from fes_pin.workers import Progress, in_parallel
+from fes_pin.workers import OutOfTime, Progress, in_parallel, time_limit
 
 MOST_ITEMS = 5
 """Common causes and changes together."""
@@ -68,11 +69,22 @@ class ContrastSearch:
         self.fits, self.seed, self.progress = fits, seed, progress
 
     def run(self) -> ContrastFound:
-        """Search forward, swap, take back what is superfluous, under the noise that the set itself leaves."""
+        """Search as long as the limit of time lets it; the nominal model is fitted and scored anyway."""
         self.progress(0.05, "one model for all groups")
-        nominal = self.fits.first()
-        promises, scores = self.fits.promises(nominal)
-        self.family = Family(scores, self.seed)
+        with time_limit(math.inf):
+            nominal = self._kept = self.fits.first()
+            promises, scores = self.fits.promises(nominal)
+            self.family = Family(scores, self.seed)
+        try:
+            return self._run(nominal, promises)
+        except OutOfTime:
+            with time_limit(math.inf):
+                best = self._dropped(self._kept)
+                rests = {i: self.fits.without(best, i) for i in best.changes}
+                return self._with_rivals(nominal, best, rests, {i: [] for i in rests})
+
+    def _run(self, nominal: Grouped, promises: list[Promise]) -> ContrastFound:
+        """Search forward, swap, take back what is superfluous, under the noise that the set itself leaves."""
         best = self._forward(nominal, promises)
         self.progress(0.6, "swaps")
         best = self._settled(best)
@@ -112,7 +124,7 @@ class ContrastSearch:
                 best = self._two_at_once(self.fits.refined(first), base) or self._common(tried, base)
             if best is None:
                 break
-            base = self.fits.in_common(best)
+            base = self._kept = self.fits.in_common(best)
             promises, _ = self.fits.promises(base)
         return base
 
@@ -212,11 +224,8 @@ class ContrastSearch:
         """
         best = self._dropped(self.fits.in_common(best))
         while True:
-            p_values, without, rivals = {}, {}, {}
-            for item in best.changes:
-                rest = self.fits.without(best, item)
-                without[item] = self.fits.weighed_as(rest, best)
-                p_values[item] = p_value(self.fits, self.family, best, rest)
+            rests, rivals = {i: self.fits.without(best, i) for i in best.changes}, {}
+            for item, rest in rests.items():
                 rivals[item] = self._tenable(self._beside(rest, self.fits.promises(rest)[0], item), best, rest)
             every = [one for many in rivals.values() for one in many]
             doubtful = [f for f in every if f.items[-1].group is None and f.price < best.price + SEPARABLE]
@@ -224,6 +233,14 @@ class ContrastSearch:
             if not doubtful and better is None:
                 break
             best = self._dropped(min(doubtful, key=lambda f: f.price)) if doubtful else better or best
+        return self._with_rivals(nominal, best, rests, rivals)
+
+    def _with_rivals(
+        self, nominal: Grouped, best: Grouped, rests: dict[Item, Grouped], rivals: dict[Item, list[Grouped]]
+    ) -> ContrastFound:
+        """A set, from the fits without each of its changes, with the probability and the rivals of each."""
+        p_values = {i: p_value(self.fits, self.family, best, rest) for i, rest in rests.items()}
+        without = {i: self.fits.weighed_as(rest, best) for i, rest in rests.items()}
         promises, _ = self.fits.promises(best)
         return ContrastFound(nominal, best, p_values, without, rivals, promises, self.family)
 

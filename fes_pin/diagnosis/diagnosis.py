@@ -25,7 +25,7 @@ from fes_pin.diagnosis.misread import NAME as MISREAD
 from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.restate import restated_study, search_with_conditions, with_misread
-from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.diagnosis.result import STOPPED, Diagnosis
 from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import NominalFitError, SimulationSearch
 from fes_pin.diagnosis.searches import Result, Search, Searches
@@ -34,7 +34,7 @@ from fes_pin.identify.recording import earns, low_pass_of
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs.base import Rig
-from fes_pin.workers import OutOfTime, Progress, one_thread_each, time_limit
+from fes_pin.workers import OutOfTime, Progress, noting_stops, one_thread_each, time_limit
 
 
 def diagnose_joint(
@@ -77,13 +77,14 @@ def diagnose_joint(
     catalogue, made = catalogue_of(library), provenance_now(study, seed)
     measured = measured_study(study)
     warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
-    work = _Work(catalogue, seed, tell, math.inf if limit is None else began + limit)
-    with one_thread_each():
+    with one_thread_each(), noting_stops() as stops:
+        work = _Work(catalogue, seed, tell, math.inf if limit is None else began + limit, stops)
         diagnosis = work.diagnosis_of_log(measured.study)
     tell(1.0, "done")
     warnings += diagnosis.warnings
-    if work.was_stopped:
+    if stops:
         warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
+        diagnosis = replace(diagnosis, verdict=STOPPED)
     found = replace(diagnosis, left_out=measured.left_out, warnings=tuple(warnings), catalogue=catalogue)
     return replace(found, provenance=made, wall_s=time.perf_counter() - began)
 
@@ -97,15 +98,12 @@ class _Work:
         As of `diagnose_joint`.
     end
         When searches must have ended, of `time.perf_counter`.
-
-    Attributes
-    ----------
-    was_stopped
-        True if one had to.
+    stops
+        Holds something once a search had to; see `noting_stops`.
     """
 
-    def __init__(self, catalogue: Catalogue, seed: int, tell: Progress, end: float) -> None:
-        self.catalogue, self.seed, self.tell, self.end, self.was_stopped = catalogue, seed, tell, end, False
+    def __init__(self, catalogue: Catalogue, seed: int, tell: Progress, end: float, stops: list[float]) -> None:
+        self.catalogue, self.seed, self.tell, self.end, self.stops = catalogue, seed, tell, end, stops
 
     def diagnosis_of_log(self, study: Study) -> Diagnosis:
         """The diagnosis of a study as its log wrote it down, with what that did to its trials undone if it can be."""
@@ -115,13 +113,13 @@ class _Work:
         faults = LogFaults(study.trials, lambda trials: _searched(study, trials, driven), self.end)
         log = Log(effort_noise=faults.noise_beside_nominal(nominal)) if driven and logged else Log()
         found = self._logged(study, log)
-        if not self.was_stopped and (passed := _low_passed(found, self.end)) is not None:
+        if not self.stops and (passed := _low_passed(found, self.end)) is not None:
             found = _likelier(self.diagnosis(passed), found)
         if found.extended.doubt is None or not logged:
             return found
-        if not self.was_stopped and (noise := faults.noise_beside(found)) != found.log.effort_noise:
+        if not self.stops and (noise := faults.noise_beside(found)) != found.log.effort_noise:
             found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
-        late = None if self.was_stopped else faults.lateness(found)
+        late = None if self.stops else faults.lateness(found)
         if late is not None:
             recorded, log = found, with_timing_of(found.log, late.log)
             found = likelier(self._logged(study, log), recorded)
@@ -151,7 +149,6 @@ class _Work:
             reason = f"the search met numbers that cannot be calculated with ({problem})"
             assert searches.last is not None
             found = unfitted(study, searches.last.nominal(), reason, test)
-        self.was_stopped |= searches.last is not None and searches.last.was_stopped
         return replace(found, warnings=(*said, *found.warnings))
 
     def _judged(self, study: Study, searches: Searches, train: list[Trial], test: list[Trial]) -> Diagnosis:

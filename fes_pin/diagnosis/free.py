@@ -15,7 +15,7 @@ from fes_pin.diagnosis.decide.held_out import HeldOut, cross_validate, errors_of
 from fes_pin.diagnosis.decide.rivals import absorbed, equivalents, estimates, experiment, ranking
 from fes_pin.diagnosis.errors_ahead import free_errors
 from fes_pin.diagnosis.remainder.open_set import Remainder, unexplained_remainder
-from fes_pin.diagnosis.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosis
+from fes_pin.diagnosis.result import CROSS_VALIDATED, NOTHING, SEPARATE, STOPPED, Diagnosis
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.misspecified import under_one_noise
 from fes_pin.diagnosis.search.simulation_search import Searched, SimulationSearch
@@ -58,8 +58,6 @@ def judge_free(
     left, reason = with_error(with_refused(left, refused), searched)
     if worthless:
         left, reason = replace(left, unexplained=True), "the best set of causes predicts worse than a mean would"
-    if searched.stopped and not causes:
-        left, reason = replace(left, unexplained=True), "the search was stopped before a cause earned its place"
     if not causes and not searched.complete and not searched.stopped:
         searched = search.for_prediction(searched)
         held = _held_out(search, searched, test, horizon)
@@ -89,13 +87,13 @@ def judge_free(
 
 
 def unfitted(study: Study, nominal: Fit, reason: str, test: Sequence[Trial]) -> Diagnosis:
-    """What is said where no fit carries a verdict: that something is unexplained, and why."""
+    """The diagnosis where fits did not converge: that the search stopped, and why."""
     floor = rough_noise(Model(nominal.model.rig), nominal.trials)
     inside = errors_of(nominal.model, nominal.trials, floor)
     outside = errors_of(nominal.model, test, floor).error_percent() if test else None
     return Diagnosis(
         study=study,
-        verdict="unexplained",
+        verdict=STOPPED,
         causes=(),
         remainder=Remainder(True, math.nan, None),
         absorbed=(),

@@ -32,7 +32,10 @@ from fes_pin.models.model import Model
 if TYPE_CHECKING:
     import pandas
 
+STOPPED = "stopped"
+"""The verdict where a limit of time ended the search, or fits did not converge: the set is the best so far."""
 HEADLINES = {
+    STOPPED: "stopped: best set so far: no cause, and no claim about causes that were not tried.",
     "adequate": "the model is adequate: these data justify no extension of it.",
     "unexplained": "the model misses something, and nothing in the library explains it.",
 }
@@ -56,7 +59,8 @@ class Diagnosis:
     Attributes
     ----------
     verdict
-        "adequate", "causes_found" or "unexplained".
+        "adequate", "causes_found", "unexplained", or "stopped": a limit of time ended the search, or fits did not
+        converge. Then the causes are the best set so far, and nothing is claimed of what is not among them.
     causes
         By held-out gain, largest first.
     model
@@ -151,7 +155,9 @@ class Diagnosis:
             return HEADLINES[self.verdict].removesuffix(".") + (f": {self.reason}." if self.reason else ".")
         share = self.explained_percent()
         rest = ", and something is left" if self.remainder.unexplained else ""
-        return f"{explaining(count)} {share:.0f} % of what the model gets wrong, {100.0 - share:.0f} % stays{rest}."
+        so_far = "stopped: best set so far: " if self.verdict == STOPPED else ""
+        gone = f"{share:.0f} % of what the model gets wrong, {100.0 - share:.0f} % stays"
+        return f"{so_far}{explaining(count)} {gone}{rest}."
 
     def footnotes(self) -> list[str]:
         """What stands beneath the table."""

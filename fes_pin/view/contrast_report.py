@@ -34,7 +34,9 @@ def contrast_html(found: Contrast) -> str:
 def _head(found: Contrast) -> Markup:
     counts = ", ".join(f"{g}: {sum(t.group == g for t in found.study.trials)} trials" for g in found.groups)
     words = contrast_headline(found)
-    style = {"nothing_changed": "adequate", "changed": "causes_found", "unexplained": "unexplained"}[found.verdict]
+    style = {"nothing_changed": "adequate", "changed": "causes_found", "unexplained": "unexplained"}.get(
+        found.verdict, "stopped"
+    )
     return element(
         "header",
         element("p", f"{found.study.name} \u00b7 rig {found.study.rig} \u00b7 {counts}", class_="eyebrow"),

@@ -8,7 +8,7 @@ import re
 from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.errors_ahead import Ahead
 from fes_pin.diagnosis.record import NEXT_FILE
-from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.diagnosis.result import STOPPED, Diagnosis
 from fes_pin.diagnosis.text import LEAST_P, percent, probability, quantity
 from fes_pin.models.describe import sentence
 from fes_pin.models.stage import Effect
@@ -30,15 +30,18 @@ def listed(names: list[str], last: str = "and") -> str:
 
 def title(diagnosis: Diagnosis) -> str:
     """The verdict as the heading of the page."""
+    so_far = "Stopped: best set so far: " if diagnosis.verdict == STOPPED else ""
     if not diagnosis.causes:
         if diagnosis.verdict == "adequate":
             return "The model is adequate"
+        if so_far:
+            return f"{so_far}no cause"
         return "The model misses something that no known cause explains"
     lacks = [plain(c.name) for c in diagnosis.causes if c.trial is None]
     misread = [f"trial {c.trial} was not run as it states" for c in diagnosis.causes if c.trial is not None]
     said = listed([*misread, *([f"the model lacks {listed(lacks)}"] if lacks else [])])
     rest = " \N{EN DASH} and something more" if diagnosis.remainder.unexplained else ""
-    return f"{said[0].upper()}{said[1:]}{rest}"
+    return f"{so_far}{said}{rest}" if so_far else f"{said[0].upper()}{said[1:]}{rest}"
 
 
 def answers(diagnosis: Diagnosis) -> Markup:
@@ -176,7 +179,11 @@ def _nothing(diagnosis: Diagnosis) -> list[tuple[str, Content]]:
             ("How large its error is", f"{size}."),
             ("How sure that is", f"What the model leaves looks like noise ({probability(left.p_value)})."),
         ]
-    why = diagnosis.reason or "something is there, and none of the causes in the library earned its place"
+    why = diagnosis.reason or (
+        "the search ended before it had tried every cause; nothing is claimed of those that it did not try"
+        if diagnosis.verdict == STOPPED
+        else "something is there, and none of the causes in the library explains it"
+    )
     where = f" It depends most on {left.where}." if left.where else ""
     return [
         ("What the model gets wrong", f"{why[0].upper()}{why[1:]}. {count} causes were looked for.{where}"),
@@ -192,7 +199,16 @@ def _certain(p_value: float) -> str:
     return f"Noise alone leaves as much in {often}."
 
 
+NEXT = {
+    STOPPED: "Diagnose again without a limit of time, or with a longer one, before you use this answer.",
+    "adequate": "Keep the model. To look for causes that these trials cannot show, record other ones.",
+}
+"""What to do next, by verdicts that alone decide it."""
+
+
 def _next(diagnosis: Diagnosis) -> Content:
+    if diagnosis.verdict in NEXT:
+        return NEXT[diagnosis.verdict]
     plan = diagnosis.next_experiment
     if plan is not None and diagnosis.causes:
         pair = listed([plain(n) for n in plan.separates])
@@ -210,8 +226,6 @@ def _next(diagnosis: Diagnosis) -> Content:
         )
     if diagnosis.causes:
         return "Use the extended model with care, and look at what is left: the missing torque shows what it follows."
-    if diagnosis.verdict == "adequate":
-        return "Keep the model. To look for causes that these trials cannot show, record other ones."
     return (
         "Look at the missing torque below, most telling variable first; check sensors and conditions of the trials "
         "that are missed most; write the cause that you suspect as one of your own, and diagnose again."

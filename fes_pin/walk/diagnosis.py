@@ -27,7 +27,7 @@ from fes_pin.walk.judge import (
 from fes_pin.walk.likelihood import white_level
 from fes_pin.walk.nulls import LEVEL, Nulls, simulated_nulls
 from fes_pin.walk.recording import recordings_of
-from fes_pin.walk.result import Estimate, WalkCause, WalkDiagnosis, WalkRemainder
+from fes_pin.walk.result import STOPPED, Estimate, WalkCause, WalkDiagnosis, WalkRemainder
 from fes_pin.walk.search import WalkSearch
 from fes_pin.workers import Progress, one_thread_each, time_limit
 
@@ -88,8 +88,11 @@ def diagnose_walk(
         tell(0.85, "strides held out")
         out = _judged(study, search, best, nulls, seed)
     tell(1.0, "done")
-    stopped = (f"the search was stopped at its limit of {limit:g} s: best set so far",) if search.was_stopped else ()
-    return replace(out, cutoff_hz=cutoff_hz, warnings=stopped, wall_s=time.perf_counter() - began)
+    out = replace(out, cutoff_hz=cutoff_hz, wall_s=time.perf_counter() - began)
+    if not search.was_stopped:
+        return out
+    said = f"the search was stopped at its limit of {limit:g} s: best set so far"
+    return replace(out, verdict=STOPPED, warnings=(said,))
 
 
 def _chosen(sizes: list[Set], critical: float) -> Set:

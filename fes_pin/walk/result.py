@@ -19,7 +19,10 @@ from fes_pin.walk.search import WalkSearch
 
 CERTAIN = 1e-6
 """Level of a cause in a single stride."""
+STOPPED = "stopped"
+"""The verdict where a limit of time ended the search: the set is the best so far."""
 HEADLINES = {
+    STOPPED: "stopped: best set so far: no cause, and no claim about causes that were not tried.",
     "adequate": "the walking model is adequate: these data justify no extension of it.",
     "unexplained": "the walking model misses something, and nothing in the library explains it.",
 }
@@ -111,7 +114,7 @@ class WalkDiagnosis:
     Attributes
     ----------
     verdict
-        "adequate", "causes_found" or "unexplained".
+        "adequate", "causes_found", "unexplained", or "stopped": a limit of time ended the search.
     causes
         By held-out gain, largest first.
     remainder
@@ -152,7 +155,8 @@ class WalkDiagnosis:
         if not count:
             return HEADLINES[self.verdict]
         rest = ", and something is left" if self.remainder.unexplained else ""
-        return f"{explaining(count)} what the walking model gets wrong{rest}."
+        so_far = "stopped: best set so far: " if self.verdict == STOPPED else ""
+        return f"{so_far}{explaining(count)} what the walking model gets wrong{rest}."
 
     def footnotes(self) -> list[str]:
         """What stands beneath the table."""

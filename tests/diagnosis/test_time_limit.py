@@ -1,5 +1,6 @@
 """A search that is stopped tells the best set so far, and says so."""
 
+import json
 import time
 
 import pytest
@@ -30,7 +31,10 @@ def test_work_ends_at_its_limit_in_every_thread(monkeypatch):
 
 def test_without_time_nothing_is_claimed(study):
     stopped = diagnose_joint(study, limit=0.0)
-    assert stopped.verdict == "unexplained" and "stopped before a cause" in stopped.reason
+    assert stopped.verdict == "stopped" and not stopped.causes and stopped.reason is None
+    assert "stopped: best set so far" in str(stopped) and "nothing in the library explains it" not in str(stopped)
+    assert "Stopped: best set so far" in report_html(stopped)
+    assert json.loads(diagnosis_files(stopped)["diagnosis.json"])["verdict"] == "stopped"
     assert any("limit of 0 s" in w for w in stopped.warnings)
     assert report_html(stopped) and diagnosis_files(stopped)
 
@@ -43,6 +47,7 @@ def test_what_has_earned_its_place_is_told(study, monkeypatch):
 
     monkeypatch.setattr(SimulationSearch, "_extend_beam", out_of_time)
     stopped = diagnose_joint(study, limit=1e3)
-    assert [c.name for c in stopped.causes] == ["coulomb_friction"]
+    assert [c.name for c in stopped.causes] == ["coulomb_friction"] and stopped.verdict == "stopped"
+    assert "stopped: best set so far: one cause explains" in stopped.headline()
     assert stopped.nominal_error[1] is None and any("limit of 1000 s" in w for w in stopped.warnings)
     assert report_html(stopped) and diagnosis_files(stopped)

@@ -33,7 +33,7 @@ def test_a_fit_ends_at_its_limit(study):
 
 def test_without_time_nothing_is_claimed(study):
     stopped = diagnose_joint(study, limit=0.0)
-    assert stopped.verdict == "unexplained" and not stopped.causes
+    assert stopped.verdict == "stopped" and not stopped.causes
     assert any("limit of 0 s" in w for w in stopped.warnings)
     assert report_html(stopped) and diagnosis_files(stopped)
 
@@ -49,6 +49,6 @@ def test_what_has_earned_its_place_is_told(study, monkeypatch):
 
     monkeypatch.setattr(LikelihoodSearch, "_extend", out_of_time)
     stopped = diagnose_joint(study, limit=1e3)
-    assert [c.name for c in stopped.causes] == ["coulomb_friction"]
+    assert [c.name for c in stopped.causes] == ["coulomb_friction"] and stopped.verdict == "stopped"
     assert any("limit of 1000 s" in w for w in stopped.warnings)
     assert report_html(stopped) and diagnosis_files(stopped)

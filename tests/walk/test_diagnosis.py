@@ -61,6 +61,7 @@ def test_one_question_for_every_study_and_its_limit_of_time_holds(heavy, tmp_pat
     assert isinstance(found, type(heavy))
     assert found.warnings == ("the search was stopped at its limit of 0 s: best set so far",)
     assert not found.causes and not heavy.warnings
+    assert found.verdict == "stopped" and "stopped: best set so far" in found.headline()
     assert json.loads(walk_files(found)["diagnosis.json"])["warnings"] == list(found.warnings)
     assert "stopped at its limit" in str(found)
     assert heavy.model.mass_kg > found.model.mass_kg

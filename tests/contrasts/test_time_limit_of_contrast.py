@@ -1,0 +1,37 @@
+"""A contrast that is stopped says so as its verdict, keeps the best set so far, and claims nothing else."""
+
+import json
+
+import pytest
+from contrast_pairs.free import free_pair
+
+import fes_pin as fp
+from fes_pin.contrasts.record import contrast_json
+from fes_pin.contrasts.search import ContrastSearch
+from fes_pin.view.contrast_report import contrast_html
+from fes_pin.workers import OutOfTime
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return free_pair("muscle", ("gain",), 80.0, 9, tmp_path_factory.mktemp("pair"))
+
+
+def test_without_time_nothing_is_claimed(study):
+    found = fp.contrast(study, limit=0.0)
+    assert found.verdict == "stopped" and not found.changes
+    assert not found.unchanged and not found.excluded
+    assert "stopped: best set so far: no change" in str(found)
+    assert "Stopped: best set so far" in contrast_html(found)
+    assert json.loads(contrast_json(found))["verdict"] == "stopped"
+    assert any("limit of 0 s" in words for words in found.warnings)
+
+
+def test_a_change_that_was_found_in_time_is_kept(study, monkeypatch):
+    def out_of_time(search, best):
+        raise OutOfTime
+
+    monkeypatch.setattr(ContrastSearch, "_settled", out_of_time)
+    found = fp.contrast(study, limit=1e3)
+    assert found.verdict == "stopped" and [c.name for c in found.changes] == ["gain"]
+    assert "stopped: best set so far: one thing changed" in str(found)
