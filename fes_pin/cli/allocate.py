@@ -8,7 +8,10 @@ from typing import Annotated
 
 import typer
 
+from fes_pin.cli.group import needs
+from fes_pin.cli.options import pairs
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number_in
 
 MOST_NM, MOST_DEG_S = 1e5, 1e4
 """No body's joint has more torque, N m, nor turns faster, degrees per second."""
@@ -16,7 +19,7 @@ MOST_US = 1e5
 """No stimulator's pulse is longer, us."""
 
 
-def pairs(values: list[str], what: str, most: float) -> dict[str, float]:
+def joint_numbers(words: list[str] | None, what: str, most: float) -> dict[str, float]:
     """Numbers by name from `name=number`.
 
     Raises
@@ -27,16 +30,12 @@ def pairs(values: list[str], what: str, most: float) -> dict[str, float]:
     from fes_pin.body.joints import known_joint
 
     result: dict[str, float] = {}
-    for value in values:
-        name, equal, text = (part.strip() for part in value.partition("="))
+    for name, text in pairs(what, words).items():
         try:
-            number = float(text)
-        except ValueError:
-            equal = ""
-        if not equal:
-            raise InputError(f"{what} must read joint=number, got {value!r}")
-        if known_joint(name) in result:
-            raise InputError(f"{what} names {name} twice: {result[name]:g} and {number:g}")
+            number = number_in(text)
+        except ValueError as problem:
+            raise InputError(f"{problem} of {name}", column=what) from None
+        known_joint(name)
         if not abs(number) <= most:
             raise InputError(f"{what} of {name} must lie within {most:g} either way, got {text}")
         result[name] = number
@@ -56,6 +55,9 @@ def within(value: float, low: float, high: float, option: str) -> float:
     return value
 
 
+@needs(
+    **dict.fromkeys(("angle", "rate", "least", "as_json", "threshold_us", "saturation_us"), "torque"), passive="walk"
+)
 def allocate(
     torque: Annotated[
         list[str] | None, typer.Argument(help="Wanted torques, joint=N m, such as left_knee_flexion=-40.")
@@ -88,12 +90,6 @@ def allocate(
     from fes_pin.muscles.recruitment import LinearRecruitment
 
     _alone(walk=walk is not None, nerves=nerves, torques=bool(torque))
-    only_torque = {"--angle": angle, "--rate": rate, "--least": least, "--json": as_json or None}
-    for option, given in only_torque.items():
-        if given and not torque:
-            raise InputError(f"{option} goes with a wanted torque")
-    if passive is not None and walk is None:
-        raise InputError("--passive goes with --walk")
     if strength is not None:
         within(strength, 0.0, STRONGEST, "--strength")
     if least is not None:
@@ -109,13 +105,13 @@ def allocate(
     if walk is not None:
         typer.echo(walk_table(walk, channels, 0.0 if passive is None else within(passive, 0.0, 10.0, "--passive")))
         return
-    wanted = pairs(torque or [], "a torque", MOST_NM)
-    posture = {name: radians(value) for name, value in pairs(angle or [], "--angle", 360.0).items()}
+    wanted = joint_numbers(torque, "a torque", MOST_NM)
+    posture = {name: radians(value) for name, value in joint_numbers(angle, "--angle", 360.0).items()}
     for name, value in posture.items():
         low, high = joint_limits(name)
         if not low <= value <= high:
             raise InputError(f"--angle: {name} must lie within {degrees(low):.0f} to {degrees(high):.0f} degrees")
-    rates = {name: radians(value) for name, value in pairs(rate or [], "--rate", MOST_DEG_S).items()}
+    rates = {name: radians(value) for name, value in joint_numbers(rate, "--rate", MOST_DEG_S).items()}
     curve = LinearRecruitment(threshold_us, saturation_us)
     answer = solve(wanted, channels, posture, least=least, recruitment=curve, v=rates or None)
     typer.echo(json.dumps(answer.as_dict(), indent=1) if as_json else str(answer))

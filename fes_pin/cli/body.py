@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import wraps
 from inspect import Signature, signature
 from pathlib import Path
@@ -10,10 +10,10 @@ from typing import Annotated
 
 import typer
 
-from fes_pin.cli.group import Commands, release_output
+from fes_pin.cli.group import App, needs, python_names, release_output
 from fes_pin.data.errors import InputError
 
-app = typer.Typer(cls=Commands, help="The walking body: modes, nerves, view.")
+app = App(help="The walking body: modes, nerves, view.")
 
 
 def _body_options(
@@ -38,14 +38,9 @@ def _body_options(
     from fes_pin.body.minimal_sets import ORTHOSES
     from fes_pin.body.passive import PassiveLegs
 
-    person = {"--mass": mass, "--height": height, "--sex": sex, "--stance": stance}
-    if segments is not None and urdf is not None:
-        raise InputError("give a table of segments or a URDF, not both", column="--urdf")
     if urdf is not None:
-        _none_of(person, "the URDF says it", "--urdf")
         body = Body.from_urdf(urdf)
     elif segments is not None:
-        _none_of({n: v for n, v in person.items() if n != "--stance"}, "the table of segments says it", "--segments")
         body = Body.from_segments(segments, stance or "right")
     else:
         body = Body.from_subject(
@@ -55,13 +50,6 @@ def _body_options(
     linear = linearize(body, posture, slope, passive=legs)
     joints = [joint for name in brace or [] for joint in ORTHOSES.get(name, (name,))]
     return linear.brace(list(dict.fromkeys(joints))) if joints else linear
-
-
-def _none_of(options: Mapping[str, object], why: str, with_option: str) -> None:
-    """Options that another one leaves no meaning are refused."""
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise InputError(f"does not go with {with_option}: {why}", column=given[0])
 
 
 def _within(value: float, option: str, low: float, high: float) -> float:
@@ -76,6 +64,8 @@ def _of_a_body(command: Callable) -> Callable:
     common = signature(_body_options, eval_str=True).parameters
     own = list(signature(command, eval_str=True).parameters.values())[1:]
 
+    @needs(**dict.fromkeys(("mass", "height", "sex"), "not urdf segments"), stance="not urdf", segments="not urdf")
+    @python_names(mass_kg="--mass", height_m="--height")
     @wraps(command)
     def run(**given):
         return command(_body_options(**{name: given.pop(name) for name in common}), **given)
@@ -87,6 +77,7 @@ def _of_a_body(command: Callable) -> Callable:
 
 @app.command()
 @_of_a_body
+@needs(doubt="goniometers")
 def modes(
     linear,
     goniometers: Annotated[bool, typer.Option("--goniometers", help="also the fewest that see every fall")] = False,
@@ -109,6 +100,7 @@ def modes(
 
 @app.command()
 @_of_a_body
+@needs(max_braces="fewest", lean="fewest", constant="fewest")
 def nerves(
     linear,
     name: Annotated[list[str] | None, typer.Argument(help="nerves to use; all of the table if none is named")] = None,
@@ -186,6 +178,7 @@ def _fewest(linear, inputs, lean: float, max_braces: int, stimulation: str, sett
 
 @app.command()
 @_of_a_body
+@needs(posture="not walk", slope="not walk", brace="mode nerve", passive="mode")
 def view(
     linear,
     out: Annotated[Path | None, typer.Argument(help="HTML page to write")] = None,
@@ -238,28 +231,14 @@ def _serve(scene) -> None:
 
 
 def _walking(body, path: Path):
-    import warnings
-    from io import StringIO
-
     import numpy as np
 
     from fes_pin.body.gait import pelvis_turns, postures_of_walk
     from fes_pin.body.joints import JOINT_NAMES
-    from fes_pin.data.files import read_text
+    from fes_pin.data.motion import read_coordinates
     from fes_pin.view.viewer import show_walk
 
-    text = read_text(path)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # numpy warns of an empty file, and of rows of another length
-            table = np.atleast_1d(np.genfromtxt(StringIO(text), delimiter=",", names=True))
-        columns = {name: table[name] for name in table.dtype.names or ()}
-        time = columns["time"] if "time" in columns else columns["time_s"]
-    except (ValueError, TypeError, KeyError, IndexError, Warning) as error:
-        reason = " ".join(str(error).split())[:100] or "no columns"
-        raise InputError(f"cannot be read as coordinates with a column time_s: {reason}", file=path) from None
-    if len(time) < 2 or not (np.diff(time) > 0.0).all():
-        raise InputError("needs two or more samples, and times that rise", file=path)
+    time, columns = read_coordinates(path)
     try:
         postures, turns = postures_of_walk(columns, body.stance, flat_foot=False), pelvis_turns(columns)
     except InputError as error:

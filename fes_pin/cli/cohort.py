@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fes_pin.cli.group import VOICE, needs, remark
+from fes_pin.cli.options import Libraries
+
 if TYPE_CHECKING:
     from fes_pin.cohort.run import CohortProgress
 
@@ -19,6 +22,7 @@ SAID_EVERY_S = 30.0
 """Seconds between lines of progress where nobody watches."""
 
 
+@needs(workers="not scheduler")
 def cohort(
     studies: Annotated[list[Path], typer.Argument(help="Studies, or folders that hold studies.")],
     out: Annotated[Path, typer.Option(help="Folder for the answers, the tables and cohort.html; a run goes on in it.")],
@@ -30,9 +34,7 @@ def cohort(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values and bootstrap intervals.")] = 0,
     limit: Annotated[float | None, typer.Option(min=0.0, help="Seconds of search for each study.")] = None,
-    library: Annotated[
-        list[str] | None, typer.Option("--library", help="A Python file or module with causes or rigs; it is run.")
-    ] = None,
+    library: Libraries = None,
 ) -> None:
     """Diagnose many studies, and say what they have in common. What is there already is not done again."""
     from fes_pin.cohort.run import run_cohort
@@ -62,13 +64,13 @@ def cohort(
 @contextmanager
 def _progress() -> Iterator[Callable[[CohortProgress], None]]:
     """A bar with the time left on standard error if a person is watching, a line now and then if not."""
-    if not sys.stderr.isatty():
+    if VOICE.get() or not sys.stderr.isatty():
         said = [0.0]
 
         def line(p: CohortProgress) -> None:
-            if time.monotonic() - said[0] > SAID_EVERY_S or p.done == p.total:
+            if time.monotonic() - said[0] > SAID_EVERY_S or VOICE.get() > 0 or p.done == p.total:
                 said[0] = time.monotonic()
-                typer.echo(f"fes-pin: {p.done} of {p.total}, {p.failed} failed, {_left(p.left_s)}", err=True)
+                remark(f"fes-pin: {p.done} of {p.total}, {p.failed} failed, {_left(p.left_s)}")
 
         yield line
         return

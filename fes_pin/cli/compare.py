@@ -7,12 +7,8 @@ from typing import Annotated
 
 import typer
 
+from fes_pin.cli.options import Libraries
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
-
-Libraries = Annotated[
-    list[str] | None,
-    typer.Option("--library", help="A Python file, or the name of a module, with causes or rigs. Its code is run."),
-]
 
 
 def compare(

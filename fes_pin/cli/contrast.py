@@ -7,14 +7,12 @@ from typing import Annotated
 
 import typer
 
+from fes_pin.cli.group import needs
+from fes_pin.cli.options import Libraries
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
 
-Libraries = Annotated[
-    list[str] | None,
-    typer.Option("--library", help="A Python file, or the name of a module, with causes or rigs. Its code is run."),
-]
 
-
+@needs(by="not after")
 def contrast(
     study: Annotated[Path, typer.Argument(help="Folder of a study whose trials have groups, or of what was before.")],
     out: Annotated[Path, typer.Option(help="Folder for contrast.json and report.html.")],
@@ -33,13 +31,10 @@ def contrast(
     from fes_pin.contrasts.contrast import contrast as find
     from fes_pin.contrasts.record import FILE, contrast_json
     from fes_pin.contrasts.result import contrast_text
-    from fes_pin.data.errors import InputError
     from fes_pin.data.files import check_folder, write_files
     from fes_pin.data.study import read_study
     from fes_pin.view.contrast_report import contrast_html
 
-    if after is not None and by is not None:
-        raise InputError("expected --by, or a second study, found both: two studies are two groups")
     catalogue = catalogue_with(library)
     schemas = catalogue.schemas()
     before = read_study(study, rigs=schemas)

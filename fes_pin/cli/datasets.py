@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
+from fes_pin.cli.group import needs
 
+
+@needs(out="names", unverified="names")
 def datasets(
     names: Annotated[list[str] | None, typer.Argument(help="To fetch. [default: list them]")] = None,
     out: Annotated[

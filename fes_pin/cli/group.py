@@ -1,20 +1,78 @@
-"""What all commands share: bad input is one line on standard error and exit code 2, with nothing printed before."""
+"""What all commands share: help, what options need, and bad input as one line on standard error and exit code 2."""
 
 from __future__ import annotations
 
 import io
 import os
+import re
 import sys
+from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
-from typing import Any, TextIO
+from contextvars import ContextVar
+from functools import wraps
+from inspect import Parameter, Signature, signature
+from typing import Annotated, Any, TextIO, TypeVar
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from fes_pin.data.errors import InputError
 
 USAGE_ERROR: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 """What typer raises for a command line that it cannot read; it exports only classes below this one."""
+
+VOICE: ContextVar[int] = ContextVar("VOICE", default=0)
+"""How much is said besides the answer: -1 with --quiet, 1 with --verbose."""
+QUIET, LOUD = "No progress, no remarks; with --out only errors.", "Progress as lines where no bar is watched."
+SHARED = (
+    Parameter("ctx", Parameter.KEYWORD_ONLY, annotation=typer.Context),
+    Parameter(
+        "quiet",
+        Parameter.KEYWORD_ONLY,
+        default=False,
+        annotation=Annotated[bool, typer.Option("--quiet", "-q", help=QUIET)],
+    ),
+    Parameter(
+        "verbose",
+        Parameter.KEYWORD_ONLY,
+        default=False,
+        annotation=Annotated[bool, typer.Option("--verbose", "-v", help=LOUD)],
+    ),
+)
+"""Parameters of every command."""
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def needs(**rules: str) -> Callable[[F], F]:
+    """Say of options of a command when they have a meaning: where they would be ignored they are refused.
+
+    Parameters
+    ----------
+    rules
+        By parameter the parameters of which one must be given as well ("rate width"), or none after "not".
+    """
+
+    def with_rules(command: F) -> F:
+        command.__dict__.setdefault("rules", {}).update(rules)
+        return command
+
+    return with_rules
+
+
+def python_names(**words: str) -> Callable[[F], F]:
+    """Say which words of a command line give what errors name as an argument of Python: `horizon_s="--horizon"`."""
+
+    def with_words(command: F) -> F:
+        command.__dict__.setdefault("words", {}).update(words)
+        return command
+
+    return with_words
+
+
+def remark(text: str) -> None:
+    """Say something besides the answer, on standard error; nothing with --quiet."""
+    if VOICE.get() >= 0:
+        typer.echo(text, err=True)
 
 
 class Held(io.StringIO):
@@ -22,9 +80,11 @@ class Held(io.StringIO):
 
     def __init__(self, stream: TextIO) -> None:
         super().__init__()
-        self.stream, self.is_released = stream, False
+        self.stream, self.is_released, self.is_silent = stream, False, False
 
     def write(self, text: str, /) -> int:
+        if self.is_silent:
+            return len(text)
         return self.stream.write(text) if self.is_released else super().write(text)
 
     def flush(self) -> None:
@@ -56,6 +116,93 @@ def release_output() -> None:
     """Print at once what the command has said so far, and what follows: for a command that waits for a person."""
     if isinstance(sys.stdout, Held):
         sys.stdout.release()
+
+
+class Command(TyperCommand):
+    """A command whose help is printed as it was written."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the help: what stands in brackets is no markup."""
+        from rich.markup import escape
+
+        one: Any
+        for one in (self, *self.params):
+            one.help = escape(getattr(one, "help", None) or "")
+        super().format_help(ctx, formatter)
+
+
+class App(typer.Typer):
+    """A group of commands that have -h, -q and -v, refuse options that they would ignore, and name them in errors."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]}, **given)
+
+    def command(self, name: str | None = None, **given: Any) -> Any:
+        """Add a function as a command, as typer's own."""
+        register = super().command(name, **{"cls": Command, **given})
+
+        def add(command: F) -> F:
+            register(_run_by_group(command))
+            return command
+
+        return add
+
+
+def _run_by_group(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The command with what all commands share before and after it."""
+
+    @wraps(command)
+    def run(ctx: typer.Context, quiet: bool, verbose: bool, **given: Any) -> Any:
+        words = {one.name: _word(one) for one in ctx.command.params if one.name is not None}
+        if quiet and verbose:
+            raise InputError("does not go with --verbose", column="--quiet")
+        _check_needs(ctx, words, getattr(command, "rules", {}))
+        if quiet and str(given.get("out") or "-") != "-" and isinstance(sys.stdout, Held):
+            sys.stdout.is_silent = True
+        before = VOICE.set(verbose - quiet)
+        try:
+            return command(**given)
+        except InputError as error:
+            raise _in_options(error, words, getattr(command, "words", {})) from error
+        finally:
+            VOICE.reset(before)
+
+    own = signature(command, eval_str=True).parameters.values()
+    parameters = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in (*own, *SHARED)]
+    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run
+
+
+def _check_needs(ctx: typer.Context, words: Mapping[str, str], rules: Mapping[str, str]) -> None:
+    """Refuse options that another one, or its absence, leaves no meaning."""
+    given = {
+        name
+        for name in words
+        if getattr(ctx.get_parameter_source(name), "name", "DEFAULT") != "DEFAULT"
+        and ctx.params.get(name) not in (None, (), [])
+    }
+    for name, rule in rules.items():
+        others = rule.removeprefix("not ").split()
+        there = [n for n in others if n in given]
+        if name in given and bool(there) == rule.startswith("not "):
+            told = " or ".join(words[n] for n in there or others)
+            raise InputError(f"{'does not go' if there else 'goes only'} with {told}", column=words[name])
+
+
+def _word(one: Any) -> str:
+    """What a person writes for a parameter: its option, or the name of an argument in capitals."""
+    return max(one.opts, key=len) if one.param_type_name == "option" else one.name.upper()
+
+
+def _in_options(error: InputError, own: Mapping[str, str], told: Mapping[str, str]) -> InputError:
+    """An error with options of the command line in place of arguments of Python."""
+    column, message = error.column, error.message
+    if error.file is None and column is not None:
+        column = told.get(column, own.get(column, column))
+    if told:
+        message = re.sub(rf"\b({'|'.join(map(re.escape, told))})\b", lambda found: told[found[0]], message)
+    return InputError(message, file=error.file, row=error.row, column=column)
 
 
 class Commands(TyperGroup):

@@ -14,7 +14,8 @@ from fes_pin.cli.cohort import cohort
 from fes_pin.cli.compare import compare
 from fes_pin.cli.contrast import contrast
 from fes_pin.cli.datasets import datasets
-from fes_pin.cli.group import Commands
+from fes_pin.cli.group import App
+from fes_pin.cli.options import Libraries, pairs
 from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from fes_pin.diagnosis.result import Diagnosis
     from fes_pin.models.model import Model
 
-app = typer.Typer(cls=Commands, pretty_exceptions_enable=False)
+app = App(pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
 app.command()(allocate)
 app.command()(new_study)
@@ -36,11 +37,6 @@ app.command()(pulses)
 app.command()(cohort)
 app.command()(contrast)
 app.command()(compare)
-
-Libraries = Annotated[
-    list[str] | None,
-    typer.Option("--library", help="A Python file, or the name of a module, with causes or rigs. Its code is run."),
-]
 
 DIAGNOSING = 0.8
 """Share of the time of `diagnose` before the report is drawn, about."""
@@ -167,7 +163,7 @@ def predict(
     catalogue = catalogue_with(library)
     check_table(out)
     loaded = load_model(model, library=catalogue)
-    kind, conditions = _settings(setting or [])
+    kind, conditions = _settings(setting)
     own = None if columns_of is None else read_columns(columns_of, rigs=catalogue.schemas())
     rig = loaded.rig.described()
     given = read_trial(trial, rig=rig, kind=kind, conditions=conditions, inputs_only=horizon is None, own=own)
@@ -214,25 +210,19 @@ def effects(library: Libraries = None) -> None:
     print_effects()
 
 
-def _settings(pairs: list[str]) -> tuple[str | None, dict[str, float]]:
+def _settings(words: list[str] | None) -> tuple[str | None, dict[str, float]]:
     """`--set` options as the kind of trial and its numbers."""
     from fes_pin.data.errors import InputError
+    from fes_pin.data.numbers import number_in
 
-    kind: str | None = None
+    given = pairs("--set", words)
+    kind = given.pop("kind", None)
     numbers: dict[str, float] = {}
-    for pair in pairs:
-        name, equals, value = pair.partition("=")
-        if not equals or not name:
-            raise InputError(f"expected --set NAME=VALUE, found {pair!r}")
-        if name in numbers or (name == "kind" and kind is not None):
-            raise InputError(f"expected --set {name} once, found it again as {pair!r}")
-        if name == "kind":
-            kind = value
-            continue
+    for name, value in given.items():
         try:
-            numbers[name] = float("" if "_" in value else value)
-        except ValueError:
-            raise InputError(f"expected a number for --set {name}, found {value!r}") from None
+            numbers[name] = number_in(value)
+        except ValueError as problem:
+            raise InputError(str(problem), column=f"--set {name}") from None
     return kind, numbers
 
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fes_pin.cli.group import release_output
+from fes_pin.cli.group import needs, release_output
+from fes_pin.cli.options import Libraries, pairs
 from fes_pin.data.files import write_files
 
 if TYPE_CHECKING:
@@ -27,12 +28,11 @@ if TYPE_CHECKING:
 FAR = 0.3
 """Share of the variance that a nominal model leaves from which on it is said that it is far off."""
 
-Libraries = Annotated[
-    list[str] | None,
-    typer.Option("--library", help="A Python file, or the name of a module, with causes or rigs. Its code is run."),
-]
 
-
+@needs(
+    **dict.fromkeys(("urdf", "rig", "name", "column", "setting", "resample", "fill", "library"), "files"),
+    upright="pendulum rod",
+)
 def new_study(
     files: Annotated[list[Path] | None, typer.Argument(help="Recordings, one a trial.")] = None,
     rig: Annotated[
@@ -87,7 +87,7 @@ def new_study(
         _write_template(template, out or Path(), force)
         return
     catalogue = load_library(*(library or []))
-    given: Mapping[str, object] = {"columns": _pairs("--column", column), "settings": _pairs("--set", setting)}
+    given: Mapping[str, object] = {"columns": pairs("--column", column), "settings": pairs("--set", setting)}
     with _urdf_file(template, urdf) as path:
         wanted = _wanted(files, rig, out, name, catalogue, template or urdf, path, resample, fill, given)
         if (wanted.folder / "study.toml").exists() and not force:
@@ -187,8 +187,6 @@ def _template(
         return "pendulum.urdf", templates.pendulum(*pendulum, upright)
     if rod is not None:
         return "rod.urdf", templates.rod(*rod, upright)
-    if upright:
-        raise InputError("expected --upright with --pendulum or --rod", column="--upright")
     return None if slide is None else ("slide.urdf", templates.slide(slide))
 
 
@@ -268,20 +266,6 @@ def _wanted(
 def _ask(question: str) -> str:
     release_output()
     return str(typer.prompt(question, default="", show_default=False))
-
-
-def _pairs(option: str, words: list[str] | None) -> dict[str, str]:
-    from fes_pin.data.errors import InputError
-
-    out: dict[str, str] = {}
-    for word in words or []:
-        key, equals, value = word.partition("=")
-        if not equals or not key:
-            raise InputError(f"expected {option} NAME=VALUE, found {word!r}")
-        if key in out:
-            raise InputError(f"expected {option} {key} once, found it again as {word!r}")
-        out[key] = value
-    return out
 
 
 def _tried(made: NewStudy, folder: Path, catalogue: Catalogue) -> tuple[Study, list[str]]:

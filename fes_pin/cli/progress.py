@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-import typer
+from fes_pin.cli.group import VOICE, remark
 
 if TYPE_CHECKING:
     from fes_pin.models.catalogue import Catalogue
@@ -23,14 +23,15 @@ def catalogue_with(library: list[str] | None) -> Catalogue:
 def say_whose_code(catalogue: Catalogue) -> None:
     """Say on standard error whose code runs beside that of fes-pin, a line for each file or module."""
     for where, names in catalogue.origins().items():
-        typer.echo(f"fes-pin: runs the code of {where}: {', '.join(names)}", err=True)
+        remark(f"fes-pin: runs the code of {where}: {', '.join(names)}")
 
 
 @contextmanager
 def progress() -> Iterator[Callable[[float, str], None]]:
-    """A progress bar on standard error, if a person is watching."""
-    if not sys.stderr.isatty():
-        yield lambda _share, _words: None
+    """A progress bar on standard error, if a person is watching; lines with --verbose, nothing with --quiet."""
+    if VOICE.get() < 0 or not sys.stderr.isatty():
+        loud = VOICE.get() > 0
+        yield lambda share, words: remark(f"fes-pin: {share:4.0%} {words}") if loud else None
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

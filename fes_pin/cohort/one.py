@@ -97,7 +97,7 @@ def _files(work: Work) -> dict[str, str | bytes]:
     catalogue = load_library(*work.library)
     study = read_study(work.folder, rigs=catalogue.schemas())
     if study.rig == "body":
-        return _walking(study, work.seed)
+        return _walking(study, work)
     from fes_pin.diagnosis.diagnosis import diagnose_joint  # noqa: PLC0415
     from fes_pin.diagnosis.record import by_command, diagnosis_files  # noqa: PLC0415
     from fes_pin.view.report import report_html  # noqa: PLC0415
@@ -106,10 +106,10 @@ def _files(work: Work) -> dict[str, str | bytes]:
     return {**diagnosis_files(found), "report.html": report_html(found)}
 
 
-def _walking(study: Any, seed: int) -> dict[str, str | bytes]:
+def _walking(study: Any, work: Work) -> dict[str, str | bytes]:
     from fes_pin.view.walk_report import walk_report_html  # noqa: PLC0415
     from fes_pin.walk.diagnosis import diagnose_walk  # noqa: PLC0415
     from fes_pin.walk.record import walk_files  # noqa: PLC0415
 
-    found = diagnose_walk(study, seed=seed)
+    found = diagnose_walk(study, seed=work.seed, limit=work.limit)
     return {**walk_files(found), "report.html": walk_report_html(found)}

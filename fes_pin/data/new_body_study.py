@@ -11,6 +11,7 @@ from fes_pin.data.motion import coordinates_of, ground_reaction_of, read_motion
 from fes_pin.data.new_study import NewStudy
 from fes_pin.data.schema import BODY, unknown
 from fes_pin.data.study_text import HEADER, quoted
+from fes_pin.data.wanted import number_set
 
 
 def new_body_study(files: Sequence[Path], folder: Path, name: str, settings: Mapping[str, str]) -> NewStudy:
@@ -42,9 +43,10 @@ def new_body_study(files: Sequence[Path], folder: Path, name: str, settings: Map
     if missing:
         raise InputError(f"the files do not say everything; please add {', '.join(missing)}")
     contents: dict[str, str | bytes] = {}
-    rig = [f"{key} = {_number(key, settings[key])!r}" for key in BODY.either]
+    rig = [f"{key} = {number_set(key, settings[key], BODY.constants[key])!r}" for key in BODY.either]
     text = [*HEADER, "", "[study]", f"name = {quoted(name)}", 'rig = "body"', "", "[rig]", *rig]
-    conditions = [f"{key} = {_number(key, settings[key])!r}" for key in BODY.conditions if key in settings]
+    given = {key: number_set(key, settings[key], n) for key, n in BODY.conditions.items() if key in settings}
+    conditions = [f"{key} = {value!r}" for key, value in given.items()]
     origins: dict[str, Path] = {}
     for move, push in zip(moves, pushes, strict=True):
         places = [_place(path, folder, contents) for path in (move, push)]
@@ -64,15 +66,6 @@ def _is_ground_reaction(path: Path) -> bool:
         coordinates_of(table, in_degrees)
         return False
     return True
-
-
-def _number(key: str, text: str) -> float:
-    known = {**BODY.constants, **BODY.conditions}[key]
-    try:
-        return known.check(float("" if "_" in text else text))
-    except ValueError as problem:
-        words = str(problem) if str(problem).startswith("expected") else f"expected a number, found {text[:40]!r}"
-        raise InputError(words, column=f"--set {key}") from None
 
 
 def _place(path: Path, folder: Path, contents: dict[str, str | bytes]) -> str:

@@ -29,7 +29,7 @@ from fes_pin.data.study_text import (
     toml_value,
 )
 from fes_pin.data.units import known_unit, own_unit, quantities_of
-from fes_pin.data.wanted import Wanted
+from fes_pin.data.wanted import Wanted, number_set
 
 
 @dataclass(frozen=True)
@@ -212,11 +212,7 @@ class _Making:
         if not text:
             self.missing.append(f"--set {place}{key}=NUMBER{f' ({unit})' if unit else ''}")
             return None
-        try:
-            return number.check(float(text))
-        except ValueError as problem:
-            words = str(problem) if str(problem).startswith("expected") else f"expected a number, found {text[:40]!r}"
-            raise InputError(words, column=f"--set {key}") from None
+        return number_set(key, text, number)
 
     def _numbers(self, where: str, table: Mapping[str, Any]) -> dict[str, float]:
         """Numbers of a table: those that it must have, and those that were given."""

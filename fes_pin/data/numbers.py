@@ -26,6 +26,20 @@ def as_number(value: object) -> float | None:
         return math.inf
 
 
+def number_in(text: str) -> float:
+    """The number that a text says, written as in files of numbers: without underscores.
+
+    Raises
+    ------
+    ValueError
+        It says none.
+    """
+    try:
+        return float("" if "_" in text else text)
+    except ValueError:
+        raise ValueError(f"expected a number, found {text[:40]!r}") from None
+
+
 def printed(value: float | None, digits: int) -> float | None:
     """A number with so many significant digits, as results are written; None for what is not finite."""
     return None if value is None or not math.isfinite(value) else float(f"{value:.{digits}g}")

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import in_full
+from fes_pin.data.numbers import in_full, number_in
 from fes_pin.data.recorded.columns import SOURCE_KEYS
 from fes_pin.data.recorded.text import TextForm
 from fes_pin.data.units import own_unit
@@ -73,9 +73,9 @@ def source_from_option(column: str, option: str, names: Sequence[str]) -> dict[s
 
 def _number_of(text: str, where: str) -> float:
     try:
-        return float("" if "_" in text else text)
-    except ValueError:
-        raise InputError(f"expected a number, found {text[:40]!r}", column=where) from None
+        return number_in(text)
+    except ValueError as problem:
+        raise InputError(str(problem), column=where) from None
 
 
 def source_in_words(source: Mapping[str, Any], column: str, revolute: bool | None) -> str:

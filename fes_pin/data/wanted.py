@@ -6,7 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fes_pin.data.schema import RigSchema
+from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number_in
+from fes_pin.data.schema import NumberKey, RigSchema
 
 Ask = Callable[[str], str]
 """Puts a question to a person and gives the answer."""
@@ -54,3 +56,17 @@ class Wanted:
     resample_hz: float | None = None
     fill: bool = False
     ask: Ask | None = None
+
+
+def number_set(key: str, text: str, number: NumberKey) -> float:
+    """The number that was set for a key.
+
+    Raises
+    ------
+    InputError
+        The text says none, or one out of bounds.
+    """
+    try:
+        return number.check(number_in(text))
+    except ValueError as problem:
+        raise InputError(str(problem), column=f"--set {key}") from None

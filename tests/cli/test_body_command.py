@@ -106,10 +106,10 @@ def test_view_plays_the_measured_walk(walk, tmp_path):
 @pytest.mark.parametrize(
     ("spoil", "says"),
     [
-        (lambda lines: lines[:2], "two or more samples"),
+        (lambda lines: lines[:2], "at least 3 rows"),
         (lambda lines: [*lines[:3], lines[3].replace(lines[3].split(",")[7], "nan"), *lines[4:9]], "finite"),
-        (lambda lines: [*lines[:3], lines[3].replace(lines[3].split(",")[7], "abc"), *lines[4:9]], "finite"),
-        (lambda lines: [lines[0], *lines[9:3:-1]], "times that rise"),
+        (lambda lines: [*lines[:3], lines[3].replace(lines[3].split(",")[7], "abc"), *lines[4:9]], "row 4"),
+        (lambda lines: [lines[0], *lines[9:3:-1]], "time"),
         (lambda lines: [lines[0].replace("q_hip_flexion_r", "q_hip_r"), *lines[1:9]], "q_hip_flexion_r"),
         (lambda lines: [lines[0].replace("time", "when"), *lines[1:9]], "time_s"),
     ],
@@ -150,7 +150,7 @@ def test_nothing_is_written_or_printed_where_an_option_is_wrong(tmp_path):
     ("arguments", "says"),
     [
         (("modes", "--posture", "sitting"), "unknown posture"),
-        (("modes", "--mass", "7"), "mass_kg"),
+        (("modes", "--mass", "7"), "--mass: "),
         (("modes", "--stance", "both"), "stance"),
         (("modes", "--slope", "1", "1"), "slope"),
         (("modes", "--brace", "plaster"), "cannot brace 'plaster'"),

@@ -29,7 +29,7 @@ NEEDS = {  # words of the command line, what its one line must say
     "not_a_number": (("body", "modes", "--mass", "heavy"), "--mass"),
     "one_of_two": (("body", "modes", "--slope", "1"), "--slope"),
     "refused_by_us": (("diagnose", "nowhere", "--out", "y"), "nowhere: no such study"),
-    "refused_by_us_in_a_group": (("body", "modes", "--mass", "7"), "mass_kg"),
+    "refused_by_us_in_a_group": (("body", "modes", "--mass", "7"), "--mass: "),
 }
 
 
