@@ -1,4 +1,8 @@
-"""Many studies one after the other, with a line of results each, by which a run that was broken off goes on."""
+"""Many studies one after the other, with a line of results each, by which a run that was broken off goes on.
+
+Each line holds a hash of the code that made it: after a change of the package a run begins again, and the lines of the
+code before stay in the file.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,35 @@ import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
+
+from fes_pin.data.sources import code_hash
+
+CODE = "code"
+"""Key of a line: the hash of the code that made it."""
+
+
+def rows_of(results: Path | None, whatever_code: bool = False) -> list[dict[str, Any]]:
+    """The lines of a file that this code made, in order; none of a file that is not there.
+
+    Parameters
+    ----------
+    whatever_code
+        Also those that other code made.
+    """
+    if results is None or not results.exists():
+        return []
+    rows = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines() if line.strip()]
+    return [r for r in rows if whatever_code or r.get(CODE) == code_hash()]
+
+
+def keep(row: dict[str, Any], results: Path | None) -> dict[str, Any]:
+    """A row with the hash of the code, as a file has it; appended to the file if there is one."""
+    line = json.dumps({**row, CODE: code_hash()})
+    if results:
+        with results.open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
+    made: dict[str, Any] = json.loads(line)
+    return made
 
 
 def results_of(
@@ -20,13 +53,9 @@ def results_of(
     results
         File of one line a result; none is written without.
     """
-    rows = [json.loads(x) for x in results.read_text().splitlines()] if results and results.exists() else []
+    rows = rows_of(results)
     done = {r["seed"] for r in rows}
     for k, piece in enumerate(work):
-        if seed + k in done:
-            continue
-        rows.append(judged(piece, seed + k))
-        if results:
-            with results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(rows[-1]) + "\n")
+        if seed + k not in done:
+            rows.append(keep(judged(piece, seed + k), results))
     return rows

@@ -27,7 +27,7 @@ ALLOWED = {
     "allocation": {"muscles", "body", "data"},
     "control": {"paper", "allocation", "muscles", "identify", "models", "data"},
     "verdict": {"walk", "diagnosis", "models", "data"},
-    "cohort": {"view", "walk", "diagnosis", "models", "data"},
+    "cohort": {"view", "walk", "diagnosis", "identify", "models", "data"},
     "view": {
         *("paper", "contrasts", "diagnosis", "identify", "models", "data"),
         *("control", "allocation", "muscles", "body", "walk"),

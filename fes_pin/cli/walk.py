@@ -23,17 +23,13 @@ def diagnose_walking(
         The study's files cannot be used, or the folder cannot be written.
     """
     from fes_pin.data.files import write_files
-    from fes_pin.view.walk_playback import show_reactions
-    from fes_pin.view.walk_report import PLAYBACK_FILE, walk_report_html
+    from fes_pin.view.walk_playback import walk_answer_files
     from fes_pin.walk.diagnosis import diagnose_walk
-    from fes_pin.walk.record import NEXT_FILE, walk_files
+    from fes_pin.walk.record import NEXT_FILE
 
     diagnosis = diagnose_walk(study, seed=seed, limit=limit, progress=lambda share, words: tell(0.9 * share, words))
-    tell(0.9, "report")
-    files = {**walk_files(diagnosis), "report.html": walk_report_html(diagnosis)}
-    tell(0.95, "playback")
-    first = diagnosis.search.banks.recordings[0]
-    files[PLAYBACK_FILE] = show_reactions(first.motion, first.plates, f"{study.name}, {first.name}").html()
+    tell(0.9, "report and playback")
+    files = walk_answer_files(diagnosis)
     write_files(out, files, without={NEXT_FILE} - set(files))
     return str(diagnosis)
 

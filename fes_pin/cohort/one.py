@@ -12,11 +12,11 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.provenance import hashes, versions
-from fes_pin.data.study import read_study
+from fes_pin.data.sources import code_hash
+from fes_pin.data.study import Study, read_study
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Work:
     command: str = ""
 
     def key(self) -> str:
-        """What the answer depends on: the study's files, the versions, seed, limit and library."""
+        """What the answer depends on: the study's files, the code, the versions, seed, limit and library."""
         files = [hashlib.sha256(Path(n).read_bytes()).hexdigest() for n in self.library if Path(n).is_file()]
-        told = [asdict(self) | {"folder": "", "command": ""}, hashes(Path(self.folder)), versions(), files]
+        told = [asdict(self) | {"folder": "", "command": ""}, hashes(Path(self.folder)), versions(), code_hash(), files]
         return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 
@@ -106,10 +106,8 @@ def _files(work: Work) -> dict[str, str | bytes]:
     return {**diagnosis_files(found), "report.html": report_html(found)}
 
 
-def _walking(study: Any, work: Work) -> dict[str, str | bytes]:
-    from fes_pin.view.walk_report import walk_report_html  # noqa: PLC0415
+def _walking(study: Study, work: Work) -> dict[str, str | bytes]:
+    from fes_pin.view.walk_playback import walk_answer_files  # noqa: PLC0415
     from fes_pin.walk.diagnosis import diagnose_walk  # noqa: PLC0415
-    from fes_pin.walk.record import walk_files  # noqa: PLC0415
 
-    found = diagnose_walk(study, seed=work.seed, limit=work.limit)
-    return {**walk_files(found), "report.html": walk_report_html(found)}
+    return walk_answer_files(diagnose_walk(study, seed=work.seed, limit=work.limit))

@@ -10,6 +10,7 @@ from typing import Any
 from fes_pin.cohort.pool import pooled
 from fes_pin.data.provenance import today, versions
 from fes_pin.diagnosis.text import percent, probability
+from fes_pin.identify.error_measures import E_WORDS
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.page import Content, Markup, element, figure, folded, html_table, joined, page, section, value_text
@@ -19,6 +20,11 @@ PageRow = dict[str, Any]
 FOREST = 40
 """Studies of one forest plot; of more only the pooled value is drawn."""
 ROW, NAMES, WIDE = 20.0, 150.0, 420.0
+MODELS = (
+    "Of the nominal, then of the extended model, on trials held out where there are such. Free: from the inputs alone; "
+    "ahead: each sample from what was measured up to the study's horizon before it."
+)
+"""What is said of the errors of studies."""
 
 
 def cohort_html(
@@ -171,18 +177,27 @@ def _forest(cause: str, parameter: str, rows: Sequence[PageRow]) -> Drawing:
 
 
 def _studies(rows: Sequence[PageRow]) -> list[Markup]:
-    head = ("study", "verdict", "causes", "E nominal", "E extended", "left")
+    head = ("study", "verdict", "causes", "E free", "E ahead", "left")
     cells: list[list[Content]] = []
     for r in rows:
         if r["verdict"] == "failed":
             cells.append([r["study"], "failed", r["error"], "-", "-", "-"])
             continue
         link = element("a", r["study"], href=f"studies/{r['study']}/report.html")
-        errors = [percent(r[f"{n}_error_percent"]) for n in ("nominal", "extended")]
+        free = _errors(r, "fit" if math.isnan(r["nominal_held_out_percent"]) else "held_out")
         left = "something" if r["unexplained"] else "nothing"
-        cells.append([link, r["verdict"].replace("_", " "), r["causes"] or "-", *errors, left])
+        cells.append([link, r["verdict"].replace("_", " "), r["causes"] or "-", free, _errors(r, "horizon"), left])
     made = html_table(head, cells, (3, 4))
-    return [made] if len(rows) <= FOREST else [folded(f"All {len(rows)} studies", made)]
+    return [
+        element("p", f"{E_WORDS} {MODELS}", class_="soft"),
+        made if len(rows) <= FOREST else folded(f"All {len(rows)} studies", made),
+    ]
+
+
+def _errors(row: PageRow, name: str) -> str:
+    """E of the nominal and of the extended model; of one alone where both are the same."""
+    pair = [percent(row[f"{model}_{name}_percent"]) for model in ("nominal", "extended")]
+    return " \u2192 ".join(dict.fromkeys(pair))
 
 
 def _provenance(seed: int, command: str) -> list[Markup]:

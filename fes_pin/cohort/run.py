@@ -14,6 +14,7 @@ from fes_pin.cohort.local import Task, in_processes
 from fes_pin.cohort.one import Answer, Work, diagnose_one
 from fes_pin.cohort.page import cohort_html
 from fes_pin.cohort.tables import (
+    ERRORS,
     Row,
     cause_rows,
     csv_text,
@@ -154,8 +155,7 @@ def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
 
 HEADS = {
     "studies": (
-        *("study", "verdict", "causes", "unexplained", "nominal_error_percent", "extended_error_percent"),
-        *("ceiling_percent", "wall_s", "error"),
+        *("study", "verdict", "causes", "unexplained", *ERRORS, "horizon_s", "ceiling_percent", "wall_s", "error"),
     ),
     "causes": (
         *("study", "cause", "stage", "parameter", "value", "std", "p_value", "false_discovery_rate"),

@@ -11,6 +11,7 @@ from typing import Any
 
 from fes_pin.cohort.keep import Kept
 from fes_pin.cohort.pool import discovery_rates, pooled, share_interval
+from fes_pin.identify.error_measures import MEASURES
 from fes_pin.models.catalogue import Catalogue
 
 Row = dict[str, Any]
@@ -18,34 +19,28 @@ RATE = 0.05
 """False discovery rate below which a cause counts as found in the cohort."""
 
 
+ERRORS = {f"{model}_{n}_percent": (model, n) for model in ("nominal", "extended") for n in MEASURES}
+"""Columns of errors E, by model and name in `diagnosis.json`: see `identify.error_measures`."""
+
+
 def study_rows(kept: Iterable[Kept]) -> list[Row]:
-    """What was found of each study; of a study that failed its error."""
+    """What was found of each study; of a study that failed its error, and None or NaN for what was not computed."""
     return [_study(one) for one in kept]
 
 
 def _study(one: Kept) -> Row:
     found = one.record
-    nominal, extended = (found.get(n, {}).get("error_percent", {}) for n in ("nominal", "extended"))
-    left = found.get("remainder", {})
     return {
         "study": one.name,
         "verdict": found.get("verdict", "failed"),
-        "causes": " + ".join(c["name"] for c in found.get("causes", ())),
-        "unexplained": bool(left.get("unexplained", False)),
-        "nominal_error_percent": _told(nominal),
-        "extended_error_percent": _told(extended),
+        "causes": " + ".join(c["name"] for c in found["causes"]) if found else None,
+        "unexplained": found["remainder"]["unexplained"] if found else None,
+        **{name: _number(found.get(model, {}).get("error_percent", {}).get(n)) for name, (model, n) in ERRORS.items()},
+        "horizon_s": _number(found.get("horizon_s")),
         "ceiling_percent": _number(found.get("ceiling_percent")),
         "wall_s": _number(found.get("wall_s")),
         "error": one.error,
     }
-
-
-def _told(errors: Mapping[str, Any]) -> float:
-    """Held out if there is such an error; over the horizon of a driven rig."""
-    for name in ("horizon", "held_out", "fit"):
-        if errors.get(name) is not None:
-            return float(errors[name])
-    return math.nan
 
 
 def _number(value: Any) -> float:
@@ -154,7 +149,7 @@ def csv_text(rows: Sequence[Row], head: Sequence[str]) -> str:
 
 
 def _unknown(value: Any) -> bool:
-    return isinstance(value, float) and math.isnan(value)
+    return value is None or (isinstance(value, float) and math.isnan(value))
 
 
 def parquet_bytes(rows: Sequence[Row], head: Sequence[str]) -> bytes | None:
@@ -165,7 +160,8 @@ def parquet_bytes(rows: Sequence[Row], head: Sequence[str]) -> bytes | None:
     except ImportError:
         return None
     kinds = {bool: pyarrow.bool_(), int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
-    types = {n: kinds[type(rows[0][n])] if rows else pyarrow.string() for n in head}
+    known = {n: next((type(r[n]) for r in rows if r[n] is not None), str) for n in head}
+    types = {n: kinds[kind] for n, kind in known.items()}
     table = pyarrow.table({n: pyarrow.array([None if _unknown(r[n]) else r[n] for r in rows], types[n]) for n in head})
     sink = io.BytesIO()
     pyarrow.parquet.write_table(table, sink)

@@ -18,8 +18,9 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import measured_study, split
 from fes_pin.identify.ahead import default_horizon
-from fes_pin.identify.fit import fit_multistart
-from fes_pin.identify.noise import Noise
+from fes_pin.identify.error_measures import percent_of_spread
+from fes_pin.identify.fit import fit_multistart, rough_noise
+from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Problem
 from fes_pin.models.catalogue import Source
 from fes_pin.models.model import Model
@@ -85,12 +86,12 @@ def compare(
         _check_time(given_s, every, "--given")
     chosen = _chosen(models, extended, nominal, every, library)
     parts = partings(fitted, held)
-    scale = spreads(nominal, every)
+    scale, floor = spreads(nominal, every), rough_noise(nominal, every)
     told = []
     with one_thread_each():
         for k, one in enumerate(chosen):
             tell(k / len(chosen), one.name)
-            told.append(_compared(one, parts, fitted, scale, horizon, given_s))
+            told.append(_compared(one, parts, fitted, scale, floor, horizon, given_s))
     tell(1.0, "done")
     ranked = sorted(told, key=lambda m: m.percent["free"])
     return Comparison(
@@ -145,17 +146,21 @@ def _compared(
     parts: Sequence[Parting],
     fitted: Sequence[Trial],
     scale: Mapping[str, float],
+    floor: NoiseModel,
     horizon_s: float,
     given_s: float | None,
 ) -> Compared:
+    """A model with its errors; `scale` weighs the columns in its fits, `floor` in E."""
     fits = fits_of(one.model, parts, scale)
     errors = left_out_errors(fits, parts, scale, horizon_s, given_s)
     white = {n: Noise(s, (), s) for n, s in scale.items()}
     whole = fits[0] if len(parts) == 1 else fit_multistart(Problem(one.model, fitted, white), one.model.parameters())
-    columns = np.array([one.model.rig.output(t.kind) for p in parts for t in p.held])
+    trials = [t for p in parts for t in p.held]
+    columns = np.array([one.model.rig.output(t.kind) for t in trials])
     kinds = {n: e for n in ("free", "horizon", "begun", "free_rest") if (e := getattr(errors, n)) is not None}
-    unit = np.array([scale[c] ** 2 for c in columns])
-    squares = {n: 100.0 * e / unit for n, e in kinds.items()}
+    weight = np.array([len(t) / floor[c].std ** 2 for t, c in zip(trials, columns, strict=True)])
+    around = weight * errors.around
+    squares = {n: len(trials) * 100.0 * weight * e / around.sum() for n, e in kinds.items()}
     return Compared(
         name=one.name,
         words=one.words,
@@ -166,7 +171,7 @@ def _compared(
             str(c): {n: math.sqrt(float(e[columns == c].mean())) for n, e in kinds.items()}
             for c in dict.fromkeys(columns)
         },
-        percent={n: float(e.mean()) for n, e in squares.items()},
+        percent={n: percent_of_spread(weight * e, around) for n, e in kinds.items()},
         squares=squares,
         apart={},
         fit=whole,

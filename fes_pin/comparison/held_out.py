@@ -40,12 +40,15 @@ class LeftOutErrors:
         of a trial from its beginning (None if that was not asked for, or too few trials tell how they differ).
     free_rest
         As `free`, of the same samples as `begun`.
+    around
+        Shape (trials,): mean squares of the measurement about the mean of its trial.
     """
 
     free: np.ndarray
     horizon: np.ndarray
     begun: np.ndarray | None
     free_rest: np.ndarray | None
+    around: np.ndarray
 
 
 def partings(fitted: Sequence[Trial], held: Sequence[Trial]) -> tuple[Parting, ...]:
@@ -79,10 +82,12 @@ def left_out_errors(
     """Errors of one model on every held-out trial, parting after parting."""
     many = in_parallel(lambda pair: _of_parting(*pair, scale, horizon_s, given_s), list(zip(fits, parts, strict=True)))
     free, horizon = (np.concatenate([m[k] for m in many]) for k in (0, 1))
+    rig = fits[0].model.rig
+    around = np.array([float(np.var(t[rig.output(t.kind)])) for p in parts for t in p.held])
     if given_s is None or any(m[2] is None for m in many):
-        return LeftOutErrors(free, horizon, None, None)
+        return LeftOutErrors(free, horizon, None, None, around)
     begun, rest = (np.concatenate([m[k] for m in many]) for k in (2, 3))
-    return LeftOutErrors(free, horizon, begun, rest)
+    return LeftOutErrors(free, horizon, begun, rest, around)
 
 
 def _of_parting(

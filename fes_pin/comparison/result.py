@@ -18,12 +18,12 @@ LEVEL = 0.05
 
 @dataclass(frozen=True)
 class Apart:
-    """How much more a model misses than the best: the mean over held-out trials of E, and its interval.
+    """How much more a model misses than the best: the difference of E on held-out trials, and its interval.
 
     Attributes
     ----------
     more, low, high
-        Percent of the spread of the measurement, squared errors; the interval holds for all models at once.
+        Percent; the interval holds for all models at once.
     """
 
     more: float
@@ -52,9 +52,9 @@ class Compared:
         By output column and then by "free", "horizon", "begun" and "free_rest": root mean squared error over held-out
         trials, in the unit of the column.
     percent
-        By the same: E of eq. (2), percent, the mean over held-out trials.
+        By the same: E on held-out trials, percent; see `identify.error_measures`.
     squares
-        By the same: shape (trials,), E of each held-out trial.
+        By the same: shape (trials,), what each held-out trial adds to E, times the number of trials: their mean is E.
     apart
         By "free" and "horizon": against the best of that kind of error; None of the best.
     fit
@@ -199,7 +199,7 @@ def _unit(column: str) -> str:
 def notes(found: Comparison) -> list[str]:
     """What stands beneath the table."""
     how = "each trial by fits without it" if found.by == "folds" else "trials that the study holds out"
-    lines = [f"root mean squared error on whole trials left out ({how}); in brackets E, squared error over spread"]
+    lines = [f"root mean squared error on whole trials left out ({how}); in brackets the error E of eq. (2)"]
     for one in found.models:
         if one.words:
             less = f"; not felt here: {', '.join(one.unfelt)}" if one.unfelt else ""

@@ -120,8 +120,14 @@ def scatter(parts: Sequence[Linearized], columns: Sequence[np.ndarray], names: S
         V of each trial, shape (m, names), without what its own unknowns take up.
     names
         Of the parameters that may scatter.
+
+    Returns
+    -------
+    dict
+        Empty also where a trial's readings or sensitivities are no numbers: such trials say nothing of their scatter.
     """
-    return _Scatter(parts, columns, names).found()
+    with np.errstate(all="ignore"):  # what overflows costs infinitely much
+        return _Scatter(parts, columns, names).found()
 
 
 class _Scatter:
@@ -176,6 +182,11 @@ class _Scatter:
         ----------
         deviations
             Shape (points, names).
+
+        Returns
+        -------
+        ndarray, shape (points,)
+            Infinite where a product is beyond floating-point numbers.
         """
         felt = np.flatnonzero(deviations.any(axis=0))
         d = deviations[:, None, felt]
@@ -185,8 +196,9 @@ class _Scatter:
         hessian = (self.xx - xv @ solved[..., :-1]).sum(axis=1)
         gradient = (self.xr - (xv @ solved[..., -1:])[..., 0]).sum(axis=1)
         own = np.linalg.slogdet(inner)[1].sum(axis=1) - (vr * solved[..., -1]).sum(axis=(1, 2))
-        inverse = np.linalg.pinv(hessian, rcond=1e-12, hermitian=True)
-        return np.asarray(own - np.einsum("gp,gpq,gq->g", gradient, inverse, gradient))
+        usable = np.isfinite(hessian).all(axis=(1, 2)) & np.isfinite(gradient).all(axis=1) & np.isfinite(own)
+        inverse = np.linalg.pinv(np.where(usable[:, None, None], hessian, 0.0), rcond=1e-12, hermitian=True)
+        return np.where(usable, own - np.einsum("gp,gpq,gq->g", gradient, inverse, gradient), np.inf)
 
 
 def without_locals(part: Linearized, columns: np.ndarray) -> np.ndarray:

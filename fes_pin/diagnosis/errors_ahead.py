@@ -12,6 +12,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.held_out import Errors
 from fes_pin.identify.ahead import SquaredErrors, forecast_errors, forecasts, one_step, own_noise, reach_of
 from fes_pin.identify.doubts import driving_size
+from fes_pin.identify.error_measures import percent_of_spread
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.levels import SMALL_SHARE
 from fes_pin.identify.noise import NoiseModel
@@ -63,8 +64,7 @@ class Ahead:
     @classmethod
     def of(cls, total: SquaredErrors) -> Ahead:
         """From squared errors."""
-        share = 100.0 / max(total.around, 1e-300)
-        return cls(share * total.one_step, share * total.horizon, share * total.free)
+        return cls(*(percent_of_spread(e, total.around) for e in (total.one_step, total.horizon, total.free)))
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import scipy.optimize
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
+from fes_pin.identify.error_measures import percent_of_spread
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle
 from fes_pin.models.simulate import Simulator, max_step
@@ -36,8 +37,8 @@ def error_percent(measured: Sequence[np.ndarray], simulated: Sequence[np.ndarray
     measured, simulated
         One array of shape (n,) for each trial.
     """
-    wrong = sum(float(np.sum((m - s) ** 2)) for m, s in zip(measured, simulated, strict=True))
-    return 100.0 * wrong / sum(float(np.sum((m - m.mean()) ** 2)) for m in measured)
+    wrong = [float(np.sum((m - s) ** 2)) for m, s in zip(measured, simulated, strict=True)]
+    return percent_of_spread(wrong, [float(np.sum((m - m.mean()) ** 2)) for m in measured])
 
 
 def ankle_of(twin: AnkleTwin) -> Model:

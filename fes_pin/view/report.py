@@ -13,6 +13,7 @@ from fes_pin.diagnosis.record import NEXT_FILE
 from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.text import left_out_text, percent, probability
+from fes_pin.identify.error_measures import E_WORDS, FREE, ONE_STEP
 from fes_pin.models.describe import sentence
 from fes_pin.models.outside import origin
 from fes_pin.view.page import (
@@ -87,12 +88,6 @@ def _head(diagnosis: Diagnosis) -> Markup:
     )
 
 
-E_WORDS = (
-    "E is the squared error of a model, in percent of the measurement's squares about its mean (equation 2 of the "
-    "paper): 0 % is a perfect model, 100 % no better than the mean."
-)
-
-
 def _errors(diagnosis: Diagnosis) -> list[Markup]:
     """Errors of both models, in sample and held out; of a driven rig over three spans of time."""
     both, rows = bool(diagnosis.causes), _error_rows(diagnosis)
@@ -129,7 +124,7 @@ def _error_rows(diagnosis: Diagnosis) -> list[list[Content]]:
     ahead = diagnosis.ahead
     if ahead is None:
         pairs = zip(("fitted", "held out"), diagnosis.nominal_error, diagnosis.extended_error, strict=True)
-        return [[where, "free, from the inputs", percent(b), percent(a)] for where, b, a in pairs if b is not None]
+        return [[where, FREE, percent(b), percent(a)] for where, b, a in pairs if b is not None]
     rows: list[list[Content]] = []
     for where, before, after in (
         ("fitted", ahead.nominal, ahead.extended),
@@ -145,9 +140,9 @@ def _spans(horizon_s: float, before: Ahead, after: Ahead) -> list[tuple[str, str
         return "meaningless: it falls" if value is None else percent(value)
 
     return [
-        ("one sample ahead", percent(before.one_step), percent(after.one_step)),
+        (ONE_STEP, percent(before.one_step), percent(after.one_step)),
         (f"{horizon_s:g} s ahead", percent(before.horizon), percent(after.horizon)),
-        ("free, from the inputs", free(before.free), free(after.free)),
+        (FREE, free(before.free), free(after.free)),
     ]
 
 

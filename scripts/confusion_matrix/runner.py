@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 import time
@@ -12,6 +11,8 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
+
+from going_on import keep, rows_of
 
 from confusion_matrix.generator import Made, make
 from confusion_matrix.judge import judge
@@ -55,17 +56,14 @@ def run(
     wanted: Iterable[Sequence[Item]], results: Path | None, workers: int = 1, answer: Answer = judge
 ) -> list[dict[str, Any]]:
     """Results of studies, those in the file `results` included; new ones are appended to it as they come."""
-    done = read(results) if results else {}
+    done = {record["id"]: record for record in rows_of(results)}
     wanted = [tuple(group) for group in wanted]
     todo = [part for group in wanted if (part := tuple(i for i in group if i.name not in done))]
     total, began, fresh = sum(len(g) for g in todo), time.perf_counter(), 0
     for records in _all(todo, workers, answer):
         for record in records:
-            done[record["id"]] = record
+            done[record["id"]] = keep(record, results)
             fresh += 1
-            if results:
-                with results.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(record) + "\n")
         _bar(fresh, total, time.perf_counter() - began)
     names = {item.name for group in wanted for item in group}
     return [done[name] for name in sorted(names) if name in done]
@@ -81,11 +79,8 @@ def _all(todo: Sequence[Sequence[Item]], workers: int, answer: Answer) -> Iterab
 
 
 def read(results: Path) -> dict[str, dict[str, Any]]:
-    """Results of a file by study; the last of each."""
-    if not results.exists():
-        return {}
-    records = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines() if line.strip()]
-    return {record["id"]: record for record in records}
+    """Results of a file by study, whatever code made them; the last of each."""
+    return {record["id"]: record for record in rows_of(results, whatever_code=True)}
 
 
 def _bar(count: int, total: int, elapsed: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import tempfile
 import time
@@ -13,6 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from driven_rigs.draw import Recording
+from going_on import keep, rows_of
 
 from contrast_pairs.driven import CAUSES as DRIVEN_CAUSES
 from contrast_pairs.driven import NOMINAL as DRIVEN_NOMINAL
@@ -106,19 +106,12 @@ def main(
 ) -> None:
     """Change something on purpose in one of two groups, and count what the contrast makes of it."""
     os.environ.setdefault("FES_PIN_THREADS", "1")
-    rows = [json.loads(x) for x in results.read_text().splitlines()] if results and results.exists() else []
+    rows = rows_of(results)
     done = {r["seed"] for r in rows}
-
-    def keep(row: dict[str, Any]) -> None:
-        rows.append(json.loads(json.dumps(row)))
-        if results:
-            with results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
-
     if practice:
         for k, (study, own, changes) in enumerate(of_practice(practice, nulls)):
             if seed <= k < seed + count and k not in done:
-                keep(judged(study, k, own, changes))
+                rows.append(keep(judged(study, k, own, changes), results))
     else:
         recording = Recording(recorded, low_pass, every)
         for k, drawn, changes in plan(count, seed, nulls, rig):
@@ -129,7 +122,7 @@ def main(
                     study = driven_pair(changes, size / 200.0, k, Path(folder), recording)
                 else:
                     study = free_pair(drawn, changes, size, k, Path(folder))
-                keep(judged(study, k, drawn, changes))
+                rows.append(keep(judged(study, k, drawn, changes), results))
     typer.echo("\n".join(table(rows)))
 
 

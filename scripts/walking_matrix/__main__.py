@@ -1,7 +1,6 @@
 """Hide causes in walks made without the engine, diagnose each, print how often the hidden one is named."""
 
 import argparse
-import json
 import tempfile
 import time
 from collections import defaultdict
@@ -9,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from going_on import keep, rows_of
 
 from fes_pin.body.measured_walk import data_folder
 from fes_pin.data.study import read_study
@@ -107,9 +107,7 @@ def main() -> None:
     parser.add_argument("--kind", choices=KINDS, help="hide this cause in all")
     parser.add_argument("--out", type=Path, help="file of records, one line each")
     options = parser.parse_args()
-    gait, done = gait_of(data_folder()), {}
-    if options.out and options.out.exists():
-        done = {r["key"]: r for r in map(json.loads, options.out.read_text().splitlines())}
+    gait, done = gait_of(data_folder()), {r["key"]: r for r in rows_of(options.out)}
     kinds = (options.kind,) if options.kind else KINDS
     hidden = [(kinds[k % len(kinds)], options.seed + k) for k in range(options.hidden)]
     nulls = [("none", options.seed + 10000 + k) for k in range(options.nulls)]
@@ -128,9 +126,7 @@ def main() -> None:
                 done[key]["cpu_s"] = round(time.process_time() - began, 2)
                 if kind != "none":
                     done[key]["d"] = round(strength(gait, wrong, seed, found), 1)
-            if options.out:
-                with options.out.open("a") as file:
-                    file.write(json.dumps(done[key]) + "\n")
+            done[key] = keep(done[key], options.out)
         records.append(done[key])
     print(table(records))
     clear = [r for r in records if r.get("d", 0.0) >= CLEAR]

@@ -42,6 +42,28 @@ def test_one_bad_study_and_one_that_kills_its_process_stop_no_other(tmp_path):
     assert "Coulomb friction in 2 of 4 studies" in page and 'href="studies/f1/report.html"' in page
 
 
+def test_nothing_is_said_of_what_was_not_computed(tmp_path):
+    """A study that failed has no remainder, no causes and no errors: not false, not none, not zero."""
+    made = run_cohort([studies(tmp_path / "in", ["bad", "f1"])], tmp_path / "out", run=quick)
+    failed, good = made.studies
+    assert failed["unexplained"] is None and failed["causes"] is None and good["unexplained"] is False
+    csv_row = rows(tmp_path / "out/studies.csv")[0]
+    assert {n for n, cell in csv_row.items() if cell} == {"study", "verdict", "error"}
+    assert csv_row["verdict"] == "failed"
+
+
+def test_tables_and_page_say_the_errors_that_the_record_says(tmp_path):
+    """One name, one quantity: a column is called as the key of `diagnosis.json` that it holds."""
+    run_cohort([studies(tmp_path / "in", ["f1"])], tmp_path / "out", run=quick)
+    record = json.loads((tmp_path / "out/studies/f1/diagnosis.json").read_text())
+    (row,) = rows(tmp_path / "out/studies.csv")
+    for model in ("nominal", "extended"):
+        for name in ("fit", "held_out"):
+            assert float(row[f"{model}_{name}_percent"]) == record[model]["error_percent"][name]
+        assert row[f"{model}_horizon_percent"] == ""  # this record has none
+    assert "10 % \u2192 3 %" in (tmp_path / "out/cohort.html").read_text()
+
+
 def test_a_cohort_goes_on_where_it_was(tmp_path):
     places = studies(tmp_path / "in", ["a0", "bad", "killer"])
     first = run_cohort([places], tmp_path / "out", run=quick)
@@ -63,7 +85,9 @@ def test_parquet_says_what_the_csv_says(tmp_path):
         table = parquet.read_table(tmp_path / f"out/{name}.parquet")
         assert tuple(table.column_names) == head
         assert table.num_rows == len(rows(tmp_path / f"out/{name}.csv")) > 0
-    assert parquet.read_table(tmp_path / "out/studies.parquet")["ceiling_percent"].to_pylist() == [None, 1.5, 1.5]
+    table = parquet.read_table(tmp_path / "out/studies.parquet")
+    assert table["ceiling_percent"].to_pylist() == [None, 1.5, 1.5]
+    assert table["unexplained"].to_pylist() == [None, False, False]
 
 
 def test_studies_of_one_name_are_told_apart(tmp_path):
@@ -93,7 +117,7 @@ def test_a_run_that_is_killed_leaves_whole_answers_and_goes_on(tmp_path):
         f"if __name__ == '__main__': run_cohort([Path({str(places)!r})], Path({str(tmp_path / 'out')!r}), run=quick)"
     )
     (tmp_path / "go.py").write_text(code)
-    known = {**os.environ, "PYTHONPATH": str(here)}
+    known = {**os.environ, "PYTHONPATH": os.pathsep.join([str(here), str(here.parent)])}
     with subprocess.Popen([sys.executable, str(tmp_path / "go.py")], env=known) as process:
         until = time.monotonic() + 60.0
         while len(list((tmp_path / "out").glob("studies/*/state.json"))) < 2 and time.monotonic() < until:

@@ -3,6 +3,7 @@
 import json
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,12 @@ from fes_pin.comparison.literature import LITERATURE, published_model
 from fes_pin.comparison.own_part import own_part
 from fes_pin.comparison.result import apart_from
 from fes_pin.data.errors import InputError
+from fes_pin.diagnosis.decide.held_out import errors_of
+from fes_pin.diagnosis.errors_ahead import Ahead
+from fes_pin.identify.ahead import forecast_errors, own_noise
+from fes_pin.identify.fit import rough_noise
+
+DEMO = Path(__file__).parents[2] / "analysis/studies/ankle_demo"
 
 
 def test_ding_is_the_published_equations():
@@ -51,6 +58,30 @@ def test_trials_that_the_study_holds_out_are_the_judges():
     trials = [replace(t, role="held_out" if k > 4 else "fit") for k, t in enumerate(study.trials)]
     found = fp.compare(replace(study, trials=tuple(trials)), ["nominal"])
     assert (found.by, found.held_out) == ("role", ("05", "06", "07"))
+
+
+def test_the_error_is_that_of_a_diagnosis(tmp_path):
+    """E of eq. (2), free and over the horizon, as a diagnosis calculates it for the same fit and trials."""
+    study = twins.study("lag", 4, count=8)
+    trials = [replace(t, role="held_out" if k > 4 else "fit") for k, t in enumerate(study.trials)]
+    (found,) = fp.compare(replace(study, trials=tuple(trials)), ["nominal"], horizon_s=0.2).models
+    held, floor = trials[5:], rough_noise(found.fit.model, trials)
+    assert found.percent["free"] == pytest.approx(errors_of(found.fit.model, held, floor).error_percent())
+    ahead = Ahead.of(forecast_errors(found.fit.model, held, own_noise(found.fit), floor, 0.2))
+    assert found.percent["horizon"] == pytest.approx(ahead.horizon)
+    assert found.percent["free"] == pytest.approx(ahead.free)
+    for kind, squares in found.squares.items():
+        assert squares.mean() == pytest.approx(found.percent[kind])
+
+
+def test_columns_count_in_the_error_by_their_noise(tmp_path):
+    """An ankle's angle and force together: E of the demonstration as its diagnosis calculates it."""
+    study = fp.read_study(DEMO)
+    (found,) = fp.compare(study, ["nominal"]).models
+    floor = rough_noise(found.fit.model, study.trials)
+    whole = errors_of(found.fit.model, study.trials, floor).error_percent()
+    assert {"angle_rad", "force_n"} == set(found.rmse)
+    assert whole < found.percent["free"] < 1.5 * whole  # by fits without the trials
 
 
 def test_the_beginning_of_a_trial_tells_its_rest():

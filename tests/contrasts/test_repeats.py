@@ -1,5 +1,7 @@
 """Repeats that differ: the scatter of nominal parameters between trials, and what stands out beside it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from contrast_pairs.free import free_pair
@@ -37,6 +39,23 @@ def test_trials_alike_do_not_scatter(seed):
     parts = drawn(0.0, seed)
     found = scatter(parts, [without_locals(p, p.jacobian) for p in parts], ["slope"])
     assert found.get("slope", 0.0) < 0.03
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
+@pytest.mark.parametrize("field", ["residual", "jacobian", "columns"])
+def test_a_trial_beyond_floating_point_numbers_scatters_by_nothing(bad, field):
+    """Eigenvalues of three parameters or more do not converge where a product is no number."""
+    x = np.linspace(0.0, 10.0, 80)[:, None] ** np.arange(1, 5)
+    noise = np.random.default_rng(0).standard_normal((6, len(x)))
+    parts = [Linearized(r, x, np.ones((len(x), 1))) for r in noise]
+    columns = [without_locals(p, p.jacobian) for p in parts]
+    spoilt = columns[3].copy() if field == "columns" else getattr(parts[3], field).copy()
+    spoilt[5] = bad
+    if field == "columns":
+        columns[3] = spoilt
+    else:
+        parts[3] = replace(parts[3], **{field: spoilt})
+    assert scatter(parts, columns, ["a", "b", "c", "d"]) == {}
 
 
 def test_the_squares_are_those_of_the_covariance(tmp_path):

@@ -10,6 +10,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import SquaredErrors, default_horizon, forecast_errors, own_noise
+from fes_pin.identify.error_measures import percent_of_spread
 from fes_pin.identify.fit import Fit, fit_problem, go_on
 from fes_pin.identify.levels import CONFIDENCE_95, NOTHING_PERCENT, RUNAWAY
 from fes_pin.identify.noise import NoiseModel
@@ -75,11 +76,11 @@ class Errors:
 
     def error_percent(self) -> float:
         """E of eq. (2), pooled."""
-        return 100.0 * float(self.squares.sum() / max(self.spread.sum(), 1e-300))
+        return percent_of_spread(self.squares, self.spread)
 
     def ceiling_percent(self) -> float:
         """E of a model that leaves the noise alone."""
-        return 100.0 * float(self.noise.sum() / max(self.spread.sum(), 1e-300))
+        return percent_of_spread(self.noise, self.spread)
 
 
 def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
