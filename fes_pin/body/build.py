@@ -17,6 +17,7 @@ from fes_pin.body.skeleton import Skeleton, read_segments
 from fes_pin.body.urdf import origin_of, write_urdf
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
+from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word, positive_number
 from fes_pin.data.urdf import moving_joints
 
@@ -56,7 +57,8 @@ class Body:
 
     Notes
     -----
-    Arrays over joints are in the order of `joint_names`, which is that of Pinocchio's q; mappings by name are better.
+    Arrays over joints are in the order of `joint_names`, which is that of Pinocchio's q and begins at the stance foot.
+    Those that a body gives hold their names (`NamedArray`), and whatever takes joint values takes them by name.
     """
 
     urdf: str = field(repr=False)
@@ -181,18 +183,19 @@ class Body:
         return (moving + fixed.mass * fixed.lever) / self.mass_kg
 
     @property
-    def limits(self) -> tuple[np.ndarray, np.ndarray]:
-        """Smallest and greatest joint angles: two arrays (19,), rad."""
-        return self.model.lowerPositionLimit.copy(), self.model.upperPositionLimit.copy()
+    def limits(self) -> tuple[NamedArray, NamedArray]:
+        """Smallest and greatest joint angles: two arrays (19,), rad, by name."""
+        low, high = self.model.lowerPositionLimit, self.model.upperPositionLimit
+        return NamedArray(low, self.joint_names), NamedArray(high, self.joint_names)
 
-    def angles(self, posture: Posture, check: bool = True) -> np.ndarray:
-        """A posture as Pinocchio's q: (19,) rad.
+    def angles(self, posture: Posture, check: bool = True) -> NamedArray:
+        """A posture as Pinocchio's q: (19,) rad, by name, as in `body.angles("mid_stance")["right_knee_flexion"]`.
 
         Parameters
         ----------
         posture
             A name (`standing`, `mid_stance`, ... see `fes_pin.body.gait.posture_names`), a mapping by joint name
-            (absent joints are at 0), or an array in the order of `joint_names`.
+            (absent joints are at 0), or an array: with names in any order, without in the order of `joint_names`.
         check
             Whether angles must lie within the joints' limits.
 
@@ -214,15 +217,15 @@ class Body:
             )
         return q
 
-    def rates(self, values: Mapping[str, float] | Sequence[float] | np.ndarray | None) -> np.ndarray:
-        """Joint rates, accelerations or torques by name as an array (19,); None is zero.
+    def rates(self, values: Mapping[str, float] | Sequence[float] | np.ndarray | None) -> NamedArray:
+        """Joint rates, accelerations or torques as an array with names (19,); None is zero.
 
         Raises
         ------
         InputError
             Unknown joint, wrong shape, or not finite.
         """
-        return np.zeros(19) if values is None else angles_array(values, self.joint_names)
+        return angles_array({} if values is None else values, self.joint_names)
 
     def placement(self, frame: str, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
         """Rotation (3, 3) and position (3,) m of a link in the world at a posture.

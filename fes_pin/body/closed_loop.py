@@ -102,14 +102,10 @@ def close_the_loop(
     """
     if linear.both_feet:
         raise InputError("the closed loop is simulated on one foot only")
-    if isinstance(start, Mapping):
-        given = dict(zip(JOINT_NAMES, angles_array(start, JOINT_NAMES), strict=True))
-        start = np.array([given[name] for name in linear.joint_names])
-    else:
-        start = angles_array(start, linear.joint_names)
+    start = np.asarray(angles_array(start, linear.joint_names))
     plans = plans_of(linear, Inputs.of(inputs, linear), settle_deg, balance)
     plant = _Plant(linear)
-    q, v = linear.q + start, np.zeros(linear.n)
+    q, v = plant.rest + start, np.zeros(linear.n)
     deviations, outside, lost = [start], -np.inf, ""
     given_inputs: list[np.ndarray] = []
     for _ in range(round(positive_number(seconds, "seconds") / PULSE_S)):
@@ -122,14 +118,14 @@ def close_the_loop(
                     raise
                 lost = error.message
                 break
-        stimulation = _first_input(now, q - linear.q, v)
+        stimulation = _first_input(now, q - plant.rest, v)
         if stimulation is None:
             lost = "no input within the bounds brings it back"
             break
         torque = now.inputs.on(linear) @ stimulation
         q, v, far = plant.run(q, v, torque)
         outside = max(outside, far)
-        deviations.append(q - linear.q)
+        deviations.append(q - plant.rest)
         given_inputs.append(stimulation)
         if not np.abs(deviations[-1]).max() < np.radians(LOST_DEG):
             lost = f"{linear.joint_names[int(np.abs(deviations[-1]).argmax())]} is {LOST_DEG:g} degrees off"
@@ -165,7 +161,7 @@ class _Plant:
         self.data = self.model.createData()
         self.extra = -linear.C - pin.computeGeneralizedGravity(self.model, self.data, linear.q)
         self.stiffness = -linear.B - pin.computeGeneralizedGravityDerivatives(self.model, self.data, linear.q)
-        self.rest, self.support = linear.q, soles_of(linear)
+        self.rest, self.support = np.asarray(linear.q), soles_of(linear)
         self.damping = linear.E
 
     def _acceleration(self, q: np.ndarray, v: np.ndarray, torque: np.ndarray) -> np.ndarray:

@@ -12,6 +12,8 @@ import numpy as np
 from fes_pin.body.anthropometry import HIP_SPACING
 from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, mirrored
 from fes_pin.data.errors import InputError
+from fes_pin.data.named import NamedArray
+from fes_pin.data.numbers import known_word
 
 TABLE = Path(__file__).with_name("gait_postures.csv")
 """Degrees, right stance; made by scripts/generate/gait_postures.py from the measured walk."""
@@ -95,8 +97,8 @@ def ankle_rotation(side: str, dorsiflexion: np.ndarray, inversion: np.ndarray, r
     return _turn(-left, dorsiflexion) @ _turn(sign * forward, inversion) @ _turn(sign * up, rotated)
 
 
-def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_foot: bool = True) -> np.ndarray:
-    """Measured OpenSim coordinates as postures of our body: (N, 19) rad, in the order of `JOINT_NAMES`.
+def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_foot: bool = True) -> NamedArray:
+    """Measured OpenSim coordinates as postures of our body: (N, 19) rad by joint name.
 
     Hips, knees, MTP and lumbar angles are the measured ones. (OpenSim's torso frame leans some 9 degrees against the
     line from hips to shoulders in this recording: a lumbar extension of -19 degrees is nearly upright.) OpenSim's
@@ -119,8 +121,7 @@ def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_fo
     InputError
         A coordinate is missing or not finite, or another stance.
     """
-    if stance not in SIDES:
-        raise InputError(f"must be 'left' or 'right', got {stance!r}", column="stance")
+    known_word(stance, SIDES, "stance")
 
     def measured(name: str) -> np.ndarray:
         return _coordinate(coordinates, name)
@@ -143,7 +144,7 @@ def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_fo
             angles[f"{side}_{joint}"] = value
     for joint in JOINT_NAMES[16:]:
         angles[joint] = measured(joint)
-    return np.stack([angles[name] for name in JOINT_NAMES], axis=1)
+    return NamedArray(np.stack([angles[name] for name in JOINT_NAMES], axis=1), JOINT_NAMES)
 
 
 def _coordinate(coordinates: Mapping[str, np.ndarray], name: str) -> np.ndarray:

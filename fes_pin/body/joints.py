@@ -10,10 +10,12 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.named import NamedArray
 
 SIDES = ("left", "right")
 _LEG = (
@@ -146,21 +148,24 @@ def known_joint(name: str) -> str:
     return name
 
 
-def angles_array(angles: Mapping[str, float] | Sequence[float] | np.ndarray, order: Sequence[str]) -> np.ndarray:
-    """Joint values as an array in the given order: (19,); joints that a mapping leaves out are 0.
+def angles_array(angles: Mapping[str, float] | Sequence[float] | np.ndarray, order: Sequence[str]) -> NamedArray:
+    """Joint values by name in the given order, (19,): of a mapping or an array with names, which may leave some out
+    (they are 0), or of an array without names that is in this order.
 
     Raises
     ------
     InputError
-        Unknown joint, wrong number of values, or a value that is not finite.
+        Unknown joint, or one that is not in the order; wrong number of values, or a value that is not finite.
     """
-    if isinstance(angles, Mapping):
-        for name in angles:
-            known_joint(name)
+    if hasattr(angles, "keys"):
+        given: dict[str, Any] = {known_joint(name): value for name, value in dict(angles).items()}
         try:
-            values = np.array([float(angles.get(name, 0.0)) for name in order])
+            values = np.array([float(given.get(name, 0.0)) for name in order])
+            locked = [name for name, value in given.items() if name not in order and float(value)]
         except (TypeError, ValueError):
             raise InputError("a joint's value must be a number") from None
+        if locked:
+            raise InputError(f"{locked[0]} is not among the joints that move")
     else:
         try:
             values = np.asarray(angles, dtype=float)
@@ -170,7 +175,7 @@ def angles_array(angles: Mapping[str, float] | Sequence[float] | np.ndarray, ord
             raise InputError(f"{len(order)} joint values were expected, got an array of shape {values.shape}")
     if not np.all(np.isfinite(values)):
         raise InputError(f"{order[int(np.argmin(np.isfinite(values)))]} must be a finite number")
-    return values
+    return NamedArray(values, order)
 
 
 def mirrored(name: str) -> str:

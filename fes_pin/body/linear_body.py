@@ -17,6 +17,7 @@ from scipy.linalg import null_space
 from fes_pin.body.build import GRAVITY, Body
 from fes_pin.body.modes import ModeSet, modes
 from fes_pin.data.errors import InputError
+from fes_pin.data.named import NamedArray
 
 _RANK = 1e-9
 """Singular values below this part of the largest are rounding: the second foot's rows are of order 1."""
@@ -26,12 +27,14 @@ _RANK = 1e-9
 class LinearBody:
     """A body linearized at a posture; arrays over joints in the order of `joint_names`.
 
+    Vectors answer by name, as in `linear.C["right_hip_flexion"]`, matrices as tables: `linear.to_frame("A")`.
+
     Parameters
     ----------
     joint_names
         The joints that move: 19, or fewer where braces hold some.
     q
-        Their angles at the posture, rad.
+        Their angles at the posture, rad: (n,).
     A, B
         Inertia, kg m2, and minus the stiffness of gravity and tissue, N m/rad: (n, n).
     C
@@ -47,10 +50,10 @@ class LinearBody:
     """
 
     joint_names: tuple[str, ...]
-    q: np.ndarray = field(repr=False)
+    q: NamedArray = field(repr=False)
     A: np.ndarray = field(repr=False)
     B: np.ndarray = field(repr=False)
-    C: np.ndarray = field(repr=False)
+    C: NamedArray = field(repr=False)
     E: np.ndarray = field(repr=False)
     body: Body = field(repr=False)
     slope: tuple[float, float] = (0.0, 0.0)
@@ -60,10 +63,19 @@ class LinearBody:
     posture_name: str = ""
     gravity: float = GRAVITY
 
+    def __post_init__(self) -> None:
+        for name in ("q", "C"):
+            object.__setattr__(self, name, NamedArray(getattr(self, name), self.joint_names))
+
     @property
     def n(self) -> int:
         """Number of joints that move."""
         return len(self.joint_names)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states of equation (11), in the order of `F`: the joints, then their rates."""
+        return (*self.joint_names, *(f"{name}_rate" for name in self.joint_names))
 
     @property
     def both_feet(self) -> bool:
@@ -103,12 +115,12 @@ class LinearBody:
     @property
     def holding_torque(self) -> dict[str, float]:
         """Joint torques that hold the posture (-C), N m by name."""
-        return dict(zip(self.joint_names, (-self.C).tolist(), strict=True))
+        return {name: -float(value) for name, value in self.C.items()}
 
     @property
     def posture(self) -> dict[str, float]:
         """Angles of the joints that move, rad by name."""
-        return dict(zip(self.joint_names, self.q.tolist(), strict=True))
+        return {name: float(value) for name, value in self.q.items()}
 
     @property
     def whole_posture(self) -> dict[str, float]:

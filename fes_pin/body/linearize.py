@@ -23,6 +23,7 @@ from fes_pin.body.ground import second_foot
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.passive import Passive
 from fes_pin.data.errors import InputError
+from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import number
 
 
@@ -141,7 +142,7 @@ def linearize_batch(
     body
         The body.
     postures
-        Joint angles in the order of `body.joint_names`: (N, 19) rad.
+        Joint angles, with names or in the order of `body.joint_names`: (N, 19) rad.
     slope
         As in `linearize`.
     out
@@ -157,6 +158,8 @@ def linearize_batch(
     InputError
         Wrong shape, or an angle that is not finite.
     """
+    if isinstance(postures, NamedArray) and postures.names is not None:
+        postures = postures.arranged(body.joint_names)
     try:
         q = np.ascontiguousarray(postures, dtype=float)
     except (TypeError, ValueError):

@@ -17,6 +17,7 @@ from scipy import linalg
 
 from fes_pin.body.build import Body
 from fes_pin.body.joints import side_of
+from fes_pin.data.named import NamedArray
 
 NEUTRAL_RATE = 1e-3
 """Below this rate, 1/s, a mode neither falls nor swings within a quarter of an hour."""
@@ -83,20 +84,24 @@ class Mode:
     value
         Eigenvalue of A^-1 B, 1/s2: positive falls, negative swings.
     shape
-        Eigenvector with shape' A shape = 1: (n,).
+        Eigenvector with shape' A shape = 1: (n,), by joint name as in `mode.shape["right_hip_flexion"]`.
     joint_names
         Its joints.
     participation
-        Share of each joint in the mode, by |shape_j (A shape)_j|: (n,), sums to 1.
+        Share of each joint in the mode, by |shape_j (A shape)_j|: (n,) by joint name, sums to 1.
     name
         For a person: "fall sideways about the stance ankle, 0.24 s to double".
     """
 
     value: float
-    shape: np.ndarray = field(repr=False)
+    shape: NamedArray = field(repr=False)
     joint_names: tuple[str, ...] = field(repr=False)
-    participation: np.ndarray = field(repr=False)
+    participation: NamedArray = field(repr=False)
     name: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("shape", "participation"):
+            object.__setattr__(self, name, NamedArray(getattr(self, name), self.joint_names))
 
     @property
     def kind(self) -> str:
@@ -130,8 +135,8 @@ class Mode:
         return {self.joint_names[i]: float(self.participation[i]) for i in order}
 
     @property
-    def one_degree(self) -> np.ndarray:
-        """The shape scaled so that the joint that moves most moves by one degree: (n,) rad."""
+    def one_degree(self) -> NamedArray:
+        """The shape scaled so that the joint that moves most moves by one degree: (n,) rad by joint name."""
         return self.shape * np.radians(1.0) / np.abs(self.shape).max()
 
 

@@ -234,7 +234,6 @@ def _walking(body, path: Path):
     import numpy as np
 
     from fes_pin.body.gait import pelvis_turns, postures_of_walk
-    from fes_pin.body.joints import JOINT_NAMES
     from fes_pin.data.motion import read_coordinates
     from fes_pin.view.viewer import show_walk
 
@@ -243,6 +242,5 @@ def _walking(body, path: Path):
         postures, turns = postures_of_walk(columns, body.stance, flat_foot=False), pelvis_turns(columns)
     except InputError as error:
         raise InputError(error.message, file=path, column=error.column) from None
-    order = [JOINT_NAMES.index(name) for name in body.joint_names]
     rate = int(np.clip(round(1.0 / float(np.median(np.diff(time)))), 1, 120))
-    return show_walk(body, postures[:, order], rate, f"{path.name} ({body.label})", turns)
+    return show_walk(body, postures, rate, f"{path.name} ({body.label})", turns)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from numbers import Real
 from typing import Any
 
@@ -148,14 +148,15 @@ def known_word(value: object, allowed: Collection[str], name: str) -> str:
 
 
 def by_name(values: Any, names: Sequence[str], what: str, default: float) -> np.ndarray:
-    """Numbers per name, from a mapping (absent names get the default), one number for all, or an array.
+    """Numbers per name: a mapping or a `NamedArray` (absent names get the default), one number for all, or an array.
 
     Raises
     ------
     InputError
         Unknown name, wrong length, or not a finite number.
     """
-    if isinstance(values, Mapping):
+    if hasattr(values, "keys"):
+        values = dict(values)
         unknown = [key for key in values if key not in names]
         if unknown:
             raise InputError(f"{what} names {unknown[0]!r}, which is not one of {', '.join(names)}")

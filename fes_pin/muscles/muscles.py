@@ -7,8 +7,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, angles_array
+from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, angles_array, known_joint
 from fes_pin.data.errors import InputError
+from fes_pin.data.named import NamedArray
 from fes_pin.muscles.fibres import isometric_force, velocity_factor
 from fes_pin.muscles.paths import COORDINATES, LegPaths, leg_paths, read_table
 
@@ -37,15 +38,20 @@ def angles_of(q) -> np.ndarray:
     Parameters
     ----------
     q
-        Mapping from joint name to angle (absent joints are at 0), or array (..., 19), rad. None: the neutral posture.
+        By name, rad: a mapping (absent joints are at 0), or a `NamedArray` (..., n) as `Body.angles` gives it. An array
+        without names, (..., 19), is in the order of `JOINT_NAMES`, which is no body's. None: the neutral posture.
 
     Raises
     ------
     InputError
         Unknown joint, wrong shape, or an angle that is not a number.
     """
-    if q is None or hasattr(q, "keys"):
-        return angles_array(q or {}, JOINT_NAMES)
+    if isinstance(q, NamedArray) and q.ndim > 1 and q.names is not None:
+        for name in q.names:
+            known_joint(name)
+        q = q.arranged(JOINT_NAMES)
+    elif q is None or hasattr(q, "keys"):
+        q = angles_array({} if q is None else q, JOINT_NAMES)
     try:
         angles = np.asarray(q, dtype=float)
     except (TypeError, ValueError):

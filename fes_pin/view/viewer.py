@@ -22,6 +22,7 @@ from fes_pin.body.joints import JOINTS
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode
 from fes_pin.data.errors import InputError
+from fes_pin.data.named import NamedArray
 from fes_pin.view.arrows import Arrow, arrow_commands
 
 FRAMES_A_SECOND = 30
@@ -62,13 +63,15 @@ class BodyScene:
         return self
 
     def play(self, postures: np.ndarray) -> BodyScene:
-        """Show postures one after the other: (T, 19) rad in the order of `body.joint_names`.
+        """Show postures one after the other: (T, 19) rad, with names or in the order of `body.joint_names`.
 
         Raises
         ------
         InputError
             Wrong shape.
         """
+        if isinstance(postures, NamedArray) and postures.names is not None:
+            postures = postures.arranged(self.body.joint_names)
         postures = np.asarray(postures, dtype=float)
         if postures.ndim != 2 or postures.shape[1] != self.body.model.nq or not len(postures):
             raise InputError(f"frames must be of shape (T, {self.body.model.nq}), got {postures.shape}")
@@ -182,7 +185,7 @@ def show_walk(
     body
         The body.
     postures
-        Joint angles, (T, 19) rad, in the order of `body.joint_names`.
+        Joint angles, (T, 19) rad, with names or in the order of `body.joint_names`.
     fps
         Postures a second.
     caption

@@ -241,7 +241,7 @@ def _pose(
     """Joint angles (n, 19), the pelvis's orientation (n, 3, 3) and where its link's origin is, (n, 3) m."""
     for name in OPTIONAL:
         coordinates.setdefault(f"q_{name}", np.zeros_like(coordinates["q_pelvis_tx"]))
-    angles = postures_of_walk(coordinates, body.stance, flat_foot)
+    angles = np.asarray(postures_of_walk(coordinates, body.stance, flat_foot))
     turn = pelvis_turns(coordinates)
     origin = np.stack([coordinates[f"q_pelvis_t{c}"] for c in "xyz"], axis=1) @ TO_WORLD.T
     side = np.array([1.0, 1.0, 1.0 if body.stance == "right" else -1.0])

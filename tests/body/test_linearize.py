@@ -6,14 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fes_pin import allocate
 from fes_pin.body.anthropometry import Subject, skeleton_of_subject
 from fes_pin.body.build import GRAVITY, Body
-from fes_pin.body.gait import posture_names
+from fes_pin.body.gait import posture_angles, posture_names
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.linearize import ground_normal, linearize, linearize_batch, linearize_chunks, model_on_slope
 from fes_pin.body.passive import ElasticJoints, PassiveLegs
 from fes_pin.body.skeleton import Segment, Skeleton
 from fes_pin.data.errors import InputError
+from fes_pin.muscles.nerves import Nerves
 
 slopes = st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
 
@@ -297,3 +299,44 @@ def test_what_cannot_be_says_so_in_one_line(body, call, says):
         call(body)
     assert says in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("stance", ["left", "right"])
+def test_joint_vectors_hold_their_names_whatever_the_order(stance):
+    """A body's order begins at its stance foot, the nerves' at the left hip: by name they mean the same."""
+    body = Body.from_subject(70.0, 1.75, stance=stance)
+    q, named = body.angles("mid_stance"), posture_angles("mid_stance", stance)
+    assert dict(q) == named
+    assert body.angles(q.arranged(JOINT_NAMES)).tolist() == body.angles(named).tolist() == q.tolist()
+    assert body.rates(q.arranged(JOINT_NAMES)).tolist() == q.tolist()
+    nerves = Nerves(["left_femoral", "right_tibial"])
+    for same in (q, q.arranged(JOINT_NAMES), q.arranged(body.joint_names[::-1])):
+        assert np.array_equal(nerves.torque_matrix(same), nerves.torque_matrix(named))
+        rows = np.zeros((2, 1)) + same
+        assert np.array_equal(nerves.torque_matrix(rows)[1], nerves.torque_matrix(named))
+    linear = linearize(body, q)
+    assert linear.C["right_hip_flexion"] == -linear.holding_torque["right_hip_flexion"]
+    assert dict(linear.q) == named
+    for mode in linear.modes():
+        assert dict(mode.participation) == mode.joints
+        assert max(np.abs(list(dict(mode.one_degree).values()))) == pytest.approx(np.radians(1.0), rel=1e-12)
+    braced = linear.brace([f"{stance}_knee_flexion"])
+    assert braced.C.keys() == braced.joint_names
+    assert linear.state_names == (*linear.joint_names, *(f"{name}_rate" for name in linear.joint_names))
+
+
+@pytest.mark.parametrize("stance", ["left", "right"])
+def test_an_allocation_takes_a_bodys_posture_by_name(stance):
+    body = Body.from_subject(70.0, 1.75, stance=stance)
+    nerves, torque = Nerves(), {"left_ankle_dorsiflexion": -40.0, "right_hip_adduction": -20.0}
+    one, other = (
+        allocate(torque, nerves, q) for q in (body.angles("mid_stance"), posture_angles("mid_stance", stance))
+    )
+    assert one.pulse_widths_us == other.pulse_widths_us
+    assert one.pulse_widths_us["left_tibial"] > 180.0
+
+
+def test_postures_in_rows_are_taken_by_name(body):
+    q = np.zeros((3, 1)) + body.angles("mid_stance")
+    for A, B in zip(linearize_batch(body, q), linearize_batch(body, q.arranged(JOINT_NAMES)), strict=True):
+        assert np.array_equal(A, B)

@@ -216,6 +216,7 @@ def test_bad_questions(two_links, body):
         (lambda: modal_bound(two_links, motors, lag_s=-1.0), "lag_s"),
         (lambda: close_the_loop(linearize(body, "standing"), motors, np.zeros(19)), "one foot only"),
         (lambda: close_the_loop(two_links, motors, np.zeros(2), seconds="long"), "seconds"),
+        (lambda: close_the_loop(two_links, motors, {"left_knee_flexion": 0.1}), "left_knee_flexion is not among"),
         (lambda: close_the_loop(two_links, motors, np.zeros(2), moving_arms=True), "moving_arms"),
     ):
         with pytest.raises(InputError, match=says):
