@@ -10,9 +10,14 @@ import numpy as np
 _SYMBOLIC = (ca.SX, ca.MX, ca.DM)
 
 
+def is_expression(value: Any) -> bool:
+    """True of an expression of CasADi."""
+    return isinstance(value, _SYMBOLIC)
+
+
 def _either(symbolic: Any, numeric: Any) -> Any:
     def function(*x: Any) -> Any:
-        return symbolic(*x) if any(isinstance(v, _SYMBOLIC) for v in x) else numeric(*x)
+        return symbolic(*x) if any(map(is_expression, x)) else numeric(*x)
 
     function.__doc__ = f"NumPy's `{numeric.__name__}` of numbers and arrays, CasADi's of its expressions."
     return function

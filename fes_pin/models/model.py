@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from fes_pin.data.errors import InputError
+from fes_pin.data.schema import unknown
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import ParameterInfo
@@ -21,21 +23,41 @@ if TYPE_CHECKING:
 class Model:
     """A rig and its effects, in the order of the signal path; immutable. `model + effect` is the extended model.
 
-    A parameter's name is its path: `gain`, `coulomb_friction.torque_nm`.
+    A parameter's name is its path: `gain`, `coulomb_friction.torque_nm`. `model - effect`, or `model - "its_name"`, is
+    the model without it.
+
+    Raises
+    ------
+    InputError
+        When it is built: a rig that lacks constants, an effect that is not for the rig, two of one name. Of `-`: an
+        effect that the model does not have.
     """
 
     rig: Rig
     effects: tuple[Effect, ...] = ()
 
-    def __add__(self, effect: Effect) -> Model:
-        if any(e.name == effect.name for e in self.effects):
-            raise ValueError(f"the model has {effect.name} already")
-        if not self.rig.takes(effect):
-            raise ValueError(f"{effect.name} is not for the rig {self.rig.name}")
-        return Model(self.rig, in_order((*self.effects, effect)))
+    def __post_init__(self) -> None:
+        names = [e.name for e in self.effects]
+        if missing := set(self.rig.needed) - set(self.rig.constants):
+            raise InputError(f"expected {', '.join(sorted(missing))} as well", column="constants")
+        for effect in self.effects:
+            if names.count(effect.name) > 1:
+                raise InputError(f"the model has {effect.name} already")
+            if hasattr(effect, "rigs") and not self.rig.takes(effect):  # a probe of the residual is for any rig
+                raise InputError(f"{effect.name} is not for the rig {self.rig.name}")
+        object.__setattr__(self, "effects", in_order(self.effects))
 
-    def __sub__(self, name: str) -> Model:
-        return Model(self.rig, tuple(e for e in self.effects if e.name != name))
+    def __add__(self, effect: Effect) -> Model:
+        if not isinstance(effect, Effect):
+            raise InputError(f"expected an effect, as in CoulombFriction(torque_nm=0.04); found {effect!r}")
+        return Model(self.rig, (*self.effects, effect))
+
+    def __sub__(self, effect: str | Effect | type[Effect]) -> Model:
+        name = effect if isinstance(effect, str) else effect.name
+        left = tuple(e for e in self.effects if e.name != name)
+        if len(left) == len(self.effects):
+            raise InputError(unknown(name, [e.name for e in self.effects]), column=name)
+        return Model(self.rig, left)
 
     def parameters(self) -> dict[str, float]:
         """The value of every parameter that all trials share, by name."""
@@ -84,13 +106,13 @@ class Model:
 
         Raises
         ------
-        KeyError
-            For a name that the model does not have.
+        InputError
+            For a name that the model does not have, or a value out of its bounds.
         """
         known = self.parameters()
         for name in values:
             if name not in known:
-                raise KeyError(f"no parameter {name}; there are {', '.join(known)}")
+                raise InputError(unknown(name, known), column=name)
         nominal: dict[str, Any] = {n: float(v) for n, v in values.items() if "." not in n}
         rig = dataclasses.replace(self.rig, **nominal)
         effects = []

@@ -7,9 +7,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from numbers import Real
 from typing import Any
 
+from fes_pin.data.errors import InputError
+from fes_pin.data.schema import NumberKey, any_number
+from fes_pin.models.maths import is_expression
+
 _KEY = "fes_pin"
+ANY_NUMBER = any_number("")
 ROTARY = {"q": "rad", "y": "rad", "effort": "N m"}
 """Units of a revolute joint."""
 SLIDING = {"q": "m", "y": "m", "effort": "N"}
@@ -94,3 +100,43 @@ def parameters_of(thing: Any) -> dict[str, ParameterInfo]:
 @cache
 def _parameters_of(kind: type) -> dict[str, ParameterInfo]:
     return {f.name: f.metadata[_KEY] for f in dataclasses.fields(kind) if _KEY in f.metadata}
+
+
+def checked_number(value: Any, name: str, key: NumberKey = ANY_NUMBER) -> float:
+    """A number that somebody gave, also one of NumPy's.
+
+    Raises
+    ------
+    InputError
+        Not a number, not finite, or out of its bounds; names it by `name`.
+    """
+    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else value
+    try:
+        return key.check(number)
+    except ValueError as problem:
+        raise InputError(str(problem), column=name) from None
+
+
+def check_parameters(thing: Any, keys: Mapping[str, NumberKey] | None = None) -> None:
+    """Make sure that the parameters of a rig or an effect are within their bounds; expressions of CasADi may be any.
+
+    Parameters
+    ----------
+    keys
+        What a study may state of some of them, by name: this is as possible as what is within the bounds of a fit.
+
+    Raises
+    ------
+    InputError
+        For one that is not, with its name.
+    """
+    kind: type = type(thing)
+    for name, info in _parameters_of(kind).items():
+        value = getattr(thing, name)
+        if (type(value) is float and info.lower <= value <= info.upper) or is_expression(value):
+            continue
+        number = checked_number(value, name)
+        if keys and name in keys and not info.lower <= number <= info.upper:
+            checked_number(number, name, keys[name])
+        elif not info.lower <= number <= info.upper:
+            raise InputError(f"expected a number from {info.lower:g} to {info.upper:g}, found {number:g}", column=name)

@@ -225,15 +225,20 @@ class _Block:
                 self.repeated[: len(trial), k, lane] = repeated(column, hunting)
                 repeats[:, k] = self.repeated[: len(trial), k, lane] if count_of(column) > 0.0 else 1.0
             self.readings.append(Readings(self.outputs, judged.astype(bool), repeats))
-        self._given: tuple[tuple[int, ...], np.ndarray] | None = None
+        self._given: tuple[tuple[int, ...] | None, np.ndarray] = None, np.empty(0)
 
     def _driven(self, shift: tuple[int, ...]) -> np.ndarray:
-        """Inputs of all lanes, later by whole samples, beside what was measured and whether it was."""
-        if self._given is None or self._given[0] != shift:
-            driven = lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.width), shift)
-            read = (self.measured, self.seen.astype(float), self.repeated)
-            self._given = (shift, np.concatenate([driven, *read], axis=1))
-        return self._given[1]
+        """Inputs of all lanes, later by whole samples, beside what was measured and whether it was.
+
+        The last ones are kept as in `models.simulate`: in one piece, since another thread may ask for others meanwhile.
+        """
+        known, u = self._given
+        if known == shift:
+            return u
+        driven = lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.width), shift)
+        u = np.concatenate([driven, self.measured, self.seen.astype(float), self.repeated], axis=1)
+        self._given = shift, u
+        return u
 
     def run(
         self,

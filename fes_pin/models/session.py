@@ -10,11 +10,14 @@ they are of more than one session.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
+from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.models.maths import exp
 
@@ -30,6 +33,24 @@ PAST = tuple(f"past_{k:02d}" for k in range(BINS))
 """Names of the constants of a trial that hold the mean recruitment of each bin, newest first."""
 PIECES, SHORTEST_S = 20, 0.25
 """A trial is kept in so many pieces, or in fewer that last so long."""
+
+
+def checked_session(rows: Sequence[Sequence[float]]) -> Session:
+    """Stretches of stimulation as they must be: each a begin, a later end and a mean recruitment.
+
+    Raises
+    ------
+    InputError
+        For one that is not, or whose numbers are not finite.
+    """
+    out: list[tuple[float, float, float]] = []
+    for row in rows if isinstance(rows, list | tuple) else [()]:
+        numbers = [float(v) for v in row if isinstance(v, Real)] if isinstance(row, list | tuple) else []
+        if len(numbers) != 3 or not all(map(math.isfinite, numbers)) or not numbers[0] < numbers[1]:
+            message = "expected rows of a begin, a later end and a mean recruitment, all finite"
+            raise InputError(message, column="session")
+        out.append((numbers[0], numbers[1], numbers[2]))
+    return tuple(out)
 
 
 def session_of(trials: Sequence[Trial], recruited: Callable[[Trial], np.ndarray]) -> Session:

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from fes_pin.models.maths import sqrt, where
-from fes_pin.models.parameters import ParameterInfo, parameters_of
+from fes_pin.models.parameters import ParameterInfo, check_parameters, parameters_of
 
 
 class Stage(StrEnum):
@@ -67,6 +67,11 @@ class Effect:
     each_trial
         Its amplitudes are unknowns of each trial, estimated from that trial alone; the fields keep what a trial that
         was not measured is predicted with: their nulls. All other parameters stay common to all trials.
+
+    Raises
+    ------
+    InputError
+        When it is built: a parameter that is no number, or out of its bounds.
     """
 
     name: ClassVar[str]
@@ -87,6 +92,9 @@ class Effect:
     scales: ClassVar[bool] = False
 
     each_trial: bool = dataclasses.field(default=False, kw_only=True)
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
 
     def apply(self, value: Any, s: Any) -> Any:
         """The signal with the effect, from the signal without it."""

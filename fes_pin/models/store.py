@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,13 +10,12 @@ import tomli_w
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
-from fes_pin.data.schema import NumberKey, RigSchema, one_of
+from fes_pin.data.schema import NumberKey, one_of
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.outside import origin
 from fes_pin.models.rigs.base import Rig
-from fes_pin.models.session import Session
 from fes_pin.models.stage import Effect
 
 FORMAT = 1
@@ -80,52 +78,25 @@ def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = 
         kind = kinds[one_of(name, tuple(kinds))]
     except ValueError as problem:
         raise document.error("rig", _missing(document, name, str(problem))) from None
-    fitted = document.data.get("fitted")
-    names = list(kind.parameters())
-    if not isinstance(fitted, list) or not all(f in names for f in fitted) or len(set(fitted)) < len(fitted):
-        raise document.error("fitted", f"expected names among {', '.join(names)}, each once")
-    nominal = _numbers(document, "nominal", set(names))
-    constants = _numbers(document, "constants", None)
-    if missing := set(kind.needed) - set(constants):
-        raise document.error("constants", f"expected {', '.join(sorted(missing))} as well")
-    _check_possible(document, kind.schema, {"nominal": nominal, "constants": constants})
-    model = Model(kind(**nominal, constants=constants, fitted=tuple(fitted), session=_session(document)))
+    nominal: dict[str, Any] = _numbers(document, "nominal", set(kind.parameters()))
+    constants, fitted = _numbers(document, "constants", None), document.data.get("fitted", "")
+    try:
+        model = Model(kind(**nominal, constants=constants, fitted=fitted, session=document.data.get("session", ())))
+    except InputError as problem:
+        key = f"nominal.{problem.column}" if problem.column in nominal else str(problem.column)
+        raise document.error(key, problem.message) from None
     listed = document.table("effects")
     for name in listed:
         try:
             model = model + _effect(document, catalogue, name, listed)
         except KeyError as error:
             raise document.error(f"effects.{name}", _missing(document, name, str(error.args[0]))) from None
-        except InputError:
-            raise
-        except ValueError as error:
-            raise document.error(f"effects.{name}", str(error)) from None
+        except InputError as problem:
+            if problem.file is not None:
+                raise
+            within = f".{problem.column}" if problem.column else ""
+            raise document.error(f"effects.{name}{within}", problem.message) from None
     return model
-
-
-def _session(document: Document) -> Session:
-    """Stretches of stimulation: each a begin, an end and a mean recruitment."""
-    listed, out = document.data.get("session", []), []
-    for row in listed if isinstance(listed, list) else [None]:
-        numbers = [float(v) for v in row if isinstance(v, int | float)] if isinstance(row, list) else []
-        if len(numbers) != 3 or not all(map(math.isfinite, numbers)) or not numbers[0] < numbers[1]:
-            raise document.error("session", "expected rows of a begin, a later end and a mean recruitment, all finite")
-        out.append((numbers[0], numbers[1], numbers[2]))
-    return tuple(out)
-
-
-def _check_possible(document: Document, schema: RigSchema, tables: Mapping[str, Mapping[str, float]]) -> None:
-    """Refuse what a study of this rig could not hold either: a mass below zero, a saturation below the threshold."""
-    known = {**schema.constants, **schema.passive, **schema.start}
-    for key, table in tables.items():
-        for name in table.keys() & known.keys():
-            try:
-                known[name].check(table[name])
-            except ValueError as problem:
-                raise document.error(f"{key}.{name}", str(problem)) from None
-    constants = tables["constants"]
-    if "threshold_us" in constants and constants.get("saturation_us", math.inf) <= constants["threshold_us"]:
-        raise document.error("constants.saturation_us", f"expected more than {constants['threshold_us']:g}")
 
 
 def _effect_table(one: Effect) -> dict[str, Any]:

@@ -13,10 +13,10 @@ from fes_pin.models.nominal import nominal_model
 
 
 def test_a_prediction_that_runs_away_counts_as_a_large_error():
-    """A spring that pushes: the joint leaves the floating-point numbers, and the errors stay numbers."""
+    """A spring too stiff for any step: the joint leaves the floating-point numbers, and the errors stay numbers."""
     study = study_of("joint", driven=False)
     base = fit(nominal_model(study), study.trials)
-    falling = effect_named("parallel_stiffness")(stiffness_nm_per_rad=-500.0, rest_angle_rad=0.0)
+    falling = effect_named("parallel_stiffness")(stiffness_nm_per_rad=1e8, rest_angle_rad=0.0)
     errors = errors_of(base.model + falling, study.trials, base.noise)
     most = RUNAWAY * max(np.abs(t["position"]).max() for t in study.trials)
     assert np.isfinite(errors.squares).all()
@@ -27,7 +27,7 @@ def test_a_prediction_that_runs_away_counts_as_a_large_error():
 def test_evidence_against_a_model_that_runs_away_is_a_number():
     study = study_of("joint", driven=False)
     base = fit(nominal_model(study), study.trials)
-    falling = base.model + effect_named("parallel_stiffness")(stiffness_nm_per_rad=-500.0, rest_angle_rad=0.0)
+    falling = base.model + effect_named("parallel_stiffness")(stiffness_nm_per_rad=1e8, rest_angle_rad=0.0)
     fallen = replace(base, model=falling)
     with_it, without_it = (
         separate(base, one, {"cause": other}, study.trials, base.noise)

@@ -265,7 +265,7 @@ def test_a_trial_of_which_noise_of_a_long_order_leaves_nothing_has_no_lines():
 def test_of_a_simulation_that_runs_away_features_are_those_of_the_measured_motion():
     time = np.arange(400) * DT
     trial = Trial("wild", "motion", {"effort": np.sin(3.0 * time), "position": np.sin(2.0 * time)}, time)
-    slide = Joint(constants={"inertia": 1.0, "gravity_cos": 0.0, "gravity_sin": 0.0, "revolute": 0.0}, damping=-1e5)
+    slide = Joint(constants={"inertia": 1.0, "gravity_cos": 0.0, "gravity_sin": 0.0, "revolute": 0.0}, damping=1e8)
     made = open_set.features(Model(slide), [trial], {"position": WHITE})
     assert np.isfinite(made.columns).all()
     assert made.columns.any(axis=0).all()

@@ -1,7 +1,7 @@
 """Fits against scipy's least squares on the whole system, bounds, what is not identified, intervals."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -16,7 +16,9 @@ from fes_pin.identify.noise import Noise, thinning
 from fes_pin.identify.problem import Problem, normal_equations
 from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
+from fes_pin.models.parameters import parameter
 from fes_pin.models.rigs import Joint
+from fes_pin.models.stage import Effect, Stage
 
 
 @pytest.mark.parametrize(("rig", "velocity"), [("ankle", False), ("joint", False), ("joint", True), ("muscle", False)])
@@ -67,10 +69,21 @@ def test_the_unknowns_of_a_trial_are_eliminated_exactly():
     assert promised == pytest.approx(residual @ residual - left @ left, rel=1e-9)
 
 
+@dataclass(frozen=True)
+class Pushing(Effect):
+    """What drives a joint along its velocity."""
+
+    name, stage, signal, rigs = "pushing", Stage.JOINT, "torque", ("joint",)
+    size: float = parameter(0.004, null=0.0)
+
+    def apply(self, value, s):
+        return value + self.size * s.v
+
+
 def test_a_bound_holds():
     """Data of a joint that gains energy: the damping ends at 0, exactly, and the rest is the best that is left."""
     rng = np.random.default_rng(3)
-    true = Model(RIGS["joint"]).with_parameters({"damping": -0.004})
+    true = Model(RIGS["joint"]).with_parameters({"damping": 0.0}) + Pushing()
     trials = [measured(true, trial("joint", "motion", rng), rng) for _ in range(3)]
     start = Model(RIGS["joint"])
     fitted = fit(start, trials, WHITE)
@@ -131,16 +144,16 @@ def test_nothing_is_identified_without_a_stimulus():
 def test_a_shape_is_not_identified_where_its_effect_is_absent():
     """A muscle that gains force with use: fatigue stays at its bound, so its recovery is nowhere in the data."""
     rng = np.random.default_rng(6)
-    model = Model(RIGS["muscle"]) + effect_named("fatigue")(rate_per_s=-0.05, recovery_s=30.0)
+    model = Model(RIGS["muscle"]) + effect_named("potentiation")(gain=0.5, decay_s=30.0)
     trials = [measured(model, trial("muscle", "isometric", rng, 400), rng) for _ in range(3)]
-    fitted = fit(model.with_parameters({"fatigue.rate_per_s": 0.02}), trials, WHITE)
+    fitted = fit(Model(RIGS["muscle"]) + effect_named("fatigue")(rate_per_s=0.02, recovery_s=30.0), trials, WHITE)
     assert "fatigue.rate_per_s" in fitted.at_bound
     assert fitted.not_identified() == ("fatigue.recovery_s",)
 
 
 def test_a_start_that_cannot_be_simulated_is_infinitely_bad():
     model, trials = trials_of("joint", np.random.default_rng(7))
-    broken = model + effect_named("parallel_stiffness")(stiffness_nm_per_rad=-500.0)
+    broken = model + effect_named("parallel_stiffness")(stiffness_nm_per_rad=1e8)
     fitted = fit_problem(Problem(broken, trials, WHITE, ("damping",)), broken.parameters())
     assert not fitted.converged and not fitted.is_optimal()
     assert math.isinf(fitted.sse) and math.isinf(fitted.std("damping"))

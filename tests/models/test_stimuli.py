@@ -29,6 +29,6 @@ def test_trains_have_their_rates_their_pauses_and_an_end_before_the_trials():
 
 def test_a_prediction_that_runs_away_is_refused_where_it_does():
     given = trial("joint", "motion", np.random.default_rng(0), 4000)
-    falling = Model(RIGS["joint"]) + ParallelStiffness(stiffness_nm_per_rad=-1e5)
+    falling = Model(RIGS["joint"]) + ParallelStiffness(stiffness_nm_per_rad=1e8)
     with pytest.raises(InputError, match=r"position is not finite from sample \d+ on: the model is unstable here"):
         predict(falling, Trial(given.name, "motion", given.columns, given.time, given.conditions))

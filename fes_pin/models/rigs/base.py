@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
+from fes_pin.data.errors import InputError
+from fes_pin.data.frozen import Frozen
 from fes_pin.data.imposed import MOTION, imposed_motion, same_motion
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.models.parameters import ROTARY, ParameterInfo, parameters_of
+from fes_pin.models.parameters import (
+    ANY_NUMBER,
+    ROTARY,
+    ParameterInfo,
+    check_parameters,
+    checked_number,
+    parameters_of,
+)
 from fes_pin.models.rigs.stimuli import both_signs
-from fes_pin.models.session import Session, past_of
+from fes_pin.models.session import Session, checked_session, past_of
 from fes_pin.models.stage import Effect, Signals
 
 GRAVITY = 9.81
@@ -28,7 +38,7 @@ RUN_OUT = "inertia over damping"
 
 
 @dataclasses.dataclass(frozen=True)
-class Rig:
+class Rig(Frozen):
     """A rig and its nominal model: fields are what the nominal model fits, `constants` what is known before.
 
     A subclass writes its equations on `Signals`: `s.x` states, `s.m` memories, `s.u` inputs, `s.c` constants of rig
@@ -36,10 +46,17 @@ class Rig:
     step is longer), and `s.delayed(now, before)` for what is held between samples and may come late. What an imposed
     motion is at an instant `imposed_now` says.
     Each method serves every `kind` of trial.
+
+    Raises
+    ------
+    InputError
+        When it is built: a parameter or a constant that is no finite number or out of its bounds, a saturation that is
+        not above the threshold, a name in `fitted` that is no parameter, a session that is not one.
     """
 
-    constants: Mapping[str, float] = dataclasses.field(default_factory=dict, kw_only=True)
+    constants: Mapping[str, float] = dataclasses.field(default_factory=dict, kw_only=True, hash=False)
     fitted: tuple[str, ...] | None = dataclasses.field(default=None, kw_only=True)
+    """Names of the parameters that a nominal fit moves; all of them by default."""
     session: Session = dataclasses.field(default=(), kw_only=True)
     """What was stimulated when, of trials that say when they began."""
 
@@ -58,6 +75,22 @@ class Rig:
     """Readings that are the rate of another, and may have been computed from it: their column and the other's."""
     begins: ClassVar[str] = ""
     """Where a prediction of it begins, one sentence, if that is to be told."""
+
+    def __post_init__(self) -> None:
+        names, schema = tuple(self.parameters()), self.schema
+        listed = names if self.fitted is None else self.fitted
+        if not isinstance(listed, list | tuple) or not set(listed) <= set(names) or len(set(listed)) < len(listed):
+            raise InputError(f"expected names among {', '.join(names)}, each once", column="fitted")
+        check_parameters(self, schema.start)
+        known = {**schema.constants, **schema.passive, **schema.start}
+        constants = {
+            n: checked_number(v, f"constants.{n}", known.get(n, ANY_NUMBER)) for n, v in self.constants.items()
+        }
+        if "threshold_us" in constants and constants.get("saturation_us", math.inf) <= constants["threshold_us"]:
+            message = f"expected more than {constants['threshold_us']:g}"
+            raise InputError(message, column="constants.saturation_us")
+        vars(self).update(constants=constants, fitted=tuple(listed), session=checked_session(self.session))
+        self._freeze()
 
     @classmethod
     def described(cls) -> RigSchema:
@@ -140,7 +173,7 @@ class Rig:
 
     def fitted_parameters(self) -> tuple[str, ...]:
         """The parameters that a nominal fit moves."""
-        return tuple(self.parameters()) if self.fitted is None else self.fitted
+        return self.fitted or ()
 
     def units(self) -> Mapping[str, str]:
         """Units of position, reading and effort; see `Parameter.in_units`."""
