@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.frozen import Frozen
 from fes_pin.data.imposed import MOTION, imposed_motion, same_motion
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -38,7 +38,7 @@ RUN_OUT = "inertia over damping"
 
 
 @dataclasses.dataclass(frozen=True)
-class Rig(Frozen):
+class Rig(ReadOnly):
     """A rig and its nominal model: fields are what the nominal model fits, `constants` what is known before.
 
     A subclass writes its equations on `Signals`: `s.x` states, `s.m` memories, `s.u` inputs, `s.c` constants of rig
@@ -79,7 +79,7 @@ class Rig(Frozen):
     def __post_init__(self) -> None:
         names, schema = tuple(self.parameters()), self.schema
         listed = names if self.fitted is None else self.fitted
-        if not isinstance(listed, list | tuple) or not set(listed) <= set(names) or len(set(listed)) < len(listed):
+        if not isinstance(listed, list | tuple) or sorted(n for n in names if n in listed) != sorted(map(str, listed)):
             raise InputError(f"expected names among {', '.join(names)}, each once", column="fitted")
         check_parameters(self, schema.start)
         known = {**schema.constants, **schema.passive, **schema.start}

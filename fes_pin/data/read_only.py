@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 
-class Frozen:
+class ReadOnly:
     """Base of a frozen dataclass: its mappings and arrays are read-only, also in copies and after pickling."""
 
     def _freeze(self) -> None:
