@@ -161,7 +161,7 @@ class _Work:
         diagnosis = _judged(whole, search, searched, (train, test), self.seed)
         if _may_be_driven(diagnosis, search, train):
             with time_limit(self.end - time.perf_counter()):
-                search, searched = searches.by_likelihood(train)
+                search, searched = searches.by_likelihood(train, answered=True)  # hidden by what smoothed the record
             diagnosis = _judged(whole, search, searched, (train, test), self.seed)
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
 

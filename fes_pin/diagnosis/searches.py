@@ -64,25 +64,25 @@ class Searches:
         self.last = search = self._begun(trials)
         found: Result = search.run()
         if isinstance(found, Searched) and self._is_undecided(found):
-            return self.by_likelihood(trials)
+            return self.by_likelihood(trials, self.driven)
         return search, found
 
-    def by_likelihood(self, trials: Sequence[Trial]) -> tuple[LikelihoodSearch, Found]:
-        """Search trials by the likelihood, whatever drives the rig."""
-        self.last = search = self._by_likelihood(trials)
+    def by_likelihood(self, trials: Sequence[Trial], answered: bool) -> tuple[LikelihoodSearch, Found]:
+        """Search trials by the likelihood, whatever drives the rig; `answered` if its effort answers its reading."""
+        self.last = search = self._by_likelihood(trials, answered)
         return search, search.run()
 
     def _begun(self, trials: Sequence[Trial]) -> Search:
         if self.driven or any(t.kind == IMPOSED for t in trials):
-            return self._by_likelihood(trials)
+            return self._by_likelihood(trials, self.driven)
         now = {id(old): new for old, new in zip(self.train, trials, strict=True)}
         stated = {t.name: t.conditions for t in trials}
         recorded = [now.get(id(t)) or _with(t, stated.get(t.name, t.conditions)) for t in self.recorded]
         return SimulationSearch(self.nominal, trials, recorded, self._seed, self._progress, self._effects)
 
-    def _by_likelihood(self, trials: Sequence[Trial]) -> LikelihoodSearch:
+    def _by_likelihood(self, trials: Sequence[Trial], answered: bool) -> LikelihoodSearch:
         parts = in_parts(self.nominal.rig, trials)
-        sets = LikelihoodFits(self.nominal, parts, self._effects)
+        sets = LikelihoodFits(self.nominal, parts, self._effects, answered)
         return LikelihoodSearch(sets, self._seed, self._progress, self._horizon_s)
 
     def _is_undecided(self, found: Searched) -> bool:

@@ -12,6 +12,7 @@ from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.problem import answered_columns, measured_columns
 from fes_pin.models.effects import Backlash, CoulombFriction, SensorGain, SensorLag
 from fes_pin.models.nominal import nominal_model
 
@@ -31,7 +32,7 @@ def test_another_unit_is_no_gain(tmp_path):
     nominal = sets.nominal()
     sets.extend_all(())
     gain = sets.fits[GAIN]
-    assert gain.model.effects[0].error == -0.5 and not is_possible(gain)
+    assert gain.model.effects[0].error == -0.5 and not sets.is_possible(gain)
     assert nominal.price - gain.price > 30.0
     assert gain.price < sets.fits[FRICTION].price
     assert sets.ranked(1) == [FRICTION, GAIN]
@@ -42,7 +43,7 @@ def test_a_gain_that_is_small_is_possible(tmp_path):
     sets = LikelihoodFits(nominal_model(study), study.trials, [SensorGain, CoulombFriction])
     sets.nominal()
     sets.extend_all(())
-    assert all(is_possible(f) for f in sets.fits.values())
+    assert all(sets.is_possible(f) for f in sets.fits.values())
 
 
 @pytest.mark.parametrize(("half_width", "possible"), [(0.4, False), (0.6, True), (0.0, True)])
@@ -53,7 +54,8 @@ def test_a_play_of_less_than_a_count_is_the_counts(half_width, possible, tmp_pat
     trials = [t.with_columns(position=count * np.round(t["position"] / count)) for t in study.trials]
     model = nominal_model(study) + Backlash(half_width=half_width * count)
     problem = LikelihoodProblem(model, trials, first_guess(model, trials), free=("damping",))
-    assert is_possible(fit_problem(problem, model.parameters())) == possible
+    fitted = fit_problem(problem, model.parameters())
+    assert is_possible(fitted, answered_columns(model, trials)) == possible
 
 
 @pytest.mark.parametrize(("rows", "possible"), [(0.4, False), (0.6, True), (0.0, True)])
@@ -62,6 +64,6 @@ def test_a_lag_of_less_than_half_a_row_is_the_logs(rows, possible, tmp_path):
     study = in_another_unit(tmp_path, 1.0)
     model = nominal_model(study) + SensorLag(lag_s=rows * study.trials[0].dt)
     problem = LikelihoodProblem(model, study.trials, first_guess(model, study.trials), free=("damping",))
-    fitted = replace(fit_problem(problem, model.parameters()), doubt=problem.doubt)
-    assert is_possible(fitted) == possible
-    assert is_possible(replace(fitted, doubt=None))
+    fitted = fit_problem(problem, model.parameters())
+    assert is_possible(fitted, answered_columns(model, study.trials)) == possible
+    assert is_possible(fitted, measured_columns(model, study.trials))

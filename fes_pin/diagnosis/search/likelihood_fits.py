@@ -58,6 +58,8 @@ class LikelihoodFits:
         What was measured.
     effects
         The causes that are looked for; by default all that are known of the rig.
+    answered
+        Whether an effort, if there is one, answers what is read; a property of the trials, not of the likelihood.
 
     Attributes
     ----------
@@ -69,9 +71,15 @@ class LikelihoodFits:
         Other forms of a set that is fitted.
     """
 
-    def __init__(self, model: Model, trials: Sequence[Trial], effects: Sequence[type[Effect]] | None = None) -> None:
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        effects: Sequence[type[Effect]] | None = None,
+        answered: bool = True,
+    ) -> None:
         self.model, self.trials = Model(model.rig), tuple(trials)
-        self.library = Library(self.model, trials, effects, answered=True)
+        self.library = Library(self.model, trials, effects, answered)
         self.fits: dict[Names, Fit] = {}
         self._calm: Doubt | None = None
         self._converged: set[Names] = set()
@@ -280,9 +288,13 @@ class LikelihoodFits:
                 fitted = self._maxima.from_start(fitted.model + started(one, nothing), fitted.doubt, fitted.unknowns)
         return fitted
 
+    def is_possible(self, fitted: Fit) -> bool:
+        """False if the size of a cause is nothing that it can be; see `possible.is_possible`."""
+        return is_possible(fitted, self.library.measured)
+
     def ranked(self, size: int) -> list[Names]:
         """Sets of a size, cheapest first; those that have converged to what cannot be come last."""
-        absurd = {n for n in self._converged if not is_possible(self.fits[n])}
+        absurd = {n for n in self._converged if not self.is_possible(self.fits[n])}
         return sorted((n for n in self.fits if len(n) == size), key=lambda n: (n in absurd, self.fits[n].price, n))
 
 

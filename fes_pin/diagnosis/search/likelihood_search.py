@@ -22,7 +22,6 @@ from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.remainder.driven import driven_remainder
 from fes_pin.diagnosis.search.cause_sets import MOST_CAUSES
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits, Names
-from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_pairs
 from fes_pin.diagnosis.search.simulation_search import NominalFitError
 from fes_pin.identify.ahead import default_horizon
@@ -155,7 +154,7 @@ class LikelihoodSearch:
 
     def possible(self) -> dict[Names, Fit]:
         """All sets that are fitted, but for those that cannot be, or that were found not to earn their place."""
-        return {n: f for n, f in self.sets.fits.items() if n not in self._unearned and is_possible(f)}
+        return {n: f for n, f in self.sets.fits.items() if n not in self._unearned and self.sets.is_possible(f)}
 
     def _worth_extending(self, names: Names) -> bool:
         """True where the score of a further cause beside a set is not what chance brings, or where something is left.
@@ -210,7 +209,7 @@ class LikelihoodSearch:
         """Whether a set can be, and is worth more than the best smaller one."""
         larger, smaller = self.sets.fits[names], self.sets.fits[best]
         earned = self._is_earned(larger, smaller) and self._foretells_more(larger, smaller)
-        return self._kept(names, earned) and is_possible(larger)
+        return self._kept(names, earned) and self.sets.is_possible(larger)
 
     def _foretells_more(self, larger: Fit, smaller: Fit) -> bool:
         """Whether what stands beside a cause lessens the errors ahead of the very trials that it was fitted to.
@@ -308,7 +307,7 @@ class LikelihoodSearch:
             rest = tuple(n for n in names if n != name)
             without[name] = sets.without(names, name)
             others = [k for k in sets.fits if len(k) == len(names) and set(rest) <= set(k) and name not in k]
-            finite = (f for k in others if math.isfinite((f := sets.fits[k]).sse) and is_possible(f))
+            finite = (f for k in others if math.isfinite((f := sets.fits[k]).sse) and sets.is_possible(f))
             rivals[name] = sorted(finite, key=lambda f: f.price)
         none, best = sets.fits[()], sets.fits[names]
         p_values = {n: self.p_value(best, without[n]) for n in names}

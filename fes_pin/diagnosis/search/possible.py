@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.problem import answered_columns, measured_columns
 
 
-def is_possible(fitted: Fit) -> bool:
-    """False if the size of a cause is nothing that it can be: it stands for another.
+def is_possible(fitted: Fit, measured: Mapping[str, np.ndarray]) -> bool:
+    """False if the size of a cause of a fit is nothing that it can be: another cause is mistaken for it.
 
-    It ended where that ends, other than at nothing, or is less than what is read can tell.
+    The size ended at its bound, other than at nothing, or is less than the readings can resolve.
+
+    Parameters
+    ----------
+    measured
+        Columns of the trials; see `identify.problem.measured_columns`, and `answered_columns` where a controller
+        answers the reading.
     """
-    if not fitted.model.effects:
-        return True
-    columns = measured_columns if fitted.doubt is None else answered_columns
-    measured = columns(fitted.model, fitted.trials)
     for effect in fitted.model.effects:
         info, smallest = effect.parameters(), effect.smallest(measured)
         for n in effect.amplitudes():

@@ -75,7 +75,7 @@ class SimulationFits:
     def is_absurd(self, fitted: Fit) -> bool:
         """True of a fit that has converged to what cannot be; see `is_possible`."""
         if self._absurd.get(id(fitted), (None,))[0] is not fitted:
-            self._absurd[id(fitted)] = (fitted, fitted.converged and not is_possible(fitted))
+            self._absurd[id(fitted)] = (fitted, fitted.converged and not is_possible(fitted, self.library.measured))
         return self._absurd[id(fitted)][1]
 
     def add(self, made: dict[Names, Callable[[], Fit]]) -> None:
