@@ -22,6 +22,7 @@ from fes_pin.models.stage import Effect, Stage
 
 ROOMS = {
     "data": "Studies, trials, readers",
+    "infer": "Inference",
     "models": "Models: rigs, effects, simulation",
     "identify": "Fits, noise",
     "diagnosis": "Diagnosis",
@@ -222,7 +223,7 @@ def public_text() -> str:
     return table(("name", "what it is"), rows)
 
 
-REASONED = ("diagnosis", "identify", "contrasts")
+REASONED = ("infer", "diagnosis", "identify", "contrasts")
 """Rooms whose numbers are listed with their reasons."""
 DECIDING = {
     "UNUSUAL_LEVEL",

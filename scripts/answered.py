@@ -14,7 +14,7 @@ from going_on import results_of
 
 import fes_pin as fp
 from fes_pin.diagnosis.misread import NAME as MISREAD
-from fes_pin.identify.levels import CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.models.catalogue import shipped
 
 

@@ -1,5 +1,6 @@
 """The imports run one way: view -> diagnosis -> identify -> models -> data; control -> allocation -> muscles -> body.
 
+Inference (infer) knows no rig and no body: all may use it, and it uses nothing of ours but `workers`.
 The controller takes eq. (1) from paper. Measured walking (walk) reads the body, and the parameters and stages of models
 for its causes.
 """
@@ -14,6 +15,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "fes_pin"
 ALLOWED = {
+    "infer": set(),
     "data": set(),
     "models": {"data"},
     "identify": {"models", "data"},
@@ -53,8 +55,17 @@ def test_imports_run_one_way(path):
     if chapter not in ALLOWED:
         return
     known = set(ALLOWED) | {"cli"}
-    forbidden = (imported_chapters(path) & known) - ALLOWED[chapter] - {chapter}
+    forbidden = (imported_chapters(path) & known) - ALLOWED[chapter] - {chapter, "infer"}
     assert not forbidden, f"{path} imports {sorted(forbidden)}"
+
+
+def test_inference_uses_nothing_of_ours_but_workers():
+    """What `workers` itself needs, the settings and the one error, comes with it."""
+    told = "import sys, pkgutil, importlib, fes_pin; before = set(sys.modules); import fes_pin.infer as infer; "
+    told += "[importlib.import_module(f'fes_pin.infer.{m.name}') for m in pkgutil.iter_modules(infer.__path__)]; "
+    told += "print(*(n for n in set(sys.modules) - before if n.startswith('fes_pin.') and '.infer' not in n))"
+    run = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
+    assert set(run.stdout.split()) <= {"fes_pin.workers", "fes_pin.settings", "fes_pin.data", "fes_pin.data.errors"}
 
 
 def imported_files(path: Path) -> set[Path]:

@@ -13,8 +13,8 @@ from fes_pin.contrasts.result import Change
 from fes_pin.contrasts.search import ContrastFound
 from fes_pin.contrasts.words import of_cause, of_nominal
 from fes_pin.diagnosis.cause import ParameterEstimate
-from fes_pin.identify.distributions import normal_quantile
-from fes_pin.identify.levels import ABSORBED_BELOW, CLAIM_LEVEL, SEPARABLE
+from fes_pin.infer.distributions import normal_quantile
+from fes_pin.infer.levels import ABSORBED_BELOW, CLAIM_LEVEL, SEPARABLE
 from fes_pin.models.catalogue import Catalogue
 
 SEEN = 0.95

@@ -15,7 +15,7 @@ from fes_pin.contrasts.search import ContrastFound
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials
-from fes_pin.identify.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
+from fes_pin.infer.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
 from fes_pin.models.model import Model
 
 ROUNDS = 3

@@ -29,9 +29,9 @@ from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.promises import UNFELT, Promise, units
 from fes_pin.contrasts.repeats import Repeats
 from fes_pin.diagnosis.decide.significance import Family
-from fes_pin.identify.distributions import f_tail
-from fes_pin.identify.levels import CLAIM_LEVEL, UNUSUAL_LEVEL
 from fes_pin.identify.scatter import excess_scatter
+from fes_pin.infer.distributions import f_tail
+from fes_pin.infer.levels import CLAIM_LEVEL, UNUSUAL_LEVEL
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ import numpy as np
 from fes_pin.contrasts.repeats import RepeatedProblem, Repeats
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Linearized, Problem, Unknowns
 from fes_pin.identify.scoring import Point, Told
+from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.predictor import Doubt

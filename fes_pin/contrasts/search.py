@@ -18,7 +18,7 @@ from fes_pin.contrasts.grouped import Grouped, Item
 from fes_pin.contrasts.promises import Promise
 from fes_pin.diagnosis.decide.significance import Family
 from fes_pin.diagnosis.search.starts import STARTS
-from fes_pin.identify.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
+from fes_pin.infer.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
 from fes_pin.workers import OutOfTime, Progress, in_parallel, time_limit
 
 MOST_ITEMS = 5

@@ -13,9 +13,9 @@ from fes_pin.diagnosis.errors_ahead import RandomPart, are_large, random_parts
 from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.search.likelihood_search import Found
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import CERTAIN_LEVEL, NOTHING_PERCENT
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import WORTH
+from fes_pin.infer.levels import CERTAIN_LEVEL, NOTHING_PERCENT
 
 UNMOVED = "the motion is as likely without the recorded input, so something else moves the rig"
 """Why no cause is named where `is_moved_by_what_is_recorded` is False."""

@@ -14,9 +14,9 @@ from fes_pin.identify.ahead import SquaredErrors, forecast_errors, forecasts, on
 from fes_pin.identify.doubts import driving_size
 from fes_pin.identify.error_measures import percent_of_spread
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import SMALL_SHARE
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
+from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import in_parallel
 

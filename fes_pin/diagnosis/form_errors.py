@@ -15,7 +15,7 @@ from fes_pin.diagnosis.search.likelihood_search import Found, LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import NominalFitError
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts, step_s
-from fes_pin.identify.levels import NOTHING_PERCENT
+from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 
 FRESH = "what acts at random was taken for new in every sample: beside what lasts, the model foretold less"

@@ -21,8 +21,8 @@ from fes_pin.diagnosis.search.misspecified import under_one_noise
 from fes_pin.diagnosis.search.simulation_search import Searched, SimulationSearch
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import Fit, rough_noise
-from fes_pin.identify.levels import CERTAIN_LEVEL
 from fes_pin.identify.noise import NoiseModel
+from fes_pin.infer.levels import CERTAIN_LEVEL
 from fes_pin.models.model import Model
 
 OF_THE_MEAN = 100.0

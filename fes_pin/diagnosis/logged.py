@@ -20,9 +20,9 @@ from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_no
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts
 from fes_pin.identify.lateness import Lateness, lateness_of, words_of_lateness
-from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.timing import with_doubt_of_lateness, with_doubt_of_timing
 from fes_pin.identify.turns import maximum_from
+from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 

@@ -13,9 +13,9 @@ from fes_pin.diagnosis.errors_ahead import AheadErrors
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.ahead import over_horizon
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import RUNAWAY
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
+from fes_pin.infer.levels import RUNAWAY
 
 
 @dataclass(frozen=True)

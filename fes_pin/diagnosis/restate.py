@@ -26,9 +26,9 @@ from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.diagnosis.searches import Result, Search
 from fes_pin.identify.ahead import forecast_errors, own_noise
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
-from fes_pin.identify.levels import PARAMETER_PRICE, SEPARABLE
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.levels import PARAMETER_PRICE, SEPARABLE
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Stage
 from fes_pin.workers import OutOfTime

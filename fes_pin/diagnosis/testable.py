@@ -19,8 +19,8 @@ from fes_pin.diagnosis.long_records import searched_part
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.score import Projection, Scores
 from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
-from fes_pin.identify.levels import ABSORBED_BELOW
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.levels import ABSORBED_BELOW
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model

@@ -16,10 +16,10 @@ import math
 
 import numpy as np
 
-from fes_pin.identify.distributions import normal_quantile
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import CLAIM_LEVEL, SEPARABLE, SURE
 from fes_pin.identify.scatter import in_pieces
+from fes_pin.infer.distributions import normal_quantile
+from fes_pin.infer.levels import CLAIM_LEVEL, SEPARABLE, SURE
 
 
 def least_apart(likelier: Fit, other: Fit) -> float:

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.identify.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.models.foretold import ForetoldTrial
 
 MOST = 8

@@ -15,8 +15,8 @@ from fes_pin.data.answered import ControllerAnswer
 from fes_pin.data.log import quiet
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import CERTAIN_GAIN
 from fes_pin.identify.turns import maximum_from
+from fes_pin.infer.levels import CERTAIN_GAIN
 from fes_pin.workers import in_parallel
 
 TRIED = (0.1, 0.25, 0.5, 0.75)

@@ -9,8 +9,8 @@ import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.distributions import chi2_tail, f_tail
-from fes_pin.identify.levels import CERTAIN_LEVEL
+from fes_pin.infer.distributions import chi2_tail, f_tail
+from fes_pin.infer.levels import CERTAIN_LEVEL
 from fes_pin.models.rigs.base import Rig
 
 LAGS = 4

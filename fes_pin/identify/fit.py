@@ -15,9 +15,9 @@ from fes_pin.data.show import frame, table_html
 from fes_pin.data.trial import Trial
 from fes_pin.identify.covariance import covariance_of, promised_gain
 from fes_pin.identify.descent import Descent
-from fes_pin.identify.levels import CONFIDENCE_95, PARAMETER_PRICE
 from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
+from fes_pin.infer.levels import CONFIDENCE_95, PARAMETER_PRICE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import one_thread_each

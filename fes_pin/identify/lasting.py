@@ -19,8 +19,8 @@ from dataclasses import replace
 from fes_pin.data.counts import count_of, hunts
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import SMALL_SHARE
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs.base import Rig
 

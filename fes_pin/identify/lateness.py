@@ -16,9 +16,9 @@ from scipy.optimize import minimize_scalar
 
 from fes_pin.data.log import Log
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import CERTAIN_GAIN
 from fes_pin.identify.simultaneous import cost_of_answers
 from fes_pin.identify.turns import maximum_from
+from fes_pin.infer.levels import CERTAIN_GAIN
 from fes_pin.workers import in_parallel
 
 LEAST_ROWS = 0.25

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg
 from numpy.lib.stride_tricks import as_strided
 
-from fes_pin.identify.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PRICE
 
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 """Orders tried. Sensor noise is whitened by a few; random torque under white sensor noise is slow and needs 24 to 48:

@@ -18,8 +18,8 @@ from scipy.optimize import minimize_scalar
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
-from fes_pin.identify.levels import SMALL_SHARE
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.models.model import Model
 
 SMOOTH = 0.3

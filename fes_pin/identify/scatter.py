@@ -17,10 +17,10 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.identify.covariance import covariance_of, scattered, widened
-from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import UNUSUAL_LEVEL
 from fes_pin.identify.problem import Linearized, normal_equations
+from fes_pin.infer.distributions import chi2_quantile
+from fes_pin.infer.levels import UNUSUAL_LEVEL
 
 PIECES = 40
 """Pieces of the data by whose scores a model's errors of form show: as many as tell a deviation within a tenth, and so

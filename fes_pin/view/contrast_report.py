@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from fes_pin.contrasts.result import Change, Contrast, contrast_headline, contrast_notes
 from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.text import probability
-from fes_pin.identify.levels import CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.page import Content, Markup, element, figure, html_table, joined, page, section, unit_text, value_text

@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.identify.levels import SEPARABLE
+from fes_pin.infer.levels import SEPARABLE
 from fes_pin.models.catalogue import Catalogue
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv

@@ -6,7 +6,7 @@ from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.result import EACH_TRIAL, Diagnosis
 from fes_pin.diagnosis.text import probability
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.mathml import equations_mathml
 from fes_pin.view.page import Content, Markup, element, figure, html_table, unit_text, value_text

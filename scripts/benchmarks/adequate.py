@@ -24,7 +24,7 @@ from confusion_matrix.plan import Item
 
 from fes_pin.diagnosis.decide.claims import slowness
 from fes_pin.identify.fit import fit
-from fes_pin.identify.levels import SMALL_SHARE
+from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.models.nominal import nominal_model
 
 

@@ -23,7 +23,7 @@ from contrast_pairs.free import free_pair
 
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.misread import find_misread
-from fes_pin.identify.levels import CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.models.nominal import nominal_model
 
 

@@ -21,7 +21,7 @@ from driven_rigs.draw import CAUSES, OUTSIDE, Drawn, draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.identify.levels import CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95
 
 PAIRS = (
     ("coulomb_friction", "quadratic_damping"),

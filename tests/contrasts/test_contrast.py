@@ -15,7 +15,7 @@ from fes_pin.contrasts.record import contrast_record
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.identify.levels import CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.view.contrast_report import contrast_html
 
 

@@ -7,10 +7,10 @@ from diagnosis.hidden import study_of
 
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, share_of
 from fes_pin.diagnosis.decide.held_out import folds_of
-from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import fit, fit_problem
-from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predictor import Doubt

@@ -11,7 +11,7 @@ from fes_pin.diagnosis.decide.claims import Claims
 from fes_pin.diagnosis.decide.held_out import Evidence, Gain, added_likelihood, speaks_for
 from fes_pin.diagnosis.free import with_refused
 from fes_pin.diagnosis.remainder.open_set import Remainder
-from fes_pin.identify.levels import CERTAIN_LEVEL
+from fes_pin.infer.levels import CERTAIN_LEVEL
 
 
 def test_evidence_covers_what_the_difference_is_worth():

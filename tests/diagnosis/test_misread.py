@@ -10,7 +10,7 @@ from oracle import TYPICAL, make_study
 import fes_pin as fp
 from fes_pin.diagnosis.misread import find_misread
 from fes_pin.diagnosis.record import diagnosis_record
-from fes_pin.identify.levels import CONFIDENCE_95
+from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.view.report import report_html
 
 

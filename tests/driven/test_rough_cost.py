@@ -11,10 +11,10 @@ from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.driven_held_out import as_random_as_in_all
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
-from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.identify.turns import maximise
+from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.models.effects import CoulombFriction, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
 

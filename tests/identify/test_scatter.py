@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fes_pin.identify.distributions import chi2_quantile
 from fes_pin.identify.problem import Linearized
 from fes_pin.identify.scatter import (
     as_wide_as_estimates_differ,
@@ -14,6 +13,7 @@ from fes_pin.identify.scatter import (
     excess_scatter,
     with_honest_intervals,
 )
+from fes_pin.infer.distributions import chi2_quantile
 
 EACH, TRIALS, DRAWS = 500, 4, 200
 

@@ -8,10 +8,10 @@ from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.diagnosis.search.score import Scores
 from fes_pin.diagnosis.search.simulation_fits import SimulationFits
 from fes_pin.diagnosis.search.starts import forms_beside
-from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
-from fes_pin.identify.levels import CERTAIN_GAIN, CLAIM_LEVEL, SMALL_SHARE, UNUSUAL_LEVEL
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.levels import CERTAIN_GAIN, CLAIM_LEVEL, SMALL_SHARE, UNUSUAL_LEVEL
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 

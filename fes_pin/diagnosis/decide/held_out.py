@@ -12,10 +12,10 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import SquaredErrors, default_horizon, forecast_errors, own_noise
 from fes_pin.identify.error_measures import percent_of_spread
 from fes_pin.identify.fit import Fit, fit_problem, go_on
-from fes_pin.identify.levels import CONFIDENCE_95, NOTHING_PERCENT, RUNAWAY
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT, RUNAWAY
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 

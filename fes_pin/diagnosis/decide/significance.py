@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fes_pin.diagnosis.search.score import Scores
-from fes_pin.identify.distributions import chi2_tail, f_tail
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import CLAIM_LEVEL, DRIVEN_LEVEL
+from fes_pin.infer.distributions import chi2_tail, f_tail
+from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL
 
 DRAWS = 4000
 """Simulated score vectors; the 5 % quantile of the smallest p-value then has a standard error of 7 %."""

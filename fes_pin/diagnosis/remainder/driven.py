@@ -17,10 +17,10 @@ import numpy as np
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.remainder.open_set import SIGN_DRAWS, Remainder, beside_smooth
 from fes_pin.diagnosis.search.score import Projection
-from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit, fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import limits_of
+from fes_pin.infer.distributions import chi2_tail
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
 from fes_pin.models.stage import Effect
 

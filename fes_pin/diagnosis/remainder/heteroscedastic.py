@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fes_pin.diagnosis.remainder.innovations import autocorrelation, convolved, normal_scores
-from fes_pin.identify.distributions import f_tail
+from fes_pin.infer.distributions import f_tail
 
 SCALES_S = (0.0, 0.08, 0.3, 1.0)
 """Lengths that the innovations are averaged over, s; 0 takes them as they are."""

@@ -9,7 +9,7 @@ import scipy.fft
 import scipy.ndimage
 
 from fes_pin.diagnosis.remainder.innovations import CLIP, Innovations, driven
-from fes_pin.identify.distributions import chi2_quantile, f_tail
+from fes_pin.infer.distributions import chi2_quantile, f_tail
 
 LOWEST_HZ = 2.0
 """Slower oscillations are the smooth features' and the library's."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fes_pin.diagnosis.remainder.innovations import CLIP, autocorrelation
-from fes_pin.identify.distributions import f_tail
+from fes_pin.infer.distributions import f_tail
 
 SCALES_S = (0.0, 0.03, 0.08, 0.2, 0.5)
 """Lengths that the innovations are averaged over, s; 0 takes them as they are."""

@@ -22,10 +22,10 @@ from fes_pin.identify.doubts import first_guess, stilled
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import fresh
 from fes_pin.identify.lasting import with_new_noise
-from fes_pin.identify.levels import SEPARABLE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import normal_equations
 from fes_pin.identify.scoring import LITTLE, WORTH
+from fes_pin.infer.levels import SEPARABLE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect

@@ -11,10 +11,10 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import STARTS
 from fes_pin.identify.covariance import moved_with
 from fes_pin.identify.fit import Fit, fit_problem
-from fes_pin.identify.levels import PARAMETER_PRICE
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import limits_of
 from fes_pin.identify.turns import ROUNDS, maximise
+from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect

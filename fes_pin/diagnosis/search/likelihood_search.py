@@ -25,10 +25,10 @@ from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits, Names
 from fes_pin.diagnosis.search.score import Scored, best_pairs
 from fes_pin.diagnosis.search.simulation_search import NominalFitError
 from fes_pin.identify.ahead import default_horizon
-from fes_pin.identify.distributions import chi2_tail
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.levels import UNUSUAL_LEVEL
 from fes_pin.identify.scatter import excess_scatter
+from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.levels import UNUSUAL_LEVEL
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
 BEAM = 3

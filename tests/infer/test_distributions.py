@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from fes_pin.identify.distributions import chi2_quantile, chi2_tail, f_tail, normal_quantile, pearson3_tail
+from fes_pin.infer.distributions import chi2_quantile, chi2_tail, f_tail, normal_quantile, pearson3_tail
 
 
 @pytest.mark.parametrize("degrees", [1, 2, 7, 70])

@@ -5,7 +5,7 @@ A level is the share of rigs, with nothing to say of, of which it is said all th
 
 from __future__ import annotations
 
-from fes_pin.identify.distributions import chi2_quantile, normal_quantile
+from fes_pin.infer.distributions import chi2_quantile, normal_quantile
 
 UNUSUAL_LEVEL = 0.05
 """At which something is unusual by itself: a parameter or a coefficient earns its price there, an interval ends, a set
