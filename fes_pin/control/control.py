@@ -12,8 +12,10 @@ the controller says so and becomes calmer; if that does not help, it is a fault.
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +29,10 @@ from fes_pin.control.observer import JointObserver
 from fes_pin.control.oscillation import OscillationWatch
 from fes_pin.control.pulse import PulseWidth
 from fes_pin.control.reference import LOOKAHEAD, ReferenceWindow, coming, trajectory
+from fes_pin.control.timing import PulseClock
 from fes_pin.control.tuning import Gains, tune
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import between, shortened
 from fes_pin.models.effects.recruitment_hysteresis import RecruitmentHysteresis
 from fes_pin.models.model import Model
 from fes_pin.muscles.recruitment import LinearRecruitment
@@ -46,6 +50,11 @@ CALMEST = 0.1
 """A loop that still swings with less of the feedback than this is at fault: two calmings did not help."""
 RESOLUTION_RAD = 1e-3
 """Step of the sensor's readings: 12 bits of a potentiometer of 270 degrees make 1.15 mrad."""
+FARTHEST_BEYOND_RAD = math.radians(0.5)
+"""A reference that lies farther beyond reach than this is warned of: nearer ones are held, and nobody sees it."""
+RISE_PULSES = 23
+"""0.5 s after the first pulse after a pause, in which the reference is let in: a joint that came to rest is not thrown
+to where the reference has gone."""
 REACH_ANGLES = 200
 """Angles that the muscle's reach is tabulated at: to half a degree."""
 
@@ -56,14 +65,15 @@ class PositionController:
     Parameters
     ----------
     model
-        The ankle as identified; of its effects, `recruitment_hysteresis` is compensated, `frame_vibration` is tuned
-        for, and `fatigue` tells how long the muscle will last.
+        The ankle as identified, or the fit or diagnosis that holds it. Of its effects, `recruitment_hysteresis` is
+        compensated, `frame_vibration` is tuned for, and `fatigue` says how long the muscle will last.
     load_kg
         M.
     observer
-        State estimate; by default one with the noise levels of `JointObserver`.
+        State estimate of this ankle with this load; by default one with the noise levels of `JointObserver`. The
+        controller takes a copy, so that two controllers never share one.
     limits
-        What the stimulation may do; by default what the muscle can.
+        What the stimulation may do, as `StimulationLimits` or a mapping of their names; by default what the muscle can.
     resolution_rad
         Step of the sensor's readings. The coarser beside its noise, the later a frozen reading is told from one that
         is just the same again.
@@ -77,14 +87,22 @@ class PositionController:
     wanted_rad
         The reference as the joint is to follow it now: smoothed and held within reach.
     short_of
-        Recruitment that was wanted beyond what the muscle has, in the last pulse.
+        Recruitment that the last pulse lacked: what the feedback wanted above 1, or what the reference takes beyond
+        what the muscle can hold.
+    beyond_rad
+        How far the reference has lain outside of rest to `highest` since `follow` or `reset`, at most, rad.
+    highest
+        Farthest angle that the muscle is asked for now, rad: 2 degrees less than it can hold.
+    paused_s
+        Longest pause between two calls since `reset`, s; 0 if there was none.
     calm
         Share of the tuned feedback that is in use: below 1 the loop has swung by itself.
 
     Raises
     ------
     InputError
-        For another rig, a load that is none, limits that allow no pulses, or an ankle that no gains hold.
+        For another rig, a load that is none or that rests nowhere, an observer of another ankle, limits that allow no
+        pulses or do not hold the angle at rest, or an ankle that no gains hold.
 
     Examples
     --------
@@ -98,24 +116,36 @@ class PositionController:
         model: Model,
         load_kg: float = 0.0,
         observer: JointObserver | None = None,
-        limits: StimulationLimits | None = None,
+        limits: StimulationLimits | Mapping[str, Any] | None = None,
         resolution_rad: float = RESOLUTION_RAD,
     ) -> None:
-        if not 0.0 <= resolution_rad < math.inf:
-            raise InputError(f"resolution_rad: expected 0 or more rad, found {resolution_rad!r}")
+        resolution_rad = between(resolution_rad, 0.0, MARGIN_RAD, "resolution_rad")
+        model = getattr(model, "model", model)
         dynamics = AnkleDynamics.of(model, load_kg)
+        if observer is not None and getattr(observer, "dynamics", None) != dynamics:
+            raise InputError(
+                f"expected a JointObserver of this ankle with {load_kg:g} kg, found {shortened(observer)}",
+                column="observer",
+            )
         constants = model.rig.constants
         play = [e.half_width_us for e in model.effects if isinstance(e, RecruitmentHysteresis)]
         curve = LinearRecruitment(constants["threshold_us"], constants["saturation_us"])
-        self.limits = limits if limits is not None else StimulationLimits()
+        self.limits = StimulationLimits.given(limits)
         self.pulse = PulseWidth(curve, play[0] if play else 0.0, self.limits)
         self.dynamics = dynamics
-        self.observer = observer if observer is not None else JointObserver(dynamics)
+        self.lowest, self.fade = dynamics.rest_angle(), math.exp(-PULSE_S / dynamics.time_constant)
+        if not self.limits.range_of_motion_rad[0] < self.lowest < self.limits.range_of_motion_rad[1]:
+            low, high = self.limits.range_of_motion_rad
+            raise InputError(
+                f"expected a range that holds the {self.lowest:.3g} rad at which the joint rests, "
+                f"found {low:g} to {high:g} rad",
+                column="range_of_motion_rad",
+            )
+        self.observer = copy.deepcopy(observer) if observer is not None else JointObserver(dynamics)
         self.gains = tune(dynamics, self.observer)
         self.monitor = FaultMonitor(
             dynamics, self.limits.range_of_motion_rad, self.observer.angle_std_rad, resolution_rad
         )
-        self.lowest, self.fade = dynamics.rest_angle(), math.exp(-PULSE_S / dynamics.time_constant)
         angles = np.linspace(self.lowest, 2.8, REACH_ANGLES)
         # from the first angle on that needs more than those before
         self.reachable = angles, np.maximum.accumulate([dynamics.activation_for(q) for q in angles.tolist()])
@@ -128,20 +158,27 @@ class PositionController:
         After a fault call this when its cause was found and mended, not by a program. What charge was given in the last
         second still counts.
         """
+        self.trajectory: list[float] = []
+        self.place = 0
+        self.swings, self.calm = OscillationWatch(), 1.0
+        self.observer.torque_wander = self.gains.torque_wander
+        self.watch = EnduranceWatch(self.fatigue) if self.fatigue else None
+        self.clock = PulseClock()
+        self.beyond_rad = self.paused_s = 0.0
+        self._begin()
+
+    def _begin(self) -> None:
+        """Wait for readings of a joint at rest, at the start and after a pause."""
         self.status = Status.WAITING
         self.observer.reset()
-        self.observer.torque_wander = self.gains.torque_wander
         self.monitor.reset()
         self.pulse.reset()
         self.window = ReferenceWindow(self.lowest)
-        self.trajectory: list[float] = []
-        self.place = self.count = self.good = 0
+        self.count, self.good, self.risen = 0, 0, RISE_PULSES
         self.falling: list[float] | None = None
         self.recruitment = self.short_of = 0.0
         self.wanted_rad = self.lowest
         self.highest = self.dynamics.rest_angle(self.pulse.most)
-        self.swings, self.calm = OscillationWatch(), 1.0
-        self.watch = EnduranceWatch(self.fatigue) if self.fatigue else None
 
     @property
     def share(self) -> float:
@@ -164,10 +201,18 @@ class PositionController:
             For what is no row of such angles; the trajectory before it stays.
         """
         self.trajectory = trajectory(reference_rad, self.limits.range_of_motion_rad)
-        self.place = 0
+        self.place, self.beyond_rad = 0, 0.0
 
-    def step(self, angle_rad: float | None, reference_rad: float | Sequence[float] | None = None) -> float:
+    def step(
+        self,
+        angle_rad: float | None,
+        reference_rad: float | Sequence[float] | None = None,
+        time_s: float | None = None,
+    ) -> float:
         """One pulse: the pulse width in us from a reading.
+
+        After a pause between two calls nothing is stimulated until the joint has been seen at rest again, as at the
+        start; from there the reference is let in within `RISE_PULSES`.
 
         Parameters
         ----------
@@ -177,6 +222,9 @@ class PositionController:
             Without it the trajectory given to `follow` goes on, or the joint is left at rest. Or the angles wanted now
             and at the next `LOOKAHEAD` pulses, as far as they are known; the last is held. Or a single number, for a
             target that nobody knows before: it is taken for `LOOKAHEAD` pulses ahead, and the joint follows that late.
+        time_s
+            When the reading was taken, s, from any start: a gap of `timing.PAUSE_S` is a pause. Without it the
+            computer's clock is asked, and a gap of `timing.CLOCK_PAUSE_S` is one. State it in simulations.
 
         Returns
         -------
@@ -186,9 +234,9 @@ class PositionController:
         Raises
         ------
         InputError
-            For what is no reading or no reference: text, lists, booleans, degrees, angles outside the range of motion.
-            It is a fault, too. A number that no joint can have is refused only before the first pulse; later it is the
-            sensor that is at fault, not the caller.
+            For what is no reading, no reference or no time: text, lists, booleans, degrees, angles outside the range of
+            motion, a time that is not at least half a pulse after the last. It is a fault, too. A number that no joint
+            can have is refused only before the first pulse; later it is the sensor that is at fault, not the caller.
         """
         if self.status.is_fault:
             return self._ramp()
@@ -196,10 +244,16 @@ class PositionController:
             reading = read(angle_rad)
             if self.status is Status.WAITING and abs(reading) > LARGEST_RAD:
                 raise InputError(f"angle_rad: expected an angle in rad, found {reading:g}{hint(reading)}")
-            self._next(reference_rad)
+            wanted, preview = self._coming(reference_rad)
+            pause_s = self.clock.pause_s(time_s)
         except InputError:
             self.status = Status.REFUSED
             raise
+        if pause_s:
+            self.paused_s = max(self.paused_s, pause_s)
+            self._begin()
+            self.risen = 0
+        self._next(wanted, preview)
         if self.status is Status.WAITING:
             self._await(reading)
         elif self.monitor.judge(reading, self.observer, self.recruitment > 0.0):
@@ -211,27 +265,41 @@ class PositionController:
             self.status = self.monitor.fault or self._calmed(reading)
             if self.status.is_fault:
                 return self._ramp()
-            wanted = self._law()
-            width, self.recruitment = self.pulse(wanted)
-            self.short_of = max(wanted - 1.0, 0.0)
+            needed = self._law()
+            width, self.recruitment = self.pulse(needed)
+            self.short_of = max(needed - 1.0, self._lacking(wanted[0]), 0.0)
         if self.watch is not None:
             self.watch.take(self.observer.x[0] * self.share, self.share)
         self.observer.predict(self.recruitment)
         return width
 
-    def _next(self, reference_rad: object) -> None:
+    def _coming(self, reference_rad: object) -> tuple[list[float], bool]:
+        """What is wanted in this pulse and the next ones, and whether those are known."""
+        if reference_rad is not None:
+            return coming(reference_rad, self.limits.range_of_motion_rad)
+        if not self.trajectory:
+            return [self.lowest], True
+        wanted = self.trajectory[self.place : self.place + LOOKAHEAD + 1]
+        self.place = min(self.place + 1, len(self.trajectory) - 1)
+        return wanted, True
+
+    def _next(self, wanted: list[float], preview: bool) -> None:
         """Let the window go on by one pulse."""
         if self.count % 15 == 0:
             self._reach()
         self.count += 1
-        if reference_rad is not None:
-            wanted, preview = coming(reference_rad, self.limits.range_of_motion_rad)
-        elif self.trajectory:
-            wanted, preview = self.trajectory[self.place : self.place + LOOKAHEAD + 1], True
-            self.place = min(self.place + 1, len(self.trajectory) - 1)
-        else:
-            wanted, preview = [self.lowest], True
-        self.window.take(wanted, preview, self.lowest, self.highest)
+        if self.status is Status.RUNNING:
+            self.risen = min(self.risen + 1, RISE_PULSES)
+        let_in = self.lowest + self.risen / RISE_PULSES * (self.highest - self.lowest)
+        self.window.take(wanted, preview, self.lowest, let_in)
+
+    def _lacking(self, wanted: float) -> float:
+        """Recruitment that a reference takes beyond what the muscle can hold; notes how far it lies beyond reach."""
+        beyond = max(wanted - self.highest, self.lowest - wanted)
+        if beyond <= 0.0:
+            return 0.0
+        self.beyond_rad = max(self.beyond_rad, beyond)
+        return self.dynamics.activation_for(wanted, torque=self.observer.x[3]) / self.share - self.pulse.most
 
     def _await(self, reading: float) -> None:
         """Wait for a row of readings of one joint near its rest."""
@@ -264,10 +332,17 @@ class PositionController:
 
     @property
     def warning(self) -> str:
-        """A line when the loop has swung by itself, and one some time before the muscle can no longer do what it has
-        been doing; else empty.
+        """Lines when the loop has swung by itself, when a reference lay beyond reach, when the calls paused, and some
+        time before the muscle can no longer do what it has been doing; else empty.
         """
         lines = [self.watch.warning] if self.watch is not None and self.watch.warning else []
+        if self.beyond_rad > FARTHEST_BEYOND_RAD:
+            lines.append(
+                f"the reference lies up to {math.degrees(self.beyond_rad):.1f} degrees beyond what the muscle is asked "
+                f"for with this load, {self.lowest:.2f} to {self.highest:.2f} rad: the joint is held within that"
+            )
+        if self.paused_s:
+            lines.append(f"the calls paused for {self.paused_s:.3g} s: stimulation begins again with the joint at rest")
         if self.calm < 1.0:
             lines.append(
                 f"the loop swung by itself at {self.swings.frequency_hz:.1f} Hz and was calmed to "

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number
+from fes_pin.data.numbers import number, shortened
 from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.ankle import Ankle
@@ -71,13 +71,23 @@ class AnkleDynamics:
         Raises
         ------
         InputError
-            For another rig, or a load that is none.
+            For another rig, or a load that is none or that the passive joint does not hold.
         """
+        if not isinstance(model, Model):
+            raise InputError(
+                f"expected a model, as fp.nominal_model gives it, found {shortened(model)}", column="model"
+            )
         if not isinstance(model.rig, Ankle):
             raise InputError(f"position control needs the rig ankle, found {model.rig.name}")
         if number(load_kg, "load_kg") < 0.0:
             raise InputError(f"expected a load of at least 0 kg, found {load_kg:g}")
         rig, c = model.rig, {n: float(v) for n, v in model.rig.constants.items()}
+        ends = [static_torque_nm(c, q, 0.0, load_kg) for q in ANGLES_RAD]
+        if not ends[0] > 0.0 > ends[1]:
+            low, high = ANGLES_RAD
+            raise InputError(
+                f"expected a load that rests between {low} and {high} rad, found {load_kg:g}", column="load_kg"
+            )
         return cls(
             rig.inertia_kgm2,
             rig.damping_nms,

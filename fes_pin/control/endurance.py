@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
+from fes_pin.control.dynamics import ANGLES_RAD, PULSE_S, AnkleDynamics
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import between, numbers, whole
 from fes_pin.models.effects.fatigue import FLOOR, Fatigue
 from fes_pin.models.model import Model
 
@@ -74,14 +75,16 @@ def muscle_budget(model: Model, load_kg: float, reference_rad: np.ndarray, capac
     Raises
     ------
     InputError
-        If the model knows no fatigue, or the schedule is no row of angles.
+        If the model knows no fatigue, the schedule is no row of angles in rad, or the capacity is not within 0 to 1.
     """
+    capacity = between(capacity, 0.0, 1.0, "capacity")
     fatigue = fatigue_of(model)
     if fatigue is None:
         raise InputError("a fatigue budget needs a model with the effect fatigue")
-    angles = np.asarray(reference_rad, dtype=float)
-    if angles.ndim != 1 or not len(angles) or not np.isfinite(angles).all():
-        raise InputError("expected a schedule of one or more finite angles")
+    angles = numbers(reference_rad, "reference_rad")
+    low, high = ANGLES_RAD
+    if angles.ndim != 1 or not len(angles) or not ((angles >= low) & (angles <= high)).all():
+        raise InputError(f"expected a schedule of one or more finite angles from {low} to {high} rad")
     dynamics = AnkleDynamics.of(model, load_kg)
     speed = np.gradient(angles, PULSE_S) if len(angles) > 1 else np.zeros(1)
     needed = np.array([max(dynamics.activation_for(q, v), 0.0) for q, v in zip(angles.tolist(), speed, strict=True)])
@@ -113,8 +116,6 @@ def least_rest(model: Model, load_kg: float, bout_rad: np.ndarray, bouts: int) -
     InputError
         If no rest of up to 10 minutes is enough, or `bouts` is below 1.
     """
-    if bouts < 1:
-        raise InputError(f"expected 1 bout or more, found {bouts}")
     rest_angle = AnkleDynamics.of(model, load_kg).rest_angle()
 
     def fits(rest_s: float) -> bool:
@@ -132,8 +133,15 @@ def least_rest(model: Model, load_kg: float, bout_rad: np.ndarray, bouts: int) -
 
 
 def scheduled(bout_rad: np.ndarray, bouts: int, rest_s: float, rest_rad: float) -> np.ndarray:
-    """Bouts with rests between them, one angle per pulse, shape (n,)."""
-    pause = np.full(round(rest_s / PULSE_S), rest_rad)
+    """Bouts with rests of up to 10 minutes between them, one angle per pulse, shape (n,).
+
+    Raises
+    ------
+    InputError
+        For fewer than one bout, or another rest.
+    """
+    bouts = whole(bouts, "bouts", least=1)
+    pause = np.full(round(between(rest_s, 0.0, LONGEST_REST_S, "rest_s") / PULSE_S), rest_rad)
     return np.concatenate([bout_rad, *[part for _ in range(bouts - 1) for part in (pause, bout_rad)]])
 
 

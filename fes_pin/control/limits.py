@@ -3,20 +3,57 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
 
 from fes_pin.control.dynamics import ANGLES_RAD, PULSE_S
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import as_number, between, positive_number
+from fes_pin.data.numbers import as_number, between, number, shortened
 
 BURST = 0.2
 """Share of a second's charge that may be given at once; the rest is what may be given steadily. Together they are what
 any one second can hold."""
+RANGES = {
+    "pulse_width_us": (10.0, 5000.0, "us"),
+    "rate_us_per_s": (20.0, 20_000.0, "us/s"),
+    "charge_uc_per_s": (5.0, 5000.0, "uC/s"),
+    "current_ma": (0.2, 200.0, "mA"),
+}
+"""Limits that a stimulator of nerves can have. No range spans more than a factor of 1000, so that a limit in A, C, s or
+ms in place of mA, uC and us lies outside of it. At the skin FES uses 1 to 150 mA and up to 500 us (Valtin and others,
+Eur. J. Transl. Myol. 26:6076, 2016); a stimulator for research gives 10 us and more (Hasomed RehaMove3 Science),
+section II of Dombre, Fournier and Coiffet uses 1000 us. Electrodes at the nerve need a hundredth of that current. The
+charge is the product of both, 45 times a second; a width that changes by 20 000 us/s crosses the paper's muscle in two
+pulses."""
+
+
+def check_width(value: object, name: str) -> float:
+    """A pulse width that a stimulator can give, us.
+
+    Raises
+    ------
+    InputError
+        Anything else; see `RANGES`.
+    """
+    return _in_range(value, "pulse_width_us", name)
+
+
+def _in_range(value: object, kind: str, name: str) -> float:
+    low, high, unit = RANGES[kind]
+    found = as_number(value)
+    if found is None or math.isnan(found) or not low <= found <= high:
+        number(value, name, infinite=True)
+        raise InputError(f"expected {low:g} to {high:g} {unit}, found {shortened(value)}", column=name)
+    return found
 
 
 @dataclass(frozen=True)
 class StimulationLimits:
     """Limits that hold for every pulse, whatever the feedback wants; by default the muscle's own.
+
+    Where two limits contradict each other in one pulse, the one that gives less charge wins: a width that may fall by
+    44 us only falls farther, to 0 if need be, where the charge of the last second allows no more.
 
     Parameters
     ----------
@@ -38,7 +75,7 @@ class StimulationLimits:
     Raises
     ------
     InputError
-        For a limit that is none, or contradicts another.
+        For a limit that is none, that no stimulator has (`RANGES`: probably another unit), or that contradicts another.
     """
 
     pulse_width_us: float = math.inf
@@ -49,12 +86,12 @@ class StimulationLimits:
     ramp_s: float = 0.2
 
     def __post_init__(self) -> None:
-        for name in ("pulse_width_us", "rate_us_per_s", "charge_uc_per_s"):
-            positive_number(getattr(self, name), name, infinite=True)
-        if self.current_ma is not None:
-            positive_number(self.current_ma, "current_ma")
-        elif self.charge_uc_per_s < math.inf:
-            raise InputError("charge_uc_per_s: a limit of charge needs current_ma")
+        for name in RANGES:
+            value = getattr(self, name)
+            if value is not None if name == "current_ma" else value != math.inf:
+                _in_range(value, name, name)
+        if self.current_ma is None and self.charge_uc_per_s < math.inf:
+            raise InputError("a limit of charge needs current_ma", column="charge_uc_per_s")
         between(self.ramp_s, 0.0, 1.0, "ramp_s")
         ends = self.range_of_motion_rad
         two = isinstance(ends, tuple) and len(ends) == 2 and None not in map(as_number, ends)
@@ -62,12 +99,30 @@ class StimulationLimits:
             low, high = ANGLES_RAD
             raise InputError(f"range_of_motion_rad: expected two angles within {low:g} to {high:g} rad, found {ends!r}")
 
+    @classmethod
+    def given(cls, limits: StimulationLimits | Mapping[str, Any] | None) -> StimulationLimits:
+        """Limits from limits, or from a mapping of their names; without any the muscle's own.
+
+        Raises
+        ------
+        InputError
+            For something else, or a name that is no limit.
+        """
+        if isinstance(limits, cls):
+            return limits
+        names = [item.name for item in fields(cls)]
+        if not isinstance(limits, Mapping | None) or set(limits or {}) - set(names):
+            wanted = f"expected StimulationLimits, or a mapping of {', '.join(names)}"
+            raise InputError(f"{wanted}, found {shortened(limits)}", column="limits")
+        return cls(**(limits or {}))
+
 
 class Limiter:
     """Holds pulse after pulse within the limits.
 
     Charge is a bucket: a fifth of a second's charge at most, refilled steadily with the other four fifths. No second
-    can then hold more than the limit, and a steady demand meets a steady width instead of bursts.
+    can then hold more than the limit, and a steady demand meets a steady width instead of bursts. Charge comes before
+    the rate of change: an empty bucket lets the width fall at once.
 
     Raises
     ------
@@ -76,6 +131,8 @@ class Limiter:
     """
 
     def __init__(self, limits: StimulationLimits, threshold_us: float, saturation_us: float) -> None:
+        check_width(saturation_us, "saturation_us")
+        between(threshold_us, 0.0, saturation_us, "threshold_us")
         if limits.pulse_width_us < threshold_us:
             raise InputError(
                 f"pulse_width_us: expected at least the threshold of {threshold_us:g} us, "

@@ -72,7 +72,7 @@ def track(
         angle = joint.angle_rad
         measured = sensor(k, angle + float(noise[k]))
         began = time.perf_counter()
-        width = controller.step(measured)
+        width = controller.step(measured, time_s=k * PULSE_S)
         took = time.perf_counter() - began
         joint.step(width, PULSE_S)
         rows.append((k * PULSE_S, reference_rad[k], angle, measured, width, controller.share, took))

@@ -64,7 +64,7 @@ class PulseWidth:
         self.threshold, self.saturation = float(curve.threshold_us), float(curve.saturation_us)
         if not (self.half == 0.0 or 0.0 < self.half < self.threshold):
             raise InputError(f"expected a half width from 0 to below the threshold of {self.threshold:g} us")
-        self.limiter = Limiter(limits or StimulationLimits(), self.threshold, self.saturation)
+        self.limiter = Limiter(StimulationLimits.given(limits), self.threshold, self.saturation)
         self.followed = 0.0
         # one straight line needs no arrays
         self._straight = type(curve) is LinearRecruitment

@@ -16,11 +16,14 @@ import numpy as np
 import scipy.optimize
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import between, numbers, positive_number
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import GRAVITY
 from fes_pin.paper.ratios import RATIOS, Optimum, RatioProblem, least_error
 
 NAMES = ("f0_n", "f1_per_rad", "theta_r_rad")
+RESTS_RAD = (0.1, 3.0)
+"""Angles in rad that a load can hang at: at 0 and pi its cable pulls along the leg."""
 START = (np.log(5.0), np.log(2.0))
 """Logarithms of f0 in N and f1 in 1/rad where the search starts; theta_r starts at the smallest angle less 0.3 rad."""
 
@@ -81,7 +84,7 @@ def rest_angles(values: np.ndarray, loads_kg: np.ndarray, foot_mass_kg: float) -
         missing = values[0] * np.expm1(values[1] * np.maximum(q - values[2], 0.0))
         missing = missing - loads_kg * GRAVITY - weight / np.tan(q)
         stiff = values[0] * values[1] * np.exp(values[1] * np.maximum(q - values[2], 0.0)) * (q > values[2])
-        q = np.clip(q - np.clip(missing / (stiff + weight / np.sin(q) ** 2), -0.2, 0.2), 0.1, 3.0)
+        q = np.clip(q - np.clip(missing / (stiff + weight / np.sin(q) ** 2), -0.2, 0.2), *RESTS_RAD)
     return q
 
 
@@ -100,13 +103,20 @@ def fit_antagonist(
     Raises
     ------
     InputError
-        For fewer than four loads (the curve has three parameters), or numbers that are none.
+        For fewer than four loads (the curve has three parameters), numbers that are none, angles that no load hangs at
+        (degrees?), or a fit that does not converge.
     """
-    loads, angles = np.array(loads_kg, dtype=float), np.array(angles_rad, dtype=float)
+    loads, angles = numbers(loads_kg, "loads_kg"), numbers(angles_rad, "angles_rad")
+    positive_number(angle_std_rad, "angle_std_rad")
+    between(foot_mass_kg, 0.0, np.inf, "foot_mass_kg")
     if loads.shape != angles.shape or loads.ndim != 1 or len(np.unique(loads)) < 4:
         raise InputError("expected an angle for each of at least four different loads to find F_ANT from")
-    if not (np.isfinite(loads).all() and np.isfinite(angles).all() and angle_std_rad > 0.0):
-        raise InputError("expected finite loads and angles, and a noise above 0")
+    if not (np.isfinite(loads).all() and (loads >= 0.0).all()):
+        raise InputError("expected finite loads of 0 kg or more", column="loads_kg")
+    low, high = RESTS_RAD
+    if not ((angles >= low) & (angles <= high)).all():
+        odd = angles[~((angles >= low) & (angles <= high))][0]
+        raise InputError(f"expected {low:g} to {high:g} rad, found {odd:g} (degrees?)", column="angles_rad")
 
     def values(x: np.ndarray) -> np.ndarray:
         return np.array([np.exp(x[0]), np.exp(x[1]), x[2]])
@@ -123,6 +133,8 @@ def fit_antagonist(
         return rise * [p[0], p[1], 1.0] / angle_std_rad
 
     found = scipy.optimize.least_squares(residual, [*START, angles.min() - 0.3], jac=jacobian, x_scale="jac")
+    if not found.success or not np.isfinite(found.fun).all() or np.linalg.matrix_rank(found.jac) < len(NAMES):
+        raise InputError("no curve fits these loads and angles: the search for F_ANT did not converge")
     to_values = np.diag([*np.exp(found.x[:2]), 1.0])
     covariance = to_values @ np.linalg.pinv(found.jac.T @ found.jac) @ to_values
     return Antagonist(values(found.x), covariance, found.fun * angle_std_rad)

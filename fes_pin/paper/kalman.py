@@ -24,6 +24,7 @@ import numpy as np
 import scipy.stats
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import between, number, positive_number
 from fes_pin.data.trial import Trial
 
 START_TIME_CONSTANT_S = 0.1
@@ -34,19 +35,44 @@ GAIN_95 = float(scipy.stats.norm.ppf(0.975))
 
 @dataclass(frozen=True)
 class StraightRecruitment:
-    """Straight recruitment from threshold to saturation, and the force that belongs to gain 1."""
+    """Straight recruitment from threshold to saturation, and the force that belongs to gain 1.
+
+    Raises
+    ------
+    InputError
+        For numbers that are none, a threshold below 0, a saturation that is not above it, a force that is not above 0.
+    """
 
     threshold_us: float = 180.0
     saturation_us: float = 1000.0
     force_scale_n: float = 1.0
 
+    def __post_init__(self) -> None:
+        between(self.threshold_us, 0.0, math.inf, "threshold_us")
+        positive_number(self.force_scale_n, "force_scale_n")
+        if not number(self.saturation_us, "saturation_us") > self.threshold_us:
+            raise InputError(
+                f"expected more than the threshold of {self.threshold_us:g} us, found {self.saturation_us:g}",
+                column="saturation_us",
+            )
+
     @classmethod
     def of(cls, constants: Mapping[str, float]) -> StraightRecruitment:
-        """From the `[rig]` numbers of a study."""
+        """From the `[rig]` numbers of a study.
+
+        Raises
+        ------
+        InputError
+            If one of the three is missing, or as the class.
+        """
         names = ("threshold_us", "saturation_us", "force_scale_n")
-        return cls(**{n: float(constants[n]) for n in names if n in constants})
+        if missing := [n for n in names if n not in constants]:
+            raise InputError(f"expected the rig's {', '.join(missing)}", column="constants")
+        return cls(**{n: float(constants[n]) for n in names})
 
     def __call__(self, pulse_width_us: float) -> float:
+        if not math.isfinite(pulse_width_us):
+            raise InputError(f"expected a finite number of us, found {pulse_width_us}", column="pulse_width_us")
         share = (pulse_width_us - self.threshold_us) / (self.saturation_us - self.threshold_us)
         return min(max(share, 0.0), 1.0)
 
@@ -72,6 +98,13 @@ class GainFilter:
     ----------
     nis
         Normalised innovation squared of the last sample; one degree of freedom.
+    skipped
+        Number of samples without a force: the filter went on without them.
+
+    Raises
+    ------
+    InputError
+        For a time step, a noise or a gain that is not above 0, or a wander below 0.
     """
 
     def __init__(
@@ -82,15 +115,16 @@ class GainFilter:
         greatest_gain: float = 2.0,
         wander: float = 0.0,
     ) -> None:
-        if not (dt > 0.0 and noise_std > 0.0 and math.isfinite(dt) and math.isfinite(noise_std)):
-            raise InputError(f"expected a time step and a noise above 0, found {dt:g} s and {noise_std:g} N")
+        for name, value in (("dt", dt), ("noise_std", noise_std), ("greatest_gain", greatest_gain)):
+            positive_number(value, name)
+        between(wander, 0.0, math.inf, "wander")
         self.dt, self.recruitment, self.noise_std, self.wander = dt, recruitment, noise_std, wander
         alpha = math.exp(-dt / START_TIME_CONSTANT_S)
         beta = (1.0 - alpha) * 0.5 * greatest_gain * recruitment.force_scale_n
         self._x = (0.0, alpha, beta)
         # upper triangle by rows
         self._p = (noise_std**2, 0.0, 0.0, START_ALPHA_STD**2, 0.0, beta**2)
-        self.nis = math.nan
+        self.nis, self.skipped = math.nan, 0
 
     @property
     def x(self) -> np.ndarray:
@@ -104,10 +138,19 @@ class GainFilter:
         return np.array([[ff, fa, fb], [fa, aa, ab], [fb, ab, bb]])
 
     def step(self, force_n: float, pulse_width_us: float) -> None:
-        """Take in one measured force (NaN: none), and the pulse width that is held from now on."""
+        """Take in one measured force (NaN: none), and the pulse width that is held from now on.
+
+        Raises
+        ------
+        InputError
+            For a pulse width that is not finite; the filter stays as it was.
+        """
+        recruitment = self.recruitment(pulse_width_us)
         if math.isfinite(force_n):
             self._correct(force_n)
-        self._predict(self.recruitment(pulse_width_us))
+        else:
+            self.skipped += 1
+        self._predict(recruitment)
 
     def _correct(self, force_n: float) -> None:
         (force, alpha, beta), (ff, fa, fb, aa, ab, bb) = self._x, self._p
@@ -152,17 +195,21 @@ class RegressionFilter:
         self.dt, self.recruitment, self.noise_std = dt, recruitment, noise_std
         self.x, self.p = start.x[1:], start.p[1:, 1:]
         self.before: np.ndarray | None = None
-        self.nis = math.nan
+        self.nis, self.skipped = math.nan, 0
 
     def step(self, force_n: float, pulse_width_us: float) -> None:
-        """Take in one measured force, and the pulse width that is held from now on."""
+        """Take in one measured force (NaN: none, nor anything to explain the next one by), and the next pulse width."""
+        known = np.array([force_n, self.recruitment(pulse_width_us)])
+        if not math.isfinite(force_n):
+            self.before, self.skipped = None, self.skipped + 1
+            return
         if self.before is not None:
             size = float(self.before @ self.p @ self.before) + 2.0 * self.noise_std**2
             innovation = force_n - float(self.before @ self.x)
             gain = self.p @ self.before / size
             self.nis = innovation**2 / size
             self.x, self.p = self.x + gain * innovation, self.p - np.outer(gain, gain) * size
-        self.before = np.array([force_n, self.recruitment(pulse_width_us)])
+        self.before = known
 
     def gain_and_time_constant(self) -> tuple[float, float]:
         """K and tau in s."""
@@ -211,7 +258,15 @@ class GainHistory:
     nis: np.ndarray
 
     def at(self, time: float) -> tuple[float, float]:
-        """K and tau in s, as known at a time."""
+        """K and tau in s, as known at a time in s; after the last sample as known then.
+
+        Raises
+        ------
+        InputError
+            For a time before the first sample, or that is none.
+        """
+        if not number(time, "time") >= self.time[0]:
+            raise InputError(f"expected {self.time[0]:g} s or later, found {time:g}", column="time")
         k = int(np.searchsorted(self.time, time, side="right")) - 1
         return float(self.gain[k]), float(self.time_constant_s[k])
 
@@ -233,7 +288,7 @@ def track_gain(
     Raises
     ------
     InputError
-        For a trial without measured force or pulse widths.
+        For a trial without measured force or pulse widths, or constants without the muscle's.
     """
     for column in ("force_n", "pulse_width_us"):
         if column not in trial:

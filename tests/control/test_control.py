@@ -248,6 +248,12 @@ def test_rests_bring_a_schedule_within_the_budget():
     assert not muscle_budget(model, LOAD, scheduled(bout, 4, rest - 0.5, low)).respected
 
 
+@pytest.mark.parametrize("capacity", [math.nan, -0.1, 1.5, "1"])
+def test_a_capacity_that_is_none_is_no_budget(capacity):
+    with pytest.raises(InputError, match=r"^capacity: "):
+        muscle_budget(ankle_of(TIRING) + Fatigue(), LOAD, np.full(3, 1.8), capacity)
+
+
 def test_bad_input_is_one_line():
     with pytest.raises(InputError, match="needs the rig ankle"):
         PositionController(Model(Muscle()), LOAD)
@@ -259,3 +265,8 @@ def test_bad_input_is_one_line():
         muscle_budget(ankle_of(TIRING) + Fatigue(), LOAD, np.array([1.8, math.nan]))
     with pytest.raises(InputError, match="no rest"):
         least_rest(ankle_of(TIRING) + Fatigue(**FATIGUE), LOAD, sine(LOW, 60.0, 0.5, 4.0), 3)
+    for bouts, rest_s in ((0, 1.0), (2.5, 1.0), (2, -1.0), (2, math.nan)):
+        with pytest.raises(InputError):
+            scheduled(sine(LOW, 15.0, 0.5, 4.0), bouts, rest_s, LOW)
+    with pytest.raises(InputError, match="rad"):
+        muscle_budget(ankle_of(TIRING) + Fatigue(), LOAD, np.degrees(sine(LOW, 15.0, 0.5, 4.0)))

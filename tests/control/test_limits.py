@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S
 from fes_pin.control.faults import Status
-from fes_pin.control.limits import Limiter, StimulationLimits
+from fes_pin.control.limits import RANGES, Limiter, StimulationLimits
 from fes_pin.control.loop import sine, track
 from fes_pin.control.pulse import PulseWidth
 from fes_pin.data.errors import InputError
@@ -89,12 +89,19 @@ def test_a_reading_outside_the_range_of_motion_is_a_fault_and_a_reference_an_err
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"pulse_width_us": 0.0}, "pulse_width_us: must be positive, got 0.0"),
+        ({"pulse_width_us": 0.0}, "pulse_width_us: expected 10 to 5000 us, found 0.0"),
         ({"pulse_width_us": "300"}, "pulse_width_us: must be a number, got '300'"),
         ({"rate_us_per_s": math.nan}, "rate_us_per_s"),
         ({"charge_uc_per_s": 100.0}, "needs current_ma"),
         ({"charge_uc_per_s": 100.0, "current_ma": -1.0}, "current_ma"),
         ({"current_ma": True}, "current_ma"),
+        ({"current_ma": 0.04}, "current_ma: expected 0.2 to 200 mA, found 0.04"),  # in A
+        ({"pulse_width_us": 0.5}, "pulse_width_us: expected 10 to 5000 us, found 0.5"),  # in ms
+        ({"rate_us_per_s": 9.0}, "rate_us_per_s: expected 20 to 20000 us/s, found 9.0"),  # in ms/s
+        (
+            {"charge_uc_per_s": 0.9, "current_ma": 40.0},
+            "charge_uc_per_s: expected 5 to 5000 uC/s, found 0.9",
+        ),  # in mC/s
         ({"ramp_s": 2.0}, "ramp_s: must lie between 0 and 1, got 2"),
         ({"range_of_motion_rad": (60.0, 120.0)}, "range_of_motion_rad"),
         ({"range_of_motion_rad": (2.0, 1.0)}, "range_of_motion_rad"),
@@ -110,6 +117,98 @@ def test_limits_that_allow_no_pulse_are_refused():
         Limiter(StimulationLimits(pulse_width_us=100.0), 180.0, 1000.0)
     with pytest.raises(InputError, match="at least 405 uC/s, which steady pulses"):
         Limiter(StimulationLimits(charge_uc_per_s=300.0, current_ma=40.0), 180.0, 1000.0)
+
+
+def test_a_slip_of_units_does_not_disable_the_charge_limit():
+    """A for mA left 400 000 us in a second in place of 400; nothing is built from such limits."""
+    with pytest.raises(InputError, match="current_ma"):
+        StimulationLimits(500, 9000, 900, 0.04)
+    assert Limiter(StimulationLimits(500, 9000, 900, 40), 180.0, 1000.0).left_us == pytest.approx(4500.0)
+
+
+def test_no_range_of_limits_holds_both_a_number_and_its_thousandth():
+    assert all(high <= 1000.0 * low for low, high, _ in RANGES.values())
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [({"pulse_width": 500.0}, "limits: expected StimulationLimits, or a mapping"), (500.0, "limits"), ([], "limits")],
+)
+def test_what_is_no_limits_is_refused(limits, message):
+    with pytest.raises(InputError, match=message):
+        PositionController(ankle_of(TWIN), 0.5, limits=limits)
+
+
+def test_limits_may_be_a_mapping_of_their_names():
+    controller = PositionController(ankle_of(TWIN), 0.5, limits={"pulse_width_us": 600.0})
+    assert controller.limits == StimulationLimits(pulse_width_us=600.0)
+
+
+def test_where_charge_and_rate_contradict_each_other_the_charge_limit_wins():
+    """The last pulse of a bucket is followed by a fall that the rate alone would not allow."""
+    limits = StimulationLimits(500, 1980, 900, 40)  # a change of 44 us from pulse to pulse
+    limiter, widths = Limiter(limits, 180.0, 1000.0), []
+    for _ in range(100):
+        widths.append(limiter.allowed(1000.0))
+        limiter.give(widths[-1])
+    falls = -np.diff(widths)
+    assert falls.max() > 44.0 + 1.0  # the charge is not exceeded for the sake of a slow fall
+    assert np.convolve(widths, np.ones(45)).max() * 40.0 * 1e-3 <= 900.0 + 1e-9
+
+
+WIDTHS = st.one_of(st.just(math.inf), st.floats(), st.floats(10.0, 5000.0))
+
+
+@settings(max_examples=300, deadline=None)
+@given(WIDTHS, WIDTHS, WIDTHS, st.floats(), st.floats(), st.floats(), st.lists(st.floats(), max_size=30))
+def test_no_limits_and_no_muscle_that_can_be_built_give_a_width_above_their_limit(
+    width, rate, charge, current, threshold, saturation, wanted
+):
+    try:
+        limits = StimulationLimits(width, rate, charge, current)
+        limiter = Limiter(limits, threshold, saturation)
+    except InputError:
+        return
+    for each in [*wanted, 1e9]:
+        given = limiter.allowed(each)
+        limiter.give(given)
+        assert given == 0.0 or threshold <= given <= min(width, saturation, 5000.0)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.floats(10.0, 5000.0),
+    st.floats(20.0, 20_000.0),
+    st.floats(5.0, 5000.0),
+    st.floats(0.2, 200.0),
+    st.floats(0.0, 1000.0),
+    st.floats(10.0, 5000.0),
+    st.lists(st.floats(0.0, 6000.0), max_size=120),
+)
+def test_sane_limits_hold_in_every_second(width, rate, charge, current, threshold, saturation, wanted):
+    try:
+        limiter = Limiter(StimulationLimits(width, rate, charge, current), threshold, saturation)
+    except InputError:
+        return
+    widths = [0.0]
+    for each in wanted:
+        widths.append(limiter.allowed(each))
+        limiter.give(widths[-1])
+    second = np.convolve(widths, np.ones(45)).max() * current * 1e-3
+    assert second <= charge * (1.0 + 1e-9) and max(widths) <= min(width, saturation)
+    assert (np.diff(np.maximum(widths, threshold)) <= rate * PULSE_S + 1e-6).all()
+
+
+@pytest.mark.parametrize("load", [1000.0, -0.1, "0.5", math.nan])
+def test_a_load_that_no_ankle_holds_is_refused(load):
+    with pytest.raises(InputError, match="load"):
+        PositionController(ankle_of(TWIN), load)
+
+
+@pytest.mark.parametrize("ends", [(0.4, 0.6), (REST + 0.01, 2.8)])
+def test_a_range_of_motion_that_does_not_hold_the_joint_at_rest_is_refused(ends):
+    with pytest.raises(InputError, match=r"range_of_motion_rad: expected a range that holds the 1.62 rad at which"):
+        PositionController(ankle_of(TWIN), 0.5, limits=StimulationLimits(range_of_motion_rad=ends))
 
 
 @pytest.mark.parametrize("height_deg", [0.0, 0.25, 0.5, 1.0])

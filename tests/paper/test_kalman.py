@@ -8,7 +8,7 @@ from fes_pin.identify.fit import fit
 from fes_pin.identify.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_trial, paper_twin
-from fes_pin.paper.kalman import GainFilter, StraightRecruitment, chi2_band, nees, track_gain
+from fes_pin.paper.kalman import GainFilter, RegressionFilter, StraightRecruitment, chi2_band, nees, track_gain
 from fes_pin.paper.twin import record
 
 TWIN = paper_twin("3-23")
@@ -113,8 +113,58 @@ def test_a_wandering_gain_is_followed():
     assert track_gain(fading, CONSTANTS, FORCE_NOISE_N).gain[-1] > 1.08 * 0.7 * 0.65
 
 
+@pytest.mark.parametrize("time", [-1.0, np.nan, np.inf, "1"])
+def test_a_history_knows_nothing_before_its_first_sample(time):
+    history = track_gain(isometric(0, seconds=1.0), CONSTANTS, FORCE_NOISE_N)
+    with pytest.raises(InputError, match=r"^time: "):
+        history.at(time)
+    assert history.at(0.0) == (history.gain[0], history.time_constant_s[0])
+
+
+@pytest.mark.parametrize("kind", [GainFilter, RegressionFilter])
+@pytest.mark.parametrize("force", [np.nan, np.inf, -np.inf])
+def test_a_force_that_is_none_is_skipped_and_counted_and_the_filter_goes_on(kind, force):
+    trial = isometric(5, seconds=4.0)
+    one, other = (kind(trial.dt, StraightRecruitment.of(CONSTANTS), FORCE_NOISE_N) for _ in range(2))
+    for k, (f, w) in enumerate(zip(trial["force_n"], trial["pulse_width_us"], strict=True)):
+        one.step(force if k == 100 else float(f), float(w))
+        other.step(float(f), float(w))
+    assert one.skipped == 1 and other.skipped == 0
+    assert one.gain_and_time_constant() == pytest.approx(other.gain_and_time_constant(), rel=0.02)
+
+
+@pytest.mark.parametrize("kind", [GainFilter, RegressionFilter])
+@pytest.mark.parametrize("width", [np.nan, np.inf, -np.inf])
+def test_a_pulse_width_that_is_none_is_refused_and_the_filter_stays_as_it_was(kind, width):
+    tracker = kind(0.005, StraightRecruitment.of(CONSTANTS), FORCE_NOISE_N)
+    for k in range(50):
+        tracker.step(0.1 * k, 600.0)
+    before = tracker.gain_and_time_constant(), tracker.stds()
+    with pytest.raises(InputError, match=r"^pulse_width_us: expected a finite number"):
+        tracker.step(3.0, width)
+    assert (tracker.gain_and_time_constant(), tracker.stds()) == before
+
+
+def test_constants_without_the_muscles_are_refused():
+    """With none at all the gain was 39 in place of 0.65."""
+    for missing in ("threshold_us", "saturation_us", "force_scale_n"):
+        with pytest.raises(InputError, match=f"constants: expected the rig's {missing}"):
+            track_gain(isometric(0), {n: v for n, v in CONSTANTS.items() if n != missing}, 0.2)
+    with pytest.raises(InputError, match="threshold_us, saturation_us, force_scale_n"):
+        track_gain(isometric(0), {}, 0.2)
+
+
+@pytest.mark.parametrize(
+    "numbers", [(180.0, 180.0, 60.0), (-1.0, 1000.0, 60.0), (180.0, np.nan, 60.0), (180.0, 1e3, 0.0)]
+)
+def test_a_recruitment_that_is_none_is_refused(numbers):
+    with pytest.raises(InputError):
+        StraightRecruitment(*numbers)
+
+
 def test_bad_input_is_one_line():
     with pytest.raises(InputError, match="no column force_n"):
         track_gain(paper_trial("3-23"), CONSTANTS, FORCE_NOISE_N)
-    with pytest.raises(InputError, match="above 0"):
-        GainFilter(0.0, StraightRecruitment(), 0.2)
+    for wrong in ((0.0, 0.2), (0.005, np.nan), (0.005, 0.2, -1.0), (0.005, 0.2, 2.0, np.nan)):
+        with pytest.raises(InputError):
+            GainFilter(wrong[0], StraightRecruitment(), *wrong[1:])

@@ -202,6 +202,27 @@ def test_antagonist_needs_four_loads():
         fit_antagonist([1.0, 1.0, 2.0], [1.8, 1.8, 2.0], 2e-3, 0.12)
 
 
+@pytest.mark.parametrize("angles", [np.degrees(read_angles(0)), -read_angles(0), np.full(len(LOADS), np.nan)])
+def test_angles_that_no_load_hangs_at_are_refused(angles):
+    """Of degrees the fit gave its start values back."""
+    with pytest.raises(InputError, match=r"^angles_rad: expected 0.1 to 3 rad, found .*degrees"):
+        fit_antagonist(LOADS, angles, 2e-3, 0.12)
+
+
+def test_a_fit_that_does_not_converge_says_so():
+    with pytest.raises(InputError, match="did not converge"):
+        fit_antagonist([0.0, 0.0, 1.0, 2.0, 3.0], [3.0, 3.0, 3.0, 3.0, 3.0], 2e-3, 0.12)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"angle_std_rad": 0.0}, {"foot_mass_kg": np.nan}, {"loads_kg": -LOADS}, {"loads_kg": "x"}]
+)
+def test_what_is_no_static_trial_is_refused(wrong):
+    given = {"loads_kg": LOADS, "angles_rad": read_angles(0), "angle_std_rad": 2e-3, "foot_mass_kg": 0.12}
+    with pytest.raises(InputError):
+        fit_antagonist(**{**given, **wrong})
+
+
 def test_the_tool_says_what_cannot_be_told():
     study = paper_study("3-23")
     motion = ankle_identifiability(nominal_model(study), [t for t in study.trials if t.kind == "motion"][:2])

@@ -1,0 +1,45 @@
+"""Whether a controller is called once a pulse."""
+
+from __future__ import annotations
+
+import math
+import time
+
+from fes_pin.control.dynamics import PULSE_S
+from fes_pin.control.faults import BAD_READINGS
+from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number
+
+PAUSE_S = BAD_READINGS * PULSE_S
+"""Time between two readings from which on it is a pause, 0.13 s: so many missing readings in a row are a fault, too."""
+CLOCK_PAUSE_S = 1.0
+"""The same by the computer's clock, which other programs hold up: a muscle lets go within 0.2 s."""
+SOONEST_S = 0.5 * PULSE_S
+"""Readings that are nearer to each other are not those of pulses: the charge of a second would be another."""
+
+
+class PulseClock:
+    """Times of the calls of a controller, as they are stated or by the computer's clock."""
+
+    def __init__(self) -> None:
+        self.last: tuple[bool, float] | None = None
+
+    def pause_s(self, time_s: float | None) -> float:
+        """Note a call; the time in s since the last one if that was a pause, else 0.
+
+        Raises
+        ------
+        InputError
+            For a stated time that is none, or that is less than half a pulse after the last.
+        """
+        stated = time_s is not None
+        now = number(time_s, "time_s") if stated else time.monotonic()
+        gap = now - self.last[1] if self.last and self.last[0] == stated else PULSE_S
+        if stated and gap < SOONEST_S:
+            raise InputError(
+                f"expected one call per pulse, every {PULSE_S:.4f} s, found {gap:.3g} s after the last", column="time_s"
+            )
+        self.last = stated, now
+        if gap < 0.0:  # the clock of another machine or process: it says nothing of how long it was
+            return math.inf
+        return gap if gap >= (PAUSE_S if stated else CLOCK_PAUSE_S) - 1e-9 else 0.0
