@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.data.trial import Trial as Trial
     from fes_pin.data.trial import read_trial as read_trial
     from fes_pin.data.trial import write_trial as write_trial
+    from fes_pin.diagnosis.checked import check as check
     from fes_pin.diagnosis.result import Diagnosis as Diagnosis
     from fes_pin.identify.fit import Fit as Fit
     from fes_pin.identify.fit import fit as fit
@@ -62,6 +63,7 @@ _WHERE = {
     "predict": "fes_pin.models.predict",
     "fit": "fes_pin.identify.fit",
     "Fit": "fes_pin.identify.fit",
+    "check": "fes_pin.diagnosis.checked",
     "diagnose": "fes_pin.verdict.ask",
     "Diagnosis": "fes_pin.diagnosis.result",
     "compare": "fes_pin.comparison.compare",

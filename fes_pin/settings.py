@@ -61,7 +61,7 @@ def threads() -> int:
     return int(chosen)
 
 
-def check() -> None:
+def check_settings() -> None:
     """Read every setting, so that a wrong one is said before any work.
 
     Raises

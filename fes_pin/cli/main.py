@@ -59,7 +59,7 @@ def before_any_command(
     """Functional electrical stimulation on Pinocchio: what a simulation gets wrong, and its cause by name."""
     from fes_pin import settings
 
-    settings.check()  # a wrong setting of the environment is said before any work
+    settings.check_settings()  # a wrong setting of the environment is said before any work
 
 
 @app.command()

@@ -6,7 +6,7 @@ import shutil
 import sys
 import tempfile
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from fes_pin.data.study import Study
     from fes_pin.data.wanted import Wanted
     from fes_pin.models.catalogue import Catalogue
-
-FAR = 0.3
-"""Share of the variance that a nominal model leaves from which on it is said that it is far off."""
 
 
 @needs(
@@ -75,6 +72,7 @@ def new_study(
     from fes_pin.data.new_body_study import new_body_study
     from fes_pin.data.new_study import new_study as make
     from fes_pin.data.schema import IMPOSED
+    from fes_pin.diagnosis.checked import odd_lines
     from fes_pin.models.catalogue import load_library
     from fes_pin.models.nominal import guess_start
 
@@ -105,7 +103,7 @@ def new_study(
         typer.echo(
             f"{schema.outputs[IMPOSED]} is taken as what drives it; where the motion drives: --set kind={IMPOSED}"
         )
-    _say(study, warnings)
+    typer.echo("\n".join(odd_lines(study, warnings)))
     place = wanted.folder / "study.toml"
     typer.echo(
         f"wrote {place}: look at it, then run\n  fes-pin check {wanted.folder}\n"
@@ -115,62 +113,20 @@ def new_study(
 
 def check(
     study: Annotated[Path, typer.Argument(help="Folder of a study, or its study.toml.")],
+    as_json: Annotated[bool, typer.Option("--json", help="The same as JSON.")] = False,
     library: Libraries = None,
 ) -> None:
     """Say what is odd about a study before anything is looked for, and what its trials can and cannot show."""
+    import json
+
     from fes_pin.data.study import read_study
-    from fes_pin.diagnosis.testable import testable_causes
+    from fes_pin.diagnosis.checked import check as find
     from fes_pin.models.catalogue import load_library
 
     catalogue = load_library(*(library or []))
     measured = read_study(study, rigs=catalogue.schemas())
-    _say(measured, _checked(measured, catalogue))
-    if measured.schema.owner is None:
-        return
-    found = testable_causes(measured, catalogue)
-    if isinstance(found, str):
-        typer.echo(f"what these trials can show is not known before a diagnosis: {found}")
-        return
-    for warning in found.warnings:
-        typer.echo(f"odd: {warning}")
-    if found.unexplained > FAR:
-        share = f"{100.0 * found.unexplained:.3g} % of the variance"
-        typer.echo(f"the nominal model leaves {share}: what follows is linearized far from what was measured")
-    _list(f"these trials can show {len(found.shown)} causes", found.shown)
-    _list("they cannot show, as what is fitted takes it up", found.absorbed)
-    _list("they cannot show, as it acts in none of them", found.silent)
-    if found.alike:
-        typer.echo(f"they look alike on these trials: {'; '.join(' and '.join(group) for group in found.alike)}")
-    if len(measured.trials) == 1:
-        typer.echo("one trial: nothing can be held out, and no cause can be borne out by another trial")
-
-
-def _list(words: str, names: Sequence[str] | Mapping[str, float]) -> None:
-    if names:
-        typer.echo(f"{words}: {', '.join(names)}")
-
-
-def _say(study: Study, warnings: Sequence[str]) -> None:
-    typer.echo(study)
-    for warning in warnings:
-        typer.echo(f"odd: {warning}")
-    if study.schema.owner is None:
-        typer.echo("its files can be read; numbers of walking are not judged before a diagnosis")
-    elif not warnings:
-        typer.echo("nothing is odd about its numbers")
-
-
-def _checked(study: Study, catalogue: Catalogue) -> list[str]:
-    from fes_pin.diagnosis.diagnosis import measured_study
-    from fes_pin.diagnosis.plausibility import check_study
-    from fes_pin.models.nominal import nominal_model
-
-    if study.schema.owner is None:
-        return []
-    clean = measured_study(study)
-    count = sum(len(k) for columns in clean.left_out.values() for k in columns.values())
-    said = [f"{count} samples look like spikes, and are taken for what their neighbours say"] if count else []
-    return [*said, *clean.warnings, *check_study(clean.study, nominal_model(clean.study))]
+    found = find(measured, library=catalogue)
+    typer.echo(json.dumps(found.as_dict(), indent=1) if as_json else str(found))
 
 
 def _template(
@@ -278,11 +234,12 @@ def _tried(made: NewStudy, folder: Path, catalogue: Catalogue) -> tuple[Study, l
     """
     from fes_pin.data.errors import InputError
     from fes_pin.data.study import read_study
+    from fes_pin.diagnosis.checked import odd_numbers
 
     with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
         try:
             study = read_study(_staged(made, folder, Path(scratch)), rigs=catalogue.schemas())
-            return study, _checked(study, catalogue)
+            return study, odd_numbers(study)[1]
         except InputError as error:
             if error.file is None or not Path(error.file).is_relative_to(scratch):
                 raise

@@ -2,21 +2,24 @@
 
 Refused, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change or go
 to and fro between two counts, too few samples, an angle that only degrees explain, a length that only millimetres
-explain, an imposed motion that never moves. Everything else is a warning: the diagnosis goes on, and tells it.
+explain, a load that only grams explain, an imposed motion that never moves. Everything else is a warning: the diagnosis
+goes on, and tells it. Trials that are only to be predicted are held to the same list, but for what a fit needs.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from fes_pin.data.counts import hunts
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import imposed_motion
-from fes_pin.data.schema import IMPOSED
+from fes_pin.data.schema import IMPOSED, RigSchema
 from fes_pin.data.stuck import RUN
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -33,8 +36,10 @@ STRONGEST_N = 1e4
 """Force in N that no limb exerts: the strongest knee extensions measured come to about 3 kN at the shank."""
 STRONGEST_NM = 1e3
 """Torque in N m that no joint exerts: those 3 kN at the shank, a third of a metre from the knee."""
-HEAVIEST_KG = 100.0
-"""Load in kg that nobody hangs on an ankle; grams begin there."""
+HEAVIEST_KG, IMPOSSIBLE_KG = 100.0, 300.0
+"""Load in kg that nobody hangs on an ankle: a warning; and one that weighs as much as those 3 kN: it is in grams."""
+SHORTEST_US = 10.0
+"""Pulse width in us that excites no nerve through the skin: widths that never exceed it are in ms or s."""
 COMMON = 0.05
 """Share of equal neighbours from which a reading is coarse: equal samples in a row then say nothing."""
 CLIPPED = 0.01
@@ -53,8 +58,29 @@ PIECES = 8
 """Pieces of a trial that velocity and slope are compared over: over one sample the position's noise would be all."""
 
 
-def implausible(study: Study) -> list[str]:
-    """Warnings about a study's trials, one line each.
+@dataclass(frozen=True)
+class ToPredict:
+    """Trials that a model is to predict, to be judged like those of a study.
+
+    Parameters
+    ----------
+    trials, schema, constants
+        Of the model's rig; the trials may have no outputs.
+    folder
+        Where they come from, for errors.
+    start
+        What is fitted: nothing.
+    """
+
+    trials: Sequence[Trial]
+    schema: RigSchema
+    constants: Mapping[str, float]
+    folder: Path | None = None
+    start: Mapping[str, float] = field(default_factory=dict)
+
+
+def implausible(study: Study | ToPredict) -> list[str]:
+    """Warnings about trials, one line each.
 
     Raises
     ------
@@ -67,7 +93,7 @@ def implausible(study: Study) -> list[str]:
     measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in _driving(study, t)]
     constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
     _check_counts(study, [one for one in measured if one not in constant])
-    if len(constant) == len(measured):
+    if len(constant) == len(measured) and not isinstance(study, ToPredict):
         raise InputError("no output changes in any trial; there is nothing to compare a model with", file=study.folder)
     warnings += _told("does not change at all", constant)
     moving = [one for one in measured if one not in constant]
@@ -78,7 +104,7 @@ def implausible(study: Study) -> list[str]:
     return [*warnings, *_rates(study.trials)]
 
 
-def _check_counts(study: Study, moving: Sequence[tuple[Trial, str]]) -> None:
+def _check_counts(study: Study | ToPredict, moving: Sequence[tuple[Trial, str]]) -> None:
     """Refuse outputs that hardly ever do more than go to and fro between two counts; what moves is in none of them."""
     columns = [t[n] for t, n in moving]
     hunting = [hunts(c) for c in columns]
@@ -94,22 +120,22 @@ def _check_counts(study: Study, moving: Sequence[tuple[Trial, str]]) -> None:
         )
 
 
-def _read(study: Study) -> list[str]:
+def _read(study: Study | ToPredict) -> list[str]:
     """What was done to samples when they were read: the same of many trials in one line."""
     by_remark: dict[str, list[str]] = {}
     for trial in study.trials:
         for remark in trial.remarks:
             by_remark.setdefault(remark, []).append(trial.name)
-    return [f"{remark} in {_trials(names)}" for remark, names in by_remark.items()]
+    return [f"{remark} in {trials_named(names)}" for remark, names in by_remark.items()]
 
 
-def _driving(study: Study, trial: Trial) -> tuple[str, ...]:
+def _driving(study: Study | ToPredict, trial: Trial) -> tuple[str, ...]:
     """Columns that a trial has as inputs."""
     schema = study.schema
     return tuple(n for n in (*schema.stimuli(trial.kind), *schema.motion(trial.kind)) if n in trial)
 
 
-def _stimuli(study: Study, trial: Trial) -> tuple[str, ...]:
+def _stimuli(study: Study | ToPredict, trial: Trial) -> tuple[str, ...]:
     """Those of them that are not a motion."""
     return tuple(n for n in study.schema.stimuli(trial.kind) if n in trial)
 
@@ -119,14 +145,15 @@ def _told(what: str, found: Sequence[tuple[Trial, str]]) -> list[str]:
     by_column: dict[str, list[str]] = {}
     for trial, name in found:
         by_column.setdefault(name, []).append(trial.name)
-    return [f"{name} {what} in {_trials(names)}" for name, names in by_column.items()]
+    return [f"{name} {what} in {trials_named(names)}" for name, names in by_column.items()]
 
 
-def _trials(names: Sequence[str]) -> str:
+def trials_named(names: Sequence[str]) -> str:
+    """One trial by its name, several by their number, the first and the last."""
     return f"trial {names[0]}" if len(names) == 1 else f"{len(names)} trials ({names[0]} to {names[-1]})"
 
 
-def _check_rows(study: Study) -> None:
+def _check_rows(study: Study | ToPredict) -> None:
     fitted = [t for t in study.trials if t.role != "held_out"]
     wanted = SAMPLES_EACH * len(study.start)
     found = sum(map(len, fitted))
@@ -138,11 +165,11 @@ def _check_rows(study: Study) -> None:
         )
 
 
-def _inputs(study: Study) -> Iterable[str]:
+def _inputs(study: Study | ToPredict) -> Iterable[str]:
     """What is odd about inputs; refuses a muscle that is never stimulated."""
     short = [t.name for t in study.trials if len(t) < FEW]
     if short:
-        yield f"fewer than {FEW} samples in {_trials(short)}"
+        yield f"fewer than {FEW} samples in {trials_named(short)}"
     names = dict.fromkeys(n for t in study.trials for n in _stimuli(study, t))
     if not names and not any(t.kind == IMPOSED for t in study.trials):
         column = " or ".join(study.schema.inputs)
@@ -154,17 +181,21 @@ def _inputs(study: Study) -> Iterable[str]:
         told = f"{name} is never above the threshold of {threshold:g} us" if threshold else f"{name} is zero throughout"
         if len(silent) < len(driven):
             if silent and name in PULSES:  # a joint may swing free between driven trials
-                yield f"{told} in {_trials(silent)}"
+                yield f"{told} in {trials_named(silent)}"
         elif name not in PULSES:
             yield f"no trial is driven: {told}"
         else:
             most = max(float(np.abs(t[name]).max()) for t in study.trials if name in t)
-            hint = f" (it reaches {most:.4g}: is it in ms?)" if threshold < 1e3 * most and most > 0.0 else ""
+            unit = "ms" if threshold < 1e3 * most else "s"
+            hint = f" (it reaches {most:.4g}: is it in {unit}?)" if 0.0 < most < SHORTEST_US else ""
+            if isinstance(study, ToPredict) and not hint:
+                yield f"{told}: nothing is stimulated"
+                continue
             message = f"{told} in all trials{hint}; a muscle that is never stimulated shows nothing"
             raise InputError(message, file=study.folder)
 
 
-def _units(study: Study) -> Iterable[str]:
+def _units(study: Study | ToPredict) -> Iterable[str]:
     """Ranges that another unit would explain; refuses an ankle's angle beyond a turn."""
     for trial in study.trials:
         angles = [trial["angle_rad"]] if "angle_rad" in trial else []
@@ -176,16 +207,21 @@ def _units(study: Study) -> Iterable[str]:
     for name, most, unit, small in (("force_n", STRONGEST_N, "N", "mN"), ("torque_nm", STRONGEST_NM, "N m", "mN m")):
         strong = [t.name for t in study.trials if name in t and float(np.abs(t[name]).max()) > most]
         if strong:
-            yield f"{name} is beyond {most:g} {unit}, which no limb exerts, in {_trials(strong)}: is it in {small}?"
+            told = f"{name} is beyond {most:g} {unit}, which no limb exerts"
+            yield f"{told}, in {trials_named(strong)}: is it in {small}?"
     whole = [t.name for t in study.trials if t.dt >= 1.0 and (t.time == np.rint(t.time)).all()]
     if whole:
-        yield f"time_s counts whole numbers in {_trials(whole)}: is it in ms, or a number of the sample?"
-    heavy = [t.name for t in study.trials if t.conditions.get("load_kg", 0.0) > HEAVIEST_KG]
-    if heavy:
-        yield f"load_kg is above {HEAVIEST_KG:g} kg in {_trials(heavy)}: is it in g?"
+        yield f"time_s counts whole numbers in {trials_named(whole)}: is it in ms, or a number of the sample?"
+    loads = {t.name: t.conditions.get("load_kg", 0.0) for t in study.trials}
+    if max(loads.values(), default=0.0) > IMPOSSIBLE_KG:
+        name = max(loads, key=lambda n: loads[n])
+        message = f"trial {name}: load_kg is {loads[name]:.4g} kg; no ankle holds so much: is it in g?"
+        raise InputError(message, file=study.folder, column="load_kg")
+    if heavy := [name for name, load in loads.items() if load > HEAVIEST_KG]:
+        yield f"load_kg is above {HEAVIEST_KG:g} kg in {trials_named(heavy)}: is it in g?"
 
 
-def _imposed(study: Study) -> Iterable[str]:
+def _imposed(study: Study | ToPredict) -> Iterable[str]:
     """What is odd about imposed motions; refuses a length in millimetres, and a motion that never moves."""
     trials = [t for t in study.trials if t.kind == IMPOSED]
     if not trials:
@@ -198,6 +234,8 @@ def _imposed(study: Study) -> Iterable[str]:
     if name == "length_m" and (short := [t for t in trials if not t[name].min() > 0.0]):
         message = f"trial {short[0].name}: length_m is {short[0][name].min():.4g} m; expected the whole length, above 0"
         raise InputError(message, file=study.folder, column=name)
+    if isinstance(study, ToPredict):
+        return
     motions = [imposed_motion(t, study.schema.imposed) for t in trials]
     ends = [(float(m.values[0].min()), float(m.values[0].max())) for m in motions]
     moved = max(high for _, high in ends) - min(low for low, _ in ends)
@@ -289,4 +327,4 @@ def _rates(trials: Sequence[Trial]) -> Iterable[str]:
         if power > 0.0 and not 1.0 / RATE_RATIO < float(slopes @ means) / power < RATE_RATIO:
             wrong.append(trial.name)
     if wrong:
-        yield f"velocity is not the slope of position in {_trials(wrong)}: is one of them in another unit?"
+        yield f"velocity is not the slope of position in {trials_named(wrong)}: is one of them in another unit?"

@@ -17,6 +17,7 @@ from fes_pin.data.spikes import without_spikes
 from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.decide.doubts import few_trials
 from fes_pin.diagnosis.driven import driven_diagnosis
 from fes_pin.diagnosis.free import judge_free, unfitted
 from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
@@ -29,6 +30,7 @@ from fes_pin.diagnosis.result import STOPPED, Diagnosis
 from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import NominalFitError, SimulationSearch
 from fes_pin.diagnosis.searches import Result, Search, Searches
+from fes_pin.diagnosis.testable import given_away
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
 from fes_pin.identify.recording import earns, low_pass_of
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
@@ -77,11 +79,13 @@ def diagnose_joint(
     catalogue, made = catalogue_of(library), provenance_now(study, seed)
     measured = measured_study(study)
     warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
+    warnings += given_away(measured.study)
     with one_thread_each(), noting_stops() as stops:
         work = _Work(catalogue, seed, tell, math.inf if limit is None else began + limit, stops)
         diagnosis = work.diagnosis_of_log(measured.study)
     tell(1.0, "done")
     warnings += diagnosis.warnings
+    warnings += few_trials(len(split(measured.study)[0])) if diagnosis.causes else []
     if stops:
         warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
         diagnosis = replace(diagnosis, verdict=STOPPED)

@@ -8,10 +8,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.plausibility import implausible
+from fes_pin.data.plausibility import PULSES, ToPredict, implausible, trials_named
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import RUN_OUT
+from fes_pin.models.simulate import simulate
 
 COARSE = 5.0
 """Time constants that a sample step may be long: a first-order lag has then settled to less than a hundredth, and
@@ -30,8 +32,12 @@ ASKEW = 0.5
 """Angle in rad from hanging at which dry friction hardly holds a pendulum: half of its weight pulls."""
 
 
-def check_study(study: Study, model: Model) -> list[str]:
-    """Warnings about a study that are known before a fit, one line each.
+TURNED = -0.7
+"""Correlation of what is read with what the model says, from which on it would explain half with the sign turned."""
+
+
+def check_study(study: Study | ToPredict, model: Model) -> list[str]:
+    """Warnings about a study, or trials to predict, that are known before a fit, one line each.
 
     Raises
     ------
@@ -44,11 +50,11 @@ def check_study(study: Study, model: Model) -> list[str]:
         *_steps(study, model),
         *_range(study, model),
         *_swings(study, model),
-        *_turned(model),
+        *_turned(study, model),
     ]
 
 
-def _steps(study: Study, model: Model) -> Iterable[str]:
+def _steps(study: Study | ToPredict, model: Model) -> Iterable[str]:
     slowest = max(study.trials, key=lambda t: t.dt)
     longest = max(t.duration for t in study.trials)
     if slowest.dt > SLOWEST_S:
@@ -66,22 +72,36 @@ def _steps(study: Study, model: Model) -> Iterable[str]:
             yield f"the longest trial lasts {longest:.4g} s, and {name} is {constant:.4g} s: is time_s in another unit?"
 
 
-def _turned(model: Model) -> Iterable[str]:
+def _turned(study: Study | ToPredict, model: Model) -> Iterable[str]:
+    """Readings that fall where the muscle pulls."""
     if model.rig.constants.get("torque_sign", 1.0) < 0.0:
         yield "torque_nm falls where the muscle pulls: it is taken as counted the other way, as what moves the ankle"
+    found: dict[str, list[str]] = {}
+    for trial in study.trials:
+        name = model.rig.output(trial.kind)
+        if trial.kind == IMPOSED or name not in trial or not any(n in trial and np.ptp(trial[n]) for n in PULSES):
+            continue
+        simulated, measured = simulate(model, trial)[name], trial[name]
+        if not np.isfinite(simulated).all() or not np.ptp(simulated) > 0.0 or not np.ptp(measured) > 0.0:
+            continue
+        if np.corrcoef(simulated, measured)[0, 1] < TURNED:
+            found.setdefault(name, []).append(trial.name)
+    for name, names in found.items():
+        yield f"{name} falls where it should rise in {trials_named(names)}: is its sign turned round (scale = -1)?"
 
 
-def _range(study: Study, model: Model) -> Iterable[str]:
+def _range(study: Study | ToPredict, model: Model) -> Iterable[str]:
     if "revolute" not in model.rig.constants:
         return
     most = max((float(np.abs(t["position"]).max()) for t in study.trials if "position" in t), default=0.0)
+    most = max(most, *(abs(t.conditions.get("position0", 0.0)) for t in study.trials))
     if model.rig.constants["revolute"] and most > TURNS * 2.0 * math.pi:
         yield f"position reaches {most:.4g} rad, {most / (2.0 * math.pi):.1f} turns: is it in degrees?"
     if not model.rig.constants["revolute"] and most > LONGEST_M:
         yield f"position reaches {most:.4g} m: is it in mm?"
 
 
-def _swings(study: Study, model: Model) -> Iterable[str]:
+def _swings(study: Study | ToPredict, model: Model) -> Iterable[str]:
     """What no pendulum does by itself: swing back from more than a turn away, or rest where it does not hang."""
     c = model.rig.constants
     weight = math.hypot(c.get("gravity_cos", 0.0), c.get("gravity_sin", 0.0))

@@ -40,7 +40,7 @@ friction delays a motion by some hundredths."""
 SHIFTED = 0.1
 """Share of its squared error that a shifted trial must be left with to be called so."""
 REVERSED = 0.3
-"""Share of the squared error that must be left with an effort that counts the other way."""
+"""Share of the squared error, and of the variance, that is left at most with an effort that counts the other way."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
     -------
     Testable, or why it cannot be told before a diagnosis, in words
     """
-    nominal = nominal_model(study)
-    trials = [t for t in study.trials if t.role != "held_out"] or list(study.trials)
-    trials, _, _ = searched_part(trials, study.schema)
+    nominal, trials = _to_fit(study)
     effects = (catalogue or installed()).effects_for(nominal.rig)
     with one_thread_each():
         try:
@@ -90,7 +88,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
                 return "the nominal model runs away when it is simulated from its start values"
             library = Library(nominal, trials, effects)
             scores = Projection(fitted.parts).score(library.probes(fitted, fitted.noise))
-            warnings = (*_reversed(nominal, trials, fitted), *_shifted(nominal, trials, fitted))
+            warnings = _given_away(nominal, trials, fitted)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             return f"the nominal model cannot be fitted ({problem})"
     kept: dict[str, float] = {}
@@ -104,6 +102,26 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
         unexplained=_unexplained(fitted),
         warnings=tuple(warnings),
     )
+
+
+def given_away(study: Study) -> list[str]:
+    """What a fit of the nominal model gives away of a study; the warnings of `Testable`."""
+    nominal, trials = _to_fit(study)
+    with one_thread_each():
+        try:
+            fitted = _fitted(nominal, trials)
+            return _given_away(nominal, trials, fitted) if math.isfinite(fitted.sse) else []
+        except (ArithmeticError, np.linalg.LinAlgError):
+            return []
+
+
+def _given_away(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
+    return [*_reversed(model, trials, fitted), *_shifted(model, trials, fitted)]
+
+
+def _to_fit(study: Study) -> tuple[Model, Sequence[Trial]]:
+    trials = [t for t in study.trials if t.role != "held_out"] or list(study.trials)
+    return nominal_model(study), searched_part(trials, study.schema)[0]
 
 
 def _fitted(model: Model, trials: Sequence[Trial]) -> Fit:
@@ -145,8 +163,8 @@ def _reversed(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
         return []
     turned = [t.with_columns(effort=-t["effort"]) if "effort" in t else t for t in trials]
     other = _fitted(model, turned)
-    if not (math.isfinite(other.sse) and other.sse < REVERSED * fitted.sse):
-        return []
+    if not (math.isfinite(other.sse) and other.sse < REVERSED * fitted.sse and _unexplained(other) < REVERSED):
+        return []  # a rig whose effort answers its reading is explained by neither
     share = 100.0 * other.sse / fitted.sse
     return [
         f"with the effort the other way round the nominal model is left with {share:.2g} % of its squared error: "

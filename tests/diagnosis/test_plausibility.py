@@ -2,6 +2,7 @@
 """What is said of a study before anything is fitted."""
 
 import functools
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,8 @@ from diagnosis.hidden import slide
 from diagnosis.hidden import study_of as made
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.plausibility import ToPredict
+from fes_pin.diagnosis.checked import check
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.record import diagnosis_record
@@ -36,6 +39,21 @@ def changed(study, names, change, only=None):
 
 def timed(study, factor):
     return replace(study, trials=tuple(replace(t, time=factor * t.time) for t in study.trials))
+
+
+def loaded(study, change):
+    """The study with other loads."""
+    trials = [
+        replace(t, conditions={n: change(v) if n == "load_kg" else v for n, v in t.conditions.items()})
+        for t in study.trials
+    ]
+    return replace(study, trials=tuple(trials))
+
+
+def shifted(study, by=100):
+    """The study with one trial whose readings come later than those of the others."""
+    late = lambda y: np.concatenate([y[:by][::-1], y[:-by]])  # noqa: E731
+    return changed(study, OUTPUTS, late, 2)
 
 
 def said(study):
@@ -77,6 +95,8 @@ REFUSED = {  # rig, what was done, words
     "pulse_widths_in_ms": ("ankle", lambda s: changed(s, INPUTS, lambda u: 1e-3 * u), "is it in ms"),
     "milliseconds": ("ankle", lambda s: timed(s, 1e3), "is time_s in ms"),
     "milliseconds_of_a_swing": ("joint", lambda s: timed(s, 1e3), "is time_s in ms"),
+    "pulse_widths_in_s": ("ankle", lambda s: changed(s, INPUTS, lambda u: 1e-6 * u), "is it in s"),
+    "grams": ("ankle", lambda s: loaded(s, lambda load: 1e3 * load), "is it in g"),
     "few_rows": ("muscle", lambda s: replace(s, trials=tuple(t.first(3) for t in s.trials)), "at least 20 samples"),
 }  # fmt: skip
 
@@ -102,7 +122,10 @@ WARNED = {
     "swing_in_degrees": ("joint", lambda s: changed(s, OUTPUTS, np.degrees), "is it in degrees"),
     "minutes": ("ankle", lambda s: timed(s, 1 / 600), "is time_s in another unit"),
     "not_driven": ("joint", lambda s: changed(s, INPUTS, np.zeros_like), "no trial is driven: effort is zero throughout"),
-    "grams": ("ankle", lambda s: replace(s, trials=tuple(replace(t, conditions={n: 1e3 * v if n == "load_kg" else v for n, v in t.conditions.items()}) for t in s.trials)), "is it in g"),
+    "heavy": ("ankle", lambda s: loaded(s, lambda _: 150.0), "load_kg is above 100 kg"),
+    "force_turned_round": ("muscle", lambda s: changed(s, OUTPUTS, np.negative), "force_n falls where it should rise in 5 trials"),
+    "one_force_turned_round": ("ankle", lambda s: changed(s, ("force_n",), np.negative, 4), "force_n falls where it should rise in trial 04"),
+    "angle_turned_round": ("ankle", lambda s: changed(s, ("angle_rad",), np.negative), "angle_rad falls where it should rise in"),
 }  # fmt: skip
 
 
@@ -150,3 +173,51 @@ def test_a_warning_stands_in_all_that_is_written():
     assert diagnosis_record(diagnosis)["warnings"] == [words]
     assert f"warning: {words}" in str(diagnosis)
     assert words in report_html(diagnosis)
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_refused_of_a_study_is_refused_of_trials_to_predict(case):
+    """But for what only a fit needs: a number of samples, outputs that change, a muscle that is stimulated."""
+    rig, change, words = REFUSED[case]
+    study = change(study_of(rig))
+    to_predict = ToPredict(study.trials, study.schema, study.constants)
+    if case in ("never_stimulated", "faint", "constant", "hunting", "few_rows"):
+        check_study(to_predict, nominal_model(study))
+    else:
+        with pytest.raises(InputError, match=words):
+            check_study(to_predict, nominal_model(study))
+
+
+def test_trials_to_predict_need_no_outputs():
+    study = study_of("ankle")
+    bare = tuple(t.without(*(n for n in OUTPUTS if n in t)) for t in study.trials)
+    assert check_study(ToPredict(bare, study.schema, study.constants), nominal_model(study)) == []
+    still = tuple(t.with_columns(pulse_width_us=0.0 * t.time) for t in bare)
+    (words,) = check_study(ToPredict(still, study.schema, study.constants), nominal_model(study))
+    assert "nothing is stimulated" in words
+
+
+def test_a_check_and_a_diagnosis_warn_of_the_same():
+    """Also of what a fit gives away; of how few trials there are a diagnosis warns where it names causes."""
+    study = replace(study_of("muscle"), trials=study_of("muscle").trials[:4])
+    study = shifted(study)
+    found, diagnosis = check(study), diagnose_joint(study)
+    (odd,) = found.odd
+    assert "trial 02 answers" in odd and "is it shifted in time?" in odd
+    (few,) = found.limits
+    assert few == "the names rest on 4 trials, fewer than 5: more may change them"
+    assert diagnosis.warnings[0] == odd
+
+
+def test_a_check_is_written_as_text_and_for_json():
+    study = changed(study_of("muscle"), INPUTS, np.zeros_like, 2)
+    found = check(study)
+    told = json.loads(json.dumps(found.as_dict()))
+    assert told["odd"] == list(found.odd) and told["limits"] == list(found.limits)
+    assert "fatigue" in told["shown"] and all(0.0 < share <= 1.0 for share in told["shown"].values())
+    for line in (
+        *(f"odd: {one}" for one in found.odd),
+        *found.limits,
+        f"these trials can show {len(told['shown'])} causes",
+    ):
+        assert line in str(found)

@@ -30,9 +30,11 @@ def with_error(left: Remainder, searched: Searched) -> tuple[Remainder, str | No
 
 def doubts(searched: Searched, named: int) -> list[str]:
     """What a reader must know of so many names, if they rest on little; one line each."""
-    if not named:
-        return []
-    count = len(searched.best.trials)
-    few = f"the names rest on {count} trial{'s' if count > 1 else ''}, fewer than {FOLDS}: more may change them"
     wrong = "no set of causes leaves only noise: those named predict best, and may change with other trials"
-    return [few] * (count < FOLDS) + [wrong] * (not searched.complete)
+    return [wrong] if named and not searched.complete else []
+
+
+def few_trials(count: int) -> list[str]:
+    """What a reader must know of names that rest on so many trials; nothing if they are many."""
+    few = f"the names rest on {count} trial{'s' if count > 1 else ''}, fewer than {FOLDS}: more may change them"
+    return [few] * (count < FOLDS)

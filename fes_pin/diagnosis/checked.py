@@ -1,0 +1,124 @@
+"""What can be said of a study before any cause is looked for: what is odd about it, and what its trials can show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fes_pin.data.numbers import printed
+from fes_pin.data.study import Study
+from fes_pin.diagnosis.decide.doubts import few_trials
+from fes_pin.diagnosis.diagnosis import measured_study, split
+from fes_pin.diagnosis.plausibility import check_study
+from fes_pin.diagnosis.testable import Testable, testable_causes
+from fes_pin.models.catalogue import Source, catalogue_of
+from fes_pin.models.nominal import nominal_model
+
+FAR = 0.3
+"""Share of the variance that a nominal model leaves from which on it is said that it is far off."""
+NOT_JUDGED = "its files can be read; numbers of walking are not judged before a diagnosis"
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What is odd about a study, and what its trials can and cannot show.
+
+    Attributes
+    ----------
+    study
+        As it was given.
+    odd
+        What is odd about its numbers, a line each: warnings that a diagnosis gives as well.
+    limits
+        What a verdict on so few trials lacks, a line each.
+    testable
+        What the trials can show, or why that is not known before a diagnosis.
+    """
+
+    study: Study
+    odd: tuple[str, ...]
+    limits: tuple[str, ...] = ()
+    testable: Testable | str = NOT_JUDGED
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same for JSON; `shown` holds the share of each cause's sensitivity that nothing else takes up."""
+        told: dict[str, Any] = {"study": self.study.name, "rig": self.study.rig, "trials": len(self.study.trials)}
+        told |= {"odd": list(self.odd), "limits": list(self.limits)}
+        found = self.testable
+        if isinstance(found, str):
+            return {**told, "not_known": found}
+        lists = {"absorbed": list(found.absorbed), "silent": list(found.silent), "alike": [*map(list, found.alike)]}
+        shown = {name: printed(share, 4) for name, share in found.shown.items()}
+        return {**told, "shown": shown, **lists, "unexplained_percent": printed(100.0 * found.unexplained, 4)}
+
+    def __str__(self) -> str:
+        found, lines = self.testable, [*odd_lines(self.study, self.odd)]
+        if isinstance(found, Testable):
+            if found.unexplained > FAR:
+                share = f"{100.0 * found.unexplained:.3g} % of the variance"
+                lines.append(f"the nominal model leaves {share}: what follows is linearized far from what was measured")
+            lines += _listed(f"these trials can show {len(found.shown)} causes", found.shown)
+            lines += _listed("they cannot show, as what is fitted takes it up", found.absorbed)
+            lines += _listed("they cannot show, as it acts in none of them", found.silent)
+            if found.alike:
+                groups = "; ".join(" and ".join(group) for group in found.alike)
+                lines.append(f"they look alike on these trials: {groups}")
+        elif found != NOT_JUDGED:
+            lines.append(f"what these trials can show is not known before a diagnosis: {found}")
+        return "\n".join([*lines, *self.limits])
+
+
+def check(study: Study, *, library: Source | Sequence[Source] | None = None) -> Checked:
+    """Say what is odd about a study before anything is looked for, and what its trials can and cannot show.
+
+    Parameters
+    ----------
+    study
+        The rig and its trials.
+    library
+        Causes beside those written here and installed; see `diagnose`.
+
+    Returns
+    -------
+    Checked
+
+    Raises
+    ------
+    InputError
+        For numbers that no verdict could follow from, as `diagnose`.
+    """
+    if study.schema.owner is None:
+        return Checked(study, ())
+    clean, odd = odd_numbers(study)
+    found = testable_causes(clean, catalogue_of(library))
+    given_away = () if isinstance(found, str) else found.warnings
+    count = len(split(clean)[0])
+    alone = ["one trial: nothing can be held out, and no cause can be borne out by another trial"] * (count == 1)
+    return Checked(study, (*odd, *given_away), (*few_trials(count), *alone), found)
+
+
+def odd_numbers(study: Study) -> tuple[Study, list[str]]:
+    """A study without what its sensors did not measure, and what is odd about its numbers before any fit.
+
+    Raises
+    ------
+    InputError
+        As `check`.
+    """
+    if study.schema.owner is None:
+        return study, []
+    clean = measured_study(study)
+    count = sum(len(k) for columns in clean.left_out.values() for k in columns.values())
+    said = [f"{count} samples look like spikes, and are taken for what their neighbours say"] if count else []
+    return clean.study, [*said, *clean.warnings, *check_study(clean.study, nominal_model(clean.study))]
+
+
+def odd_lines(study: Study, odd: Sequence[str]) -> list[str]:
+    """A study in one line, and what is odd about its numbers."""
+    nothing = NOT_JUDGED if study.schema.owner is None else "nothing is odd about its numbers"
+    return [str(study), *(f"odd: {one}" for one in odd)] + [nothing] * (not odd)
+
+
+def _listed(words: str, names: Sequence[str] | Mapping[str, float]) -> list[str]:
+    return [f"{words}: {', '.join(names)}"] if names else []
