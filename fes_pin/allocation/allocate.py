@@ -27,7 +27,8 @@ def allocate(
     nerves, q
         `Nerves` and the posture, or an array (joints, n) of torque at full recruitment, N m.
     previous
-        Recruitments in force until now, (n,), for `rate` and `change`; 0 by default.
+        Recruitments in force until now, 0 to 1, by channel or (n,), for `rate` and `change`; 0 by default, whatever was
+        asked before.
     solver
         See `Allocator.__call__`.
     options
@@ -69,7 +70,7 @@ def allocator_for(nerves: Any, q: Any, options: Mapping[str, Any]) -> Allocator:
 
 @lru_cache(maxsize=16)
 def recent(asked: Asked) -> Allocator:
-    """The last programs, so that the next torque of the same kind starts where the last one ended."""
+    """The last programs, so that the next torque of the same kind need not set them up."""
     return Allocator(asked.nerves, asked.q, **asked.options)
 
 

@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from fes_pin.allocation.allocation import Allocation, AllocationSequence
-from fes_pin.allocation.bounded import BoundedProgram, known_solver, refined, solve_by, solve_sequence
+from fes_pin.allocation.bounded import PRECISE, BoundedProgram, exact, known_solver, solve_by, solve_sequence
 from fes_pin.allocation.certificate import Certifier
-from fes_pin.allocation.efforts import CUBE_TOLERANCE, error_then_effort, least_cubes
-from fes_pin.allocation.inputs import wanted_torque, wanted_torques
+from fes_pin.allocation.efforts import error_then_effort, least_cubes
+from fes_pin.allocation.inputs import recruitments, wanted_torque, wanted_torques
 from fes_pin.allocation.off_or_enough import best_choice, rounded_to_least
 from fes_pin.allocation.problem import AllocationProblem, Options, problem_of
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import by_name
 
 __all__ = ["Allocator"]
 
-PRECISE = 1e-11
-"""Residual up to which an answer of DAQP is taken as it is."""
+SAME = 1e-9
+"""Recruitments are exact to this, times the number of channels; see `Certificate.flattest`."""
 
 
 class Allocator:
-    """The program at one posture, ready for any torque; it starts where its last answer was.
+    """The program at one posture, ready for any torque.
 
         min over r of sum w (R r - torque)^2 / 2 + effort + change / 2 |r - previous|^2,  lower <= r <= upper
 
-    It may be called from several threads; where `rate` or `change` count, give `previous` then.
+    An answer depends on earlier calls by `previous` alone, and only with `rate` or `change`. It may be called from
+    several threads; where `rate` or `change` count, give `previous` then.
 
     Parameters
     ----------
@@ -48,10 +49,11 @@ class Allocator:
         self.problem: AllocationProblem = problem_of(nerves, q, v, Options.of(options))
         p = self.problem
         self.certify = Certifier(p)
+        self.precise = max(PRECISE, SAME * self.certify.flattest)
         self.squares, self.pull = p.squares, p.pull
         self.H = self.squares + np.diag(p.prices + p.change)
         self.program = BoundedProgram(self.H)
-        self.previous = self.at_rest = np.zeros(p.n)
+        self._previous = self.at_rest = np.zeros(p.n)
         self.at_rest.setflags(write=False)
 
     @property
@@ -63,6 +65,15 @@ class Allocator:
     def joints(self) -> tuple[str, ...]:
         """Joints."""
         return self.problem.joints
+
+    @property
+    def previous(self) -> np.ndarray:
+        """Recruitments (n,) that the last call gave, 0 before the first: what `rate` and `change` count from."""
+        return self._previous
+
+    @previous.setter
+    def previous(self, values: Any) -> None:
+        self._previous = recruitments(values, self.problem.names)
 
     @property
     def n(self) -> int:
@@ -77,14 +88,16 @@ class Allocator:
         torque
             Wanted joint torque, N m, by joint name (absent: 0) or (joints,).
         previous
-            Recruitments in force until now, (n,), for `rate` and `change`; those of the last call by default.
+            Recruitments in force until now, 0 to 1, by channel (absent: 0) or (n,), for `rate` and `change`; those of
+            the last call by default (`Allocator.previous`). Without `rate` and `change` nothing depends on them.
         solver
             `daqp`, or any solver that qpsolvers knows (`osqp`, `proxqp` ...).
 
         Raises
         ------
         InputError
-            A torque that is not a number, unknown joint, unknown solver, or one for what only DAQP solves.
+            A torque that is not a number, unknown joint, previous recruitments that are none, unknown solver, or one
+            for what only DAQP solves.
         """
         p = self.problem
         wanted = wanted_torque(torque, p.joints)
@@ -92,11 +105,11 @@ class Allocator:
             known_solver(solver, "daqp", "an allocation")
             if not p.plain:
                 raise InputError(f"least recruitments, cubes and lexicographic are solved by daqp, not by {solver!r}")
-        before = self.previous if previous is None else previous
-        if before is not self.previous and before is not self.at_rest:
-            before = by_name(before, p.names, "previous recruitment", 0.0)
+        before = self._previous if previous is None else previous
+        if before is not self._previous and before is not self.at_rest:
+            before = recruitments(before, p.names)
         found = self._solve(wanted, before, solver)
-        self.previous = found.recruitment
+        self._previous = found.recruitment
         return found
 
     def _solve(self, wanted: np.ndarray, before: np.ndarray, solver: str) -> Allocation:
@@ -111,15 +124,18 @@ class Allocator:
         if p.least is not None:
             return self._choose(f, wanted, lower, upper, before)
         if p.cubes:
-            r, note = least_cubes(self.squares, f, p.prices, p.change, lower, upper)
-            return self.result(r, wanted, lower, upper, before, note, CUBE_TOLERANCE)
-        if solver != "daqp":
-            return self.result(self._ask(solver, f, lower, upper), wanted, lower, upper, before)
-        found = self.result(self.program.solve(f, lower, upper), wanted, lower, upper, before)
-        if found.certificate.residual <= PRECISE:
+            accuracy = self.certify.unseen(self.certify.rounding(wanted))
+            r, note = least_cubes(self.squares, f, p.prices, p.change, lower, upper, accuracy)
+            return self.result(r, wanted, lower, upper, before, note, accuracy)
+        r = self.program.solve(f, lower, upper) if solver == "daqp" else self._ask(solver, f, lower, upper)
+
+        def solve(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+            return exact(self.H, f, r, low, high)
+
+        found = self.result(r, wanted, lower, upper, before, solve=solve)
+        if found.certificate.residual <= self.precise:
             return found
-        again = refined(self.H, f, found.recruitment, lower, upper)  # numbers of very different sizes
-        return min(found, self.result(again, wanted, lower, upper, before), key=lambda a: a.certificate.residual)
+        return self.result(solve(lower, upper), wanted, lower, upper, before, solve=solve)
 
     def result(
         self,
@@ -130,10 +146,12 @@ class Allocator:
         before: np.ndarray,
         note: str = "",
         accuracy: float = 0.0,
+        solve: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> Allocation:
         """The allocation with its certificate, recomputed from the moment arms."""
-        r = self.certify.at_limits(before, wanted, r, lower, upper, accuracy)
-        certificate, achieved, gradient = self.certify(before, wanted, r, lower, upper)
+        rounding = self.certify.rounding(wanted)
+        r = self.certify.at_limits(before, wanted, r, lower, upper, rounding, accuracy, solve)
+        certificate, achieved, gradient = self.certify(before, wanted, r, lower, upper, rounding)
         width = self.problem.curves.pulse_width_us(r)
         return Allocation(
             r,
@@ -151,9 +169,9 @@ class Allocator:
         )
 
     def _ask(self, solver: str, f: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """Solve through qpsolvers; a limit that a step down the slope would reach holds."""
+        """Solve through qpsolvers; a limit that a channel's step down its slope would reach is active."""
         r = np.clip(solve_by(solver, self.H, f, lower=lower, upper=upper)[0], lower, upper)
-        step = r - (self.H @ r + f)
+        step = r - (self.H @ r + f) / self.H.diagonal()
         return np.where(step <= lower, lower, np.where(step >= upper, upper, r))
 
     def _choose(
@@ -182,37 +200,37 @@ class Allocator:
         torques
             (samples, joints), N m.
         previous
-            (n,) recruitments before the first sample, 0 by default.
+            Recruitments before the first sample, 0 to 1, by channel or (n,); 0 by default.
 
         Raises
         ------
         InputError
-            Wrong shape, a torque that is not a number, or what is allocated one torque at a time.
+            Wrong shape, a torque that is not a number, previous recruitments that are none, or what is allocated one
+            torque at a time.
         """
         p = self.problem
         wanted = wanted_torques(torques, p.joints)
         if not p.plain:
             raise InputError("least recruitments, cubes and lexicographic are allocated one torque at a time")
-        start = np.zeros(p.n) if previous is None else by_name(previous, p.names, "previous recruitment", 0.0)
+        start = np.zeros(p.n) if previous is None else recruitments(previous, p.names)
         F = wanted @ self.pull
 
+        rounding = self.certify.rounding(wanted)
+
         def settle(k: int, r: np.ndarray, before: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-            return self.certify.at_limits(before, wanted[k], r, low, high)
+            f = F[k] - p.change * before
+            return self.certify.at_limits(
+                before, wanted[k], r, low, high, rounding, solve=lambda least, most: exact(self.H, f, r, least, most)
+            )
 
-        r = solve_sequence(self.H, F, p.lower, p.upper, keep=p.change, rate=p.rate, previous=start, settle=settle)
-        return self._certified(r, wanted, start)
-
-    def _certified(self, r: np.ndarray, wanted: np.ndarray, start: np.ndarray) -> AllocationSequence:
-        """Arrays of results with residuals recomputed from the moment arms."""
-        p = self.problem
+        carried = {"keep": p.change, "rate": p.rate, "previous": start}
+        r = solve_sequence(self.H, F, p.lower, p.upper, **carried, precise=self.precise, settle=settle)
         before: Any = np.vstack([start, r[:-1]]) if p.change or p.rate < np.inf else start
         lower, upper = p.limits(before)
         if not p.change and p.rate == np.inf:  # else each was settled before the next followed from it
             slack = np.minimum(r - lower, upper - r)
-            for k in np.flatnonzero(
-                ((slack > 0.0) & (slack <= self.certify.room(self.certify.rounding(wanted)))).any(1)
-            ):
-                r[k] = self.certify.at_limits(start, wanted[k], r[k], lower, upper)
+            for k in np.flatnonzero(((slack > 0.0) & (slack <= self.certify.room(rounding))).any(1)):
+                r[k] = settle(k, r[k], start, lower, upper)
         achieved = r @ p.matrix.T
         residual = self.certify.residual(before, wanted, r, lower, upper)
         return AllocationSequence(r, p.curves.pulse_width_us(r), wanted, achieved, residual, p)

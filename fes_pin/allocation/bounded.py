@@ -1,7 +1,9 @@
 """Quadratic programs with bounds only, `min 1/2 r'Hr + f'r, lower <= r <= upper`, by DAQP, warm-started.
 
-DAQP is a dual active-set method (Arnstrom, Bemporad and Axehill 2022, IEEE Trans. Autom. Control 67:4362-4369). A
-limit with a multiplier holds exactly.
+DAQP is a dual active-set method (Arnstrom, Bemporad and Axehill 2022, IEEE Trans. Autom. Control 67:4362-4369). It
+solves in the variables `sqrt(H_ii) r_i`, whose curvatures are 1: a tolerance then means the same for every channel.
+A limit with a multiplier holds exactly. An answer whose conditions are not met to rounding is only a guess of the
+active limits; `exact` finishes it, so that the answer does not depend on where the solver started.
 """
 
 from __future__ import annotations
@@ -13,13 +15,18 @@ from typing import Any
 import daqp
 import numpy as np
 import qpsolvers
+from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csc_matrix, issparse, vstack
 
-from fes_pin.allocation.problem import within_rate
+from fes_pin.allocation.problem import EPSILON, within_rate
 from fes_pin.data.errors import InputError
 
 TOLERANCE = 1e-11
 """Violation of a bound that DAQP lets pass: a hundred times what rounding makes of numbers about 1."""
+PRECISE = 1e-14
+"""Residual, of `steps`, up to which an answer is taken as it is: 50 units of rounding."""
+BLOCKS, ROUNDS = 3, 200
+"""Exchanges of all wrong limits at once that may bring no progress; exchanges at most (some ten in practice)."""
 UNSOLVED = "no solver finds the allocation: torques or moment arms of too different sizes"
 
 
@@ -37,26 +44,70 @@ def new_model(H: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray
     return model
 
 
+def scaled(H: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Matrices (..., n, n) with a unit diagonal, and the roots (..., n) of the diagonal by which they were divided."""
+    root = np.sqrt(np.diagonal(H, axis1=-2, axis2=-1))
+    return H / (root[..., :, None] * root[..., None, :]), root
+
+
+def steps(slope: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray, curvature: np.ndarray) -> np.ndarray:
+    """How far each channel alone would move within its limits, (...) the farthest: 0 exactly at the optimum."""
+    far = np.minimum(np.maximum(slope / -curvature, lower - r), upper - r)
+    return np.maximum.reduce(np.abs(far), -1)
+
+
 def solve_once(H: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """The answer (n,) from a cold start.
+    """The answer (n,) from a cold start, exact.
 
     Raises
     ------
     InputError
-        DAQP finds none: the program holds numbers beyond what double precision can tell apart.
+        There is none: the program holds numbers beyond what double precision can tell apart.
     """
-    r, _, flag, info = new_model(H, f, lower, upper).solve()
-    if flag != 1:
-        raise InputError(UNSOLVED)
-    return held(r, info["lam"], lower, upper)
+    return exact(H, f, BoundedProgram(H).solve(f, lower, upper), lower, upper)
 
 
-def refined(H: np.ndarray, f: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """An answer after one step of Newton's method for what is free: its slope is 0 to rounding of the given H."""
-    free = np.flatnonzero((r > lower) & (r < upper))
-    better = r.copy()
-    better[free] -= np.linalg.solve(H[np.ix_(free, free)], (H @ r + f)[free])
-    return np.clip(better, lower, upper)
+def exact(
+    H: np.ndarray, f: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray, precise: float = PRECISE
+) -> np.ndarray:
+    """The optimum (n,), from any answer: the same if its residual is within `precise`, else by exchange of limits.
+
+    Free channels solve one linear system; limits that push the wrong way are let go and violated ones are taken up, all
+    at once while that brings progress, else one by one, which ends (block principal pivoting: Judice and Pires 1994,
+    Comput. Oper. Res. 21:587-596; Murty 1974, Linear Algebra Appl. 9:65-108).
+
+    Raises
+    ------
+    InputError
+        See `solve_once`.
+    """
+    if steps(H @ r + f, r, lower, upper, H.diagonal()) <= precise:
+        return r
+    S, root = scaled(H)
+    c, low, high = f / root, lower * root, upper * root
+    at, fixed = np.where(r >= upper, 1, np.where(r <= lower, -1, 0)), lower >= upper
+    at[fixed] = 1
+    fewest, tries = len(f) + 1, BLOCKS
+    for _ in range(ROUNDS):
+        x = np.where(at > 0, high, np.where(at < 0, low, 0.0))
+        free = np.flatnonzero(at == 0)
+        if len(free):
+            factors = cho_factor(S[np.ix_(free, free)], check_finite=False)
+            for _ in range(2):  # the second time refines
+                x[free] -= cho_solve(factors, (S @ x + c)[free], check_finite=False)
+        slope = S @ x + c
+        dust = len(f) * EPSILON * (np.abs(S) @ np.abs(x) + np.abs(c))
+        after = np.where((at * slope > dust) & ~fixed, 0, at)
+        after[free] = np.where(x[free] > high[free], 1, np.where(x[free] < low[free], -1, 0))
+        wrong = np.flatnonzero(after != at)
+        if not len(wrong):
+            return np.where(at > 0, upper, np.where(at < 0, lower, np.clip(x / root, lower, upper)))
+        progress = len(wrong) < fewest
+        fewest, tries = (len(wrong), BLOCKS) if progress else (fewest, tries - 1)
+        if tries < 0:
+            wrong = wrong[-1:]
+        at[wrong] = after[wrong]
+    raise InputError(UNSOLVED)
 
 
 class BoundedProgram:
@@ -70,28 +121,26 @@ class BoundedProgram:
 
     def __init__(self, H: np.ndarray) -> None:
         self.H = H
+        unit, self.root = scaled(H)
         n = len(H)
         self._lock, self._bounds = threading.Lock(), (np.zeros(n), np.ones(n))
-        self._model = new_model(H, np.zeros(n), *self._bounds)
+        self._model = new_model(unit, np.zeros(n), self._bounds[0], self.root)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return BoundedProgram, (self.H,)
 
     def solve(self, f: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """The answer (n,) for a linear term (n,).
-
-        Raises
-        ------
-        InputError
-            See `solve_once`.
-        """
+        """DAQP's answer (n,) for a linear term (n,); where it finds none, one within the limits to begin `exact` at."""
         with self._lock:
             if lower is self._bounds[0] and upper is self._bounds[1]:
-                self._model.update(f=f)
+                self._model.update(f=f / self.root)
             else:
-                self._model.update(f=f, bupper=upper.copy(), blower=lower.copy())
+                self._model.update(f=f / self.root, bupper=upper * self.root, blower=lower * self.root)
                 self._bounds = lower, upper
-            r, _, flag, info = self._model.solve()
+            x, _, flag, info = self._model.solve()
         if flag != 1:
-            return solve_once(self.H, f, lower, upper)
-        return held(r, info["lam"], lower, upper)
+            return np.clip(-f / self.H.diagonal(), lower, upper)
+        return held(x / self.root, info["lam"], lower, upper)
 
 
 def solve_sequence(
@@ -103,6 +152,7 @@ def solve_sequence(
     keep: float = 0.0,
     rate: float = np.inf,
     previous: np.ndarray | None = None,
+    precise: float = PRECISE,
     settle: Callable[[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> np.ndarray:
     """Solutions (count, n) of samples in order, each warm-started from the last.
@@ -115,6 +165,8 @@ def solve_sequence(
         (n,).
     keep, rate, previous
         Price of change (H holds its diagonal already) and its bound per sample, from `previous` (n,), by default 0.
+    precise
+        Residual up to which an answer of DAQP is taken as it is, else it is made exact.
     settle
         What to make of sample k's answer before the next one follows from it: of k, answer, the one before, limits.
 
@@ -124,35 +176,39 @@ def solve_sequence(
         See `solve_once`.
     """
     count, n = F.shape
-    R, multipliers = np.empty((count, n)), np.empty((count, n))
+    R = np.empty((count, n))
     each, carries = H.ndim == 3, keep > 0.0 or rate < np.inf
     before = np.zeros(n) if previous is None else previous
     if not count:
         return R
-    model, low, high = new_model(H[0] if each else H, F[0], lower, upper), lower, upper
+    unit, root = scaled(H)
+    root, curvature = np.broadcast_to(root, (count, n)), np.diagonal(H, axis1=-2, axis2=-1)
+    F_unit, low, high = F / root, lower, upper
+    model = new_model(unit[0] if each else unit, F_unit[0], lower * root[0], upper * root[0])
     if not each and not carries:  # nothing but the linear term changes
+        multipliers = np.empty((count, n))
         for k in range(count):
-            model.update(f=F[k])
+            model.update(f=F_unit[k])
             R[k], _, flag, info = model.solve()
-            multipliers[k] = info["lam"]
-            if flag != 1:
-                R[k], multipliers[k] = solve_once(H, F[k], lower, upper), 0.0
-        return held(R, multipliers, lower, upper)
+            multipliers[k] = info["lam"] if flag == 1 else np.nan
+        R = held(R / root, multipliers, lower, upper)
+        wrong = ~(steps(R @ H + F, R, lower, upper, curvature) <= precise)
+        for k in np.flatnonzero(wrong):
+            R[k] = exact(H, F[k], R[k], lower, upper, precise)
+        return R
     for k in range(count):
-        changed: dict[str, Any] = {"H": H[k]} if each else {}
+        changed: dict[str, Any] = {"H": unit[k]} if each else {}
         if rate < np.inf:
             low, high = within_rate(before, rate, lower, upper)
-            changed |= {"bupper": high, "blower": low}
+        if each or rate < np.inf:
+            changed |= {"bupper": high * root[k], "blower": low * root[k]}
         f = F[k] - keep * before if keep else F[k]
-        model.update(f=f, **changed)
-        R[k], _, flag, info = model.solve()
-        multipliers[k] = info["lam"]
-        if flag != 1:
-            R[k], multipliers[k] = solve_once(H[k] if each else H, f, low, high), 0.0
-        if carries:
-            r = held(R[k], multipliers[k], low, high)
-            R[k] = before = r if settle is None else settle(k, r, before, low, high)
-    return R if carries else held(R, multipliers, lower, upper)
+        model.update(f=f / root[k], **changed)
+        x, _, flag, info = model.solve()
+        r = held(x / root[k], info["lam"], low, high) if flag == 1 else np.clip(0.0 * low, low, high)
+        r = exact(H[k] if each else H, f, r, low, high, precise)
+        R[k] = before = r if settle is None else settle(k, r, before, low, high)
+    return R
 
 
 def known_solver(solver: Any, own: str, has: str) -> str:

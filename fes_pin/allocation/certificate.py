@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from fes_pin.allocation.problem import EPSILON, AllocationProblem
+
+NOTHING = 1e-12
+"""A recruitment nearer to a limit than this is at the limit; a pulse that recruits so little is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,15 +23,21 @@ class Certificate:
     primal
         Greatest violation of a limit, as a recruitment.
     dual
-        Greatest `|r - clip(r - gradient)|`: 0 exactly at an optimum.
+        Greatest `|r - clip(r - gradient / curvature)|`, the step that a channel alone would make: 0 exactly at an
+        optimum. The curvature is the channel's own, so that prices of any size mean the same.
     complementarity
-        Greatest product of a multiplier and its limit's slack.
+        Greatest product of a multiplier, over the same curvature, and its limit's slack.
     gap
-        Sum of these products: no allocation within the limits has a cost lower by more (the cost is convex).
+        Sum of the products of multipliers and slacks: no allocation within the limits has a cost lower by more (the
+        cost is convex).
     cost
         The cost reached, (torque error + effort) / scale.
     scale
         (N m)^2, the squared torque of the strongest channel.
+    flattest
+        Least part of a channel's curvature that is its price: a residual of as much may move a recruitment from 0 to 1.
+    rounding
+        Residual that double precision and `NOTHING` leave.
     """
 
     primal: float
@@ -36,6 +46,8 @@ class Certificate:
     gap: float
     cost: float
     scale: float
+    flattest: float = 1.0
+    rounding: float = 0.0
 
     @property
     def residual(self) -> float:
@@ -44,20 +56,24 @@ class Certificate:
         return math.nan if any(math.isnan(part) for part in parts) else max(parts)
 
     def is_optimal(self, tolerance: float = 1e-9) -> bool:
-        """Whether no residual exceeds the tolerance, and the cost is a finite number."""
-        return self.residual <= tolerance and math.isfinite(self.cost) and math.isfinite(self.gap)
+        """Whether no residual exceeds this part of `flattest`, or else rounding, and the cost is a finite number."""
+        return (
+            self.residual <= max(tolerance * self.flattest, self.rounding)
+            and math.isfinite(self.cost)
+            and math.isfinite(self.gap)
+        )
 
 
 def residuals(
-    gradient: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    gradient: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray, curvature: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Primal, dual, complementarity and gap per sample, over the last axis."""
-    below, above = r - lower, upper - r
+    below, above, step = r - lower, upper - r, gradient / curvature
     largest = np.maximum.reduce
     primal = largest(np.maximum(-below, -above), -1)
-    dual = largest(np.abs(np.minimum(np.maximum(-gradient, -below), above)), -1)
-    products = np.maximum(gradient * below, -gradient * above)
-    return np.maximum(primal, 0.0), dual, largest(products, -1), np.add.reduce(products, -1)
+    dual = largest(np.abs(np.minimum(np.maximum(-step, -below), above)), -1)
+    products = np.maximum(step * below, -step * above)
+    return np.maximum(primal, 0.0), dual, largest(products, -1), np.add.reduce(products * curvature, -1)
 
 
 class Certifier:
@@ -78,20 +94,25 @@ class Certifier:
         self.change = 0.0 if self.first_only else problem.change
         self.turned = np.ascontiguousarray(problem.matrix.T)
         joints, n = problem.matrix.shape
+        self.squares, prices = np.abs(problem.squares), self.prices + self.change
+        curvature = self.squares.diagonal() + prices
+        self.curvature = np.where(curvature > 0.0, curvature, 1.0)
+        self.flattest = 1.0 if self.first_only else float((prices / self.curvature).min())
         arms = np.abs(problem.matrix) * self.weighed[:, None]
-        bulk = arms.T @ np.abs(problem.matrix).sum(1) + problem.prices + problem.change
         unit = (joints + n + 4) * EPSILON  # n products in a torque, as many sums over joints, prices and change
-        self.unit, self.arms = unit * float(bulk.max()), unit * float(arms.sum(0).max())
-        curvature = np.abs(problem.squares).max(0) + problem.prices + problem.change
-        self.stiffness = n * curvature
+        self.unit, self.arms = unit * (arms.T @ np.abs(problem.matrix).sum(1) + prices), unit * arms.sum(0)
 
-    def rounding(self, wanted: np.ndarray) -> float:
-        """Bound on the rounding error of the gradient anywhere within the limits.
+    def rounding(self, wanted: np.ndarray) -> np.ndarray:
+        """Bound on the rounding error of the gradient (n,) anywhere within the limits.
 
         A sum of k products errs by k units of rounding of the sum of their sizes at most (Higham 2002, Accuracy and
         Stability of Numerical Algorithms, section 3.1).
         """
         return self.unit + self.arms * float(np.abs(wanted).max())
+
+    def unseen(self, rounding: np.ndarray) -> float:
+        """Residual up to which rounding of the gradient, or a recruitment that is nothing, hides the optimum."""
+        return max(float((rounding / self.curvature).max()), NOTHING)
 
     def gradient(self, achieved: np.ndarray, wanted: np.ndarray, r: np.ndarray, previous: np.ndarray) -> np.ndarray:
         """Slope of the cost over recruitment, (..., n), at `achieved` (..., joints) N m."""
@@ -113,27 +134,36 @@ class Certifier:
         return cost
 
     def __call__(
-        self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray
+        self,
+        previous: np.ndarray,
+        wanted: np.ndarray,
+        r: np.ndarray,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        rounding: np.ndarray | None = None,
     ) -> tuple[Certificate, np.ndarray, np.ndarray]:
-        """Certificate, achieved torque and gradient of one sample."""
+        """Certificate, achieved torque and gradient of one sample; `rounding` of the torque, if it is known."""
         achieved = r @ self.turned
         gradient = self.gradient(achieved, wanted, r, previous)
-        primal, dual, complementarity, gap = residuals(gradient, r, lower, upper)
+        primal, dual, complementarity, gap = residuals(gradient, r, lower, upper, self.curvature)
         cost = self.cost(achieved, wanted, r, previous)
-        proof = Certificate(float(primal), float(dual), float(complementarity), float(gap), cost, self.problem.scale)
-        return proof, achieved, gradient
+        parts = float(primal), float(dual), float(complementarity), float(gap)
+        unseen = self.unseen(self.rounding(wanted) if rounding is None else rounding)
+        return Certificate(*parts, cost, self.problem.scale, self.flattest, unseen), achieved, gradient
 
     def residual(
         self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray
     ) -> np.ndarray:
         """Greatest residual per sample of arrays (..., n)."""
         gradient = self.gradient(r @ self.turned, wanted, r, previous)
-        return np.maximum.reduce(residuals(gradient, r, lower, upper)[:3])
+        return np.maximum.reduce(residuals(gradient, r, lower, upper, self.curvature)[:3])
 
-    def room(self, rounding: float) -> np.ndarray:
-        """Recruitments (n,) whose effort the certificate cannot see: its slope is rounding."""
+    def room(self, rounding: np.ndarray) -> np.ndarray:
+        """Recruitments (n,) whose effort the certificate cannot see: its slope is rounding, or they are nothing."""
         squares = rounding / (self.problem.prices + self.problem.change)
-        return np.maximum(squares, np.sqrt(rounding / self.problem.prices)) if self.problem.cubes else squares
+        if self.problem.cubes:
+            squares = np.maximum(squares, np.sqrt(rounding / self.problem.prices))
+        return np.maximum(squares, NOTHING)
 
     def at_limits(
         self,
@@ -142,22 +172,31 @@ class Certifier:
         r: np.ndarray,
         lower: np.ndarray,
         upper: np.ndarray,
+        rounding: np.ndarray,
         accuracy: float = 0.0,
+        solve: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> np.ndarray:
         """The same recruitments (n,), at their limits where the certificate cannot tell them from these.
 
-        What is within the certificate's own rounding error of a limit is at the limit: off is off, not a pulse at
-        threshold. First all at once whose effort is rounding, if the certificate holds without them; else those whose
-        move changes no slope by more than rounding. `accuracy` is the residual at which an iteration ended, if one did.
+        What is within the certificate's own rounding error of a limit, or within `NOTHING`, is at the limit: off is
+        off, not a pulse at threshold. First all at once whose effort is rounding, if the certificate holds without
+        them; else those whose move changes no slope by more than rounding. If some within `NOTHING` do more than that
+        to the others, `solve` gives the optimum between limits that hold them. `rounding` is that of the gradient,
+        `accuracy` the residual at which an iteration ended, if one did.
         """
         slack = np.minimum(r - lower, upper - r)
-        rounding = max(self.rounding(wanted), accuracy)
+        rounding = np.maximum(rounding, accuracy * self.curvature)
         near = (slack > 0.0) & (slack <= self.room(rounding))
         if not near.any():
             return r
         limit = np.where(r - lower <= upper - r, lower, upper)
         moved = np.where(near, limit, r)
         before, after = (float(self.residual(previous, wanted, x, lower, upper)) for x in (r, moved))
-        if after <= max(before, rounding):
+        if after <= max(before, self.unseen(rounding)):
             return moved
-        return np.where((slack > 0.0) & (slack * self.stiffness <= rounding), limit, r)
+        turns = len(r) * (self.squares + np.diag(self.prices + self.change))
+        stiff = (slack > 0.0) & (slack * turns <= rounding[:, None]).all(0)
+        r, nothing = np.where(stiff, limit, r), near & ~stiff & (slack <= NOTHING)
+        if solve is None or not nothing.any():
+            return np.where(nothing, limit, r)
+        return solve(np.where(nothing, limit, lower), np.where(nothing, limit, upper))

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import nnls
 
-from fes_pin.allocation.bounded import BoundedProgram, solve_once
+from fes_pin.allocation.bounded import solve_once, steps
 from fes_pin.allocation.problem import EPSILON
 
 STEPS = 100
-CUBE_TOLERANCE = 1e-11
 FLATTEST = 1e-9
-"""Least curvature of a quadratic program on the way to cubes, which are flat where a channel is off."""
+"""Least curvature, of a channel's own at full recruitment, on the way to cubes, which are flat where it is off."""
 SHARES = (1e-6, 1e-8, 1e-10, 1e-4)
 """Weights of effort, of the torque error's, with which the limits of the lexicographic answer are guessed."""
 PRESSED = 1e-10
@@ -24,13 +23,20 @@ def natural_residual(gradient: np.ndarray, r: np.ndarray, lower: np.ndarray, upp
 
 
 def least_cubes(
-    squares: np.ndarray, f: np.ndarray, prices: np.ndarray, change: float, lower: np.ndarray, upper: np.ndarray
+    squares: np.ndarray,
+    f: np.ndarray,
+    prices: np.ndarray,
+    change: float,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    tolerance: float,
 ) -> tuple[np.ndarray, str]:
     """Minimise `1/2 r'Sr + f'r + prices r^3 / 3 + change/2 r'r` by quadratic programs in turn with a line search.
 
-    Returns the recruitment and a note that is empty when it converged.
+    Returns the recruitment and a note that is empty when no channel alone would move by more than the tolerance.
     """
     base = squares + change * np.eye(len(f))
+    curvature = base.diagonal() + prices
 
     def cost(r: np.ndarray) -> float:
         return 0.5 * r @ base @ r + f @ r + prices @ r**3 / 3.0
@@ -38,12 +44,13 @@ def least_cubes(
     r = np.clip(np.full(len(f), 0.5), lower, upper)
     for _ in range(STEPS):
         gradient = base @ r + f + prices * r * r
-        if natural_residual(gradient, r, lower, upper) <= CUBE_TOLERANCE:
+        if steps(gradient, r, lower, upper, curvature) <= tolerance:
             return r, ""
-        H = base + np.diag(np.maximum(2.0 * prices * r, FLATTEST))
+        H = base + np.diag(np.maximum(2.0 * prices * r, FLATTEST * curvature))
         step = solve_once(H, gradient - H @ r, lower, upper) - r
         length, now = 1.0, cost(r)
-        while length > 1e-6 and cost(r + length * step) > now + 1e-4 * length * (gradient @ step):
+        dust = 8.0 * EPSILON * abs(now)
+        while length > 1e-6 and cost(r + length * step) > now + dust + 1e-4 * length * (gradient @ step):
             length *= 0.5
         r = np.clip(r + length * step, lower, upper)
     return r, f"not converged in {STEPS} quadratic programs"
@@ -73,7 +80,7 @@ def error_then_effort(
     best, least = np.clip(target, lower, upper), np.inf
     for share in SHARES:
         weight = share / total.max()
-        guess = BoundedProgram(squares + weight * np.diag(total)).solve(f - weight * total * target, lower, upper)
+        guess = solve_once(squares + weight * np.diag(total), f - weight * total * target, lower, upper)
         for _ in range(len(f)):
             r = least_norm(squares, f, total, target, guess, (guess > lower) & (guess < upper))
             outside = (r < lower) | (r > upper)

@@ -201,7 +201,8 @@ class Horizon:
         if near.any():
             moved = self.feasible(np.where(near, limit, u), low, high)
             dual_then, gap_then = self.proof(moved, y, f, low, high)
-            if dual_then <= max(dual, rounding) and gap_then <= max(gap, u.size * rounding):
+            hidden = float(rounding.max())
+            if dual_then <= max(dual, hidden) and gap_then <= max(gap, u.size * hidden):
                 return moved, dual_then, gap_then
         return u, dual, gap
 

@@ -13,6 +13,9 @@ LARGEST_NM, SMALLEST_NM = 1e4, 1e-6
 """No joint of any body makes more: the strongest people's hips extend with some hundred N m (Anderson, Madigan and
 Nussbaum 2007, J. Biomech. 40:3105-3113). Where the strongest channel makes less, units are mistaken."""
 
+ROUNDED = 1e-9
+"""Recruitments that a caller computed may exceed 0 to 1 by so much."""
+
 
 def torque_matrix(nerves: Any, q: Any, v: Any = None) -> tuple[np.ndarray, tuple[str, ...]]:
     """Torque at full recruitment, (joints, n) N m, of `Nerves` (posture, rates) or as given, and the channels' names.
@@ -65,6 +68,24 @@ def wanted_torque(torque: Any, joints: tuple[str, ...]) -> np.ndarray:
     if abs(wanted[worst]) > LARGEST_NM:
         raise InputError(f"wanted torque of {joints[worst]} is {wanted[worst]:g} N m, beyond {LARGEST_NM:g}")
     return wanted
+
+
+def recruitments(values: Any, names: tuple[str, ...]) -> np.ndarray:
+    """Recruitments in force until now, by name (absent channels: off), one for all or (n,), as an array.
+
+    Raises
+    ------
+    InputError
+        Not such numbers, or not within 0 and 1: pulse widths are none.
+    """
+    found = by_name(values, names, "previous recruitment", 0.0)
+    inside = np.clip(found, 0.0, 1.0)
+    wrong = np.abs(found - inside) > ROUNDED
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        must = "must lie between 0 and 1 (a recruitment, not a pulse width)"
+        raise InputError(f"previous recruitment of {names[i]} {must}, got {found[i]:g}")
+    return inside
 
 
 def wanted_torques(torques: Any, joints: tuple[str, ...], what: str = "samples") -> np.ndarray:

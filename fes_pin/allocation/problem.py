@@ -16,7 +16,7 @@ from fes_pin.muscles.recruitment import ChannelRecruitment, LinearRecruitment
 
 EFFORT = 1e-4
 """Default price of effort: recruiting the strongest channel fully costs as much as missing 1 % of its torque."""
-LEAST_PRICE, LARGEST_PRICE = 1e-10, 1e6
+LEAST_PRICE, LARGEST_PRICE = 1e-10, 1e8
 """Prices of effort lie between: below, double precision cannot tell choices apart; above, nothing is ever recruited."""
 LEAST_WEIGHT, LARGEST_WEIGHT = 1e-6, 1e6
 """Weights of joints that count lie between, for the same reason."""
@@ -38,7 +38,7 @@ class Options:
     weights
         Per joint, how much its torque matters: 0, or 1e-6 to 1e6, by name or (joints,).
     effort
-        Price of recruitment squared, of `Problem.scale`, the squared torque of the strongest channel: 1e-10 to 1e6; a
+        Price of recruitment squared, of `Problem.scale`, the squared torque of the strongest channel: 1e-10 to 1e8; a
         number or one each.
     effort_kind
         `squares`; `cubes` (of recruitment, which spreads it over more channels); `fatigue` (squares, dearer the less

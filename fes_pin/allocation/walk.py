@@ -104,7 +104,8 @@ def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: A
     achieved = np.einsum("kjn,kn->kj", matrices, r)
     before = np.vstack([np.zeros(p.n), r[:-1]])
     gradient = np.einsum("knj,kj->kn", weighed, achieved - wanted) / scale + p.prices * r + p.change * (r - before)
-    residual = np.maximum.reduce(residuals(gradient, r, p.lower, p.upper)[:3])
+    curvature = np.einsum("kii->ki", H)
+    residual = np.maximum.reduce(residuals(gradient, r, p.lower, p.upper, curvature)[:3])
     return WalkAllocation(r, p.curves.pulse_width_us(r), wanted, achieved, residual, matrices, p, scale)
 
 
