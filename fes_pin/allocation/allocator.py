@@ -223,14 +223,14 @@ class Allocator:
                 before, wanted[k], r, low, high, rounding, solve=lambda least, most: exact(self.H, f, r, least, most)
             )
 
-        carried = {"keep": p.change, "rate": p.rate, "previous": start}
+        carried: dict[str, Any] = {"keep": p.change, "rate": p.rate, "previous": start}
         r = solve_sequence(self.H, F, p.lower, p.upper, **carried, precise=self.precise, settle=settle)
         before: Any = np.vstack([start, r[:-1]]) if p.change or p.rate < np.inf else start
         lower, upper = p.limits(before)
         if not p.change and p.rate == np.inf:  # else each was settled before the next followed from it
             slack = np.minimum(r - lower, upper - r)
             for k in np.flatnonzero(((slack > 0.0) & (slack <= self.certify.room(rounding))).any(1)):
-                r[k] = settle(k, r[k], start, lower, upper)
+                r[k] = settle(int(k), r[k], start, lower, upper)
         achieved = r @ p.matrix.T
         residual = self.certify.residual(before, wanted, r, lower, upper)
         return AllocationSequence(r, p.curves.pulse_width_us(r), wanted, achieved, residual, p)

@@ -193,7 +193,7 @@ def solve_sequence(
             multipliers[k] = info["lam"] if flag == 1 else np.nan
         R = held(R / root, multipliers, lower, upper)
         wrong = ~(steps(R @ H + F, R, lower, upper, curvature) <= precise)
-        for k in np.flatnonzero(wrong):
+        for k in np.flatnonzero(wrong).tolist():
             R[k] = exact(H, F[k], R[k], lower, upper, precise)
         return R
     for k in range(count):
