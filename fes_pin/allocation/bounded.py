@@ -24,7 +24,7 @@ from fes_pin.data.errors import InputError
 TOLERANCE = 1e-11
 """Violation of a bound that DAQP lets pass: a hundred times what rounding makes of numbers about 1."""
 PRECISE = 1e-14
-"""Residual, of `steps`, up to which an answer is taken as it is: 50 units of rounding."""
+"""Residual, of `lone_steps`, up to which an answer is taken as it is: 50 units of rounding."""
 BLOCKS, ROUNDS = 3, 200
 """Exchanges of all wrong limits at once that may bring no progress; exchanges at most (some ten in practice)."""
 UNSOLVED = "no solver finds the allocation: torques or moment arms of too different sizes"
@@ -50,7 +50,9 @@ def scaled(H: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return H / (root[..., :, None] * root[..., None, :]), root
 
 
-def steps(slope: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray, curvature: np.ndarray) -> np.ndarray:
+def lone_steps(
+    slope: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray, curvature: np.ndarray
+) -> np.ndarray:
     """How far each channel alone would move within its limits, (...) the farthest: 0 exactly at the optimum."""
     far = np.minimum(np.maximum(slope / -curvature, lower - r), upper - r)
     return np.maximum.reduce(np.abs(far), -1)
@@ -81,7 +83,7 @@ def exact(
     InputError
         See `solve_once`.
     """
-    if steps(H @ r + f, r, lower, upper, H.diagonal()) <= precise:
+    if lone_steps(H @ r + f, r, lower, upper, H.diagonal()) <= precise:
         return r
     S, root = scaled(H)
     c, low, high = f / root, lower * root, upper * root
@@ -192,7 +194,7 @@ def solve_sequence(
             R[k], _, flag, info = model.solve()
             multipliers[k] = info["lam"] if flag == 1 else np.nan
         R = held(R / root, multipliers, lower, upper)
-        wrong = ~(steps(R @ H + F, R, lower, upper, curvature) <= precise)
+        wrong = ~(lone_steps(R @ H + F, R, lower, upper, curvature) <= precise)
         for k in np.flatnonzero(wrong).tolist():
             R[k] = exact(H, F[k], R[k], lower, upper, precise)
         return R

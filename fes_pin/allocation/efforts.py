@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import nnls
 
-from fes_pin.allocation.bounded import solve_once, steps
+from fes_pin.allocation.bounded import lone_steps, solve_once
 from fes_pin.allocation.problem import EPSILON
 
 STEPS = 100
@@ -44,7 +44,7 @@ def least_cubes(
     r = np.clip(np.full(len(f), 0.5), lower, upper)
     for _ in range(STEPS):
         gradient = base @ r + f + prices * r * r
-        if steps(gradient, r, lower, upper, curvature) <= tolerance:
+        if lone_steps(gradient, r, lower, upper, curvature) <= tolerance:
             return r, ""
         H = base + np.diag(np.maximum(2.0 * prices * r, FLATTEST * curvature))
         step = solve_once(H, gradient - H @ r, lower, upper) - r
