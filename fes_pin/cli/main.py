@@ -182,9 +182,8 @@ def predict(
 
 def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
     """A trial's outputs foretold from what was measured so long before."""
-    from dataclasses import replace
-
     from fes_pin.data.errors import InputError
+    from fes_pin.data.trial import derived_trial
     from fes_pin.identify.ahead import foretell
     from fes_pin.identify.stored import load_random
 
@@ -193,7 +192,7 @@ def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
         raise InputError(
             "expected a table [random], as diagnose writes it: --horizon needs to know the noise", file=path
         )
-    return replace(trial, columns=foretell(model, trial, random, horizon_s))
+    return derived_trial(trial, columns=foretell(model, trial, random, horizon_s))
 
 
 @app.command()

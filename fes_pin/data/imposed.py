@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import blake2b
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -23,6 +22,8 @@ MOTION = ("imposed", "imposed_rate", "imposed_acceleration")
 
 REMEMBERED = 256
 """Readings whose smoothing is remembered, 40 bytes a sample."""
+_KNOWN = "_imposed_motion"
+"""Where a trial keeps its own: that of another trial, so far further, is not what smoothing finds to the last digit."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,6 @@ class ImposedMotion:
         return (time >= time[0] + margin) & (time <= time[-1] - margin)
 
 
-_KNOWN: WeakKeyDictionary[Trial, ImposedMotion] = WeakKeyDictionary()
-
-
 def imposed_motion(trial: Trial, columns: tuple[str, ...]) -> ImposedMotion:
     """The motion that a trial imposes.
 
@@ -69,16 +67,16 @@ def imposed_motion(trial: Trial, columns: tuple[str, ...]) -> ImposedMotion:
     columns
         Names of the columns that may hold it: the position, and perhaps its velocity.
     """
-    if trial not in _KNOWN:
-        _KNOWN[trial] = _smoothed(trial, columns)
-    return _KNOWN[trial]
+    known = vars(trial).get(_KNOWN)
+    if known is None:
+        known = vars(trial)[_KNOWN] = _smoothed(trial, columns)
+    return known
 
 
 def same_motion(trial: Trial, other: Trial, further: float = 0.0) -> Trial:
     """A trial whose imposed motion is that of another, so far further: what is known of that is not sought again."""
-    if other in _KNOWN:
-        known = _KNOWN[other]
-        _KNOWN[trial] = replace(known, values=known.values + np.array([[further], [0.0], [0.0]]))
+    if (known := vars(other).get(_KNOWN)) is not None:
+        vars(trial)[_KNOWN] = replace(known, values=known.values + np.array([[further], [0.0], [0.0]]))
     return trial
 
 

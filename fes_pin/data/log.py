@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from fes_pin.data.answered import ControllerAnswer, answer_of
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 
 EFFORT = "effort"
 """What a controller's log may write down after it acted, or with noise."""
@@ -43,7 +43,7 @@ class Log:
             trial = advanced(trial, EFFORT, self.effort_late_s)
         if EFFORT in trial and self.effort_over_s:
             trial = followed(trial, EFFORT, self.effort_over_s)
-        return replace(trial, low_pass_hz=self.low_pass_hz) if self.low_pass_hz else trial
+        return derived_trial(trial, low_pass_hz=self.low_pass_hz) if self.low_pass_hz else trial
 
 
 def answered(trial: Trial) -> ControllerAnswer:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from numbers import Real
 from typing import Any
 
 ROLES = ("fit", "held_out")
@@ -71,7 +72,7 @@ class NumberKey:
         ValueError
             Not a number, not finite, or out of bounds.
         """
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if isinstance(value, bool) or not isinstance(value, Real):
             raise ValueError(f"expected a number{self._unit()}, found {_kind_of(value)}")
         try:
             number = float(value)
@@ -256,21 +257,51 @@ def check_conditions(
     Exception
         What `error` makes, for an unknown key, a key that is missing, or a value that is not the number it must be.
     """
-    known = schema.conditions
-    numbers = {}
-    for key, value in conditions.items():
-        if key not in known:
-            raise error(key, unknown(key, [*known, "file", "kind", "role", "group"]))
-        try:
-            numbers[key] = known[key].check(value)
-        except ValueError as problem:
-            raise error(key, str(problem)) from None
+    numbers = checked_numbers(conditions, schema.conditions, error, ("file", "kind", "role", "group"))
     for key, words in schema.needed.get(kind, {}).items():
         if key not in numbers:
             raise error(key, f"missing; expected {words}")
     for key, one in schema.only.items():
         if key in numbers and kind != one:
             raise error(key, f"expected in {one} trials only, and this is a {kind} trial")
+    return numbers
+
+
+def checked_numbers(
+    table: Mapping[str, Any],
+    known: Mapping[str, NumberKey],
+    error: Callable[[str, str], Exception],
+    also: tuple[str, ...] = (),
+) -> dict[str, float]:
+    """Numbers of a table by key.
+
+    Parameters
+    ----------
+    table
+        Its values.
+    known
+        What it may hold.
+    error
+        Makes the exception for a key and a message.
+    also
+        Other keys that it might hold, named when a key is unknown.
+
+    Raises
+    ------
+    Exception
+        What `error` makes, for an unknown key, a missing one, or a value that is not the number it must be.
+    """
+    numbers = {}
+    for key, value in table.items():
+        if key not in known:
+            raise error(key, unknown(str(key), (*known, *also)))
+        try:
+            numbers[key] = known[key].check(value)
+        except ValueError as problem:
+            raise error(key, str(problem)) from None
+    for key, number in known.items():
+        if number.required and key not in numbers:
+            raise error(key, f"missing; expected a number{f' in {number.unit}' if number.unit else ''}")
     return numbers
 
 
@@ -338,7 +369,7 @@ def _kind_of(value: object) -> str:
     return words.get(type(value), f"a {type(value).__name__}")
 
 
-def _short(value: int | float) -> str:
+def _short(value: object) -> str:
     if isinstance(value, int) and value.bit_length() > 100:
         return "an integer of many digits"
     return repr(value)

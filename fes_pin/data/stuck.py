@@ -13,11 +13,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 
 RUN = 20
 """Equal samples in a row that noise does not make: with a deviation of one digit the chance of two is 0.3."""
@@ -143,7 +142,7 @@ def piece(trial: Trial, rows: slice, number: int) -> Trial:
     name = f"{trial.name}_part{number + 1}" if number else trial.name
     stated = {n: v for n, v in trial.conditions.items() if not rows.start or n not in OF_THE_START}
     columns = {n: v[rows] for n, v in trial.columns.items()}
-    return replace(trial, name=name, columns=columns, time=trial.time[rows], conditions=stated)
+    return derived_trial(trial, name=name, columns=columns, time=trial.time[rows], conditions=stated)
 
 
 def _said(trial: Trial, name: str, stretches: Sequence[slice]) -> str:

@@ -6,21 +6,25 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
+from fes_pin.data.checks import check_constants, check_same_inputs, checked_kind, checked_label, known_constants
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes, write_files
 from fes_pin.data.motion import GROUND_REACTION
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.schema import (
     ROLES,
+    NumberKey,
     Rigs,
     RigSchema,
     check_conditions,
+    checked_numbers,
     known_rigs,
     one_of,
     schema_of,
@@ -28,7 +32,7 @@ from fes_pin.data.schema import (
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.study_tables import HORIZON, StudyTables
 from fes_pin.data.toml import Document, read_toml
-from fes_pin.data.trial import Trial, checked_kind, read_body_trial, read_trial, trial_csv
+from fes_pin.data.trial import Trial, check_trial, read_body_trial, read_trial, trial_csv
 
 if TYPE_CHECKING:
     import pandas
@@ -59,6 +63,13 @@ class Study:
         What studies of the rig must and may hold, if it is not one that is written here or installed.
     horizon_s
         How far ahead errors over a horizon look, s; None leaves it to the diagnosis.
+
+    Raises
+    ------
+    InputError
+        What `read_study` refuses in a file: an unknown rig, a constant or start value that is missing, unknown or not
+        the number that it must be, a joint without URDF, no trials, two of one name, a trial that is not one of this
+        rig (see `check_trial`).
     """
 
     name: str
@@ -72,9 +83,63 @@ class Study:
     horizon_s: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "trials", tuple(self.trials))
-        for name in ("constants", "start", "files"):
-            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+        checked_label(self.name, lambda _, message: InputError(message, column="name"), what="a name")
+        schema = self._schema()
+        numbers = {}
+        known = {"constants": {**known_constants(schema), **schema.passive}, "start": dict(schema.start)}
+        for key in set(schema.start) & set(self.constants):
+            if key in self.start:
+                raise InputError("is also among the constants; expected it in one of them", column=f"start.{key}")
+            del known["start"][key]
+        for where, keys in known.items():
+            fault = partial(_fault, where)
+            numbers[where] = checked_numbers(getattr(self, where), keys, fault)
+        check_constants(schema, numbers["constants"], self.files, partial(_fault, "constants or files"))
+        trials = tuple(self.trials)
+        self._check_trials(trials, schema)
+        horizon = {HORIZON: self.horizon_s} if self.horizon_s is not None else {}
+        checked_numbers(horizon, {HORIZON: NumberKey("s", 0.0, required=False)}, partial(_fault, "Study"))
+        held: dict[str, dict[str, Any]] = {**numbers, "files": {key: Path(path) for key, path in self.files.items()}}
+        for name, value in held.items():
+            object.__setattr__(self, name, MappingProxyType(value))
+        object.__setattr__(self, "trials", trials)
+        object.__setattr__(self, "described", schema)
+
+    def _schema(self) -> RigSchema:
+        if self.described is not None and self.described.name in ("", self.rig):
+            return self.described
+        try:
+            return schema_of(self.rig)
+        except ValueError as problem:
+            raise InputError(str(problem), column="rig") from None
+
+    def _check_trials(self, trials: tuple[Trial, ...], schema: RigSchema) -> None:
+        if not trials:
+            raise InputError("expected at least one trial, found none", column="trials")
+        if odd := [one for one in trials if not isinstance(one, Trial)]:
+            raise InputError(f"expected trials, found a {type(odd[0]).__name__}", column="trials")
+        for trial in trials:
+            check_trial(trial, schema)
+        if twice := [name for name, count in Counter(t.name for t in trials).items() if count > 1]:
+            raise InputError(f"two trials are named {twice[0]!r}; expected a name for each", column="trials")
+
+        def error(place: int | None, key: str, message: str) -> InputError:
+            return (
+                InputError(message, column=f"constants.{key}")
+                if place is None
+                else trials[place].error(message, "columns")
+            )
+
+        check_same_inputs([(t.kind, t.columns) for t in trials], schema, self.constants, error)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Study) or self is other:
+            return self is other
+        same = ("name", "rig", "constants", "start", "trials", "horizon_s")
+        return all(getattr(self, one) == getattr(other, one) for one in same) and list(self.files) == list(other.files)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.rig, self.trials))
 
     def __reduce__(self) -> tuple[Any, ...]:
         tables = (dict(self.constants), dict(self.start))
@@ -92,7 +157,7 @@ class Study:
     @property
     def schema(self) -> RigSchema:
         """What studies of this rig must and may hold."""
-        return self.described or schema_of(self.rig)
+        return self._schema()
 
     @property
     def urdf(self) -> Path | None:
@@ -138,6 +203,10 @@ class Study:
         }
         given = {n: [t.conditions.get(n, math.nan) for t in self.trials] for n in conditions}
         return frame({**told, **given}, index="trial")
+
+
+def _fault(where: str, key: str, message: str) -> InputError:
+    return InputError(message, column=f"{where}.{key}")
 
 
 def read_study(path: str | Path, *, rigs: Rigs | None = None) -> Study:
@@ -193,7 +262,7 @@ class _Reader(StudyTables):
         trials = []
         for index, table in enumerate(self._trial_tables()):
             trials.append(self._trial(f"trial[{index}]", table, names[index], files))
-        self._check_together(trials, constants)
+        check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
         horizon = self.horizon()
         return Study(self.name, self.rig, constants, start, tuple(trials), self.folder, files, self.schema, horizon)
 
@@ -235,8 +304,8 @@ class _Reader(StudyTables):
             except ValueError as problem:
                 raise error("role", str(problem)) from None
         group = table.get("group")
-        if group is not None and not (isinstance(group, str) and group.strip() and group.isprintable()):
-            raise error("group", "expected a label, one line of text")
+        if group is not None:
+            checked_label(group, error)
         rest = {key: value for key, value in table.items() if key not in (*named, "kind", "role", "group")}
         numbers = check_conditions(self.schema, kind, rest, error)
         if len(named) == 1:
@@ -251,17 +320,8 @@ class _Reader(StudyTables):
         moves, pushes = (files[f"{name}.{key}"] for key in named)
         return read_body_trial(moves, pushes, name=name, conditions=numbers, role=role, group=group)
 
-    def _check_together(self, trials: list[Trial], constants: Mapping[str, float]) -> None:
-        """What only all trials together show: the same inputs in each, and a recruitment curve for pulse widths."""
-        first = {trial.kind: trial for trial in reversed(trials)}
-        for index, trial in enumerate(trials):
-            for column in self.schema.stimuli(trial.kind) if len(self.schema.recordings) == 1 else ():
-                if (column in trial) != (column in first[trial.kind]):
-                    there, others = ("has", "has not") if column in trial else ("lacks", "has it")
-                    message = f"this trial {there} the column {column} and the first {others}; expected all or none"
-                    raise self.error(f"trial[{index}].file", message)
-        if any("pulse_width_us" in t for t in trials) and "threshold_us" not in constants:
-            raise self.error("rig.threshold_us", "missing; trials with pulse_width_us need threshold and saturation")
+    def _fault_of(self, place: int | None, key: str, message: str) -> InputError:
+        return self.error(f"rig.{key}" if place is None else f"trial[{place}].{key}", message)
 
 
 def write_study(study: Study, folder: str | Path) -> None:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+from fes_pin.data.checks import check_constants, checked_label, known_constants
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
 from fes_pin.data.recorded.columns import Columns, columns_of
@@ -53,9 +54,7 @@ class StudyTables:
         for key in ("name", "rig"):
             if key not in table:
                 raise self.error(f"study.{key}", "missing")
-        name = table["name"]
-        if not isinstance(name, str) or not name.strip() or not name.isprintable():
-            raise self.error("study.name", "expected a name, one line of text")
+        name = checked_label(table["name"], lambda _, message: self.error("study.name", message), what="a name")
         try:
             return name, one_of(table["rig"], tuple(self.rigs))
         except ValueError as problem:
@@ -68,31 +67,13 @@ class StudyTables:
         if self.schema.passive:
             table.pop("passive", None)
         paths = {key: table.pop(key) for key in self.schema.files if key in table}
-        known = dict(self.schema.constants)
-        if self.schema.start_may_be_known:
-            known |= {key: NumberKey(n.unit, n.lower, n.strict, False) for key, n in self.schema.start.items()}
+        known = known_constants(self.schema)
         constants = self.document.numbers("rig", table, known, also=(*self.schema.files,))
         constants |= self.document.numbers("rig.passive", passive, self.schema.passive)
-        for key, required in self.schema.files.items():
-            if required and key not in paths:
-                raise self.error(f"rig.{key}", "missing; expected the path of a file inside the study")
-        self._check_constants(constants, paths)
+        check_constants(self.schema, constants, paths, lambda key, message: self.error(f"rig.{key}", message))
         files = {key: self.document.path_of(f"rig.{key}", value) for key, value in paths.items()}
         self._check_files(files)
         return constants, files
-
-    def _check_constants(self, constants: Mapping[str, float], paths: Mapping[str, object]) -> None:
-        threshold, saturation = constants.get("threshold_us"), constants.get("saturation_us")
-        if (threshold is None) != (saturation is None):
-            key = "threshold_us" if threshold is None else "saturation_us"
-            raise self.error(f"rig.{key}", "missing; threshold_us and saturation_us go together")
-        if threshold is not None and saturation is not None and saturation <= threshold:
-            message = f"expected a saturation above the threshold of {threshold:g} us, found {saturation:g}"
-            raise self.error("rig.saturation_us", message)
-        either = self.schema.either
-        if absent := [key for key in either if key not in constants and not paths]:
-            expected = ", or ".join((" and ".join(either), *self.schema.files))
-            raise self.error(f"rig.{absent[0]}", f"missing; expected {expected}")
 
     def _check_files(self, files: Mapping[str, Path]) -> None:
         if self.schema.check_files is not None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,12 @@ from fes_pin.data.files import read_text
 
 MIN_ROWS = 3
 STEP_TOLERANCE = 0.01  # a step may vary by 1 %
+MOST_DECIMALS = 9
+"""Nanoseconds: times that are printed with more decimals are as exact as any."""
+CLOSE = 1e-3
+"""Share of a decimal by which times may miss it: what is taken off them costs their last digits."""
+Fault = Callable[[str, str, int | None], InputError]
+"""Makes the error of a message, a column, and a sample or None: a table names its file and row, a trial itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +36,8 @@ class Table:
         The numbers.
     header_row
         Line number of the header; the first numbers stand in the next line.
-    lines, delimiter
-        The rows as text and what separates their values; None stands for white space.
+    delimiter
+        What separates the values of a row; None is white space.
     rows, half_digit, called
         Where a file is read as its study's `[columns]` says: the place of each sample, shape (n,); half of the last
         digit that times were printed with, s; the file's own names of its columns.
@@ -42,7 +47,6 @@ class Table:
     names: tuple[str, ...]
     values: np.ndarray
     header_row: int
-    lines: tuple[str, ...]
     delimiter: str | None
     rows: np.ndarray | None = None
     half_digit: float | None = None
@@ -93,7 +97,7 @@ def parse_rows(path: Path, names: tuple[str, ...], lines: list[str], header_row:
     values = _parse_fast(lines, delimiter)
     if values is None or values.shape != (len(lines), len(names)) or not np.isfinite(values).all():
         values = _parse_slowly(path, names, lines, header_row, delimiter)
-    return Table(path, names, values, header_row, tuple(lines), delimiter)
+    return Table(path, names, values, header_row, delimiter)
 
 
 def _check_names(path: Path, names: Sequence[str], header_row: int) -> None:
@@ -145,31 +149,49 @@ def _number(field: str, path: Path, row: int, column: str) -> float:
 
 
 def check_time(table: Table) -> None:
-    """Require the first column to increase in equal steps.
+    """Require the first column to increase in equal steps; see `check_times`."""
+    hint = "; resample_hz in [columns.file] has the samples interpolated"
+    check_times(table.values[:, 0], table.error, table.names[0], table.half_digit, hint)
+
+
+def check_times(
+    time: np.ndarray, error: Fault, name: str = "time_s", half_digit: float | None = None, hint: str = ""
+) -> None:
+    """Require times to increase in equal steps.
 
     A step may differ from the median step by 1 %. Where times were printed with few decimals (1/60 s as 0.017, 0.033,
     0.050), they must lie as rounding leaves them about equally spaced times: within half of the last digit, with the
     odd steps spread over the record. One odd step among equal ones is not rounding.
 
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        s.
+    error, name
+        Makes the error; the column that it names.
+    half_digit
+        Half of the last digit that times were printed with, s; None: as the times themselves show.
+    hint
+        What is said of a step that is another one.
+
     Raises
     ------
     InputError
-        With the first row that does not increase, or whose step is another one.
+        With the first sample that does not increase, or whose step is another one.
     """
-    time = table.values[:, 0]
     steps = np.diff(time)
-    if not (steps > 0).all():
-        first = int(np.argmax(steps <= 0)) + 1
-        raise table.error("expected time to increase", table.names[0], first)
+    least, most = float(steps.min()), float(steps.max())
+    if not least > 0.0:
+        raise error("expected time to increase", name, int(np.argmax(~(steps > 0.0))) + 1)
+    if most - least <= STEP_TOLERANCE * least:  # then each is within 1 % of the median, which takes longer
+        return
     step = float(np.median(steps))
     if (np.abs(steps - step) <= STEP_TOLERANCE * step * (1 + 1e-6)).all():
         return
-    half_digit = 0.5 * 10.0 ** -_time_decimals(table) if table.half_digit is None else table.half_digit
-    late = _first_off_grid(time, steps, step, half_digit)
+    late = _first_off_grid(time, steps, step, _half_digit(time) if half_digit is None else half_digit)
     if late is not None:
         found = f"expected a fixed step of {step:.6g} s within 1 %, found {steps[late - 1]:.6g} s"
-        found += "; resample_hz in [columns.file] has the samples interpolated"
-        raise table.error(found, table.names[0], late)
+        raise error(found + hint, name, late)
 
 
 def _first_off_grid(time: np.ndarray, steps: np.ndarray, step: float, half_digit: float) -> int | None:
@@ -187,17 +209,11 @@ def _first_off_grid(time: np.ndarray, steps: np.ndarray, step: float, half_digit
     return max(1, int(np.argmax(off))) if np.count_nonzero(odd) > 0.1 * len(steps) else int(np.argmax(odd)) + 1
 
 
-def _time_decimals(table: Table) -> int:
-    """Most decimals that any time was printed with."""
-    decimals = 0
-    for line in table.lines:
-        text = line.split(table.delimiter, 1)[0].strip()
-        try:
-            exponent = Decimal(text).as_tuple().exponent
-        except InvalidOperation:
-            return 17
-        decimals = max(decimals, -int(exponent))
-    return decimals
+def _half_digit(time: np.ndarray) -> float:
+    """Half of the last decimal that any time has, s; 0 for more of them than any clock has."""
+    places = range(MOST_DECIMALS + 1)
+    decimals = (d for d in places if np.abs(time - np.round(time, d)).max() <= CLOSE * 10.0**-d)
+    return 0.5 * 10.0 ** -next(decimals, math.inf)
 
 
 def format_csv(columns: Mapping[str, np.ndarray]) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import inside, read_text, what_is_at
-from fes_pin.data.schema import NumberKey, unknown
+from fes_pin.data.schema import NumberKey, checked_numbers
 
 _TABLE = re.compile(r"^\s*(\[\[?)\s*([^\]#]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*'))*)\s*=""")
@@ -67,19 +67,7 @@ class Document:
         InputError
             An unknown key, a missing one, or a value that is not the number it must be.
         """
-        numbers = {}
-        for key, value in table.items():
-            if key not in known:
-                raise self.error(f"{where}.{key}", unknown(key, (*known, *also)))
-            try:
-                numbers[key] = known[key].check(value)
-            except ValueError as problem:
-                raise self.error(f"{where}.{key}", str(problem)) from None
-        for key, number in known.items():
-            if number.required and key not in numbers:
-                unit = f" in {number.unit}" if number.unit else ""
-                raise self.error(f"{where}.{key}", f"missing; expected a number{unit}")
-        return numbers
+        return checked_numbers(table, known, lambda key, message: self.error(f"{where}.{key}", message), also)
 
     def path_of(self, key: str, value: object) -> Path:
         """Path of a file that a key names relative to this one.

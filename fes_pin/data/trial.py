@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -11,21 +11,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fes_pin.data.checks import KeyFault, check_columns, check_values, checked_kind, checked_label
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
 from fes_pin.data.recorded.columns import Columns
-from fes_pin.data.recorded.hint import read_csv_or_hint
+from fes_pin.data.recorded.hint import NEW_STUDY, read_csv_or_hint
 from fes_pin.data.schema import (
     ROLES,
+    NumberKey,
     RigSchema,
     check_conditions,
     one_of,
     schema_of,
 )
 from fes_pin.data.show import frame
-from fes_pin.data.table import MIN_ROWS, format_csv
-from fes_pin.data.trial_columns import checked_columns
+from fes_pin.data.table import MIN_ROWS, Table, check_time, check_times, format_csv
 
 if TYPE_CHECKING:
     import pandas
@@ -59,8 +60,10 @@ class Trial:
 
     Raises
     ------
-    ValueError
-        A column that is not as long as the time.
+    InputError
+        Fewer than 3 samples, times that do not increase in equal steps (as `fes_pin.data.table.check_times` says), a
+        column that is not as long as the time, numbers that are not finite, another role, a condition that is not a
+        number.
     """
 
     name: str
@@ -74,27 +77,53 @@ class Trial:
     low_pass_hz: float | None = None
 
     def __post_init__(self) -> None:
-        time = _frozen(self.time)
-        columns = {name: _frozen(values) for name, values in self.columns.items()}
-        for name, values in columns.items():
-            if values.shape != time.shape or time.ndim != 1:
-                raise ValueError(f"column {name} has shape {values.shape}, the time {time.shape}; expected (n,)")
-        object.__setattr__(self, "time", time)
-        object.__setattr__(self, "columns", MappingProxyType(columns))
-        object.__setattr__(self, "conditions", MappingProxyType(dict(self.conditions)))
+        def error(key: str, message: str) -> InputError:
+            return self.error(message, key)
+
+        checked_label(self.name, error, "name", "a name")
+        checked_label(self.kind, error, "kind", "a kind")
+        if self.role is not None:
+            _checked("role", self.role, ROLES, error)
+        if self.group is not None:
+            checked_label(self.group, error)
+        if isinstance(self.remarks, str) or not all(isinstance(one, str) for one in self.remarks):
+            raise error("remarks", "expected texts, one for each remark")
+        try:
+            conditions = {key: NumberKey("").check(value) for key, value in dict(self.conditions).items()}
+            low_pass = None if self.low_pass_hz is None else NumberKey("Hz", 0.0).check(self.low_pass_hz)
+        except ValueError as problem:
+            raise error("conditions, low_pass_hz", str(problem)) from None
+        time = _numbers(self.time, "time_s", self)
+        columns = {name: _numbers(values, name, self) for name, values in self.columns.items()}
+        if len(time) < MIN_ROWS:
+            raise self.error(f"expected at least {MIN_ROWS} samples, found {len(time)}", "time_s")
+        if odd := [name for name, values in columns.items() if values.shape != time.shape]:
+            raise self.error(f"expected shape {time.shape} as of the time, found {columns[odd[0]].shape}", odd[0])
+        check_times(time, self.error)
+        _set(self, time, columns, conditions=MappingProxyType(conditions), low_pass_hz=low_pass)
+
+    def error(self, message: str, column: str, sample: int | None = None) -> InputError:
+        """The error that names a column, this trial and a sample."""
+        place = f"trial {self.name}" + ("" if sample is None else f", sample {sample}")
+        return InputError(f"{message} ({place})", column=column)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Trial) or self is other:
+            return self is other
+        labels = ("name", "kind", "conditions", "role", "group", "remarks", "low_pass_hz")
+        return (
+            all(getattr(self, label) == getattr(other, label) for label in labels)
+            and list(self.columns) == list(other.columns)
+            and np.array_equal(self.time, other.time)
+            and all(np.array_equal(self[name], other[name], equal_nan=True) for name in self.columns)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.kind, len(self), tuple(self.columns), float(self.time[0]), float(self.time[-1])))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Trial, (
-            self.name,
-            self.kind,
-            dict(self.columns),
-            self.time,
-            dict(self.conditions),
-            self.role,
-            self.group,
-            self.remarks,
-            self.low_pass_hz,
-        )
+        state = {one.name: getattr(self, one.name) for one in fields(self)}
+        return _restored, ({**state, "columns": dict(self.columns), "conditions": dict(self.conditions)},)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -119,11 +148,19 @@ class Trial:
         return float(self.time[-1] - self.time[0])
 
     def first(self, count: int) -> Trial:
-        """The trial's first samples, itself if it has no more than `count`."""
+        """The trial's first samples, itself if it has no more than `count`.
+
+        Raises
+        ------
+        InputError
+            Fewer than 3 samples.
+        """
         if count >= len(self):
             return self
+        if count < MIN_ROWS:
+            raise InputError(f"expected at least {MIN_ROWS} samples, found {count}", column="count")
         columns = {n: v[:count] for n, v in self.columns.items()}
-        return replace(self, columns=columns, time=self.time[:count])
+        return derived_trial(self, columns=columns, time=self.time[:count])
 
     def with_columns(self, **columns: np.ndarray) -> Trial:
         """The same trial with columns added or replaced, each of shape (n,)."""
@@ -139,7 +176,7 @@ class Trial:
         """
         for name in columns:
             self[name]
-        return replace(self, columns={name: self.columns[name] for name in self.columns if name not in columns})
+        return derived_trial(self, columns={name: self.columns[name] for name in self.columns if name not in columns})
 
     def residual(self, simulated: Trial, column: str) -> np.ndarray:
         """This trial, measured, minus a simulated one, in one column.
@@ -171,10 +208,79 @@ class Trial:
         return frame({"time_s": self.time, **self.columns}, index="time_s")
 
 
-def _frozen(values: Any) -> np.ndarray:
-    array = np.array(values, dtype=float)
-    array.setflags(write=False)
+def derived_trial(trial: Trial, **changes: Any) -> Trial:
+    """A trial that the library makes of another one: as `dataclasses.replace`, and its numbers are not checked again.
+
+    What is not finite was not measured, or is a simulation that ran away.
+
+    Parameters
+    ----------
+    changes
+        Fields by name; columns and time as arrays of float, each of shape (n,).
+    """
+    state = {one.name: getattr(trial, one.name) for one in fields(trial)} | changes
+    own = {id(values) for values in (trial.time, *trial.columns.values())}  # read-only already
+    state["columns"] = {n: v if id(v) in own else np.array(v, dtype=float) for n, v in state["columns"].items()}
+    state["time"] = state["time"] if id(state["time"]) in own else np.array(state["time"], dtype=float)
+    return _restored(state)
+
+
+def _restored(state: Mapping[str, Any]) -> Trial:
+    trial = object.__new__(Trial)
+    _set(trial, **{**state, "conditions": MappingProxyType(dict(state["conditions"]))})
+    return trial
+
+
+def _set(trial: Trial, time: np.ndarray, columns: Mapping[str, np.ndarray], **labels: Any) -> None:
+    """Fields of a trial, its arrays read-only from now on."""
+    for values in (time, *columns.values()):
+        values.setflags(write=False)
+    for name, value in {**labels, "time": time, "columns": MappingProxyType(dict(columns))}.items():
+        object.__setattr__(trial, name, value)
+
+
+def _numbers(values: Any, name: str, trial: Trial) -> np.ndarray:
+    """A copy of a column or of the time as finite numbers, shape (n,)."""
+    if not isinstance(name, str) or (name == "time_s" and name in trial.columns):
+        raise trial.error("expected names of columns as text, and the time by itself", str(name))
+    try:
+        given = np.ma.filled(values.astype(float), np.nan) if np.ma.isMaskedArray(values) else np.asarray(values)
+        if given.dtype.kind not in "biufO" or (given.dtype.kind == "O" and any(isinstance(v, str) for v in given.flat)):
+            raise ValueError
+        array = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        raise trial.error(f"expected numbers, found {getattr(values, 'dtype', type(values).__name__)}", name) from None
+    if array.ndim != 1:
+        raise trial.error(f"expected shape (n,), found {array.shape}", name)
+    if not (finite := np.isfinite(array)).all():
+        sample = int(np.argmin(finite))
+        raise trial.error(f"expected finite numbers, found {array[sample]}", name, sample)
     return array
+
+
+def check_trial(trial: Trial, schema: RigSchema, *, inputs_only: bool = False) -> None:
+    """Require of a trial what a rig's schema asks: its kind, conditions, columns, and units that can be.
+
+    Parameters
+    ----------
+    inputs_only
+        Do not require the measured outputs, to predict them.
+
+    Raises
+    ------
+    InputError
+        Names the column or the condition and the trial.
+    """
+
+    def error(key: str, message: str) -> InputError:
+        return trial.error(message, key)
+
+    kind = checked_kind(schema, trial.kind, error)
+    check_conditions(schema, kind, trial.conditions, error)
+    check_columns(tuple(trial.columns), schema, kind, inputs_only, trial.error)
+    if "angle_rad" in trial.conditions:
+        check_values({"angle_rad": np.array([trial.conditions["angle_rad"]])}, schema, lambda m, c, _: error(c, m))
+    check_values(trial.columns, schema, trial.error)
 
 
 def read_trial(
@@ -229,30 +335,43 @@ def read_trial(
     numbers = check_conditions(schema, kind, conditions or {}, error)
     if len(schema.recordings) > 1:
         columns, time = _body_columns(path, inputs_only)
-        return Trial(name or path.stem, kind, columns, time, numbers, role, group)
+        check_values(columns, schema, lambda message, column, _: error(column, message))
+        return _as_read(name or path.stem, kind, columns, time, numbers, role, group)
     table, said = (read_csv_or_hint(path), "") if own is None else own.read(path, schema, kind, inputs_only)
-    columns, time = checked_columns(table, schema, kind, inputs_only)
-    return Trial(name or path.stem, kind, columns, time, numbers, role, group, (said,) if said else ())
+    columns, time = _checked_columns(table, schema, kind, inputs_only)
+    return _as_read(name or path.stem, kind, columns, time, numbers, role, group, (said,) if said else ())
 
 
-def checked_kind(schema: RigSchema, kind: object, error: Callable[[str, str], InputError]) -> str:
-    """The kind of a trial of this rig; the rig's default if it names none.
-
-    Raises
-    ------
-    InputError
-        Made by `error` from the key and a message, for a kind that the rig does not have.
-    """
-    if kind is None:
-        return schema.default_kind
-    if not isinstance(kind, str) or kind not in schema.outputs:
-        found = f"{kind[:40]!r}" if isinstance(kind, str) else f"a {type(kind).__name__}"
-        expected = f"{'one of ' if len(schema.outputs) > 1 else ''}{', '.join(schema.outputs)}"
-        raise error("kind", f"expected {expected} for rig {schema.name}, found {found}")
-    return kind
+def _as_read(
+    name: str,
+    kind: str,
+    columns: Mapping[str, np.ndarray],
+    time: np.ndarray,
+    conditions: Mapping[str, float],
+    role: str | None,
+    group: str | None,
+    remarks: tuple[str, ...] = (),
+) -> Trial:
+    """A trial of what the reader of its file has checked."""
+    labels = {"name": name, "kind": kind, "conditions": conditions, "role": role, "group": group, "remarks": remarks}
+    return _restored({**labels, "low_pass_hz": None, "time": time.copy(), "columns": columns})
 
 
-def _checked(key: str, value: object, known: tuple[str, ...], error: Callable[[str, str], InputError]) -> str:
+def _checked_columns(
+    table: Table, schema: RigSchema, kind: str, inputs_only: bool
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """A trial's columns by name, and its time, after all that is asked of them was checked."""
+    if table.names[0] != "time_s":
+        told = f"expected time_s as the first column, found {table.names[0][:40]!r}"
+        raise table.error(f"{told}; {NEW_STUDY}", "time_s")
+    check_columns(table.names[1:], schema, kind, inputs_only, table.error)
+    check_time(table)
+    columns = {name: table.column(name) for name in table.names[1:]}
+    check_values(columns, schema, table.error)
+    return columns, table.values[:, 0]
+
+
+def _checked(key: str, value: object, known: tuple[str, ...], error: KeyFault) -> str:
     try:
         return one_of(value, known)
     except ValueError as problem:
@@ -291,7 +410,7 @@ def read_body_trial(
     if len(time) < MIN_ROWS:
         message = f"expected at least {MIN_ROWS} samples in the time of {coordinates.name}, found {len(time)}"
         raise pushes.error(message, pushes.names[0], 0)
-    return Trial(name, "motion", columns, time, conditions, role, group)
+    return _as_read(name, "motion", columns, time, conditions, role, group)
 
 
 def write_trial(trial: Trial, path: str | Path) -> None:

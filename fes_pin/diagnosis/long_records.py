@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from fes_pin.data.schema import RigSchema
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.noise import noise_step, thin, thinning
 
 MOST_SAMPLES = 120_000
@@ -73,10 +72,10 @@ def thinned(trial: Trial, schema: RigSchema, driven: bool = False) -> Trial:
     held = [n for n in schema.inputs if n in trial.columns and n != schema.outputs[trial.kind]]
     if not held or count == 1:
         columns = {n: thin(values, count) for n, values in trial.columns.items()}
-        return replace(trial, columns=columns, time=thin(trial.time, count))
+        return derived_trial(trial, columns=columns, time=thin(trial.time, count))
     side = 0 if driven else (count - 1) // 2
     columns = {n: thin(v, count) if n in held else _about(v, count, side) for n, v in trial.columns.items()}
-    return replace(trial, columns=columns, time=trial.time[: len(trial) // count * count : count])
+    return derived_trial(trial, columns=columns, time=trial.time[: len(trial) // count * count : count])
 
 
 def _about(values: np.ndarray, count: int, side: int) -> np.ndarray:

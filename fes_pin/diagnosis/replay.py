@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.diagnosis.decide.held_out import within
 from fes_pin.diagnosis.errors_ahead import AheadErrors
 from fes_pin.diagnosis.result import Diagnosis
@@ -61,10 +61,12 @@ def _predicted(fitted: Fit, trials: Sequence[Trial], noise: NoiseModel, ahead: A
     model, out = fitted.model, []
     if ahead is not None:
         assert fitted.doubt is not None
-        return [t.with_columns(**over_horizon(model, t, fitted.doubt, ahead.horizon_s)) for t in trials]
+        moves = [over_horizon(model, t, fitted.doubt, ahead.horizon_s) for t in trials]
+        return [derived_trial(t, columns={**t.columns, **m}) for t, m in zip(trials, moves, strict=True)]
     for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
         names = model.rig.outputs(trial.kind)
-        out.append(trial.with_columns(**{n: _shown(readings[:, k], trial, n) for k, n in enumerate(names)}))
+        shown = {n: _shown(readings[:, k], trial, n) for k, n in enumerate(names)}
+        out.append(derived_trial(trial, columns={**trial.columns, **shown}))
     return out
 
 

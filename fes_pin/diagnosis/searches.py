@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 from fes_pin.data.schema import IMPOSED
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_search import Found, LikelihoodSearch
@@ -97,7 +96,7 @@ class Searches:
 
 
 def _with(trial: Trial, conditions: Mapping[str, float]) -> Trial:
-    return trial if trial.conditions == conditions else replace(trial, conditions=conditions)
+    return trial if trial.conditions == conditions else derived_trial(trial, conditions=conditions)
 
 
 __all__ = ["Result", "Search", "Searches"]

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.fit import rough_noise
 from fes_pin.identify.noise import Noise
 from fes_pin.models.model import Model
@@ -59,7 +59,7 @@ def _rough_noise(model: Model, trials: Sequence[Trial], lasts_s: float) -> dict[
     """Of readings so far apart that each has noise of its own."""
     steps = [slice(None, None, max(1, round(lasts_s / t.dt))) for t in trials]
     columns = [{n: v[own] for n, v in t.columns.items()} for t, own in zip(trials, steps, strict=True)]
-    apart = [replace(t, columns=c, time=t.time[own]) for t, c, own in zip(trials, columns, steps, strict=True)]
+    apart = [derived_trial(t, columns=c, time=t.time[own]) for t, c, own in zip(trials, columns, steps, strict=True)]
     return rough_noise(model, apart)
 
 

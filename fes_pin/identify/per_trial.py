@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.doubts import first_doubt
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -99,7 +99,8 @@ def foretold_unknowns(model: Model, trial: Trial, doubt: Doubt) -> list[tuple[np
     outputs, values = [n for n in model.rig.outputs(trial.kind) if n in trial.columns], model.parameters()
     out = []
     for told in halves(len(trial)):
-        shown = trial.with_columns(**{n: np.where(told, np.nan, trial[n]) for n in outputs})
+        masked = {n: np.where(told, np.nan, trial[n]) for n in outputs}
+        shown = derived_trial(trial, columns={**trial.columns, **masked})
         problem = LikelihoodProblem(model, [shown], doubt, (), starts=[trial])
         now = problem.start_unknowns()
         for _ in range(STEPS):

@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fes_pin.data.schema import IMPOSED
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import SMALL_SHARE
@@ -64,7 +63,7 @@ def low_pass_of(model: Model, trials: Sequence[Trial]) -> float | None:
         return None
 
     def fitted(log_hz: float) -> Fit:
-        passed = [replace(t, low_pass_hz=float(np.exp(log_hz))) for t in trials]
+        passed = [derived_trial(t, low_pass_hz=float(np.exp(log_hz))) for t in trials]
         return fit_problem(Problem(model, passed, rough), begun.values)
 
     grid = np.linspace(math.log(PERIODS / shortest), math.log(MOST / dt), TRIED)

@@ -26,7 +26,7 @@ import numpy as np
 
 from fes_pin.data.answered import answer_of
 from fes_pin.data.log import EFFORT, Log
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.models.predictor import are_news
@@ -80,7 +80,7 @@ def _rows(trial: Trial, lasts_s: float) -> np.ndarray:
 def _pulsed(trial: Trial, at: np.ndarray, size: float) -> Trial:
     effort = np.array(trial[EFFORT], dtype=float)
     effort[at] += size
-    return trial.with_columns(**{EFFORT: effort})
+    return derived_trial(trial, columns={**trial.columns, EFFORT: effort})
 
 
 def _felt(change: np.ndarray, at: np.ndarray, gains: np.ndarray) -> np.ndarray:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import simulate
 
@@ -32,7 +30,7 @@ def predict(model: Model, trial: Trial) -> Trial:
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values)))
             raise InputError(f"the prediction of {name} is not finite from sample {row} on: the model is unstable here")
-    return replace(trial, columns=outputs)
+    return derived_trial(trial, columns=outputs)
 
 
 def _check(model: Model, trial: Trial) -> None:

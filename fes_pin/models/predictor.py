@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fes_pin.data.counts import SAME, begins_of_runs, count_of, hunts, lengths_of_runs
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.autoregression import noise_ahead
 from fes_pin.models.compile.layout import doubt_constants, widest, width_of
 from fes_pin.models.compile.program import compiled_program
@@ -332,4 +332,4 @@ def masked(trial: Trial, outputs: Sequence[str], hidden: Sequence[range]) -> Tri
     for some in hidden:
         rows[some.start : some.stop] = True
     columns = {n: np.where(rows & (n in outputs), np.nan, v) for n, v in trial.columns.items()}
-    return replace(trial, columns=columns)
+    return derived_trial(trial, columns=columns)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from fes_pin.data.imposed import MOTION, driving_values
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.compile.layout import Layout, widest, width_of
 from fes_pin.models.compile.program import Program, compiled_program
 from fes_pin.models.least_squares import least_squares
@@ -344,4 +344,4 @@ def simulate(model: Model, trial: Trial) -> Trial:
     rig = model.rig
     columns = {name: trial[name] for name in rig.input_columns(trial)}
     columns.update({n: simulated.readings[:, k].copy() for k, n in enumerate(rig.outputs(trial.kind))})
-    return replace(trial, columns=columns)
+    return derived_trial(trial, columns=columns)

@@ -14,12 +14,12 @@ Source: Ohnishi, Shibata and Murakami, Motion control for advanced mechatronics,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
 from fes_pin.models.stage import Effect, Stage
@@ -92,7 +92,8 @@ def tracking_effort(model: Model, trial: Trial, position: np.ndarray, rate: np.n
     curve = CubicHermiteSpline(trial.time, position, rate)
     wanted = [curve(finer.time), curve(finer.time, 1)]
     servo = model + TrackingEffort()
-    given = finer.with_columns(tracked=_held(wanted[0]), tracked_rate=_held(wanted[1]))
+    tracked = {"tracked": _held(wanted[0]), "tracked_rate": _held(wanted[1])}
+    given = derived_trial(finer, columns={**finer.columns, **tracked})
     simulator = Simulator(servo, [given])
     (run,) = simulator.run(servo.parameters(), [{**model.initial_unknowns(trial), "initial_velocity": float(rate[0])}])
     inertia = float(getattr(model.rig, "inertia_scale")) * float(model.rig.constants["inertia"])  # noqa: B009
@@ -105,7 +106,8 @@ def _finer(trial: Trial, count: int) -> Trial:
     if count == 1:
         return trial
     time = trial.time[0] + trial.dt / count * np.arange(count * (len(trial) - 1) + 1)
-    return replace(trial, time=time, columns={n: np.repeat(v, count)[: len(time)] for n, v in trial.columns.items()})
+    columns = {n: np.repeat(v, count)[: len(time)] for n, v in trial.columns.items()}
+    return derived_trial(trial, time=time, columns=columns)
 
 
 def _held(values: np.ndarray) -> np.ndarray:

@@ -4,8 +4,11 @@ import hashlib
 import shutil
 from pathlib import Path
 
+import numpy as np
+
 from fes_pin.data.provenance import provenance_now
 from fes_pin.data.study import Study, read_study
+from fes_pin.data.trial import Trial
 
 DEMO = Path(__file__).parents[2] / "analysis/studies/ankle_demo"
 
@@ -26,5 +29,6 @@ def test_every_file_of_the_study_is_hashed(tmp_path):
 
 def test_a_study_in_memory_has_no_files(tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
-    made = provenance_now(Study("s", "muscle", {}, {}, (), tmp_path), 0)
+    trial = Trial("a", "isometric", {"stim": np.ones(3), "force_n": np.ones(3)}, np.arange(3.0))
+    made = provenance_now(Study("s", "muscle", {}, {"gain": 1.0, "time_constant_s": 0.05}, (trial,), tmp_path), 0)
     assert made.inputs == {} and made.date == "1970-01-01T00:00:00Z"

@@ -5,7 +5,7 @@ import pytest
 import scipy.linalg
 
 from fes_pin.data.counts import hunts
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models import predictor
 from fes_pin.models.effects import CoulombFriction, effect_named
 from fes_pin.models.model import Model
@@ -22,6 +22,11 @@ SLIDE = Joint(
 PENDULUM = Joint(constants={"inertia": 0.05, "gravity_cos": 0.1, "gravity_sin": 1.0, "revolute": 1.0}, damping=0.05)
 PRIOR = {"initial_position": 0.5, "initial_velocity": 2.0}
 DOUBT = Doubt({"position": 2e-3}, {"effort": 0.8}, {"effort": 0.12})
+
+
+def with_gaps(trial, position):
+    """The trial with a position that was not measured in some samples (NaN)."""
+    return derived_trial(trial, columns={**trial.columns, "position": position})
 
 
 def driven(seed: int, n: int = 400, size: float = 1.0) -> Trial:
@@ -78,8 +83,8 @@ def test_what_was_not_measured_corrects_nothing_and_counts_for_nothing():
     column = np.array(trial["position"])
     column[50:120] = np.nan
     column[200] = np.nan
-    (found,) = foretold(Model(SLIDE), [trial.with_columns(position=column)])
-    innovations, variances = exact(trial.with_columns(position=column), DOUBT)
+    (found,) = foretold(Model(SLIDE), [derived_trial(trial, columns={**trial.columns, "position": column})])
+    innovations, variances = exact(derived_trial(trial, columns={**trial.columns, "position": column}), DOUBT)
     assert np.allclose(found.values[:, 0], innovations, rtol=0.0, atol=1e-6)
     seen = np.isfinite(column)
     cost = np.sum(innovations[seen] ** 2 / variances[seen] + np.log(variances[seen]))
@@ -170,7 +175,9 @@ def test_a_rig_that_stands_is_known_no_better_the_longer_it_is_read():
     doubt, white = Doubt({"position": 2e-3}, {"effort": 1e-9}, {"effort": 0.1}), 2e-3**2
     known = {}
     for name, column in {"same": np.zeros(100), "noisy": 1e-6 * np.arange(100.0)}.items():
-        (one,) = foretold(Model(SLIDE), [still.with_columns(position=column)], doubt, velocity=0.0)
+        (one,) = foretold(
+            Model(SLIDE), [derived_trial(still, columns={**still.columns, "position": column})], doubt, velocity=0.0
+        )
         known[name] = one.variances[-1, 0] - repeated(column)[-1] * white
     assert known["same"] > 0.5 * white
     assert known["noisy"] < 0.1 * white
@@ -182,7 +189,9 @@ def test_what_hunts_between_two_counts_is_known_no_better_the_longer_it_is_read(
     doubt, white = Doubt({"position": 2e-3}, {"effort": 1e-9}, {"effort": 0.1}), 2e-3**2
     column = np.tile(np.repeat([0.0, 7e-3], 4), n // 8)
     hunting = hunts(column)
-    (one,) = foretold(Model(SLIDE), [still.with_columns(position=column)], doubt, velocity=0.0)
+    (one,) = foretold(
+        Model(SLIDE), [derived_trial(still, columns={**still.columns, "position": column})], doubt, velocity=0.0
+    )
     assert hunting.mean() > 0.9 and not one.seen[hunting].any()
     last = np.flatnonzero(hunting)[-1]
     assert one.variances[last, 0] - hunting.sum() * white > 0.5 * white
@@ -267,7 +276,7 @@ def flown(stretch: float | None) -> tuple[float, float]:
         Joint(damping=0.0, constants={"inertia": 1.0, "gravity_cos": 0.0, "gravity_sin": 0.0, "revolute": 1.0})
     )
     model = model if stretch is None else model + CoulombFriction(0.05, stretch=stretch)
-    trial = Trial("a", "motion", {"effort": np.zeros(len(time)), "position": read}, time)
+    trial = with_gaps(Trial("a", "motion", {"effort": np.zeros(len(time)), "position": time}, time), read)
     prior = {"initial_position": 1e-4, "initial_velocity": 0.05}
     begun = [{"initial_position": 0.0, "initial_velocity": 0.03}]
     doubt = Doubt({"position": 1e-4}, {"effort": 1e-9}, {"effort": 0.1})

@@ -9,7 +9,7 @@ import pytest
 from models.cases import RIGS
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.compile.equations import derive
 from fes_pin.models.compile.layout import make_layout
 from fes_pin.models.effects import Backlash, SensorLag, effect_named
@@ -236,7 +236,7 @@ def test_what_does_not_bear_on_the_motion_is_not_read(tmp_path):
 def test_a_joint_idles_where_it_hangs(tmp_path, base):
     """Gravity is zero there, and brings the joint back."""
     rig = joint_model(robot(tmp_path, "revolute", "0 1 0", base), {}, {"inertia_scale": 1.0, "damping": 0.0})
-    idle = rig.trial_constants(Trial("swing", "motion", {"position": np.zeros(2)}, np.arange(2.0)))["idle"]
+    idle = rig.trial_constants(Trial("swing", "motion", {"position": np.zeros(3)}, np.arange(3.0)))["idle"]
     engine = acceleration(Model(rig), "motion", (), {**rig.constants, "idle": idle}, ("q", "v"))
     beside = [engine({"q": idle + x, "v": 0.0}) for x in (-0.1, 0.0, 0.1)]
     assert beside[0] > 0 > beside[2]
@@ -247,11 +247,12 @@ def test_a_joint_idles_where_it_hangs(tmp_path, base):
 def test_a_joint_that_an_effort_holds_idles_beside_it(tmp_path, held, turns):
     """A gain about where an upright joint would hang is an offset by another name."""
     rig = joint_model(robot(tmp_path, "revolute", "0 1 0"), {}, {"inertia_scale": 1.0, "damping": 0.0})
-    hanging = rig.trial_constants(Trial("swing", "motion", {"position": np.zeros(2)}, np.arange(2.0)))["idle"]
-    columns = {"position": np.full(2, hanging + held), "effort": np.zeros(2)}
-    measured = Trial("held", "motion", columns, np.arange(2.0))
-    stated = Trial("held", "motion", {"effort": np.zeros(2)}, np.arange(2.0), {"position0": hanging + held})
-    hidden = Trial("held", "motion", {**columns, "position": np.full(2, np.nan)}, np.arange(2.0), stated.conditions)
+    hanging = rig.trial_constants(Trial("swing", "motion", {"position": np.zeros(3)}, np.arange(3.0)))["idle"]
+    columns = {"position": np.full(3, hanging + held), "effort": np.zeros(3)}
+    measured = Trial("held", "motion", columns, np.arange(3.0))
+    stated = Trial("held", "motion", {"effort": np.zeros(3)}, np.arange(3.0), {"position0": hanging + held})
+    unread = {**columns, "position": np.full(3, np.nan)}
+    hidden = derived_trial(measured, columns=unread, conditions=stated.conditions)
     for trial in (measured, stated, hidden):
         assert rig.trial_constants(trial)["idle"] == pytest.approx(hanging + turns * np.pi)
 

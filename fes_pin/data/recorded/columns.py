@@ -109,7 +109,6 @@ class Columns:
             names=("time_s", *columns),
             values=np.column_stack([time, *columns.values()]),
             header_row=recording.header_row or 0,
-            lines=(),
             delimiter=",",
             rows=rows,
             half_digit=half_digit if self.resample_hz is None else 0.0,

@@ -14,7 +14,7 @@ from fes_pin.data.imposed import MOTION, imposed_motion, same_motion
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema
 from fes_pin.data.study import Study
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.parameters import (
     ANY_NUMBER,
     ROTARY,
@@ -252,9 +252,10 @@ class Rig(ReadOnly):
     def restated(self, trial: Trial, name: str, value: float) -> Trial:
         """The trial with another value of something that it states; an imposed motion is moved as a whole."""
         if name not in trial.columns:
-            return same_motion(dataclasses.replace(trial, conditions={**trial.conditions, name: value}), trial)
+            return same_motion(derived_trial(trial, conditions={**trial.conditions, name: value}), trial)
         further = value - float(trial[name][0])
-        return same_motion(trial.with_columns(**{name: trial[name] + further}), trial, further)
+        moved = derived_trial(trial, columns={**trial.columns, name: trial[name] + further})
+        return same_motion(moved, trial, further)
 
     def constant_names(self, kind: str) -> tuple[str, ...]:
         """Names of the constants of rig and trial that the equations read."""

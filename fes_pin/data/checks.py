@@ -1,0 +1,198 @@
+"""What is asked of a trial and of what a study says of its rig, wherever they come from.
+
+The reader of a file and the objects themselves ask the same: a file adds its name, the row and the column, an object
+the trial and the sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.motion import GROUND_REACTION, REQUIRED, TRANSLATIONS
+from fes_pin.data.schema import NumberKey, RigSchema, is_like, unknown, unread
+from fes_pin.data.table import Fault
+
+KeyFault = Callable[[str, str], InputError]
+"""Makes the error of a key and a message."""
+TURN = 2.0 * math.pi
+LONGEST_MUSCLE_M = 1.0
+"""Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
+SHORTEST_PULSE_US = 2.0
+"""Pulse width in us that recruits nothing: surface stimulators give 50 to 1000 us, and 2 is a long one in ms."""
+
+
+def checked_kind(schema: RigSchema, kind: object, error: KeyFault) -> str:
+    """The kind of a trial of this rig; the rig's default if it names none.
+
+    Raises
+    ------
+    InputError
+        Made by `error` from the key and a message, for a kind that the rig does not have.
+    """
+    if kind is None:
+        return schema.default_kind
+    if not isinstance(kind, str) or kind not in schema.outputs:
+        found = f"{kind[:40]!r}" if isinstance(kind, str) else f"a {type(kind).__name__}"
+        expected = f"{'one of ' if len(schema.outputs) > 1 else ''}{', '.join(schema.outputs)}"
+        raise error("kind", f"expected {expected} for rig {schema.name}, found {found}")
+    return kind
+
+
+def checked_label(value: object, error: KeyFault, key: str = "group", what: str = "a label") -> str:
+    """A name or label: one line of text.
+
+    Raises
+    ------
+    InputError
+        Made by `error`, for anything else.
+    """
+    if not (isinstance(value, str) and value.strip() and value.isprintable()):
+        raise error(key, f"expected {what}, one line of text")
+    return value
+
+
+def check_columns(names: Sequence[str], schema: RigSchema, kind: str, inputs_only: bool, error: Fault) -> None:
+    """Require the columns of this rig and kind, and no others: another unit and a likely typo are told as such.
+
+    Parameters
+    ----------
+    names
+        Of the columns, without the time.
+    inputs_only
+        Do not require the measured outputs.
+    """
+    if len(schema.recordings) > 1:
+        _check_body_columns(names, inputs_only, error)
+        return
+    known, stimuli = schema.columns_of(kind), schema.stimuli(kind)
+    absent = [name for name in known if name not in names and name != "time_s"]
+    for name in names:
+        if name not in known and is_like(name, absent):
+            raise error(unknown(name, absent), name, None)
+    output, motion = schema.outputs[kind], schema.motion(kind)[:1]
+    found = [name for name in stimuli if name in names]
+    if schema.inputs_required and not found:
+        raise error(f"missing; this rig needs {' or '.join(stimuli)}", stimuli[0], None)
+    if len(found) > 1:
+        raise error(f"expected one of {' and '.join(found)}, found both", found[1], None)
+    for name in motion:
+        if name not in names:
+            raise error(f"missing; a trial of kind {kind} has its motion there", name, None)
+    if output not in names and not inputs_only:
+        raise error(f"missing; a trial of kind {kind} measures it", output, None)
+    for name in names:
+        if name not in known or name == "time_s":
+            raise error(_not_read(name, schema, kind), name, None)
+
+
+def _check_body_columns(names: Sequence[str], inputs_only: bool, error: Fault) -> None:
+    """Require the coordinates of a walk and its ground reaction; rates of coordinates may be there as well."""
+    for name in (*(f"q_{one}" for one in REQUIRED), *(() if inputs_only else GROUND_REACTION)):
+        if name not in names:
+            raise error("missing", name, None)
+    for name in names:
+        if name not in GROUND_REACTION and not name.startswith(("q_", "qd_", "qdd_")):
+            raise error("unknown; expected q_<coordinate>, its rates qd_ and qdd_, and the ground reaction", name, None)
+
+
+def _not_read(name: str, schema: RigSchema, kind: str) -> str:
+    """What to say of a column that a kind of trial does not read."""
+    others = [one for one in schema.outputs if name in schema.columns_of(one)]
+    if others and name != "time_s":
+        return f"is read in trials of kind {' and '.join(others)}, and this one is of kind {kind}"
+    return unread(name, schema.columns_of(kind))
+
+
+def check_values(columns: Mapping[str, np.ndarray], schema: RigSchema, error: Fault) -> None:
+    """Refuse what no stimulator, joint or muscle does: it is in another unit.
+
+    Parameters
+    ----------
+    columns
+        By name, each of shape (n,), finite.
+    schema
+        Of the rig.
+    """
+    if "pulse_width_us" in columns:
+        width = columns["pulse_width_us"]
+        if (least := float(width.min())) < 0.0:
+            told = f"expected a pulse width of at least 0 us, found {least:g}"
+            raise error(told, "pulse_width_us", int(np.argmax(width < 0.0)))
+        if 0.0 < (most := float(width.max())) <= SHORTEST_PULSE_US:
+            told = f"reaches {most:.4g} us, and no pulse is so short: is it in {'ms' if most > 0.002 else 's'}?"
+            raise error(told, "pulse_width_us", int(np.argmax(width)))
+    if "stim" in columns and (other := ~np.isin(columns["stim"], (0.0, 1.0))).any():
+        sample = int(np.argmax(other))
+        raise error(f"expected 0 or 1, found {columns['stim'][sample]:g}", "stim", sample)
+    turning = [f"q_{one}" for one in REQUIRED if one not in TRANSLATIONS] if len(schema.recordings) > 1 else []
+    for name in ("angle_rad", *turning):
+        if name in columns and (most := float(np.abs(columns[name]).max())) > TURN:
+            told = f"reaches {most:.4g}; no {'ankle' if name == 'angle_rad' else 'joint'} turns so far"
+            raise error(f"{told}: is it in degrees?", name, int(np.argmax(np.abs(columns[name]))))
+    if "length_m" in columns:
+        length = columns["length_m"]
+        if (most := float(length.max())) > LONGEST_MUSCLE_M:
+            raise error(f"reaches {most:.4g} m; no muscle is so long: is it in mm?", "length_m", int(length.argmax()))
+        if not (least := float(length.min())) > 0.0:
+            raise error(f"is {least:.4g} m; expected the whole length, above 0", "length_m", int(length.argmin()))
+
+
+def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Collection[str], error: KeyFault) -> None:
+    """What the numbers and files of a rig must be together: a curve with two ends, a body with its size.
+
+    Parameters
+    ----------
+    files
+        Keys of the files that are there.
+    """
+    threshold, saturation = constants.get("threshold_us"), constants.get("saturation_us")
+    if (threshold is None) != (saturation is None):
+        key = "threshold_us" if threshold is None else "saturation_us"
+        raise error(key, "missing; threshold_us and saturation_us go together")
+    if threshold is not None and saturation is not None and saturation <= threshold:
+        raise error(
+            "saturation_us", f"expected a saturation above the threshold of {threshold:g} us, found {saturation:g}"
+        )
+    if absent := [key for key in schema.either if key not in constants and not files]:
+        expected = ", or ".join((" and ".join(schema.either), *schema.files))
+        raise error(absent[0], f"missing; expected {expected}")
+    for key, required in schema.files.items():
+        if required and key not in files:
+            raise error(key, "missing; expected the path of a file inside the study")
+
+
+def known_constants(schema: RigSchema) -> dict[str, NumberKey]:
+    """What `[rig]` may hold: the rig's constants, and start values that may be known instead."""
+    known = dict(schema.constants)
+    if schema.start_may_be_known:
+        known |= {key: NumberKey(n.unit, n.lower, n.strict, False) for key, n in schema.start.items()}
+    return known
+
+
+def check_same_inputs(
+    trials: Sequence[tuple[str, Collection[str]]], schema: RigSchema, constants: Collection[str], error: Callable
+) -> None:
+    """What only all trials together show: the same inputs in each, and a recruitment curve for pulse widths.
+
+    Parameters
+    ----------
+    trials
+        Kind and columns of each.
+    constants
+        Those that the rig has.
+    error
+        Makes the error of a trial's place (None: of the rig), a key and a message.
+    """
+    first = {kind: columns for kind, columns in reversed(trials)}
+    for place, (kind, columns) in enumerate(trials):
+        for column in schema.stimuli(kind) if len(schema.recordings) == 1 else ():
+            if (column in columns) != (column in first[kind]):
+                there, others = ("has", "has not") if column in columns else ("lacks", "has it")
+                told = f"this trial {there} the column {column} and the first {others}; expected all or none"
+                raise error(place, schema.recordings[0], told)
+    if any("pulse_width_us" in columns for _, columns in trials) and "threshold_us" not in constants:
+        raise error(None, "threshold_us", "missing; trials with pulse_width_us need threshold and saturation")
