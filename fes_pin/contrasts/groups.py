@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, derived_trial
 
 BY_GROUP = "group"
 
@@ -49,7 +49,7 @@ def _labelled(study: Study, by: str) -> Study:
         if label is None:
             message = f"trial {trial.name} has no {by}; expected {expected}"
             raise InputError(message, file=study.folder / "study.toml", column=by)
-    trials = [replace(t, group=label) for t, label in zip(study.trials, labels, strict=True)]
+    trials = [derived_trial(t, group=label) for t, label in zip(study.trials, labels, strict=True)]
     return replace(study, trials=tuple(trials))
 
 
@@ -72,5 +72,5 @@ def _joined(before: Study, after: Study) -> Study:
     names = (before.name, after.name) if before.name != after.name else ("before", "after")
     trials: list[Trial] = []
     for label, study in zip(names, (before, after), strict=True):
-        trials += [replace(t, name=f"{label}/{t.name}", group=label) for t in study.trials]
+        trials += [derived_trial(t, name=f"{label}/{t.name}", group=label) for t in study.trials]
     return replace(before, name=f"{names[0]} and {names[1]}", trials=tuple(trials))

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path, PurePosixPath
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import tomli_w
@@ -17,6 +16,7 @@ from fes_pin.data.checks import check_constants, check_same_inputs, checked_kind
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes, write_files
 from fes_pin.data.motion import GROUND_REACTION
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.schema import (
     ROLES,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Study:
+class Study(ReadOnly):
     """One rig and its trials.
 
     Parameters
@@ -99,11 +99,9 @@ class Study:
         self._check_trials(trials, schema)
         horizon = {HORIZON: self.horizon_s} if self.horizon_s is not None else {}
         checked_numbers(horizon, {HORIZON: NumberKey("s", 0.0, required=False)}, partial(_fault, "Study"))
-        held: dict[str, dict[str, Any]] = {**numbers, "files": {key: Path(path) for key, path in self.files.items()}}
-        for name, value in held.items():
-            object.__setattr__(self, name, MappingProxyType(value))
-        object.__setattr__(self, "trials", trials)
-        object.__setattr__(self, "described", schema)
+        held = {**numbers, "files": {key: Path(path) for key, path in self.files.items()}}
+        vars(self).update(held, trials=trials, described=schema)
+        self._freeze()
 
     def _schema(self) -> RigSchema:
         if self.described is not None and self.described.name in ("", self.rig):
@@ -140,19 +138,6 @@ class Study:
 
     def __hash__(self) -> int:
         return hash((self.name, self.rig, self.trials))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        tables = (dict(self.constants), dict(self.start))
-        return Study, (
-            self.name,
-            self.rig,
-            *tables,
-            self.trials,
-            self.folder,
-            dict(self.files),
-            self.described,
-            self.horizon_s,
-        )
 
     @property
     def schema(self) -> RigSchema:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from fes_pin.data.checks import KeyFault, check_columns, check_values, checked_k
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.hint import NEW_STUDY, read_csv_or_hint
 from fes_pin.data.schema import (
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trial:
+class Trial(ReadOnly):
     """One recording or one simulation.
 
     Parameters
@@ -100,7 +100,13 @@ class Trial:
         if odd := [name for name, values in columns.items() if values.shape != time.shape]:
             raise self.error(f"expected shape {time.shape} as of the time, found {columns[odd[0]].shape}", odd[0])
         check_times(time, self.error)
-        _set(self, time, columns, conditions=MappingProxyType(conditions), low_pass_hz=low_pass)
+        vars(self).update(time=time, columns=columns, conditions=conditions, low_pass_hz=low_pass)
+        self._freeze()
+
+    def _freeze(self) -> None:
+        super()._freeze()
+        for values in self.columns.values():
+            values.setflags(write=False)
 
     def error(self, message: str, column: str, sample: int | None = None) -> InputError:
         """The error that names a column, this trial and a sample."""
@@ -120,10 +126,6 @@ class Trial:
 
     def __hash__(self) -> int:
         return hash((self.name, self.kind, len(self), tuple(self.columns), float(self.time[0]), float(self.time[-1])))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        state = {one.name: getattr(self, one.name) for one in fields(self)}
-        return _restored, ({**state, "columns": dict(self.columns), "conditions": dict(self.conditions)},)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -222,21 +224,9 @@ def derived_trial(trial: Trial, **changes: Any) -> Trial:
     own = {id(values) for values in (trial.time, *trial.columns.values())}  # read-only already
     state["columns"] = {n: v if id(v) in own else np.array(v, dtype=float) for n, v in state["columns"].items()}
     state["time"] = state["time"] if id(state["time"]) in own else np.array(state["time"], dtype=float)
-    return _restored(state)
-
-
-def _restored(state: Mapping[str, Any]) -> Trial:
-    trial = object.__new__(Trial)
-    _set(trial, **{**state, "conditions": MappingProxyType(dict(state["conditions"]))})
-    return trial
-
-
-def _set(trial: Trial, time: np.ndarray, columns: Mapping[str, np.ndarray], **labels: Any) -> None:
-    """Fields of a trial, its arrays read-only from now on."""
-    for values in (time, *columns.values()):
-        values.setflags(write=False)
-    for name, value in {**labels, "time": time, "columns": MappingProxyType(dict(columns))}.items():
-        object.__setattr__(trial, name, value)
+    made = object.__new__(Trial)
+    made.__setstate__(state)
+    return made
 
 
 def _numbers(values: Any, name: str, trial: Trial) -> np.ndarray:
@@ -354,7 +344,9 @@ def _as_read(
 ) -> Trial:
     """A trial of what the reader of its file has checked."""
     labels = {"name": name, "kind": kind, "conditions": conditions, "role": role, "group": group, "remarks": remarks}
-    return _restored({**labels, "low_pass_hz": None, "time": time.copy(), "columns": columns})
+    made = object.__new__(Trial)
+    made.__setstate__({**labels, "low_pass_hz": None, "time": time.copy(), "columns": columns})
+    return made
 
 
 def _checked_columns(
