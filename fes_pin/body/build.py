@@ -16,7 +16,7 @@ from fes_pin.body.joints import JOINT_NAMES, JOINTS, SIDES, angles_array, axis_o
 from fes_pin.body.skeleton import Skeleton, read_segments
 from fes_pin.body.urdf import origin_of, write_urdf
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_text
+from fes_pin.data.files import read_text, write_text
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word, positive_number
 from fes_pin.data.urdf import moving_joints
@@ -248,14 +248,9 @@ class Body:
         Raises
         ------
         InputError
-            It cannot be written.
+            It cannot be written, or is a file that was read.
         """
-        try:
-            Path(path).write_text(self.urdf, encoding="utf-8")
-        except (OSError, TypeError) as error:
-            raise InputError(
-                f"cannot be written: {getattr(error, 'strerror', None) or error}", file=str(path)
-            ) from None
+        write_text(path, self.urdf)
 
     def __str__(self) -> str:
         height = "" if self.height_m is None else f", {self.height_m:.2f} m"

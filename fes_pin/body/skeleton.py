@@ -11,6 +11,7 @@ import numpy as np
 
 from fes_pin.body.joints import JOINTS, SEGMENT_NAMES, SIDES
 from fes_pin.data.errors import InputError
+from fes_pin.data.read_files import note_read
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,7 @@ def read_segments(path: str | Path) -> Skeleton:
         The file cannot be read, or a segment or joint is missing or impossible.
     """
     try:
+        note_read(path)
         table = json.loads(Path(path).read_text())
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise InputError(f"cannot be read as a table of segments: {error}", file=path) from None

@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from fes_pin.cli.group import App, needs, python_names, release_output
+from fes_pin.cli.options import Force, output
 from fes_pin.data.errors import InputError
 
 app = App(help="The walking body: modes, nerves, view.")
@@ -106,7 +107,8 @@ def nerves(
     name: Annotated[list[str] | None, typer.Argument(help="nerves to use; all of the table if none is named")] = None,
     horizon: Annotated[float, typer.Option(help="time allowed to bring a mode back, s")] = 0.3,
     influence: Annotated[str | None, typer.Option(help="table of influence on `joints` or `modes`")] = None,
-    map_to: Annotated[Path | None, typer.Option("--map", help="heat map of influence: image file")] = None,
+    map_to: Annotated[Path | None, output("heat map of influence: image file", "--map")] = None,
+    force: Force = False,
     fewest: Annotated[bool, typer.Option("--fewest", help="search the fewest nerves (with the braces given)")] = False,
     max_braces: Annotated[int, typer.Option(help="with --fewest: try so many further orthoses (minutes)")] = 0,
     lean: Annotated[float, typer.Option(help="lean that the fewest nerves must catch, degrees")] = 1.0,
@@ -124,14 +126,19 @@ def nerves(
     from fes_pin.body.catchable import catchable
     from fes_pin.body.controllability import modal_controllability
     from fes_pin.body.inputs import Inputs
+    from fes_pin.data.outputs import Outputs
     from fes_pin.muscles.nerve_inputs import subject_nerves
-    from fes_pin.view.influence import influence_table, plot_influence
+    from fes_pin.view.influence import check_image, influence_image, influence_table
 
     if strength is not None:
         _within(strength, "--strength", 0.01, 10.0)
     _within(settle, "--settle", 0.1, 90.0)
     _within(lean, "--lean", 1e-3, 45.0)
     _within(max_braces, "--max-braces", 0, 10)
+    outputs = Outputs("body nerves", force)
+    if map_to is not None:  # what cannot be written is said before any work
+        check_image(map_to)
+        outputs.check_file(map_to)
     chosen = subject_nerves(linear.body, name or (), strength=strength)
     inputs = Inputs.of(chosen, linear)
     result = modal_controllability(linear, inputs, horizon)
@@ -152,10 +159,7 @@ def nerves(
     if fewest:
         lines += _fewest(linear, inputs, lean, max_braces, "constant" if constant else "over_time", settle)
     if map_to is not None:
-        try:
-            plot_influence(result, map_to)
-        except (OSError, ValueError) as error:
-            raise InputError(f"cannot be written: {str(error).splitlines()[0]}", file=map_to) from None
+        outputs.write_file(map_to, influence_image(result, check_image(map_to)))
         lines.append(f"wrote {map_to}")
     typer.echo("\n".join(lines))
 
@@ -181,20 +185,30 @@ def _fewest(linear, inputs, lean: float, max_braces: int, stimulation: str, sett
 @needs(posture="not walk", slope="not walk", brace="mode nerve", passive="mode")
 def view(
     linear,
-    out: Annotated[Path | None, typer.Argument(help="HTML page to write")] = None,
+    page: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
+    out: Annotated[Path | None, output("HTML page to write")] = None,
     mode: Annotated[int | None, typer.Option(help="show this mode (1 falls fastest) in motion")] = None,
     nerve: Annotated[str | None, typer.Option(help="show what this nerve turns")] = None,
     walk: Annotated[Path | None, typer.Option(help="play OpenSim coordinates (CSV with q_<coordinate>, rad)")] = None,
     live: Annotated[bool, typer.Option("--live", help="serve it to a browser until interrupted")] = False,
+    force: Force = False,
 ) -> None:
     """A page with the body, or a live one: a posture, a mode in motion, a nerve's influence, or measured walking."""
+    from fes_pin.data.outputs import Outputs
     from fes_pin.muscles.nerve_inputs import subject_nerves
     from fes_pin.view.viewer import BodyScene, show_influence, show_mode
 
+    if page:
+        raise InputError(
+            f"found {page[0]!r}; expected --walk FILE to play coordinates, and --out PAGE.html for the page to write"
+        )
     if sum(choice is not None for choice in (mode, nerve, walk)) > 1:
         raise InputError("choose one of --mode, --nerve and --walk")
     if out is None and not live:
-        raise InputError("give the page to write, or --live")
+        raise InputError("give the page to write, --out PAGE.html, or --live")
+    outputs = Outputs("body view", force)
+    if out is not None:
+        outputs.check_file(out)
     if mode is not None:
         found = linear.modes()
         if not 1 <= mode <= len(found):
@@ -208,10 +222,7 @@ def view(
     else:
         scene = BodyScene(linear.body, caption=str(linear.body)).pose(linear.whole_posture)
     if out is not None:
-        try:
-            scene.write(out)
-        except OSError as error:
-            raise InputError(f"cannot be written: {error.strerror}", file=out) from None
+        outputs.write_file(out, scene.html())
         typer.echo(f"wrote {out}")
     if live:
         _serve(scene)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fes_pin.cli.group import VOICE, needs, remark
-from fes_pin.cli.options import Libraries
+from fes_pin.cli.options import Force, Libraries, output
 
 if TYPE_CHECKING:
     from fes_pin.cohort.run import CohortProgress
@@ -25,7 +25,7 @@ SAID_EVERY_S = 30.0
 @needs(workers="not scheduler")
 def cohort(
     studies: Annotated[list[Path], typer.Argument(help="Studies, or folders that hold studies.")],
-    out: Annotated[Path, typer.Option(help="Folder for the answers, the tables and cohort.html; a run goes on in it.")],
+    out: Annotated[Path, output("Folder for the answers, the tables and cohort.html; a run goes on in it.")],
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes on this machine; one a core without it.")
     ] = None,
@@ -35,6 +35,7 @@ def cohort(
     seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values and bootstrap intervals.")] = 0,
     limit: Annotated[float | None, typer.Option(min=0.0, help="Seconds of search for each study.")] = None,
     library: Libraries = None,
+    force: Force = False,
 ) -> None:
     """Diagnose many studies, and say what they have in common. What is there already is not done again."""
     from fes_pin.cohort.run import run_cohort
@@ -50,6 +51,7 @@ def cohort(
             limit=limit,
             library=tuple(library or ()),
             command=this_command(),
+            force=force,
             progress=tell,
         )
     good = len(made.studies) - len(made.failed)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fes_pin.cli.options import Libraries
+from fes_pin.cli.options import Force, Libraries, output
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
 
 
@@ -25,25 +25,27 @@ def compare(
     given: Annotated[
         float | None, typer.Option(metavar="SECONDS", help="Also foretell the rest of each trial from its beginning.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for compare.json.")] = None,
+    out: Annotated[Path | None, output("Folder for compare.json.")] = None,
     library: Libraries = None,
+    force: Force = False,
 ) -> None:
     """Rank models from the literature by their errors on whole trials left out."""
     from fes_pin.comparison.compare import compare as find
     from fes_pin.comparison.record import FILE, comparison_json
     from fes_pin.comparison.result import comparison_text
-    from fes_pin.data.files import check_folder, write_files
+    from fes_pin.data.outputs import Outputs
     from fes_pin.data.study import read_study
 
     catalogue = catalogue_with(library)
     measured = read_study(study, rigs=catalogue.schemas())
+    outputs = Outputs("compare", force)
     if out is not None:
-        check_folder(out)  # what cannot be read or written is said before any work
+        outputs.check(out, (FILE,))  # what cannot be read or written is said before any work
     names = None if models is None else [n.strip() for n in models.split(",") if n.strip()]
     own = {str(path): path for path in model or ()}
     with progress() as tell:
         found = find(measured, names, extended=own, horizon_s=horizon, given_s=given, library=catalogue, progress=tell)
     if out is not None:
-        write_files(out, {FILE: comparison_json(found)})
+        outputs.write(out, {FILE: comparison_json(found)})
     say_whose_code(catalogue)
     typer.echo(comparison_text(found))

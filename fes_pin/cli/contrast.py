@@ -8,14 +8,14 @@ from typing import Annotated
 import typer
 
 from fes_pin.cli.group import needs
-from fes_pin.cli.options import Libraries
+from fes_pin.cli.options import Force, Libraries, output
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
 
 
 @needs(by="not after")
 def contrast(
     study: Annotated[Path, typer.Argument(help="Folder of a study whose trials have groups, or of what was before.")],
-    out: Annotated[Path, typer.Option(help="Folder for contrast.json and report.html.")],
+    out: Annotated[Path, output("Folder for contrast.json and report.html.")],
     after: Annotated[Path | None, typer.Argument(help="A study of the same rig: what is now.")] = None,
     by: Annotated[
         str | None, typer.Option(help="group, or a condition that every trial states. [default: group]")
@@ -26,12 +26,13 @@ def contrast(
         float | None, typer.Option(min=0.0, help="Seconds of search; then the best set of changes so far.")
     ] = None,
     library: Libraries = None,
+    force: Force = False,
 ) -> None:
     """Say what differs between groups of trials, by how much, and what did not change."""
     from fes_pin.contrasts.contrast import contrast as find
     from fes_pin.contrasts.record import FILE, contrast_json
     from fes_pin.contrasts.result import contrast_text
-    from fes_pin.data.files import check_folder, write_files
+    from fes_pin.data.outputs import Outputs
     from fes_pin.data.study import read_study
     from fes_pin.view.contrast_report import contrast_html
 
@@ -39,12 +40,13 @@ def contrast(
     schemas = catalogue.schemas()
     before = read_study(study, rigs=schemas)
     now = None if after is None else read_study(after, rigs=schemas)
-    check_folder(out)  # what cannot be read or written is said before any work
+    outputs = Outputs("contrast", force)
+    outputs.check(out, (FILE, "report.html"))  # what cannot be read or written is said before any work
     wanted = [g.strip() for g in groups.split(",") if g.strip()] if groups is not None else None
     with progress() as tell:
         found = find(
             before, now, by=by or "group", groups=wanted, library=catalogue, seed=seed, limit=limit, progress=tell
         )
-    write_files(out, {FILE: contrast_json(found), "report.html": contrast_html(found)})
+    outputs.write(out, {FILE: contrast_json(found), "report.html": contrast_html(found)})
     say_whose_code(catalogue)
     typer.echo(f"{contrast_text(found)}\nreport: {out / 'report.html'}")

@@ -8,23 +8,23 @@ from typing import Annotated
 import typer
 
 from fes_pin.cli.group import needs
+from fes_pin.cli.options import Force, output
 
 
 @needs(out="names", unverified="names")
 def datasets(
     names: Annotated[list[str] | None, typer.Argument(help="To fetch. [default: list them]")] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder to fetch into. [default: FES_PIN_DATA, or the user's cache]")
-    ] = None,
+    out: Annotated[Path | None, output("Folder to fetch into. [default: FES_PIN_DATA, or the user's cache]")] = None,
     unverified: Annotated[
         bool, typer.Option("--unverified", help="Keep what no checksum is known of and converts to other numbers.")
     ] = False,
+    force: Force = False,
 ) -> None:
     """List the public data sets that the documentation uses; with names, fetch them and make them studies."""
     from fes_pin.data.datasets import DATASETS, download
 
     for name in names or []:
-        typer.echo(f"{name}: {download(name, out, unverified)}")
+        typer.echo(f"{name}: {download(name, out, unverified, force)}")
     if names:
         return
     for one in DATASETS.values():

@@ -17,6 +17,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.read_files import one_command
 
 USAGE_ERROR: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 """What typer raises for a command line that it cannot read; it exports only classes below this one."""
@@ -212,7 +213,7 @@ class Commands(TyperGroup):
         """Run the command line, as typer's own; it ends by SystemExit unless `standalone_mode` is False."""
         if not standalone_mode:
             return super().main(args, standalone_mode=False, **given)
-        with redirect_stdout(Held(sys.stdout)) as held:
+        with one_command(), redirect_stdout(Held(sys.stdout)) as held:
             code = self._run(held, args, given)
         raise SystemExit(code)
 

@@ -15,7 +15,7 @@ from fes_pin.cli.compare import compare
 from fes_pin.cli.contrast import contrast
 from fes_pin.cli.datasets import datasets
 from fes_pin.cli.group import App
-from fes_pin.cli.options import Libraries, pairs
+from fes_pin.cli.options import Force, Libraries, output, pairs
 from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
@@ -38,6 +38,8 @@ app.command()(cohort)
 app.command()(contrast)
 app.command()(compare)
 
+ANSWER = ("diagnosis.json", "model.toml", "report.html", "next_trial.csv")
+"""What a diagnosis writes, the last where it proposes a trial."""
 DIAGNOSING = 0.8
 """Share of the time of `diagnose` before the report is drawn, about."""
 
@@ -65,7 +67,7 @@ def before_any_command(
 @app.command()
 def diagnose(
     study: Annotated[Path, typer.Argument(help="Folder of a study, or its study.toml.")],
-    out: Annotated[Path, typer.Option(help="Folder for diagnosis.json, model.toml and report.html.")],
+    out: Annotated[Path, output("Folder for diagnosis.json, model.toml and report.html.")],
     seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values and bootstrap intervals.")] = 0,
     limit: Annotated[
         float | None, typer.Option(min=0.0, help="Seconds of search; then the best set of causes so far is told.")
@@ -74,10 +76,11 @@ def diagnose(
         str | None, typer.Option(help="csv or parquet: also trajectories.csv, every sample beside both models.")
     ] = None,
     library: Libraries = None,
+    force: Force = False,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
     from fes_pin.data.errors import InputError
-    from fes_pin.data.files import check_folder, write_files
+    from fes_pin.data.outputs import Outputs
     from fes_pin.data.study import read_study
     from fes_pin.data.tabular import SUFFIXES, check_table, table_bytes
 
@@ -88,14 +91,13 @@ def diagnose(
         if f".{tables}" not in SUFFIXES:
             raise InputError(f"expected csv or parquet, found {tables!r}", column="--tables")
         check_table(table)
-    check_folder(out)  # what cannot be read or written is said before any work
+    outputs = Outputs("diagnose", force)
+    outputs.check(out, (*ANSWER, *([table] if table else [])))  # what cannot be written is said before any work
     if measured.rig == "body":
         if library:
-            from fes_pin.data.errors import InputError
-
             raise InputError("--library brings causes of rigs; walking has none but its own")
         with progress() as tell:
-            verdict = diagnose_walking(measured, out, seed, limit, tell)
+            verdict = diagnose_walking(measured, outputs, out, seed, limit, tell)
         typer.echo(f"{verdict}\nreport: {out / 'report.html'}")
         return
     from fes_pin.data.provenance import this_command
@@ -121,7 +123,7 @@ def diagnose(
             files[table] = table_bytes(columns, table, {"trial": trials})
         tell(1.0, "done")
     old = {NEXT_FILE, *(f"trajectories{suffix}" for suffix in SUFFIXES)}
-    write_files(out, files, without=old - set(files))  # what an earlier diagnosis proposed is not this one's
+    outputs.write(out, files, without=old - set(files))  # what an earlier diagnosis proposed is not this one's
     _print_verdict(diagnosis)
     typer.echo(f"report: {out / 'report.html'}")
 
@@ -130,7 +132,7 @@ def diagnose(
 def predict(
     model: Annotated[Path, typer.Argument(help="model.toml of a diagnosis.")],
     trial: Annotated[Path, typer.Argument(help="CSV with time_s and the inputs, or as --columns-of says.")],
-    out: Annotated[Path, typer.Option(help="CSV or Parquet to write: time_s and the predicted outputs.")],
+    out: Annotated[Path, output("CSV or Parquet to write: time_s and what is predicted.")],
     setting: Annotated[
         list[str] | None, typer.Option("--set", help="A condition of the trial: load_kg=1.5, kind=isometric ...")
     ] = None,
@@ -149,10 +151,11 @@ def predict(
         ),
     ] = None,
     library: Libraries = None,
+    force: Force = False,
 ) -> None:
     """Predict a trial from its inputs with a saved model, or so far ahead along a trial that has its outputs."""
     from fes_pin.data.errors import InputError
-    from fes_pin.data.files import write_bytes
+    from fes_pin.data.outputs import Outputs
     from fes_pin.data.study import read_columns
     from fes_pin.data.tabular import check_table, table_bytes
     from fes_pin.data.trial import read_trial
@@ -167,6 +170,8 @@ def predict(
     own = None if columns_of is None else read_columns(columns_of, rigs=catalogue.schemas())
     rig = loaded.rig.described()
     given = read_trial(trial, rig=rig, kind=kind, conditions=conditions, inputs_only=horizon is None, own=own)
+    outputs = Outputs("predict", force)
+    outputs.check_file(out)
     given = load_log(model).applied(given)
     found = run(loaded, given) if horizon is None else _along(model, loaded, given, horizon)
     columns = {"time_s": found.time, **found.columns}
@@ -176,7 +181,7 @@ def predict(
             raise InputError(f"expected a column {' or '.join(found.columns)} to compare with", file=trial)
         columns |= {f"{n}_measured": given[n] for n in measured}
         columns |= {f"{n}_residual": given.residual(found, n) for n in measured}
-    write_bytes(out, table_bytes(columns, out))
+    outputs.write_file(out, table_bytes(columns, out))
     say_whose_code(catalogue)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import tempfile
@@ -14,8 +15,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fes_pin.cli.group import needs, release_output
-from fes_pin.cli.options import Libraries, pairs
-from fes_pin.data.files import write_files
+from fes_pin.cli.options import Libraries, output, pairs
+from fes_pin.data.files import check_folder, write_files
+from fes_pin.data.outputs import Outputs
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,7 +49,7 @@ def new_study(
         float | None, typer.Option(metavar="MASS", help="Write a URDF: a carriage on a level rail; kg.")
     ] = None,
     upright: Annotated[bool, typer.Option("--upright", help="Position 0 is upright; else it hangs there.")] = False,
-    out: Annotated[Path | None, typer.Option(help="Folder of the study. [default: where the recordings are]")] = None,
+    out: Annotated[Path | None, output("Folder of the study. [default: where the recordings are]")] = None,
     name: Annotated[str | None, typer.Option(help="Of the study. [default: its folder's]")] = None,
     column: Annotated[
         list[str] | None,
@@ -61,7 +63,9 @@ def new_study(
         float | None, typer.Option(min=0.0, help="Hz: interpolate times that are not equally spaced.")
     ] = None,
     fill: Annotated[bool, typer.Option("--fill", help="Fill in short gaps of missing samples.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Write over a study.toml that is there.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Write over a study.toml that is there, and a URDF that was changed.")
+    ] = False,
     library: Libraries = None,
 ) -> None:
     """Make a study of your own recordings, which stay as they are: reads headers, writes study.toml, checks it.
@@ -82,20 +86,24 @@ def new_study(
     if not files:
         if template is None:
             raise InputError("expected recordings, or --pendulum LENGTH MASS for a URDF alone")
-        _write_template(template, out or Path(), force)
+        Outputs("new-study", force).write(out or Path(), {template[0]: template[1]})
+        typer.echo(f"wrote {(out or Path()) / template[0]}")
         return
     catalogue = load_library(*(library or []))
     given: Mapping[str, object] = {"columns": pairs("--column", column), "settings": pairs("--set", setting)}
     with _urdf_file(template, urdf) as path:
         wanted = _wanted(files, rig, out, name, catalogue, template or urdf, path, resample, fill, given)
-        if (wanted.folder / "study.toml").exists() and not force:
+        check_folder(wanted.folder)
+        if os.path.lexists(wanted.folder / "study.toml") and not force:
             raise InputError("is there already; --force writes over it", file=wanted.folder / "study.toml")
         if wanted.schema.owner is None:
             made = new_body_study(wanted.files, wanted.folder, wanted.name, wanted.settings)
         else:
             made = make(wanted, lambda known: guess_start(wanted.schema.owner, known, path))
+    outputs = Outputs("new-study", force)
+    outputs.check(wanted.folder, made.contents)
     study, warnings = _tried(made, wanted.folder, catalogue)
-    write_files(wanted.folder, made.contents)
+    outputs.write(wanted.folder, made.contents)
     for own, theirs, unit in made.taken:
         typer.echo(f"{own:16s} is {theirs}{f', in {unit}' if unit else ''}")
     schema = wanted.schema
@@ -144,16 +152,6 @@ def _template(
     if rod is not None:
         return "rod.urdf", templates.rod(*rod, upright)
     return None if slide is None else ("slide.urdf", templates.slide(slide))
-
-
-def _write_template(template: tuple[str, str], folder: Path, force: bool) -> None:
-    from fes_pin.data.errors import InputError
-
-    place = folder / template[0]
-    if place.exists() and not force:
-        raise InputError("is there already; --force writes over it", file=place)
-    write_files(folder, {template[0]: template[1]})
-    typer.echo(f"wrote {place}")
 
 
 @contextmanager

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 if TYPE_CHECKING:
+    from fes_pin.data.outputs import Outputs
     from fes_pin.data.study import Study
 
 
 def diagnose_walking(
-    study: Study, out: Path, seed: int, limit: float | None, tell: Callable[[float, str], None]
+    study: Study, outputs: Outputs, out: Path, seed: int, limit: float | None, tell: Callable[[float, str], None]
 ) -> str:
     """Diagnose a study of rig `body`, write its files and give its verdict as text.
 
@@ -22,15 +23,16 @@ def diagnose_walking(
     InputError
         The study's files cannot be used, or the folder cannot be written.
     """
-    from fes_pin.data.files import write_files
     from fes_pin.view.walk_playback import walk_answer_files
+    from fes_pin.view.walk_report import PLAYBACK_FILE
     from fes_pin.walk.diagnosis import diagnose_walk
-    from fes_pin.walk.record import NEXT_FILE
+    from fes_pin.walk.record import BODY_FILE, NEXT_FILE
 
+    outputs.check(out, (BODY_FILE, PLAYBACK_FILE))
     diagnosis = diagnose_walk(study, seed=seed, limit=limit, progress=lambda share, words: tell(0.9 * share, words))
     tell(0.9, "report and playback")
     files = walk_answer_files(diagnosis)
-    write_files(out, files, without={NEXT_FILE} - set(files))
+    outputs.write(out, files, without={NEXT_FILE} - set(files))
     return str(diagnosis)
 
 

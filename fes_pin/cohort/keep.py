@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fes_pin.cohort.one import Answer, Work
-from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_text, write_files
+from fes_pin.data.outputs import Outputs
 
 STATE = "state.json"
 """Beside each answer: what it depends on, and what went wrong."""
@@ -27,8 +26,8 @@ class Kept:
 class Store:
     """Answers in a folder, one folder each beneath `studies`."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, outputs: Outputs | None = None) -> None:
+        self.folder, self.outputs = folder, outputs or Outputs("cohort")
 
     def place(self, name: str) -> Path:
         """Folder of one study's answer."""
@@ -45,7 +44,7 @@ class Store:
         files = {**answer.files, STATE: json.dumps(state) + "\n"}
         place = self.place(answer.name)
         old = {p.name for p in place.iterdir() if p.is_file()} if place.is_dir() else set()
-        write_files(place, files, without=old - set(files))
+        self.outputs.write(place, files, without=old - set(files))
 
     def get(self, name: str) -> Kept | None:
         """One answer; None if there is none."""
@@ -57,7 +56,7 @@ class Store:
     @staticmethod
     def _read(path: Path) -> dict[str, Any]:
         try:
-            found = json.loads(read_text(path))
-        except (InputError, ValueError):
+            found = json.loads(path.read_bytes())  # its own, and no input
+        except (OSError, ValueError):
             return {}
         return found if isinstance(found, dict) else {}

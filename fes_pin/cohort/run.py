@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fes_pin.cohort.cluster import on_cluster
 from fes_pin.cohort.found import find_studies
-from fes_pin.cohort.keep import Kept, Store
+from fes_pin.cohort.keep import STATE, Kept, Store
 from fes_pin.cohort.local import Task, in_processes
 from fes_pin.cohort.one import Answer, Work, diagnose_one
 from fes_pin.cohort.page import cohort_html
@@ -25,7 +25,7 @@ from fes_pin.cohort.tables import (
     study_rows,
 )
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import check_folder, write_files
+from fes_pin.data.outputs import Outputs
 from fes_pin.models.catalogue import load_library
 
 
@@ -77,6 +77,7 @@ def run_cohort(
     command: str = "",
     progress: Callable[[CohortProgress], None] | None = None,
     run: Callable[[Work, str], Answer] = diagnose_one,
+    force: bool = False,
 ) -> Cohort:
     """Diagnose every study that is not diagnosed yet, and write what all of them say together.
 
@@ -98,28 +99,43 @@ def run_cohort(
         Called after each study.
     run
         What diagnoses one study.
+    force
+        Write over files in `out` that no cohort wrote, or that were changed since.
 
     Raises
     ------
     InputError
         A place without a study, a folder that cannot be written, a scheduler that does not answer, or not one study
-        that could be read.
+        that could be diagnosed: nothing is written then.
     """
     found = find_studies(places)
     library = tuple(library)
     catalogue = load_library(*library)  # what cannot be read is said before any work
-    check_folder(out)
-    store = Store(out)
+    outputs = Outputs("cohort", force, "--force" if command else "force=True")
+    store = Store(out, outputs)
     every = [Work(n, str(f), seed, limit, library, command) for n, f in found.items()]
     todo: list[Task] = [(work, key) for work in every if not store.has(work, key := work.key())]
+    outputs.check(out, ("cohort.html", *(f"{name}.{kind}" for name in HEADS for kind in ("csv", "parquet"))))
+    for work, _ in todo:
+        outputs.check(store.place(work.name), ANSWER)
     tell, began = progress or (lambda _progress: None), time.monotonic()
     done, failed = len(every) - len(todo), 0
+    waiting: list[Answer] = []  # failures, until there is a study that did not fail: else nothing is written
+    undone = {work.name for work, _ in todo}
+    old = [one for name in found if name not in undone and (one := store.get(name)) is not None]
+    any_good = any(not one.error for one in old)
     for answer in _answers(todo, workers, scheduler, run):
-        store.put(answer)
+        waiting.append(answer)
+        any_good = any_good or not answer.error
+        while any_good and waiting:
+            store.put(waiting.pop(0))
         done, failed = done + 1, failed + bool(answer.error)
         fresh = done - (len(every) - len(todo))
         left = (time.monotonic() - began) / fresh * (len(every) - done)
         tell(CohortProgress(done, len(every), failed, left, answer.name))
+    if not any_good:
+        first = min([(one.name, one.error) for one in (*waiting, *old)])
+        raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {first[1]}")
 
     def kept() -> Iterator[Kept]:  # read again for each table: no more than one record is held
         return (one for name in found if (one := store.get(name)) is not None)
@@ -127,9 +143,7 @@ def run_cohort(
     studies, causes = study_rows(kept()), cause_rows(kept(), catalogue)
     good = sum(r["verdict"] != "failed" for r in studies)
     made = Cohort(studies, causes, pooled_rows(causes, nominal_rows(kept()), good), prevalence_rows(causes, good))
-    write_files(out, _files(made, seed, command))
-    if not good:
-        raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {studies[0]['error']}")
+    outputs.write(out, _files(made, seed, command))
     return made
 
 
@@ -153,6 +167,8 @@ def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
     return out
 
 
+ANSWER = ("diagnosis.json", "model.toml", "report.html", "next_trial.csv", "body.urdf", "playback.html", STATE)
+"""What is written of one study, at most."""
 HEADS = {
     "studies": (
         *("study", "verdict", "causes", "unexplained", *ERRORS, "horizon_s", "ceiling_percent", "wall_s", "error"),

@@ -18,7 +18,7 @@ from urllib.parse import quote
 
 from fes_pin.data.conversions import CONVERTERS
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import write_files
+from fes_pin.data.outputs import Outputs
 from fes_pin.data.schema import unknown
 
 VARIABLE = "FES_PIN_DATA"
@@ -129,7 +129,7 @@ def fetch(name: str) -> Path:
     )
 
 
-def download(name: str, folder: str | Path | None = None, unverified: bool = False) -> Path:
+def download(name: str, folder: str | Path | None = None, unverified: bool = False, force: bool = False) -> Path:
     """Fetch a data set from its repository, and make a study of it.
 
     Each upstream file must have its checksum, where one is known; where none is, the converted trials must have
@@ -142,6 +142,8 @@ def download(name: str, folder: str | Path | None = None, unverified: bool = Fal
     unverified
         Keep what no checksum is known of, or whose conversion differs. A wrong checksum of an upstream file is refused
         anyway.
+    force
+        Write over files in it that were not fetched, or have been changed since.
 
     Returns
     -------
@@ -151,12 +153,13 @@ def download(name: str, folder: str | Path | None = None, unverified: bool = Fal
     Raises
     ------
     InputError
-        Unknown name, a set that cannot be fetched, no pooch, no answer, a wrong checksum.
+        Unknown name, a set that cannot be fetched, no pooch, no answer, a wrong checksum, files that were changed.
     """
     dataset = _known(name)
     if dataset.by_hand or name not in CONVERTERS:
         raise InputError(f"{dataset.by_hand}; it is at {dataset.origin} ({dataset.licence})", column=name)
-    target = Path(folder or folders()[0]) / name
+    target, outputs = Path(folder or folders()[0]) / name, Outputs("datasets", force, "--force (force=True)")
+    outputs.check(target, ("study.toml", *dataset.converted))
     with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
         _retrieve(dataset, Path(scratch))
         made = CONVERTERS[name][0](Path(scratch))
@@ -170,7 +173,7 @@ def download(name: str, folder: str | Path | None = None, unverified: bool = Fal
         )
     about = f"# From {dataset.origin}\n# {dataset.licence}; converted by fes-pin datasets. {dataset.reference}".rstrip()
     made["study.toml"] = f"{about}\n{made['study.toml']}"
-    write_files(target, {**made})
+    outputs.write(target, {**made})
     return target
 
 

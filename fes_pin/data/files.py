@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.read_files import note_read, note_written, refuse_inputs
 
 MAX_BYTES = 1 << 30
 SCRATCH = ".fes_pin-"
@@ -18,7 +19,7 @@ SCRATCH = ".fes_pin-"
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """Content of a regular file.
+    """Content of a regular file, over which nothing is written from now on; see `read_files`.
 
     Raises
     ------
@@ -33,6 +34,7 @@ def read_bytes(path: str | Path) -> bytes:
             raise InputError(f"expected a file, found {'a folder' if path.is_dir() else 'a special file'}", file=path)
         if path.stat().st_size > MAX_BYTES:
             raise InputError("expected at most 1 GiB", file=path)
+        note_read(path)
         return path.read_bytes()
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
@@ -101,7 +103,8 @@ def write_bytes(path: str | Path, content: bytes, mode: int = 0o666) -> None:
     Raises
     ------
     InputError
-        The folder is missing, `path` is a folder, or the file cannot be written; the old file is then untouched.
+        The folder is missing, `path` is a folder or a file that was read (see `read_files`), or the file cannot be
+        written; the old file is then untouched.
     """
     path = Path(path)
     with _input_errors(path):
@@ -113,8 +116,10 @@ def write_bytes(path: str | Path, content: bytes, mode: int = 0o666) -> None:
         if not path.parent.is_dir():
             raise InputError("the folder to write into does not exist", file=path)
         target = path.resolve()
+        refuse_inputs([path])
         with scratch_folder(target.parent) as scratch:
             os.replace(_stage(scratch / "new", content, mode), target)
+        note_written(target)
         _sync_folder(target.parent)
 
 
@@ -158,7 +163,8 @@ def write_files(folder: str | Path, contents: Mapping[str, str | bytes], without
     Raises
     ------
     InputError
-        The folder or a file in it cannot be written, or a path leaves the folder.
+        The folder or a file in it cannot be written, a file in it was read (see `read_files`), or a path leaves the
+        folder.
     """
     folder = Path(folder)
     with _input_errors(folder):
@@ -173,12 +179,16 @@ def write_files(folder: str | Path, contents: Mapping[str, str | bytes], without
 
 def _write_into(folder: Path, contents: Mapping[str, str | bytes], without: Iterable[str]) -> None:
     targets = {name: _target(folder, name) for name in contents}
+    gone = [_target(folder, name) for name in without]
+    refuse_inputs([*targets.values(), *gone])
     with scratch_folder(folder) as scratch:
         staged = {}
         for index, (name, content) in enumerate(contents.items()):
             whole = content.encode("utf-8") if isinstance(content, str) else content
             staged[targets[name]] = _stage(scratch / f"new-{index}", whole)
-        _exchange(staged, [*targets.values(), *(_target(folder, name) for name in without)], scratch)
+        _exchange(staged, [*targets.values(), *gone], scratch)
+    for target in targets.values():
+        note_written(target)
     for parent in {target.parent for target in targets.values()}:
         _sync_folder(parent)
 
@@ -189,7 +199,7 @@ def _exchange(staged: Mapping[Path, Path], leaving: Iterable[Path], scratch: Pat
     placed: list[Path] = []
     try:
         for index, target in enumerate(leaving):
-            if target.exists():
+            if os.path.lexists(target):
                 aside.append((target, scratch / f"old-{index}"))
                 os.replace(*aside[-1])
         for target, new in staged.items():
@@ -200,7 +210,7 @@ def _exchange(staged: Mapping[Path, Path], leaving: Iterable[Path], scratch: Pat
         for target in placed:
             target.unlink(missing_ok=True)
         for target, old in aside:
-            if old.exists():
+            if os.path.lexists(old):
                 os.replace(old, target)
         raise
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import inside, read_bytes
+from fes_pin.data.files import inside
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, read_motion
-from fes_pin.data.new_study import NewStudy
+from fes_pin.data.new_study import NewStudy, copied
 from fes_pin.data.schema import BODY, unknown
 from fes_pin.data.study_text import HEADER, quoted
 from fes_pin.data.wanted import number_set
@@ -74,7 +74,4 @@ def _place(path: Path, folder: Path, contents: dict[str, str | bytes]) -> str:
         inside(folder, relative)
         return relative
     except ValueError:
-        if path.name in contents or (folder / path.name).exists():
-            raise InputError(f"would be copied to {path.name}, where there is a file already", file=path) from None
-        contents[path.name] = read_bytes(path)
-        return path.name
+        return copied(path, folder, path.name, contents)

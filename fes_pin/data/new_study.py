@@ -285,11 +285,7 @@ class _Making:
             inside(self.wanted.folder, relative)
             return relative
         except ValueError:
-            place = f"{below}{path.name}"
-        if place in contents or (self.wanted.folder / place).exists():
-            raise InputError(f"would be copied to {place}, where there is a file already", file=path)
-        contents[place] = read_bytes(path)
-        return place
+            return copied(path, self.wanted.folder, f"{below}{path.name}", contents)
 
     def _columns(self, sources: Mapping[str, Mapping[str, Any]]) -> list[str]:
         """The table `[columns]`; empty where the files are as the study format has them."""
@@ -314,6 +310,21 @@ class _Making:
     def _units(self) -> dict[str, str]:
         schema = self.schema
         return {k: n.unit for table in (schema.constants, schema.passive, schema.start) for k, n in table.items()}
+
+
+def copied(path: Path, folder: Path, place: str, contents: dict[str, str | bytes]) -> str:
+    """Put a file that lies elsewhere among the contents of a study's folder; its place there.
+
+    Raises
+    ------
+    InputError
+        Another file has that place, in the folder or among the contents.
+    """
+    content, there = read_bytes(path), folder / place
+    if place in contents or (there.exists() and not (there.is_file() and there.read_bytes() == content)):
+        raise InputError(f"would be copied to {place}, where there is another file already", file=path)
+    contents[place] = content
+    return place
 
 
 def common_folder(files: Iterable[Path]) -> Path:

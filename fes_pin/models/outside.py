@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.read_files import note_read
 from fes_pin.data.schema import RigSchema
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect, Stage
@@ -52,6 +53,7 @@ def _run_file(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, whole)
     if spec is None or spec.loader is None:
         raise InputError("expected a Python file, whose name ends in .py", file=path)
+    note_read(whole)
     module = importlib.util.module_from_spec(spec)
     before = sys.modules.get(name)
     sys.modules[name] = module  # dataclasses look their module up

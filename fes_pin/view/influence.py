@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 
 from fes_pin.body.controllability import ModalControllability
 from fes_pin.data.errors import InputError
+from fes_pin.data.files import write_bytes
 
 ON = ("joints", "modes")
 
@@ -43,14 +45,36 @@ def influence_table(result: ModalControllability, on: str = "joints") -> str:
     return "\n".join(lines)
 
 
+def check_image(path: str | Path) -> str:
+    """The kind of image that a file's suffix names: png, svg, pdf ...
+
+    Raises
+    ------
+    InputError
+        It names none that can be drawn.
+    """
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    kinds, kind = sorted(Figure().canvas.get_supported_filetypes()), Path(path).suffix.lower().removeprefix(".")
+    if kind not in kinds:
+        raise InputError(f"expected a name that ends in one of {', '.join(kinds)}", file=path)
+    return kind
+
+
 def plot_influence(result: ModalControllability, path: str | Path, on: str = "joints") -> Path:
     """Draw the table as a heat map (logarithmic, red positive, blue negative) into an image file.
 
     Raises
     ------
     InputError
-        `on` is neither `joints` nor `modes`.
+        `on` is neither `joints` nor `modes`; `path` ends in no kind of image, was read, or cannot be written.
     """
+    write_bytes(path, influence_image(result, check_image(path), on))
+    return Path(path)
+
+
+def influence_image(result: ModalControllability, kind: str = "png", on: str = "joints") -> bytes:
+    """The heat map of `plot_influence` as an image of this kind; raises as it does."""
     from matplotlib.colors import SymLogNorm  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
 
@@ -64,5 +88,6 @@ def plot_influence(result: ModalControllability, path: str | Path, on: str = "jo
     axes.set_title(f"What each input does to each of the {on}, at first", fontsize=10)
     figure.colorbar(image, ax=axes, label="deg/s² per full input")
     figure.tight_layout()
-    figure.savefig(path, dpi=120)
-    return Path(path)
+    stream = io.BytesIO()
+    figure.savefig(stream, format=kind, dpi=120)
+    return stream.getvalue()

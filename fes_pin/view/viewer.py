@@ -22,6 +22,7 @@ from fes_pin.body.joints import JOINTS
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode
 from fes_pin.data.errors import InputError
+from fes_pin.data.files import write_text
 from fes_pin.data.named import NamedArray
 from fes_pin.view.arrows import Arrow, arrow_commands
 
@@ -153,10 +154,9 @@ class BodyScene:
         return _PAGE.format(script=script, commands=packed, caption=html.escape(self.caption))
 
     def write(self, path: str | Path) -> Path:
-        """Write the page to a file, into a folder that is there."""
-        path = Path(path)
-        path.write_text(self.html(), encoding="utf-8")
-        return path
+        """Write the page to a file, into a folder that is there; raises as `write_text`."""
+        write_text(path, self.html())
+        return Path(path)
 
 
 def show_mode(linear: LinearBody, mode: Mode) -> BodyScene:

@@ -93,13 +93,13 @@ def test_goniometers_and_influence():
 def test_view_writes_pages(tmp_path):
     for arguments in ((), ("--mode", "3"), ("--nerve", "right_tibial"), ("--nerve", "femoral")):
         page = tmp_path / "page.html"
-        assert run("view", str(page), *arguments).exit_code == 0
+        assert run("view", "--out", str(page), *arguments).exit_code == 0
         assert page.stat().st_size > 500_000
 
 
 @pytest.mark.shared
 def test_view_plays_the_measured_walk(walk, tmp_path):
-    assert run("view", str(tmp_path / "w.html"), "--walk", str(walk / "coords_mtpfree.csv")).exit_code == 0
+    assert run("view", "--out", str(tmp_path / "w.html"), "--walk", str(walk / "coords_mtpfree.csv")).exit_code == 0
 
 
 @pytest.mark.shared
@@ -118,7 +118,7 @@ def test_a_spoilt_walk_is_one_line_and_no_page(walk, tmp_path, spoil, says):
     lines = (walk / "coords_mtpfree.csv").read_text().splitlines()
     (tmp_path / "walk.csv").write_text("\n".join(spoil(lines)) + "\n")
     page = tmp_path / "page.html"
-    result = run("view", str(page), "--walk", str(tmp_path / "walk.csv"))
+    result = run("view", "--out", str(page), "--walk", str(tmp_path / "walk.csv"))
     assert result.exit_code == 2 and says in result.output and "walk.csv" in result.output
     assert len(result.output.strip().splitlines()) == 1 and not page.exists()
 
@@ -126,7 +126,7 @@ def test_a_spoilt_walk_is_one_line_and_no_page(walk, tmp_path, spoil, says):
 @pytest.mark.parametrize("content", [b"", b"\n", bytes(range(128, 255)), b"time,q_hip_flexion_r\n0,1\n1\n", b"a"])
 def test_a_walk_that_is_no_table_is_one_line(tmp_path, content):
     (tmp_path / "walk.csv").write_bytes(content)
-    result = run("view", str(tmp_path / "page.html"), "--walk", str(tmp_path / "walk.csv"))
+    result = run("view", "--out", str(tmp_path / "page.html"), "--walk", str(tmp_path / "walk.csv"))
     assert result.exit_code == 2 and "walk.csv" in result.output and not (tmp_path / "page.html").exists()
     assert len(result.output.strip().splitlines()) == 1
 
@@ -136,7 +136,9 @@ def test_a_map_that_cannot_be_written_is_one_line(tmp_path):
         result = run("nerves", "right_femoral", "--map", str(path))
         assert result.exit_code == 2 and "cannot be written" in result.output
         assert len(result.output.splitlines()) == 1 and not path.parent.joinpath("map.png").exists()
-    assert run("view", str(tmp_path / "none" / "page.html")).exit_code == 2 and not (tmp_path / "none").exists()
+    assert (
+        run("view", "--out", str(tmp_path / "none" / "page.html")).exit_code == 2 and not (tmp_path / "none").exists()
+    )
 
 
 def test_nothing_is_written_or_printed_where_an_option_is_wrong(tmp_path):
@@ -163,10 +165,10 @@ def test_nothing_is_written_or_printed_where_an_option_is_wrong(tmp_path):
         (("nerves", "--strength", "1e300"), "--strength"),
         (("nerves", "right_vagus"), "unknown nerve"),
         (("view",), "--live"),
-        (("view", "a.html", "--mode", "99"), "--mode"),
-        (("view", "a.html", "--mode", "1", "--nerve", "right_tibial"), "choose one"),
-        (("view", "a.html", "--walk", "none.csv"), "none.csv"),
-        (("view", "a.html", "--walk", "/dev/null"), "/dev/null"),
+        (("view", "--out", "a.html", "--mode", "99"), "--mode"),
+        (("view", "--out", "a.html", "--mode", "1", "--nerve", "right_tibial"), "choose one"),
+        (("view", "--out", "a.html", "--walk", "none.csv"), "none.csv"),
+        (("view", "--out", "a.html", "--walk", "/dev/null"), "/dev/null"),
     ],
 )
 def test_mistakes_are_one_line_and_exit_code_2(arguments, says):

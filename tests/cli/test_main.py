@@ -13,6 +13,7 @@ from data import studies, test_bad_studies
 from diagnosis.hidden import study_of
 
 from fes_pin.cli import main
+from fes_pin.data.outputs import Outputs
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import read_trial, write_trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
@@ -201,18 +202,16 @@ def test_bad_input_is_one_line(monkeypatch, capsys, tmp_path, case):
 
 
 def test_a_failed_write_leaves_the_old_answer(made, diagnosis, monkeypatch, capsys, tmp_path):
-    """The second rename fails, as if the disk were full: every old file is back and no new one stays."""
+    """A rename fails, as if the disk were full: every old file is back and no new one stays."""
     out = tmp_path / "out"
-    out.mkdir()
-    old = {name: f"old {name}" for name in FILES}
-    for name, text in old.items():
-        (out / name).write_text(text)
+    Outputs("diagnose").write(out, {name: f"old {name}" for name in FILES})
+    old = {p.name: p.read_text() for p in out.iterdir()}
     monkeypatch.setattr("fes_pin.diagnosis.diagnosis.diagnose_joint", lambda *_, **__: diagnosis)
     usual, count = os.replace, []
 
     def replace(source, target):
         count.append(target)
-        if len(count) == 4:
+        if len(count) == 6:
             raise OSError(28, "No space left on device")
         usual(source, target)
 
@@ -223,7 +222,7 @@ def test_a_failed_write_leaves_the_old_answer(made, diagnosis, monkeypatch, caps
 
 
 def test_what_an_earlier_diagnosis_proposed_does_not_stay(made, diagnosis, monkeypatch, tmp_path):
-    (tmp_path / NEXT_FILE).write_text("of another study")
+    Outputs("diagnose").write(tmp_path, {NEXT_FILE: "of another study"})
     decided = replace(diagnosis, next_experiment=None)
     monkeypatch.setattr("fes_pin.diagnosis.diagnosis.diagnose_joint", lambda *_, **__: decided)
     run(monkeypatch, "diagnose", made / "study", "--out", tmp_path)
