@@ -206,9 +206,6 @@ def view(
         raise InputError("choose one of --mode, --nerve and --walk")
     if out is None and not live:
         raise InputError("give the page to write, --out PAGE.html, or --live")
-    outputs = Outputs("body view", force)
-    if out is not None:
-        outputs.check_file(out)
     if mode is not None:
         found = linear.modes()
         if not 1 <= mode <= len(found):
@@ -222,7 +219,7 @@ def view(
     else:
         scene = BodyScene(linear.body, caption=str(linear.body)).pose(linear.whole_posture)
     if out is not None:
-        outputs.write_file(out, scene.html())
+        Outputs("body view", force).write_file(out, scene.html())
         typer.echo(f"wrote {out}")
     if live:
         _serve(scene)
