@@ -134,8 +134,8 @@ def run_cohort(
         left = (time.monotonic() - began) / fresh * (len(every) - done)
         tell(CohortProgress(done, len(every), failed, left, answer.name))
     if not any_good:
-        first = min([(one.name, one.error) for one in (*waiting, *old)])
-        raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {first[1]}")
+        _, first = min([*((one.name, one.error) for one in waiting), *((one.name, one.error) for one in old)])
+        raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {first}")
 
     def kept() -> Iterator[Kept]:  # read again for each table: no more than one record is held
         return (one for name in found if (one := store.get(name)) is not None)
