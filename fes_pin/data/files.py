@@ -106,15 +106,17 @@ def write_bytes(path: str | Path, content: bytes, mode: int = 0o666) -> None:
         The folder is missing, `path` is a folder or a file that was read (see `read_files`), or the file cannot be
         written; the old file is then untouched.
     """
+    if not isinstance(path, str | Path):
+        raise InputError(f"cannot be written: expected a path, found {path!r}")
     path = Path(path)
     with _input_errors(path):
         if path.is_dir():
-            raise InputError("expected a file to write, found a folder", file=path)
+            raise InputError("cannot be written: expected a file, found a folder", file=path)
         if path.exists() and not path.is_file():
             path.write_bytes(content)
             return
         if not path.parent.is_dir():
-            raise InputError("the folder to write into does not exist", file=path)
+            raise InputError("cannot be written: the folder does not exist", file=path)
         target = path.resolve()
         refuse_inputs([path])
         with scratch_folder(target.parent) as scratch:

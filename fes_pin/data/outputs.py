@@ -124,7 +124,7 @@ def _place(path: str | Path) -> Path | None:
         if place.exists() and not (place.is_file() or place.is_dir()):
             return None
         if not place.parent.is_dir():
-            raise InputError("the folder to write into does not exist", file=path)
+            raise InputError("cannot be written: the folder does not exist", file=path)
     except (OSError, RuntimeError) as error:
         raise InputError(f"cannot be written: {error}", file=path) from None
     return place
