@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from typing import TypeVar
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import OpenBLASController, threadpool_limits
 
 from fes_pin.settings import threads
 
@@ -22,7 +22,11 @@ Out = TypeVar("Out")
 
 
 class _Limit:
-    """The limit on the threads of linear algebra, which is one for the whole process, while somebody needs it."""
+    """The limit on the threads of linear algebra, which is one for the whole process, while somebody needs it.
+
+    Any thread may be the first user or the last. Newer releases of threadpoolctl let one thread alone set OpenBLAS's
+    pool, and pass over in silence what others ask for: each change here begins with a new claim to it.
+    """
 
     def __init__(self) -> None:
         self._lock, self._users = threading.Lock(), 0
@@ -32,6 +36,7 @@ class _Limit:
         """Linear algebra on one thread from the first user on."""
         with self._lock:
             if self._users == 0:
+                _claim_pool()
                 self._limits = threadpool_limits(1)
             self._users += 1
 
@@ -40,7 +45,15 @@ class _Limit:
         with self._lock:
             self._users -= 1
             if self._users == 0 and self._limits is not None:
+                _claim_pool()
                 self._limits.restore_original_limits()
+                _claim_pool()
+
+
+def _claim_pool() -> None:
+    """Let the next thread that sets OpenBLAS's pool do so, whichever it is."""
+    if hasattr(OpenBLASController, "clear_controlling_thread"):
+        OpenBLASController.clear_controlling_thread(force=True)
 
 
 _LIMIT = _Limit()

@@ -8,12 +8,15 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from models.cases import RIGS, trial
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
+from fes_pin import workers
 from fes_pin.body.build import Body
 from fes_pin.body.linearize import linearize
 from fes_pin.identify.fit import fit
-from fes_pin.models.compile import program
+from fes_pin.models.compile import machine, program
+from fes_pin.models.compile.native import NativeProgram
+from fes_pin.models.compile.virtual import VirtualProgram
 from fes_pin.models.effects.electromechanical_delay import ElectromechanicalDelay
 from fes_pin.models.effects.sensor_offset import SensorOffset
 from fes_pin.models.model import Model
@@ -118,7 +121,56 @@ def test_a_body_and_its_nerves_are_shared():
 
 
 def linear_algebra_threads():
-    return [one["num_threads"] for one in threadpool_info()]
+    return [one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"]
+
+
+def in_another_thread(function):
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(function).result()
+
+
+def test_linear_algebra_is_limited_whichever_thread_asks_for_it():
+    """Although the thread that set the pool before still lives, and holds it."""
+    with threadpool_limits(2, user_api="blas"):
+        before = linear_algebra_threads()
+        assert set(before) == {2}
+
+        def limited():
+            with one_thread_each():
+                return linear_algebra_threads()
+
+        for ask in (limited, lambda: in_another_thread(limited), limited):
+            assert set(ask()) == {1}
+            assert linear_algebra_threads() == before
+
+
+def test_the_limit_that_one_thread_began_another_ends():
+    with threadpool_limits(2, user_api="blas"):
+        before, one = linear_algebra_threads(), one_thread_each()
+        in_another_thread(one.__enter__)
+        assert set(linear_algebra_threads()) == {1}
+        one.__exit__(None, None, None)
+        assert linear_algebra_threads() == before
+
+
+@pytest.mark.parametrize("engine", program.settings.ENGINES)
+def test_no_lock_is_held_while_a_model_is_simulated(engine, monkeypatch):
+    monkeypatch.setenv("FES_PIN_ENGINE", engine)
+    rng, held = np.random.default_rng(4), []
+    model = Model(RIGS["muscle"]) + SensorOffset()
+    bare = trial("muscle", "isometric", rng, 60)
+    measured = bare.with_columns(force_n=simulate(model, bare)["force_n"] + 0.2 * rng.standard_normal(60))
+    kind = VirtualProgram if engine == "casadi" else NativeProgram
+    run = kind.run
+
+    def watched(*given):
+        held.extend(lock.locked() for lock in (program._LOCK, machine._LOCK, workers._LIMIT._lock))
+        return run(*given)
+
+    monkeypatch.setattr(kind, "run", watched)
+    fit(model, [measured])
+    assert len(held) > 10
+    assert not any(held)
 
 
 def test_the_limit_on_linear_algebra_ends_with_its_last_user():
