@@ -1,8 +1,10 @@
-"""Every public name of the library stands once: who reads it need not ask which one is meant."""
+"""Every name of a chapter stands once in it, and every public name once in the library."""
 
 import ast
 from collections import defaultdict
 from pathlib import Path
+
+import pytest
 
 import fes_pin
 
@@ -32,10 +34,22 @@ def alike(files: list[Path]) -> dict[str, list[str]]:
     return {name: places for name, places in where.items() if len(places) > 1 and name not in PAIRS}
 
 
-def test_no_two_public_names_are_alike():
+CHAPTERS = sorted({path.parent.relative_to(PACKAGE).parts[:1] for path in PACKAGE.rglob("*.py")} - {("cli",)})
+"""Folders of the package; commands (`cli`) are called as what they do."""
+
+
+@pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda parts: "/".join(parts) or "top")
+def test_no_two_names_of_a_chapter_are_alike(chapter):
+    """Front ends may use one name for the same thing: each has its `Problem`."""
+    files = sorted(PACKAGE.joinpath(*chapter).rglob("*.py") if chapter else PACKAGE.glob("*.py"))
+    assert alike(files) == {}
+
+
+def test_no_public_name_stands_twice():
     files = [path for path in sorted(PACKAGE.rglob("*.py")) if path.relative_to(PACKAGE).parts[0] != "cli"]
     assert len(files) > 200
-    assert alike(files) == {}  # commands (cli) are called as what they do
+    public = {name.lower() for name in fes_pin.__all__}
+    assert {name: places for name, places in alike(files).items() if name in public} == {}
 
 
 def test_the_pairs_are_names_that_users_know():

@@ -31,7 +31,7 @@ def trials(study):
 def singles(study, trials, library):
     sets = LikelihoodFits(nominal_model(study), trials, library)
     sets.nominal()
-    sets.extend_all(())
+    sets.extend(())
     return sets
 
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight, group_problem
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.decide.significance import MIN_UNITS
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.score import Projection, Scores
 from fes_pin.diagnosis.search.starts import started
 from fes_pin.identify.problem import Linearized
+from fes_pin.infer.family import MIN_UNITS
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel

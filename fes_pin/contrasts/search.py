@@ -16,8 +16,8 @@ from fes_pin.contrasts.decide import noise_p_value, p_value
 from fes_pin.contrasts.fits import Fits
 from fes_pin.contrasts.grouped import Grouped, Item
 from fes_pin.contrasts.promises import Promise
-from fes_pin.diagnosis.decide.significance import Family
 from fes_pin.diagnosis.search.starts import STARTS
+from fes_pin.infer.family import Family
 from fes_pin.infer.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
 from fes_pin.workers import OutOfTime, Progress, in_parallel, time_limit
 
@@ -74,7 +74,7 @@ class ContrastSearch:
         with time_limit(math.inf):
             nominal = self._kept = self.fits.first()
             promises, scores = self.fits.promises(nominal)
-            self.family = Family(scores, self.seed)
+            self.family = scores.family(self.seed)
         try:
             return self._run(nominal, promises)
         except OutOfTime:

@@ -27,7 +27,7 @@ from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.restate import restated_study, search_with_conditions, with_misread
 from fes_pin.diagnosis.result import STOPPED, Diagnosis
-from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import NominalFitError, SimulationSearch
 from fes_pin.diagnosis.searches import Result, Search, Searches
 from fes_pin.diagnosis.testable import given_away

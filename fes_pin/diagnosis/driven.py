@@ -49,7 +49,7 @@ from fes_pin.diagnosis.remainder.driven import driven_remainder
 from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosis
 from fes_pin.diagnosis.search.cause_sets import names_of
-from fes_pin.diagnosis.search.likelihood_search import Found, LikelihoodSearch
+from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
@@ -129,8 +129,8 @@ def judge_driven(
     """
     refused: dict[str, Refused] = {}
     reason = None if is_moved_by_what_is_recorded(found.best) else UNMOVED
-    found = search.told(()) if reason else found
-    horizon = search.horizon_s
+    found = search.result(()) if reason else found
+    horizon = search.models.horizon_s
     settled, formed = frozenset(found.without), set[frozenset[str]]()
     again, alike = Again(afresh), Again(as_random_as_in_all)
     while True:
@@ -143,7 +143,7 @@ def judge_driven(
         if weak := unsupported(evidence, gains, seen, random):
             weakest = min(weak, key=lambda n: gains[n].low)
             refused[weakest] = refused_from(found, weakest, gains[weakest].percent)
-            found = search.told(tuple(sorted(names - {weakest})))
+            found = search.result(tuple(sorted(names - {weakest})))
             continue
         if names != settled:
             found, settled = search.settle(tuple(sorted(names)), {n: r.p_value for n, r in refused.items()}), names
@@ -152,7 +152,7 @@ def judge_driven(
         if rare := [n for n in names if not is_chosen(share_of(chosen, _alike(found, n)))]:
             rarest = min(rare, key=lambda n: gains[n].low)
             refused[rarest] = refused_from(found, rarest, gains[rarest].percent)
-            found = search.told(tuple(sorted(names - {rarest})))
+            found = search.result(tuple(sorted(names - {rarest})))
             continue
         left = with_refused_causes(seen, random, refused)
         if not left.unexplained or names in formed or not search.form_otherwise(tuple(sorted(names))):
@@ -203,11 +203,11 @@ def driven_diagnosis(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
-    judged = likeliest = judge_driven(search, found, search.sets.trials, trials[1], seed)
+    judged = likeliest = judge_driven(search, found, search.models.trials, trials[1], seed)
     fresh = beside_what_is_new(search, judged.found)
     again = None if fresh is None else judged_again(search, judged.found, fresh)
     if again is not None:
-        judged = _foretelling_more(judge_driven(*again, search.sets.trials, trials[1], seed), judged)
+        judged = _foretelling_more(judge_driven(*again, search.models.trials, trials[1], seed), judged)
     found, left = judged.found, judged.left
     best = as_wide_as_trials_differ(with_honest_intervals(found.best), judged.again)
     other = fresh if judged.found is likeliest.found else likeliest.found.best
@@ -220,7 +220,7 @@ def driven_diagnosis(
         rivals=found.rivals,
         judged=best,
         without=found.without,
-        scored=found.scored,
+        scored=search.models.scored(found),
         floor=best.noise,
     )
     causes = [_cause(judged, one, best) for one in best.model.effects]
@@ -231,7 +231,7 @@ def driven_diagnosis(
         verdict="causes_found" if causes else ("unexplained" if left.unexplained else "adequate"),
         causes=tuple(causes),
         remainder=left,
-        absorbed=absorbed(searched, found.silent),
+        absorbed=absorbed(searched, search.models.library.silent()),
         nominal=found.nominal,
         extended=best,
         nominal_error=(fitted[0].free, held[0].free if held else None),

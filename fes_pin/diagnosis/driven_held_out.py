@@ -11,7 +11,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.gains_ahead import Fold
 from fes_pin.diagnosis.decide.held_out import Evidence, folds_of
 from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
-from fes_pin.diagnosis.search.likelihood_search import Found
+from fes_pin.diagnosis.search.likelihood_models import Found
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Unknowns, normal_equations

@@ -11,7 +11,7 @@ from fes_pin.diagnosis.decide.claims import FORM_SHARE
 from fes_pin.diagnosis.decide.held_out import Evidence, Gain, speaks_for
 from fes_pin.diagnosis.errors_ahead import RandomPart, are_large, random_parts
 from fes_pin.diagnosis.remainder.open_set import Remainder
-from fes_pin.diagnosis.search.likelihood_search import Found
+from fes_pin.diagnosis.search.likelihood_models import Found
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import WORTH

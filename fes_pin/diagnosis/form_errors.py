@@ -11,7 +11,7 @@ from fes_pin.diagnosis.decide.held_out import held_out_gain
 from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import errors_over_horizon
 from fes_pin.diagnosis.search.cause_sets import Names, names_of
-from fes_pin.diagnosis.search.likelihood_search import Found, LikelihoodSearch
+from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import NominalFitError
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts, step_s
@@ -29,8 +29,8 @@ class FreshSearch(LikelihoodSearch):
     causes apart that it should not.
     """
 
-    def __init__(self, search: LikelihoodSearch, fits: Sequence[Fit], horizon_s: float) -> None:
-        super().__init__(search.sets.begun_with(fits), search.seed, search.progress, horizon_s)
+    def __init__(self, search: LikelihoodSearch, fits: Sequence[Fit]) -> None:
+        super().__init__(search.models.begun_with(fits), search.progress)
         self._names = names_of(fits[0])
 
     def _search(self) -> Found:
@@ -38,8 +38,8 @@ class FreshSearch(LikelihoodSearch):
 
     def settle(self, names: Names, refused: Iterable[str] = ()) -> Found:
         """A set, once it has the form that the data demand."""
-        self._refine(names)
-        return self.told(names)
+        self._reform(names)
+        return self.result(names)
 
 
 def beside_what_is_new(search: LikelihoodSearch, found: Found) -> Fit | None:
@@ -68,7 +68,7 @@ def judged_again(search: LikelihoodSearch, found: Found, fresh: Fit) -> tuple[Li
         with time_limit(search.seconds_left):
             if not _foretells_more(fresh, search, found):
                 return None
-            again = FreshSearch(search, [fresh, *_beside(found)], search.horizon_s)
+            again = FreshSearch(search, [fresh, *_beside(found)])
         with time_limit(search.seconds_left):
             other = again.run()
     except (ArithmeticError, np.linalg.LinAlgError, OutOfTime, NominalFitError):
@@ -79,8 +79,8 @@ def judged_again(search: LikelihoodSearch, found: Found, fresh: Fit) -> tuple[Li
 def _foretells_more(fresh: Fit, search: LikelihoodSearch, found: Found) -> bool:
     """Whether errors over the horizon are less beside efforts that are new."""
     many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, fresh)]
-    nominal, lasting, new = (errors_over_horizon(one, search.horizon_s) for one in many)
-    return held_out_gain(nominal, lasting, new, search.seed).percent > NOTHING_PERCENT
+    nominal, lasting, new = (errors_over_horizon(one, search.models.horizon_s) for one in many)
+    return held_out_gain(nominal, lasting, new, search.models.seed).percent > NOTHING_PERCENT
 
 
 def _beside(found: Found) -> list[Fit]:

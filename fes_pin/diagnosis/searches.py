@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.diagnosis.parts import in_parts
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_search import Found, LikelihoodSearch
+from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import Searched, SimulationSearch
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -81,8 +80,8 @@ class Searches:
 
     def _by_likelihood(self, trials: Sequence[Trial], answered: bool) -> LikelihoodSearch:
         parts = in_parts(self.nominal.rig, trials)
-        sets = LikelihoodFits(self.nominal, parts, self._effects, answered)
-        return LikelihoodSearch(sets, self._seed, self._progress, self._horizon_s)
+        models = LikelihoodModels(self.nominal, parts, self._effects, answered, self._seed, self._horizon_s)
+        return LikelihoodSearch(models, self._progress)
 
     def _is_undecided(self, found: Searched) -> bool:
         """True where no set of causes leaves only noise of the reading, and there is no second trial to compare by.

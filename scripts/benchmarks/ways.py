@@ -25,8 +25,8 @@ from confusion_matrix.plan import FORMS, Item
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.decide.rivals import alternatives
 from fes_pin.diagnosis.diagnosis import split
-from fes_pin.diagnosis.search.likelihood_search import Found
 from fes_pin.diagnosis.searches import Searches
+from fes_pin.infer.search import SearchResult
 from fes_pin.models.catalogue import shipped
 from fes_pin.models.nominal import nominal_model
 
@@ -56,7 +56,7 @@ def sets_of(study: Study, driven: bool) -> list[tuple[str, ...]]:
     nominal, (train, test) = nominal_model(study), split(study)
     effects = shipped().effects_for(nominal.rig)
     _, found = Searches(nominal, train, train, test, driven, effects, 0, lambda *_: None, None).run(train)
-    best = found.best if isinstance(found, Found) else found.judged
+    best = found.best if isinstance(found, SearchResult) else found.judged
     return [(e.name, *alternatives(best, found.rivals[e.name], e.name)) for e in best.model.effects]
 
 

@@ -13,7 +13,6 @@ from confusion_matrix.generator import Made, noise_as_it_is
 from confusion_matrix.judge import known
 from confusion_matrix.plan import DISTANCES, Item
 from fes_pin.diagnosis.decide.rivals import alternatives
-from fes_pin.diagnosis.decide.significance import Family
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.simulation_fits import SimulationFits
 from fes_pin.identify.fit import MAX_ITERATIONS, Fit, fit_multistart, fit_problem
@@ -41,7 +40,7 @@ def oracle(made: Made) -> dict[str, Any]:
     name = min(fits, key=lambda n: fits[n].price)
     best = fits.pop(name)
     degrees = len(best.free) - len(nominal.free)
-    claimed = Family(scores, 0).p_value(nominal.sse - best.sse, degrees) < LEVEL
+    claimed = scores.family(0).p_value(nominal.sse - best.sse, degrees) < LEVEL
     return {
         **known(made),
         "verdict": "causes_found" if claimed else "adequate",

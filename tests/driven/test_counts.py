@@ -7,8 +7,7 @@ from driven_rigs.swing_up import draw_swing_up
 from fes_pin.data.counts import count_of
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.lasting import words_of_reading
 from fes_pin.models import predictor
 from fes_pin.models.effects import Cogging, CoulombFriction
@@ -40,9 +39,9 @@ def test_readings_that_hunt_would_tell_of_friction_that_is_not_there(seed, hunti
     if hunting:
         monkeypatch.setattr(predictor, "hunts", lambda column: np.zeros(len(column), dtype=bool))
     study = read_study(draw_swing_up((), seed, tmp_path).study)
-    sets = LikelihoodFits(nominal_model(study), study.trials, [CoulombFriction])
+    sets = LikelihoodModels(nominal_model(study), study.trials, [CoulombFriction])
     none = sets.nominal()
-    sets.extend_all(())
+    sets.extend(())
     gained = none.sse - sets.fits["coulomb_friction",].sse
     assert gained > 30.0 if hunting else gained < 4.0
 
@@ -51,7 +50,7 @@ def test_a_count_that_is_read_again_and_again_is_one_reading_of_the_noise(tmp_pa
     """Were each sample one, the noise of rounding, count / sqrt(12), came out a quarter too small."""
     study = read_study(draw_swing_up((), HELD[0], tmp_path).study)
     count = count_of(study.trials[0]["position"])
-    sets = LikelihoodFits(nominal_model(study), study.trials, [])
+    sets = LikelihoodModels(nominal_model(study), study.trials, [])
     assert sets.nominal().doubt.white["position"] == pytest.approx(count / 12.0**0.5, rel=0.05)
 
 
@@ -69,8 +68,8 @@ def test_a_hum_of_the_counts_hides_no_offset(tmp_path):
 
 def test_counts_that_hunt_hide_no_cogging(tmp_path):
     study = read_study(draw_swing_up(("cogging",), MISLED, tmp_path).study)
-    sets = LikelihoodFits(nominal_model(study), study.trials, [CoulombFriction, Cogging])
-    best = LikelihoodSearch(sets, 0, lambda share, words: None).run().best
+    sets = LikelihoodModels(nominal_model(study), study.trials, [CoulombFriction, Cogging])
+    best = LikelihoodSearch(sets, lambda share, words: None).run().best
     assert [e.name for e in best.model.effects] == ["cogging"]
     assert abs(best.values["inertia_scale"] - 1.0) < 3.0 * best.std("inertia_scale")
     assert best.std("inertia_scale") < 2e-3

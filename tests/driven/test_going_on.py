@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from driven.bristles import believed, trial
 
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.diagnosis.search.score import Scores
 from fes_pin.models.effects import CoulombFriction, SensorOffset
 
@@ -13,8 +12,8 @@ from fes_pin.models.effects import CoulombFriction, SensorOffset
 @pytest.mark.parametrize("effects", [[SensorOffset], [CoulombFriction]], ids=["friction is left", "nothing is left"])
 def test_a_search_whose_causes_promise_nothing_goes_on_where_something_is_left(effects, monkeypatch):
     """A slide with dry friction: beside the nominal model it is left, and taken up by a random effort."""
-    sets = LikelihoodFits(believed(), [trial(1), trial(2)], effects)
-    search = LikelihoodSearch(sets, 0, lambda share, words: None)
+    sets = LikelihoodModels(believed(), [trial(1), trial(2)], effects)
+    search = LikelihoodSearch(sets, lambda share, words: None)
     best = search.run().best
     names = tuple(e.name for e in best.model.effects)
     assert names == (("coulomb_friction",) if CoulombFriction in effects else ())

@@ -30,7 +30,7 @@ def test_another_unit_is_no_gain(tmp_path):
     study = in_another_unit(tmp_path, 0.3)
     sets = LikelihoodFits(nominal_model(study), study.trials, [SensorGain, CoulombFriction])
     nominal = sets.nominal()
-    sets.extend_all(())
+    sets.extend(())
     gain = sets.fits[GAIN]
     assert gain.model.effects[0].error == -0.5 and not sets.is_possible(gain)
     assert nominal.price - gain.price > 30.0
@@ -42,7 +42,7 @@ def test_a_gain_that_is_small_is_possible(tmp_path):
     study = in_another_unit(tmp_path, 1.0)
     sets = LikelihoodFits(nominal_model(study), study.trials, [SensorGain, CoulombFriction])
     sets.nominal()
-    sets.extend_all(())
+    sets.extend(())
     assert all(sets.is_possible(f) for f in sets.fits.values())
 
 

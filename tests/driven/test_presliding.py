@@ -66,7 +66,7 @@ def refined(trials):
     sets = LikelihoodFits(believed(), trials, [CoulombFriction])
     nominal = sets.nominal()
     plain = LikelihoodMaxima(trials).from_start(nominal.model + CoulombFriction(), nominal.doubt)
-    sets.extend_all(())
+    sets.extend(())
     while better := sets.forms.refined(sets.fits[NAMES]):
         sets.fits[NAMES] = better
     return nominal, plain, sets.fits[NAMES]

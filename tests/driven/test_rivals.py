@@ -17,14 +17,14 @@ def test_a_set_is_fitted_again_beside_a_cause_whose_form_has_changed():
     sets.nominal()
     plain = sets.nominal().model + CoulombFriction()
     sets.fits[FRICTION] = sets._maxima.from_start(plain, sets.nominal().doubt)
-    sets.extend_all(FRICTION)
+    sets.extend(FRICTION)
     first = sets.fits[BOTH]
-    sets.extend_all(FRICTION)
+    sets.extend(FRICTION)
     assert sets.fits[BOTH] is first
     sets.fits[FRICTION] = sets.forms.refined(sets.fits[FRICTION])
     (form,) = (e.refined() for e in sets.fits[FRICTION].model.effects)
     assert form and not first.model.effects[0].refined()
-    sets.extend_all(FRICTION)
+    sets.extend(FRICTION)
     assert sets.fits[BOTH].model.effects[0].refined() == form
     assert sets.fits[BOTH].price < first.price - 10.0
 

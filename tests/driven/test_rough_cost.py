@@ -9,8 +9,7 @@ from fes_pin.data.study import read_study
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain
 from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.driven_held_out import as_random_as_in_all
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.likelihood_search import LikelihoodSearch
+from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.identify.turns import maximise
@@ -22,9 +21,9 @@ from fes_pin.models.nominal import nominal_model
 def friction_fitted(folder):
     """A rig that hides friction, fitted with it: to where slopes for gains as they are end, and on from there."""
     study = read_study(draw(("coulomb_friction",), 0.3, 7, folder).study)
-    sets = LikelihoodFits(nominal_model(study), study.trials, [CoulombFriction])
+    sets = LikelihoodModels(nominal_model(study), study.trials, [CoulombFriction])
     sets.nominal()
-    sets.extend_all(())
+    sets.extend(())
     ended = sets.fits["coulomb_friction",]
     problem = LikelihoodProblem(ended.model, study.trials, ended.doubt)
     return maximise(problem, ended.values, ended.unknowns, near=True)
@@ -48,15 +47,15 @@ def test_a_torque_is_found_beside_friction_whose_cost_is_rough(tmp_path):
     """It gains 650 in twice the log-likelihood; beside friction that falls off within a thousandth of a radian a second
     its score was 0.1, for one column of the fit was the residual itself."""
     study = read_study(draw(("coulomb_friction", "periodic_torque"), 0.3, 1430036, tmp_path, recorded=True).study)
-    sets = LikelihoodFits(nominal_model(study), study.trials, [CoulombFriction, PeriodicTorque])
-    found = LikelihoodSearch(sets, 0, lambda share, words: None).run()
+    sets = LikelihoodModels(nominal_model(study), study.trials, [CoulombFriction, PeriodicTorque])
+    found = LikelihoodSearch(sets, lambda share, words: None).run()
     assert {e.name for e in found.best.model.effects} == {"coulomb_friction", "periodic_torque"}
 
 
 def test_a_slope_that_no_step_keeps_narrows_no_interval(tmp_path):
     """A column that holds the residual a thousand times over seems to tell its parameter; what it tells is noise."""
     study = read_study(draw((), 0.3, 3, tmp_path).study)
-    fitted = LikelihoodFits(nominal_model(study), study.trials, []).nominal()
+    fitted = LikelihoodModels(nominal_model(study), study.trials, []).nominal()
     k = fitted.free.index("damping")
     rough = []
     for part in fitted.parts:

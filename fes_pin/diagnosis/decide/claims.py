@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fes_pin.diagnosis.decide.significance import Family, coherence_p_value
 from fes_pin.diagnosis.remainder.open_set import smooth_remainder
 from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.diagnosis.search.score import Scores
@@ -11,6 +10,7 @@ from fes_pin.diagnosis.search.starts import forms_beside
 from fes_pin.identify.fit import Fit, go_on, noise_of, rough_noise
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.family import coherence_p_value
 from fes_pin.infer.levels import CERTAIN_GAIN, CLAIM_LEVEL, SMALL_SHARE, UNUSUAL_LEVEL
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
@@ -34,7 +34,7 @@ class Claims:
     """
 
     def __init__(self, sets: SimulationFits, scores: Scores, seed: int) -> None:
-        self.sets, self.family, self.seed = sets, Family(scores, seed), seed
+        self.sets, self.family, self.seed = sets, scores.family(seed), seed
         self._complete: dict[int, tuple[Fit, bool]] = {}
         self._p_values: dict[tuple[int, int], tuple[Fit, Fit, float]] = {}
 
@@ -99,12 +99,14 @@ class Claims:
 
     def _p_value(self, larger: Fit, smaller: Fit) -> float:
         degrees = max(larger.degrees - smaller.degrees, 1)
-        p_value = self.family.p_value(smaller.sse - larger.sse, degrees)
-        coherent = self.family.adjusted(coherence_p_value(smaller, larger, degrees))
+        gain = smaller.sse - larger.sse
+        p_value = self.family.p_value(gain, degrees)
+        few, many = ([p.residual for p in one.parts] for one in (smaller, larger))
+        coherent = self.family.adjusted(coherence_p_value(few, many, gain, degrees))
         if coherent < p_value or p_value >= CLAIM_LEVEL:
             return p_value
-        few, many = in_parallel(lambda one: _again(one, smaller), (smaller, larger))
-        return max(p_value, min(coherent, self.family.p_value(few.sse - many.sse, degrees)))
+        less, more = in_parallel(lambda one: _again(one, smaller), (smaller, larger))
+        return max(p_value, min(coherent, self.family.p_value(less.sse - more.sse, degrees)))
 
     def demanded(self, refined: Fit, base: Fit) -> bool:
         """True if the data demand a refinement of an effect's form."""

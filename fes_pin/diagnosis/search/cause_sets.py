@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from fes_pin.identify.fit import Fit
-
-Names = tuple[str, ...]
+from fes_pin.infer.search import Names
 
 MOST_CAUSES = 3
 """Causes that are named at most: every further one multiplies the sets."""

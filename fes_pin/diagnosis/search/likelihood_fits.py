@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Self
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
@@ -89,7 +90,7 @@ class LikelihoodFits:
         self.screen = LikelihoodScreen(self.library)
         self.forms = LikelihoodForms(self._maxima, self.library.measured)
 
-    def begun_with(self, fits: Sequence[Fit]) -> LikelihoodFits:
+    def begun_with(self, fits: Sequence[Fit]) -> Self:
         """The same trials and causes, with some fits to begin with; what is random is timed as in them."""
         other = copy.copy(self)
         other.fits = {names_of(f): f for f in fits}
@@ -139,7 +140,7 @@ class LikelihoodFits:
         guess = first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
         return fresh(guess, self.trials) if known and known.timed else guess
 
-    def extend(self, base: Fit, scored: Sequence[Scored]) -> tuple[Model, list[Fit]]:
+    def _begin(self, base: Fit, scored: Sequence[Scored]) -> tuple[Model, list[Fit]]:
         """Begin a base with one more effect, from its shapes of largest score: the start, and first fits from there."""
         worth = [s for s in scored[:STARTS] if s.gain >= 0.5 * scored[0].gain]
         starts = [base.model + started(s.probe.effect, s.amplitudes) for s in worth]
@@ -236,7 +237,7 @@ class LikelihoodFits:
         half = 0.5 * (smaller + self.fits[ranked[0]].price)
         return [n for n in ranked if n == ranked[0] or self.fits[n].price < half]
 
-    def extend_all(self, base: Names, most: int | None = None) -> list[Names]:
+    def extend(self, base: Names, most: int | None = None) -> list[Names]:
         """Fit a set with each further cause beside it, or with those of largest score; returns their names.
 
         Those that are fitted begin once more where the causes of the base have another form in them: it may have had
@@ -249,7 +250,7 @@ class LikelihoodFits:
         form = _form(fitted)
         missing = {k: v for k, v in keys.items() if (k, form) not in self._begun and not self._has(k, form)}
         self._begun.update((k, form) for k in missing)
-        self.add(fitted, {k: lambda v=v: self.extend(fitted, v) for k, v in missing.items()})  # type: ignore[misc]
+        self.add(fitted, {k: lambda v=v: self._begin(fitted, v) for k, v in missing.items()})  # type: ignore[misc]
         return list(keys)
 
     def _has(self, names: Names, form: _Refined) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 
 from fes_pin.diagnosis.search.library import Probe
 from fes_pin.identify.problem import Linearized
+from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.workers import in_parallel
 
@@ -158,6 +159,10 @@ class Scores:
     gram: np.ndarray
     along: np.ndarray
     blocks: list[slice]
+
+    def family(self, seed: int) -> Family:
+        """The family of these tests; a form with amplitudes of each trial's own is one test more, at most."""
+        return Family(self.gram, self.blocks, seed, sum(s.probe.effect.each_trial for s in self.scored))
 
 
 def _score(probe: Probe, gram: np.ndarray, along: np.ndarray, before: float) -> Scored:

@@ -1,0 +1,143 @@
+"""Sets of causes of one study as the search of `infer` sees them: fits by the likelihood, and how they are judged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from fes_pin.data.schema import IMPOSED
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.decide.claims import FORM_SHARE
+from fes_pin.diagnosis.decide.gains_ahead import Fold, gains_of
+from fes_pin.diagnosis.decide.significance import level_of
+from fes_pin.diagnosis.errors_ahead import are_large, random_parts
+from fes_pin.diagnosis.remainder.driven import driven_remainder
+from fes_pin.diagnosis.search.cause_sets import MOST_CAUSES
+from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.score import Scored, best_pairs
+from fes_pin.diagnosis.search.simulation_search import NominalFitError
+from fes_pin.identify.ahead import default_horizon
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.scatter import excess_scatter
+from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.family import Family
+from fes_pin.infer.search import Search, SearchResult
+from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
+
+Found = SearchResult[Fit]
+"""What a search among causes found."""
+
+
+class LikelihoodModels(LikelihoodFits):
+    """Fits of sets of causes to one set of trials, and how a search judges them.
+
+    Parameters
+    ----------
+    model, trials, effects, answered
+        As of `LikelihoodFits`.
+    seed
+        Of critical values.
+    horizon_s
+        How far ahead errors over a horizon look, s; by default as `default_horizon` says.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        effects: Sequence[type[Effect]] | None = None,
+        answered: bool = True,
+        seed: int = 0,
+        horizon_s: float | None = None,
+    ) -> None:
+        super().__init__(model, trials, effects, answered)
+        self.seed, self._horizon_s = seed, horizon_s
+
+    @property
+    def horizon_s(self) -> float:
+        """How far ahead errors over a horizon look, s."""
+        return self._horizon_s or default_horizon(self.trials)
+
+    @property
+    def most_candidates(self) -> int | None:
+        """Causes in a set, at most; no bound where motion is imposed.
+
+        An imposed motion excites a rig as nothing else does, and a muscle is a set of such causes.
+        """
+        return None if any(t.kind == IMPOSED for t in self.trials) else MOST_CAUSES
+
+    def nominal(self) -> Fit:
+        """Fit the nominal model.
+
+        Raises
+        ------
+        NominalFitError
+            If its likelihood is not finite.
+        """
+        fitted = super().nominal()
+        if not math.isfinite(fitted.sse):
+            raise NominalFitError("the nominal model foretells nothing finite from its start values on", fitted)
+        return fitted
+
+    def family(self) -> Family:
+        """The family of score tests of all causes in a model that contains no other."""
+        return self.screen.scores(self.fits[()]).family(self.seed)
+
+    def extend_by_pairs(self, most: int) -> None:
+        """Fit the pairs of causes of largest score together that no single cause leads to."""
+        base = self.fits[()]
+        pairs = {
+            tuple(sorted((a.probe.name, b.probe.name))): (a, b) for a, b in best_pairs(self.screen.scores(base), most)
+        }
+        missing = {k: v for k, v in pairs.items() if k not in self.fits}
+        self.add(base, {k: lambda v=v: self.extend_with_both(base, v) for k, v in missing.items()})  # type: ignore[misc]
+
+    def smallest_p_value(self, fitted: Fit) -> float:
+        """Of the score tests of all further causes, each by itself."""
+        scored = [s for s in self.screen.scores(fitted).scored if s.gain > 0.0]
+        return min((float(chi2_tail(s.gain, max(len(s.amplitudes), 1))) for s in scored), default=1.0)
+
+    def scored(self, found: Found) -> list[Scored]:
+        """Score of every cause in the nominal model, and of those that the best set lacks in that."""
+        more = self.screen.scores(found.best).scored if found.best.model.effects else []
+        return self.screen.scores(found.nominal).scored + more
+
+    def excess_scatter(self, larger: Fit, smaller: Fit) -> float:
+        """See `identify.scatter.excess_scatter`."""
+        return excess_scatter(larger, smaller)
+
+    def level(self, fitted: Fit) -> float:
+        """See `level_of`."""
+        return level_of(fitted)
+
+    def is_error_of_form(self, larger: Fit, gain: float, explained: float) -> bool:
+        """Whether a gain is no more than errors of form leave, and no random effort takes these up."""
+        assert larger.doubt is not None
+        return not larger.doubt.acting and gain < FORM_SHARE * explained
+
+    def predicts_better(self, larger: Fit, smaller: Fit) -> bool:
+        """Whether what a set adds lessens the errors over the horizon, of the very trials that it was fitted to."""
+        fold = Fold(self.fits[()], larger, {"": smaller}, self.trials)
+        return gains_of([fold], fold.without, self.horizon_s, self.seed)[""].is_material
+
+    def leaves_noise(self, fitted: Fit) -> bool:
+        """Whether a fit has no lack of fit, and its random effort is small."""
+        return not (are_large(random_parts(fitted)) or driven_remainder(fitted, self.seed).unexplained)
+
+    def better_form(self, fitted: Fit) -> Fit | None:
+        """A set with one refinement of a form fewer, one more, or all begun again, where that is better."""
+        return self.forms.simplified(fitted) or self.forms.refined(fitted) or self.forms.reformed(fitted)
+
+    def other_form(self, fitted: Fit) -> Fit | None:
+        """See `LikelihoodForms.otherwise`."""
+        return self.forms.otherwise(fitted)
+
+
+class LikelihoodSearch(Search[Fit]):
+    """The search over sets of causes of one study by the likelihood."""
+
+    models: LikelihoodModels
+
+
+__all__ = ["Found", "LikelihoodModels", "LikelihoodSearch"]

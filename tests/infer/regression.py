@@ -1,0 +1,145 @@
+"""A front end of inference that knows no rig: linear regression of repeated runs, with candidate columns and groups."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.infer.distributions import chi2_tail, f_tail
+from fes_pin.infer.family import Family
+from fes_pin.infer.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
+from fes_pin.infer.search import Names
+
+COUNT = 60
+"""Samples of a run."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A fitted set of columns; `values` and `covariance` are those of the candidates, in the order of their names."""
+
+    sse: float
+    degrees: int
+    values: np.ndarray
+    covariance: np.ndarray
+    residual: np.ndarray
+
+    @property
+    def price(self) -> float:
+        return self.sse + PARAMETER_PRICE * self.degrees
+
+
+class Regression:
+    """Sets of columns fitted to runs that are repeats of each other, or of their group.
+
+    Parameters
+    ----------
+    columns
+        Candidates by name, each of shape (COUNT,).
+    runs
+        What was measured, shape (runs, COUNT), noise of unit variance.
+    groups
+        Of each run, 0 or 1: a column by the name `name@1` acts in the runs of group 1 alone.
+    """
+
+    most_candidates: int | None = 3
+
+    def __init__(self, columns: dict[str, np.ndarray], runs: np.ndarray, groups: np.ndarray | None = None) -> None:
+        count = len(runs)
+        self.runs, self.groups = runs, np.zeros(count, int) if groups is None else groups
+        self.columns = {n: np.tile(c, count) for n, c in columns.items()}
+        if groups is not None:
+            in_group = np.repeat(groups == 1, COUNT)
+            self.columns |= {f"{n}@1": np.tile(c, count) * in_group for n, c in columns.items()}
+        self.fits: dict[Names, Line] = {}
+
+    def fit(self, names: Names) -> Line:
+        y, one = self.runs.ravel(), np.ones(self.runs.size)
+        x = np.stack([one, *(self.columns[n] for n in names)], axis=1)
+        values, *_ = np.linalg.lstsq(x, y, rcond=None)
+        left = y - x @ values
+        covariance = np.linalg.pinv(x.T @ x)
+        return Line(float(left @ left), len(names), values[1:], covariance[1:, 1:], left.reshape(self.runs.shape))
+
+    def nominal(self) -> Line:
+        self.fits[()] = self.fit(())
+        return self.fits[()]
+
+    def _projected(self, names: Names) -> dict[str, np.ndarray]:
+        """Further columns, without the part that a set takes up."""
+        x = np.stack([np.ones(self.runs.size), *(self.columns[n] for n in names)], axis=1)
+        basis = np.linalg.qr(x)[0]
+        return {n: c - basis @ (basis.T @ c) for n, c in self.columns.items() if n not in names}
+
+    def _scores(self, names: Names) -> dict[str, float]:
+        left = self.fits[names].residual.ravel()
+        return {n: float((c @ left) ** 2 / (c @ c)) for n, c in self._projected(names).items() if c @ c > 1e-9}
+
+    def family(self) -> Family:
+        x = np.stack(list(self._projected(()).values()), axis=1)
+        return Family(x.T @ x, [slice(k, k + 1) for k in range(x.shape[1])], seed=0)
+
+    def extend(self, base: Names, most: int | None = None) -> None:
+        scores = self._scores(base)
+        for name in sorted(scores, key=lambda n: -scores[n])[:most]:
+            names = tuple(sorted((*base, name)))
+            self.fits.setdefault(names, self.fit(names))
+
+    def extend_by_pairs(self, most: int) -> None:
+        """Of a linear model every pair has its better half among the singles."""
+
+    def converge(self, size: int, without: object = ()) -> None:
+        """Linear fits have converged."""
+
+    def converge_rivals(self, base: Names, name: str) -> None:
+        """Linear fits have converged."""
+
+    def ranked(self, size: int) -> list[Names]:
+        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (self.fits[n].price, n))
+
+    def near(self, size: int, without: object = ()) -> list[Names]:
+        return [n for n in self.ranked(size) if n not in without]
+
+    def without(self, names: Names, name: str) -> Line:
+        rest = tuple(n for n in names if n != name)
+        return self.fits.setdefault(rest, self.fit(rest))
+
+    def is_possible(self, fitted: Line) -> bool:
+        return True
+
+    def smallest_p_value(self, fitted: Line) -> float:
+        names = next(n for n, f in self.fits.items() if f is fitted)
+        return min((float(chi2_tail(s, 1)) for s in self._scores(names).values()), default=1.0)
+
+    def excess_scatter(self, larger: Line, smaller: Line) -> float:
+        return 1.0
+
+    def level(self, fitted: Line) -> float:
+        return CLAIM_LEVEL
+
+    def is_error_of_form(self, larger: Line, gain: float, explained: float) -> bool:
+        return False
+
+    def predicts_better(self, larger: Line, smaller: Line) -> bool:
+        return larger.price < smaller.price
+
+    def leaves_noise(self, fitted: Line) -> bool:
+        """The test of lack of fit against pure error: repeats share their columns (Draper and Smith 1998, 2.1)."""
+        means = [fitted.residual[self.groups == g].mean(axis=0) for g in np.unique(self.groups)]
+        sizes = [int((self.groups == g).sum()) for g in np.unique(self.groups)]
+        between = sum(n * float(m @ m) for n, m in zip(sizes, means, strict=True))
+        free = COUNT * len(sizes) - fitted.degrees - 1
+        pure = fitted.sse - between
+        return f_tail((between / free) / (pure / (self.runs.size - COUNT * len(sizes))), free, self.runs.size) > 0.01
+
+    def better_form(self, fitted: Line) -> None:
+        return None
+
+    def other_form(self, fitted: Line) -> None:
+        return None
+
+
+def equivalents(best: Line, rivals: list[Line], fits: dict[Names, Line]) -> list[Names]:
+    """Sets that a difference of `SEPARABLE` in price does not tell from the best."""
+    return [n for n, f in fits.items() if any(f is r for r in rivals) and f.price < best.price + SEPARABLE]

@@ -1,0 +1,51 @@
+"""Error rates: the family of tests, and coherence between units."""
+
+import numpy as np
+import pytest
+import scipy.stats
+
+from fes_pin.infer.family import Family, coherence_p_value
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6, 0.95])
+def test_the_family_wise_error_is_what_it_says(correlation):
+    """Under the null the smallest of 40 correlated tests, of one and two degrees, is below 5 % in 5 % of studies."""
+    rng = np.random.default_rng(0)
+    count, runs = 60, 4000
+    gram = (1.0 - correlation) * np.eye(count) + correlation
+    gram *= np.outer(scale := rng.uniform(0.1, 10.0, count), scale)
+    blocks = [slice(k, k + 1) for k in range(20)] + [slice(20 + 2 * k, 22 + 2 * k) for k in range(20)]
+    family = Family(gram, blocks, seed=1)
+    draws = rng.standard_normal((runs, count)) @ np.linalg.cholesky(gram).T
+    smallest = np.ones(runs)
+    for block in blocks:
+        part = draws[:, block]
+        gains = np.einsum("ni,ni->n", part @ np.linalg.inv(gram[block, block]), part)
+        smallest = np.minimum(smallest, scipy.stats.chi2.sf(gains, block.stop - block.start))
+    false = sum(family.adjusted(p) < 0.05 for p in smallest)
+    low, high = scipy.stats.binom.interval(0.999, runs, 0.05)
+    spread = 3.3 * 0.07 * 0.05 * runs  # of the critical value itself, which 4000 draws give to 7 %
+    assert low - spread <= false <= high + spread
+    assert 1.0 <= family.tests <= len(blocks) * (1.0 + 3.3 * 0.07)
+
+
+def test_one_test_alone_keeps_its_p_value():
+    family = Family(np.array([[4.0]]), [slice(0, 1)], seed=0)
+    assert family.tests == pytest.approx(1.0, abs=0.25)
+    assert family.p_value(0.0, 1) == pytest.approx(1.0)
+    assert family.p_value(40.0, 1) < 1e-8
+
+
+def test_coherence_is_uniform_under_the_null():
+    """A direction in every unit, noise of unknown size: F-distributed, so that p-values are uniform."""
+    rng = np.random.default_rng(2)
+    p_values = []
+    for _ in range(300):
+        size = rng.uniform(0.5, 3.0)
+        directions = [rng.standard_normal(60) for _ in range(8)]
+        few = [size * rng.standard_normal(60) for _ in range(8)]
+        along = sum(x @ e for x, e in zip(directions, few, strict=True)) / sum(x @ x for x in directions)
+        many = [e - along * x for x, e in zip(directions, few, strict=True)]
+        gain = sum(float(e @ e) for e in few) - sum(float(e @ e) for e in many)
+        p_values.append(coherence_p_value(few, many, gain, 1))
+    assert scipy.stats.kstest(p_values, "uniform").pvalue > 1e-3
