@@ -15,6 +15,8 @@ from fes_pin.data.schema import NumberKey, any_number
 from fes_pin.models.maths import is_expression
 
 _KEY = "fes_pin"
+ROUNDING = 1e-12
+"""Share of a bound by which a value may lie beyond it: sums of double precision end so near it, and no nearer."""
 ANY_NUMBER = any_number("")
 ROTARY = {"q": "rad", "y": "rad", "effort": "N m"}
 """Units of a revolute joint."""
@@ -61,6 +63,12 @@ class ParameterInfo:
     optional: bool = False
     rigs: tuple[str, ...] = ()
     times: str = ""
+
+    def holds(self, value: float) -> bool:
+        """Whether a value is within the bounds, or beyond one by no more than rounding, as a fit may end at it."""
+        return self.lower <= value <= self.upper or any(
+            math.isclose(value, bound, rel_tol=ROUNDING) for bound in (self.lower, self.upper)
+        )
 
     def in_units(self, units: Mapping[str, str]) -> ParameterInfo:
         """The same with the unit that it has on a rig.
@@ -136,7 +144,7 @@ def check_parameters(thing: Any, keys: Mapping[str, NumberKey] | None = None) ->
         if (type(value) is float and info.lower <= value <= info.upper) or is_expression(value):
             continue
         number = checked_number(value, name)
-        if keys and name in keys and not info.lower <= number <= info.upper:
+        if keys and name in keys and not info.holds(number):
             checked_number(number, name, keys[name])
-        elif not info.lower <= number <= info.upper:
+        elif not info.holds(number):
             raise InputError(f"expected a number from {info.lower:g} to {info.upper:g}, found {number:g}", column=name)
