@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import sys
 import tempfile
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
 
 
 @needs(
-    **dict.fromkeys(("urdf", "rig", "name", "column", "setting", "resample", "fill", "library"), "files"),
+    **dict.fromkeys(
+        ("urdf", "rig", "name", "column", "setting", "role", "group", "resample", "fill", "library"), "files"
+    ),
     upright="pendulum rod",
 )
 def new_study(
@@ -59,6 +62,10 @@ def new_study(
         list[str] | None,
         typer.Option("--set", help="A number: load_kg=1, a.csv:load_kg=1.5, rig.damping=0.1; kind=isometric."),
     ] = None,
+    role: Annotated[
+        list[str] | None, typer.Option(help="Of a trial: a.csv=held_out; with * of several: late*=held_out.")
+    ] = None,
+    group: Annotated[list[str] | None, typer.Option(help="Of a trial, for contrasts: before*=before.")] = None,
     resample: Annotated[
         float | None, typer.Option(min=0.0, help="Hz: interpolate times that are not equally spaced.")
     ] = None,
@@ -90,19 +97,20 @@ def new_study(
         typer.echo(f"wrote {(out or Path()) / template[0]}")
         return
     catalogue = load_library(*(library or []))
-    given: Mapping[str, object] = {"columns": pairs("--column", column), "settings": pairs("--set", setting)}
+    given: dict[str, dict[str, str]] = {"columns": pairs("--column", column), "settings": pairs("--set", setting)}
+    given |= {"role": pairs("--role", role), "group": pairs("--group", group)}
     with _urdf_file(template, urdf) as path:
         wanted = _wanted(files, rig, out, name, catalogue, template or urdf, path, resample, fill, given)
         check_folder(wanted.folder)
         if os.path.lexists(wanted.folder / "study.toml") and not force:
             raise InputError("is there already; --force writes over it", file=wanted.folder / "study.toml")
         if wanted.schema.owner is None:
-            made = new_body_study(wanted.files, wanted.folder, wanted.name, wanted.settings)
+            made = new_body_study(wanted)
         else:
             made = make(wanted, lambda known: guess_start(wanted.schema.owner, known, path))
     outputs = Outputs("new-study", force)
     outputs.check(wanted.folder, made.contents)
-    study, warnings = _tried(made, wanted.folder, catalogue)
+    study, warnings = _tried(made, wanted, catalogue)
     outputs.write(wanted.folder, made.contents)
     for own, theirs, unit in made.taken:
         typer.echo(f"{own:16s} is {theirs}{f', in {unit}' if unit else ''}")
@@ -114,8 +122,8 @@ def new_study(
     typer.echo("\n".join(odd_lines(study, warnings)))
     place = wanted.folder / "study.toml"
     typer.echo(
-        f"wrote {place}: look at it, then run\n  fes-pin check {wanted.folder}\n"
-        f"  fes-pin diagnose {wanted.folder} --out answer"
+        f"wrote {place}: look at it, then run\n  {shlex.join(['fes-pin', 'check', str(wanted.folder)])}\n"
+        f"  {shlex.join(['fes-pin', 'diagnose', str(wanted.folder)])} --out answer"
     )
 
 
@@ -176,7 +184,7 @@ def _wanted(
     urdf_file: Path | None,
     resample: float | None,
     fill: bool,
-    given: Mapping[str, object],
+    given: Mapping[str, Mapping[str, str]],
 ) -> Wanted:
     from fes_pin.data.errors import InputError
     from fes_pin.data.new_study import common_folder
@@ -189,8 +197,10 @@ def _wanted(
         schema = rigs[one_of(rig or "joint", tuple(rigs))]
     except ValueError as problem:
         raise InputError(str(problem), column="--rig") from None
-    if schema.owner is None and (urdf is not None or given["columns"] or resample or fill):
-        raise InputError("expected no URDF, --column, --resample or --fill for walking", column="--rig")
+    if schema.owner is None and (urdf is not None or given["columns"] or resample or fill or catalogue.origins()):
+        raise InputError("expected no URDF, --column, --resample, --fill or --library for walking", column="--rig")
+    if resample == 0.0:
+        raise InputError("expected a rate above 0 Hz", column="--resample")
     if schema.owner is not None and ("urdf" in schema.files) != (urdf is not None):
         told = "--urdf FILE, or --pendulum LENGTH MASS, --rod or --slide" if urdf is None else "no URDF"
         raise InputError(f"expected {told} for rig {schema.name}", column="--urdf")
@@ -200,7 +210,7 @@ def _wanted(
     if doubles:
         raise InputError("was named twice", file=doubles[0])
     folder = out or common_folder(files)
-    settings = dict(given["settings"])  # type: ignore[call-overload]
+    settings = dict(given["settings"])
     return Wanted(
         files=tuple(files),
         schema=schema,
@@ -208,9 +218,10 @@ def _wanted(
         name=name or folder.absolute().name or "study",
         urdf=urdf,
         revolute=is_revolute(urdf_file),
-        columns=dict(given["columns"]),  # type: ignore[call-overload]
+        columns=given["columns"],
         settings=settings,
-        kind=settings.pop("kind", None),
+        kind=None if schema.owner is None else settings.pop("kind", None),
+        labels={key: given[key] for key in ("role", "group")},
         resample_hz=resample or None,
         fill=fill,
         ask=_ask if sys.stdin.isatty() and sys.stdout.isatty() else None,
@@ -222,18 +233,19 @@ def _ask(question: str) -> str:
     return str(typer.prompt(question, default="", show_default=False))
 
 
-def _tried(made: NewStudy, folder: Path, catalogue: Catalogue) -> tuple[Study, list[str]]:
+def _tried(made: NewStudy, wanted: Wanted, catalogue: Catalogue) -> tuple[Study, list[str]]:
     """The study as it will be read, and what is odd about it, before anything of it is written where it belongs.
 
     Raises
     ------
     InputError
-        As `read_study`; of the files that were given, not of their copies.
+        As `read_study`; of the files and options that were given, not of copies and of what is not written yet.
     """
     from fes_pin.data.errors import InputError
     from fes_pin.data.study import read_study
     from fes_pin.diagnosis.checked import odd_numbers
 
+    folder = wanted.folder
     with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
         try:
             study = read_study(_staged(made, folder, Path(scratch)), rigs=catalogue.schemas())
@@ -242,8 +254,25 @@ def _tried(made: NewStudy, folder: Path, catalogue: Catalogue) -> tuple[Study, l
             if error.file is None or not Path(error.file).is_relative_to(scratch):
                 raise
             place = Path(error.file).relative_to(scratch).as_posix()
+            if place == "study.toml":
+                raise InputError(error.message, column=_option_of(error.column or "", wanted)) from None
             file = folder if place == "." else made.origins.get(place, folder / place)
             raise InputError(error.message, file=file, row=error.row, column=error.column) from None
+
+
+def _option_of(key: str, wanted: Wanted) -> str:
+    """The option that said what stands under a key of a study.toml."""
+    table, _, last = key.rpartition(".")
+    if table == "study" or key == "rig.urdf":
+        return f"--{last}"
+    if key.startswith("columns."):
+        column = key.split(".")[1]
+        return f"--column {column}" if column != "file" else "--resample" if "resample" in last else "--fill"
+    if table.startswith("trial[") and last in ("role", "group"):
+        return f"--{last}"
+    if table.startswith("trial[") and wanted.schema.owner is not None:
+        return f"--set {wanted.files[int(table[6:-1])].name}:{last}"
+    return f"--set {last}"
 
 
 def _staged(made: NewStudy, folder: Path, scratch: Path) -> Path:

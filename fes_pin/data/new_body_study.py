@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
@@ -11,24 +10,21 @@ from fes_pin.data.motion import coordinates_of, ground_reaction_of, read_motion
 from fes_pin.data.new_study import NewStudy, copied
 from fes_pin.data.schema import BODY, unknown
 from fes_pin.data.study_text import HEADER, quoted
-from fes_pin.data.wanted import number_set
+from fes_pin.data.wanted import Wanted, label_lines, number_set
 
 
-def new_body_study(files: Sequence[Path], folder: Path, name: str, settings: Mapping[str, str]) -> NewStudy:
+def new_body_study(wanted: Wanted) -> NewStudy:
     """Propose a study of a walking body: the first coordinates go with the first ground reaction.
 
-    Parameters
-    ----------
-    files
-        `.mot`, `.sto` or CSV, named as the study format says; files inside the folder stay, others are copied.
-    settings
-        `mass_kg` and `height_m`, and conditions of all trials.
+    Its files are `.mot`, `.sto` or CSV, named as the study format says; what is set is `mass_kg` and `height_m`, and
+    conditions of all trials.
 
     Raises
     ------
     InputError
         A file that is neither, files that do not pair, numbers that are missing or none.
     """
+    files, folder, settings = wanted.files, wanted.folder, wanted.settings
     moves: list[Path] = []
     pushes: list[Path] = []
     for path in files:
@@ -44,7 +40,7 @@ def new_body_study(files: Sequence[Path], folder: Path, name: str, settings: Map
         raise InputError(f"the files do not say everything; please add {', '.join(missing)}")
     contents: dict[str, str | bytes] = {}
     rig = [f"{key} = {number_set(key, settings[key], BODY.constants[key])!r}" for key in BODY.either]
-    text = [*HEADER, "", "[study]", f"name = {quoted(name)}", 'rig = "body"', "", "[rig]", *rig]
+    text = [*HEADER, "", "[study]", f"name = {quoted(wanted.name)}", 'rig = "body"', "", "[rig]", *rig]
     given = {key: number_set(key, settings[key], n) for key, n in BODY.conditions.items() if key in settings}
     conditions = [f"{key} = {value!r}" for key, value in given.items()]
     origins: dict[str, Path] = {}
@@ -52,7 +48,7 @@ def new_body_study(files: Sequence[Path], folder: Path, name: str, settings: Map
         places = [_place(path, folder, contents) for path in (move, push)]
         origins.update(zip(places, (move, push), strict=True))
         text += ["", "[[trial]]", f"coordinates = {quoted(places[0])}", f"ground_reaction = {quoted(places[1])}"]
-        text += conditions
+        text += [*label_lines(wanted, move, push), *conditions]
     contents["study.toml"] = "\n".join(text) + "\n"
     return NewStudy(contents, (), origins, ("motion",))
 

@@ -5,7 +5,7 @@ What the files do not say is taken from options, or asked of a person at a termi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from fes_pin.data.study_text import (
     toml_value,
 )
 from fes_pin.data.units import known_unit, own_unit, quantities_of
-from fes_pin.data.wanted import Wanted, number_set
+from fes_pin.data.wanted import Wanted, label_lines, number_set, of_files
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,7 @@ class _Making:
     def __init__(self, wanted: Wanted) -> None:
         self.wanted, self.schema = wanted, wanted.schema
         self.missing: list[str] = []
+        self.own = of_files(wanted.files, "--set", wanted.settings)
         self.proposals = [propose(path, self.schema, wanted.revolute) for path in wanted.files]
         self.form = self._one_form()
         self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
@@ -90,7 +91,7 @@ class _Making:
         passive = self._numbers("rig.passive", self.schema.passive)
         trials = [self._trial(p, kind) for p, kind in zip(self.proposals, kinds, strict=True)]
         known, start = self._start({**rig, **passive}, guess)
-        self._check_settings()
+        self._check_settings(sorted(set(kinds)))
         if self.missing:
             raise InputError("the files do not say everything; please add " + ", ".join(dict.fromkeys(self.missing)))
         contents: dict[str, str | bytes] = {}
@@ -103,8 +104,14 @@ class _Making:
             *toml_table("start", start, "start values of what the nominal model fits", self._units()),
             *self._columns(sources),
         ]
-        for place, kind, conditions in zip(places, kinds, trials, strict=True):
-            text += ["", "[[trial]]", f"file = {quoted(place)}", f"kind = {quoted(kind)}"]
+        for path, place, kind, conditions in zip(self.wanted.files, places, kinds, trials, strict=True):
+            text += [
+                "",
+                "[[trial]]",
+                f"file = {quoted(place)}",
+                f"kind = {quoted(kind)}",
+                *label_lines(self.wanted, path),
+            ]
             text += [f"{key} = {toml_value(value)}" for key, value in conditions.items()]
         contents["study.toml"] = "\n".join([*HEADER, *text]) + "\n"
         taken = tuple(
@@ -126,7 +133,7 @@ class _Making:
         given = self._own(path, "kind") or self.wanted.kind
         if given is not None:
             if given not in outputs:
-                raise InputError(f"expected one of {', '.join(outputs)}, found {given!r}", column="--kind")
+                raise InputError(f"expected one of {', '.join(outputs)}, found {given!r}", column="--set kind")
             return given
         fits = [k for k, c in outputs.items() if c in self.wanted.columns or proposal.candidates[c]]
         default = self.schema.default_kind
@@ -135,14 +142,7 @@ class _Making:
 
     def _own(self, path: Path, key: str) -> str | None:
         """What was set for one file alone."""
-        return next(
-            (
-                self.wanted.settings[f"{n}:{key}"]
-                for n in (path.name, path.stem)
-                if f"{n}:{key}" in self.wanted.settings
-            ),
-            None,
-        )
+        return self.own.get((path, key))
 
     def _sources(self, kinds: set[str]) -> dict[str, dict[str, Any]]:
         """For each of the rig's columns what `[columns]` says of it."""
@@ -167,7 +167,7 @@ class _Making:
     def _source(self, column: str, is_needed: bool) -> dict[str, Any] | None:
         option = self.wanted.columns.get(column)
         if option is not None:
-            return source_from_option(column, option, self.names) if option else None
+            return self._told(column, option)
         candidates = self._candidates(column)
         if len(candidates) != 1:
             if not is_needed and len(candidates) < 2:
@@ -179,7 +179,7 @@ class _Making:
 
     def _with_unit(self, column: str, name: str) -> dict[str, Any] | None:
         """The column of that name, and the unit that it seems to be in."""
-        unit = next((u for p in self.proposals if (u := p.units.get(name))), "")
+        unit = self._unit_of(name)
         quantities = quantities_of(column, self.wanted.revolute)
         if name == column or not quantities or quantities == ("pulses",):
             return {"name": name}
@@ -201,7 +201,24 @@ class _Making:
             self.missing.append(what)
             return None
         answer = self.wanted.ask(what.removeprefix("--column ")).strip().removeprefix(f"{column}=")
-        return source_from_option(column, answer, self.names) if answer else None
+        return self._told(column, answer)
+
+    def _told(self, column: str, words: str) -> dict[str, Any] | None:
+        """What somebody said of a column, in the unit that the file states where they named none."""
+        source = source_from_option(column, words, self.names) if words else None
+        if source is None or source.keys() & {"unit", "rate_hz", "edge"}:
+            return source
+        stated = known_unit(self._unit_of(source["name"]), quantities_of(column, self.wanted.revolute))
+        if stated is None or stated[1] == own_unit(column, self.wanted.revolute):
+            return source
+        if abs(source.get("scale", 1.0)) != 1.0:
+            message = f"a scale, and the file says {stated[1]}: expected NAME:UNIT,scale=NUMBER, found {words!r}"
+            raise InputError(message, column=f"--column {column}")
+        return {"name": source["name"], "unit": stated[1], **source}
+
+    def _unit_of(self, name: str) -> str:
+        """The unit of a column as the files state it; "" where none does."""
+        return next((u for p in self.proposals if (u := p.units.get(name))), "")
 
     def _number(self, key: str, unit: str, number: Any, path: Path | None = None) -> float | None:
         """A number that somebody gave; None, and it is missing, if nobody has."""
@@ -234,6 +251,8 @@ class _Making:
         needed = self.schema.needed.get(kind, {})
         for key, number in self.schema.conditions.items():
             if self.schema.only.get(key, kind) != kind:
+                if self._own(path, key) is not None:
+                    raise InputError(f"{path.name} makes a {kind} trial, which has none", column=f"--set {key}")
                 continue
             if key in needed or key in self.wanted.settings or self._own(path, key) is not None:
                 value = self._number(key, number.unit, number, path)
@@ -256,18 +275,20 @@ class _Making:
                 start[key] = float(f"{guessed[key]:.3g}")
         return known, start
 
-    def _check_settings(self) -> None:
-        """Refuse a setting that nothing reads."""
+    def _check_settings(self, kinds: Collection[str]) -> None:
+        """Refuse what was said and nothing reads."""
         schema = self.schema
         known = [*schema.constants, *schema.passive, *schema.start, *schema.conditions]
         also = [f"rig.{key}" for key in schema.start] if schema.start_may_be_known else []
-        files = {n for path in self.wanted.files for n in (path.name, path.stem)}
         for key in self.wanted.settings:
             file, _, last = key.rpartition(":")
-            if file and file not in files:
-                raise InputError(f"expected one of the files, found {file!r}", column=f"--set {key}")
             if last not in ([*schema.conditions, "kind"] if file else [*known, *also]):
                 raise InputError(unknown(last, known), column=f"--set {key}")
+            if not file and (kind := schema.only.get(key)) not in (None, *kinds):
+                raise InputError(f"no trial is of kind {kind}, and others have none", column=f"--set {key}")
+        read = {"time_s", *(c for kind in kinds for c in schema.columns_of(kind))}
+        if unread := [c for c in self.wanted.columns if c not in read]:
+            raise InputError(f"no trial of kind {' or '.join(kinds)} reads it", column=f"--column {unread[0]}")
 
     def _urdf(self, contents: dict[str, str | bytes]) -> dict[str, str]:
         urdf = self.wanted.urdf

@@ -124,6 +124,13 @@ def factor_of(unit: str, column: str, revolute: bool | None = None) -> float:
     raise ValueError(f"expected a unit of {' or '.join(quantities)}: {', '.join(expected)}; found {unit[:40]!r}")
 
 
+def unit_in_name(name: str, column: str, revolute: bool | None = None) -> str:
+    """The unit in brackets behind a name, where it is one of the quantity of a rig's column; "" where there is none."""
+    found = _BRACKETED.match(name.strip())
+    known = known_unit(found["unit"], quantities_of(column, revolute)) if found and found["unit"] else None
+    return known[1] if known else ""
+
+
 def own_unit(column: str, revolute: bool | None = None) -> str:
     """The unit that the study format has in a column; "" where it has none."""
     quantities = quantities_of(column, revolute)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from glob import escape
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number_in
-from fes_pin.data.schema import NumberKey, RigSchema
+from fes_pin.data.schema import ROLES, NumberKey, RigSchema
+from fes_pin.data.study_text import quoted
 
 Ask = Callable[[str], str]
 """Puts a question to a person and gives the answer."""
@@ -38,6 +40,8 @@ class Wanted:
         By key, numbers of the rig, start values, conditions of all trials; by `FILE:key` of one trial alone.
     kind
         Of all trials; None to be told from their columns.
+    labels
+        Of trials: by "role" and "group" what was said of files, by `FILE`.
     resample_hz, fill
         See `[columns.file]`.
     ask
@@ -53,6 +57,7 @@ class Wanted:
     columns: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, str] = field(default_factory=dict)
     kind: str | None = None
+    labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     resample_hz: float | None = None
     fill: bool = False
     ask: Ask | None = None
@@ -70,3 +75,50 @@ def number_set(key: str, text: str, number: NumberKey) -> float:
         return number.check(number_in(text))
     except ValueError as problem:
         raise InputError(str(problem), column=f"--set {key}") from None
+
+
+def of_files(files: Sequence[Path], option: str, said: Mapping[str, str]) -> dict[tuple[Path, str], str]:
+    """What was said of files, as `FILE`, or as `FILE:KEY` of --set, by file and key ("" for none).
+
+    A file is named by the end of its path, with or without its suffix; a pattern with * may name several.
+
+    Raises
+    ------
+    InputError
+        A name of no file, or of several; the same said twice of a file.
+    """
+    out: dict[tuple[Path, str], str] = {}
+    for words, value in said.items():
+        name, colon, key = words.rpartition(":") if option == "--set" else (words, ":", "")
+        if not colon:
+            continue
+        place = f"{option} {words}"
+        pattern = name if "*" in name else escape(name)
+        found = [path for path in files if name and (path.match(pattern) or path.with_suffix("").match(pattern))]
+        if not found:
+            raise InputError(f"expected one of the files, found {name!r}", column=place)
+        if len(found) > 1 and "*" not in name:
+            raise InputError(f"names several files: expected {' or '.join(map(str, found))}", column=place)
+        for path in found:
+            if (path, key) in out:
+                raise InputError(f"is said twice of {path.name}", column=place)
+            out[path, key] = value
+    return out
+
+
+def label_lines(wanted: Wanted, *files: Path) -> list[str]:
+    """Role and group of the trial that files make, as lines of its table.
+
+    Raises
+    ------
+    InputError
+        As `of_files`; a role that is none.
+    """
+    lines = []
+    for key, said in wanted.labels.items():
+        found = of_files(wanted.files, f"--{key}", said)
+        for label in [found[path, ""] for path in files if (path, "") in found][:1]:
+            if key == "role" and label not in ROLES:
+                raise InputError(f"expected one of {', '.join(ROLES)}; found {label!r}", column=f"--{key}")
+            lines.append(f"{key} = {quoted(label)}")
+    return lines

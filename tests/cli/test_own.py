@@ -213,10 +213,10 @@ WRONG = {
     "unknown_setting": (("FILE", "--rod", 1, 1, "--set", "mass=1"), "--set mass"),
     "no_number": (("FILE", "--rod", 1, 1, "--set", "damping=x"), "--set damping: expected a number, found 'x'"),
     "negative": (("FILE", "--rod", 1, 1, "--set", "damping=-1"), "--set damping: expected a number of at least 0"),
-    "wrong_unit": (("FILE", "--rod", 1, 1, "--column", "position=Winkel [°]:mm"), "position.unit: expected a unit"),
+    "wrong_unit": (("FILE", "--rod", 1, 1, "--column", "position=Winkel [°]:mm"), "--column position: expected a unit"),
     "other_file": (("FILE", "--rod", 1, 1, "--set", "x.csv:start_s=1"), "expected one of the files, found 'x.csv'"),
     "twice": (("FILE", "FILE", "--rod", 1, 1), "was named twice"),
-    "kind": (("FILE", "--rod", 1, 1, "--set", "kind=isometric"), "--kind: expected one of motion"),
+    "kind": (("FILE", "--rod", 1, 1, "--set", "kind=isometric"), "--set kind: expected one of motion"),
 }  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from fes_pin.data.recorded.regular import check_steps, filled, resampled
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
 from fes_pin.data.schema import RigSchema, one_of, unknown
 from fes_pin.data.table import Table
-from fes_pin.data.units import factor_of
+from fes_pin.data.units import factor_of, unit_in_name
 
 FILE_KEYS = ("delimiter", "decimal", "header_row", "first_row", "comment", "encoding", "resample_hz", "missing")
 SOURCE_KEYS = ("name", "unit", "scale", "zero", "edge", "rate_hz")
@@ -244,6 +244,9 @@ def _source(column: str, value: Any, revolute: bool | None, error: Callable[[str
         raise error(f"{column}.unit", "expected a unit as text")
     if rate is None and (not isinstance(name, str) or not name):
         raise error(f"{column}.name", "expected the name of a column of the files")
+    stated = "" if unit or "scale" in numbers else unit_in_name(name, column, revolute)
+    if stated and factor_of(stated, column, revolute) != 1.0:
+        raise error(f"{column}.unit", f"missing, and the name says {stated}: expected the unit of the numbers")
     try:
         factor = factor_of(unit, column, revolute) if unit else 1.0
     except ValueError as problem:
