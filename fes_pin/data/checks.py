@@ -107,7 +107,9 @@ def _not_read(name: str, schema: RigSchema, kind: str) -> str:
     return unread(name, schema.columns_of(kind))
 
 
-def check_values(columns: Mapping[str, np.ndarray], schema: RigSchema, error: Fault) -> None:
+def check_values(
+    columns: Mapping[str, np.ndarray], schema: RigSchema, error: Fault, threshold_us: float = math.inf
+) -> None:
     """Refuse what no stimulator, joint or muscle does: it is in another unit.
 
     Parameters
@@ -116,13 +118,15 @@ def check_values(columns: Mapping[str, np.ndarray], schema: RigSchema, error: Fa
         By name, each of shape (n,), finite.
     schema
         Of the rig.
+    threshold_us
+        Of its recruitment, where that is known: widths above it are in its unit.
     """
     if "pulse_width_us" in columns:
         width = columns["pulse_width_us"]
         if (least := float(width.min())) < 0.0:
             told = f"expected a pulse width of at least 0 us, found {least:g}"
             raise error(told, "pulse_width_us", int(np.argmax(width < 0.0)))
-        if 0.0 < (most := float(width.max())) <= SHORTEST_PULSE_US:
+        if 0.0 < (most := float(width.max())) <= min(SHORTEST_PULSE_US, threshold_us):
             told = f"reaches {most:.4g} us, and no pulse is so short: is it in {'ms' if most > 0.002 else 's'}?"
             raise error(told, "pulse_width_us", int(np.argmax(width)))
     if "stim" in columns and (other := ~np.isin(columns["stim"], (0.0, 1.0))).any():

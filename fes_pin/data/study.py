@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path, PurePosixPath
@@ -97,6 +97,8 @@ class Study(ReadOnly):
         check_constants(schema, numbers["constants"], self.files, partial(_fault, "constants or files"))
         trials = tuple(self.trials)
         self._check_trials(trials, schema)
+        if schema.inputs_required:  # else a trial without an input is one that nothing drives
+            check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
         horizon = {HORIZON: self.horizon_s} if self.horizon_s is not None else {}
         checked_numbers(horizon, {HORIZON: NumberKey("s", 0.0, required=False)}, partial(_fault, "Study"))
         held = {**numbers, "files": {key: Path(path) for key, path in self.files.items()}}
@@ -117,18 +119,9 @@ class Study(ReadOnly):
         if odd := [one for one in trials if not isinstance(one, Trial)]:
             raise InputError(f"expected trials, found a {type(odd[0]).__name__}", column="trials")
         for trial in trials:
-            check_trial(trial, schema)
+            check_trial(trial, schema, threshold_us=-math.inf)  # `check` judges the widths of all together
         if twice := [name for name, count in Counter(t.name for t in trials).items() if count > 1]:
             raise InputError(f"two trials are named {twice[0]!r}; expected a name for each", column="trials")
-
-        def error(place: int | None, key: str, message: str) -> InputError:
-            return (
-                InputError(message, column=f"constants.{key}")
-                if place is None
-                else trials[place].error(message, "columns")
-            )
-
-        check_same_inputs([(t.kind, t.columns) for t in trials], schema, self.constants, error)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Study) or self is other:
@@ -188,6 +181,15 @@ class Study(ReadOnly):
         }
         given = {n: [t.conditions.get(n, math.nan) for t in self.trials] for n in conditions}
         return frame({**told, **given}, index="trial")
+
+
+def _fault_of(trials: Sequence[Trial]) -> Callable[[int | None, str, str], InputError]:
+    """Makes the error of a trial's place, or of the rig's constants."""
+
+    def error(place: int | None, key: str, message: str) -> InputError:
+        return _fault("constants", key, message) if place is None else trials[place].error(message, "columns")
+
+    return error
 
 
 def _fault(where: str, key: str, message: str) -> InputError:
@@ -326,9 +328,10 @@ def write_study(study: Study, folder: str | Path) -> None:
     InputError
         If a file of the study cannot be read, or the folder cannot be written.
     """
+    schema = study.schema
+    check_same_inputs([(t.kind, t.columns) for t in study.trials], schema, study.constants, _fault_of(study.trials))
     contents: dict[str, str | bytes] = {}
     rig: dict[str, Any] = {}
-    schema = study.schema
     for key, value in study.constants.items():
         (rig.setdefault("passive", {}) if key in schema.passive else rig)[key] = float(value)
     for key, path in study.files.items():

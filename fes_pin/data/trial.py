@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -248,13 +249,15 @@ def _numbers(values: Any, name: str, trial: Trial) -> np.ndarray:
     return array
 
 
-def check_trial(trial: Trial, schema: RigSchema, *, inputs_only: bool = False) -> None:
+def check_trial(trial: Trial, schema: RigSchema, *, inputs_only: bool = False, threshold_us: float = math.inf) -> None:
     """Require of a trial what a rig's schema asks: its kind, conditions, columns, and units that can be.
 
     Parameters
     ----------
     inputs_only
         Do not require the measured outputs, to predict them.
+    threshold_us
+        Of the rig, where it is known: pulse widths above it are in us.
 
     Raises
     ------
@@ -270,7 +273,7 @@ def check_trial(trial: Trial, schema: RigSchema, *, inputs_only: bool = False) -
     check_columns(tuple(trial.columns), schema, kind, inputs_only, trial.error)
     if "angle_rad" in trial.conditions:
         check_values({"angle_rad": np.array([trial.conditions["angle_rad"]])}, schema, lambda m, c, _: error(c, m))
-    check_values(trial.columns, schema, trial.error)
+    check_values(trial.columns, schema, trial.error, threshold_us)
 
 
 def read_trial(
@@ -359,7 +362,7 @@ def _checked_columns(
     check_columns(table.names[1:], schema, kind, inputs_only, table.error)
     check_time(table)
     columns = {name: table.column(name) for name in table.names[1:]}
-    check_values(columns, schema, table.error)
+    check_values(columns, schema, table.error, -math.inf)  # a study with its threshold judges widths
     return columns, table.values[:, 0]
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 
@@ -179,8 +181,9 @@ ODDITIES: Mapping[str, Odd] = {
 
 
 def odd_study(study: Study, rng: np.random.Generator) -> tuple[str, Study]:
-    """A study with one to three oddities, and their names."""
+    """A study with one to three oddities, and their names; what cannot be built is left as it was."""
     chosen = [str(n) for n in rng.choice(list(ODDITIES), size=int(rng.integers(1, 4)), replace=False)]
     for name in chosen:
-        study = ODDITIES[name](study, rng)
+        with contextlib.suppress(InputError):
+            study = ODDITIES[name](study, rng)
     return "+".join(chosen), study

@@ -41,7 +41,8 @@ def small_study(rng: np.random.Generator, rig: str) -> Study:
     count, seconds = int(rng.integers(2, 5)), float(rng.choice((1.0, 2.0)))
     time = np.arange(round(100 * seconds)) / 100
     trials = [_bare(rng, rig, f"{k:02d}", time, k) for k in range(count)]
-    study = _study(rig, trials)
+    read = {"motion": "angle_rad" if rig == "ankle" else "position", "isometric": "force_n"}
+    study = _study(rig, [t.with_columns(**{read[t.kind]: np.zeros(len(t))}) for t in trials])  # nothing is read yet
     model = nominal_model(study)
     true = {n: v * float(np.exp(rng.uniform(-0.2, 0.2))) for n, v in model.parameters().items()}
     start = [

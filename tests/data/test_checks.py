@@ -13,7 +13,7 @@ from data import studies
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import schema_of
-from fes_pin.data.study import Study, read_study
+from fes_pin.data.study import Study, read_study, write_study
 from fes_pin.data.trial import Trial, check_trial, derived_trial
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
@@ -147,8 +147,9 @@ def test_a_joint_needs_its_urdf_and_one_input_in_all_trials(tmp_path):
     with pytest.raises(InputError, match="urdf: missing"):
         Study("s", "joint", {}, start, (Trial("a", "motion", JOINT, TIME),))
     study = read_study(studies.joint(tmp_path))
+    mixed = replace(study, trials=(Trial("c", "motion", JOINT, TIME), *study.trials))  # nothing drives the others
     with pytest.raises(InputError, match="lacks the column effort and the first has it"):
-        replace(study, trials=(Trial("c", "motion", JOINT, TIME), *study.trials))
+        write_study(mixed, tmp_path / "mixed")
     with pytest.raises(InputError, match="also among the constants"):
         replace(study, constants={"damping": 1e-3})
 

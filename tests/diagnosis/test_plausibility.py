@@ -179,13 +179,16 @@ def test_a_warning_stands_in_all_that_is_written():
 def test_what_is_refused_of_a_study_is_refused_of_trials_to_predict(case):
     """But for what only a fit needs: a number of samples, outputs that change, a muscle that is stimulated."""
     rig, change, words = REFUSED[case]
-    study = change(study_of(rig))
-    to_predict = ToPredict(study.trials, study.schema, study.constants)
+
+    def predicted():
+        study = change(study_of(rig))
+        return check_study(ToPredict(study.trials, study.schema, study.constants), nominal_model(study))
+
     if case in ("never_stimulated", "faint", "constant", "hunting", "few_rows"):
-        check_study(to_predict, nominal_model(study))
+        predicted()
     else:
         with pytest.raises(InputError, match=words):
-            check_study(to_predict, nominal_model(study))
+            predicted()
 
 
 def test_trials_to_predict_need_no_outputs():

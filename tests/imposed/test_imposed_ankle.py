@@ -120,7 +120,9 @@ def test_nothing_hidden_is_adequate(tmp_path, seed):
 )
 def test_what_cannot_be_is_one_line_and_nothing_written(tmp_path, monkeypatch, capsys, spoil, words):
     good = made(tmp_path, seed=1)
-    write_study(replace(good, trials=tuple(t.with_columns(**spoil(t)) for t in good.trials)), tmp_path / "study")
+    write_study(good, tmp_path / "study")
+    for trial in good.trials:
+        write_trial(trial.with_columns(**spoil(trial)), tmp_path / "study" / "trials" / f"{trial.name}.csv")
     for command in (["diagnose", tmp_path / "study", "--out", tmp_path / "answer"], ["check", tmp_path / "study"]):
         assert run(monkeypatch, *command) == 2
         told = capsys.readouterr().err.strip()

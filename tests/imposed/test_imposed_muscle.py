@@ -121,7 +121,8 @@ def test_sensitivities_of_a_tendon_beside_force_velocity():
 
 def study_of(**columns):
     trial = on_a_lever(columns.pop("length_m", sine(TIME))).with_columns(force_n=12.0 * activation(), **columns)
-    return Study("lever", "muscle", {"threshold_us": 0.0, "saturation_us": 1.0}, {"gain": 1.0}, (trial,))
+    start = {"gain": 1.0, "time_constant_s": 0.05}
+    return Study("lever", "muscle", {"threshold_us": 0.0, "saturation_us": 1.0}, start, (trial,))
 
 
 @pytest.mark.parametrize(

@@ -32,8 +32,8 @@ def ankle_study(seconds: float = 3.0, step: float = 0.01) -> Study:
     time = np.arange(0.0, seconds, step)
     width = np.where((time > 0.2 * seconds) & (time < 0.7 * seconds), 640.0, 0.0)
     trials = (
-        Trial(f"up {NASTY}", "motion", {"pulse_width_us": width}, time, {"load_kg": 1.0}),
-        Trial("held", "isometric", {"pulse_width_us": width}, time, {"angle_rad": 1.9}),
+        Trial(f"up {NASTY}", "motion", {"pulse_width_us": width, "angle_rad": 0.0 * time}, time, {"load_kg": 1.0}),
+        Trial("held", "isometric", {"pulse_width_us": width, "force_n": 0.0 * time}, time, {"angle_rad": 1.9}),
     )
     start = {"gain": 0.65, "time_constant_s": 0.05, "inertia_kgm2": 1e-3, "damping_nms": 0.06}
     return Study(NASTY, "ankle", ANKLE, start, trials)
@@ -43,7 +43,7 @@ def muscle_study(column: str = "pulse_width_us") -> Study:
     time = np.arange(0.0, 2.0, 0.005)
     pulses = (np.arange(len(time)) % 8 == 0).astype(float)
     given = pulses if column == "stim" else np.where((time > 0.3) & (time < 1.5), 700.0, 0.0)
-    trials = tuple(Trial(f"{k}", "isometric", {column: given}, time, {}) for k in range(2))
+    trials = tuple(Trial(f"{k}", "isometric", {column: given, "force_n": 0.0 * time}, time, {}) for k in range(2))
     known = {} if column == "stim" else {"threshold_us": 180.0, "saturation_us": 1000.0}
     return Study("muscle", "muscle", known, {"gain": 30.0, "time_constant_s": 0.05}, trials)
 
