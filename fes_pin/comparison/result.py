@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy import special
 
+from fes_pin.data.results import Recorded, Result, shown
 from fes_pin.data.study import Study
 from fes_pin.identify.fit import Fit
 
@@ -35,9 +37,13 @@ class Apart:
         """True if the interval lies above zero."""
         return self.low > 0.0
 
+    def record(self) -> dict[str, Any]:
+        """The difference as `compare.json` has it."""
+        return {"percent": shown(self.more), "low": shown(self.low), "high": shown(self.high), "told": self.told}
 
-@dataclass(frozen=True)
-class Compared:
+
+@dataclass(frozen=True, eq=False)
+class Compared(Recorded):
     """One model.
 
     Attributes
@@ -75,9 +81,25 @@ class Compared:
     fit: Fit = field(repr=False)
     converged: bool = True
 
+    def record(self) -> dict[str, Any]:
+        """The model as `compare.json` has it."""
+        return {
+            "name": self.name,
+            "words": self.words,
+            "source": self.source,
+            "effects": [e.name for e in self.fit.model.effects],
+            "not_felt": list(self.unfelt),
+            "parameters": {n: shown(self.fit.values[n]) for n in self.fit.free},
+            "rmse": {c: {k: shown(v) for k, v in errors.items()} for c, errors in self.rmse.items()},
+            "error_percent": {k: shown(v) for k, v in self.percent.items()},
+            "of_each_trial": {k: [shown(float(v)) for v in values] for k, values in self.squares.items()},
+            "worse_than_best": {k: None if a is None else a.record() for k, a in self.apart.items()},
+            "converged": self.converged,
+        }
 
-@dataclass(frozen=True)
-class Comparison:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
     """Models ranked on held-out trials.
 
     Attributes
@@ -99,7 +121,7 @@ class Comparison:
     horizon_s: float
     given_s: float | None
     warnings: tuple[str, ...] = ()
-    wall_s: float = field(default=0.0, compare=False)
+    wall_s: float = 0.0
 
     def model(self, name: str) -> Compared:
         """The model of that name.
@@ -118,6 +140,38 @@ class Comparison:
         """The models that no held-out trial tells from the best by "free" or "horizon" error, the best first."""
         order = sorted(self.models, key=lambda m: m.percent[kind])
         return tuple(m.name for m in order if (a := m.apart[kind]) is None or not a.told)
+
+    def record(self) -> dict[str, Any]:
+        """`compare.json` as a dictionary, without the text and the table that a saved result has as well."""
+        return {
+            "study": self.study.name,
+            "held_out": {"by": self.by, "trials": list(self.held_out)},
+            "horizon_s": shown(self.horizon_s),
+            "given_s": None if self.given_s is None else shown(self.given_s),
+            "best": {kind: list(self.best(kind)) for kind in ("free", "horizon")},
+            "models": [m.record() for m in self.models],
+            "warnings": list(self.warnings),
+            "wall_s": round(self.wall_s, 2),
+        }
+
+    def columns(self) -> dict[str, list[Any]]:
+        """The table of `to_frame`, by columns: a row a model, its errors E in percent."""
+        kinds = dict.fromkeys(k for m in self.models for k in m.percent)
+        apart = {kind: [m.apart[kind] or Apart(0.0, 0.0, 0.0) for m in self.models] for kind in ("free", "horizon")}
+        return {
+            "model": [m.name for m in self.models],
+            "parameters": [m.parameters for m in self.models],
+            **{f"{k}_percent": [m.percent.get(k, math.nan) for m in self.models] for k in kinds},
+            **{f"{k}_{n}": [getattr(a, n) for a in many] for k, many in apart.items() for n in ("more", "low", "high")},
+            "converged": [m.converged for m in self.models],
+        }
+
+    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        rows = [_row(self, m) for m in self.models]
+        return f"{self.study.name}: {headline(self)}", _head(self), rows, notes(self)
+
+    def __repr__(self) -> str:
+        return f"Comparison of {', '.join(m.name for m in self.models)} on {self.study.name}"
 
     def __str__(self) -> str:
         return comparison_text(self)
@@ -150,7 +204,7 @@ def apart_from(best: np.ndarray, other: np.ndarray, rivals: int, folds: int) -> 
 
 def comparison_text(found: Comparison) -> str:
     """The whole answer as a plain table."""
-    rows = [("model", "fitted", *_heads(found), "worse than the best by, E"), *(_row(found, m) for m in found.models)]
+    rows = [_head(found), *(_row(found, m) for m in found.models)]
     widths = [max(len(r[k]) for r in rows) for k in range(len(rows[0]))]
     lines = [f"{found.study.name}: {headline(found)}"]
     lines += [" " + "  ".join(cell.ljust(w) for cell, w in zip(r, widths, strict=True)).rstrip() for r in rows]
@@ -166,10 +220,10 @@ def headline(found: Comparison) -> str:
     return f"{trials} do not tell {first} from {', '.join(others)}."
 
 
-def _heads(found: Comparison) -> tuple[str, ...]:
+def _head(found: Comparison) -> tuple[str, ...]:
     kinds = ["free", f"{found.horizon_s:.3g} s ahead"]
     kinds += [f"rest, free / first {found.given_s:.3g} s given"] if found.given_s is not None else []
-    return tuple(kinds)
+    return "model", "fitted", *kinds, "worse than the best by, E"
 
 
 def _row(found: Comparison, one: Compared) -> tuple[str, ...]:

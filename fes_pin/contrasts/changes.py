@@ -63,9 +63,7 @@ def _by_group(
         parameters[path.removeprefix(f"{item.name}.")] = values = {}
         for group in groups:
             if path in model.models[group].parameters():
-                key = model.path(path, group)
-                std = best.fit.std(key) * wider if key in best.fit.free else 0.0
-                values[group] = ParameterEstimate(best.fit.values[key], std, here.unit)
+                values[group] = ParameterEstimate.of(best.fit, model.path(path, group), here.unit, wider)
             elif here.null is not None:
                 values[group] = ParameterEstimate(here.null, 0.0, here.unit)
     return parameters

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
+from fes_pin.data.results import Recorded, Result, shown
 from fes_pin.data.study import Study
-from fes_pin.diagnosis.cause import ParameterEstimate
+from fes_pin.diagnosis.cause import ParameterEstimate, estimate_columns
 from fes_pin.diagnosis.remainder.open_set import Remainder
-from fes_pin.diagnosis.text import probability, quantity
+from fes_pin.diagnosis.text import estimate_text, probability
 from fes_pin.identify.fit import Fit
 
 STOPPED = "stopped"
 """The verdict where a limit of time ended the search: the changes are the best set so far."""
 
 
-@dataclass(frozen=True)
-class Change:
+@dataclass(frozen=True, eq=False)
+class Change(Recorded):
     """One thing that differs.
 
     Attributes
@@ -48,9 +50,22 @@ class Change:
     p_value: float
     trial: str | None = None
 
+    def record(self) -> dict[str, Any]:
+        """The change as `contrast.json` has it."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "group": self.group,
+            **({"trial": self.trial} if self.trial is not None else {}),
+            "words": self.words,
+            "parameters": {n: {g: p.record() for g, p in by_group.items()} for n, by_group in self.parameters.items()},
+            "equivalents": list(self.equivalents),
+            "p_value": shown(self.p_value),
+        }
 
-@dataclass(frozen=True)
-class Contrast:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Contrast(Result):
     """What differs between the groups of a study.
 
     Attributes
@@ -88,7 +103,48 @@ class Contrast:
     driven: bool
     repeats: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
-    wall_s: float = field(default=0.0, compare=False)
+    wall_s: float = 0.0
+
+    def record(self) -> dict[str, Any]:
+        """`contrast.json` as a dictionary, without the text and the table that a saved result has as well."""
+        left = self.remainder
+        return {
+            "study": self.study.name,
+            "groups": list(self.groups),
+            "verdict": self.verdict,
+            "changes": [c.record() for c in self.changes],
+            "common": list(self.common),
+            "unchanged": {n: {"at_most": shown(v)} for n, v in self.unchanged.items()},
+            "excluded": {n: {"at_most": shown(p.value), "unit": p.unit} for n, p in self.excluded.items()},
+            "untestable": list(self.untestable),
+            "repeats": {n: shown(v) for n, v in self.repeats.items()},
+            "remainder": {"unexplained": left.unexplained, "p_value": shown(left.p_value), "where": left.where},
+            "judged_by": "predictions" if self.driven else "simulations",
+            "warnings": list(self.warnings),
+            "wall_s": round(self.wall_s, 2),
+        }
+
+    def columns(self) -> dict[str, list[Any]]:
+        """The table of `to_frame`, by columns: a row a parameter of each change in each group."""
+        rows = [(c, n, g, p) for c in self.changes for n, groups in c.parameters.items() for g, p in groups.items()]
+        return {
+            "change": [c.name for c, _, _, _ in rows],
+            "kind": [c.kind for c, _, _, _ in rows],
+            "parameter": [n for _, n, _, _ in rows],
+            "group": [g for _, _, g, _ in rows],
+            **estimate_columns([p for _, _, _, p in rows]),
+            "p_value": [c.p_value for c, _, _, _ in rows],
+            "equivalents": [", ".join(c.equivalents) for c, _, _, _ in rows],
+        }
+
+    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        head = ("change", "what happened", "values", "p", "cannot be told from")
+        title = f"{self.study.name}: {contrast_headline(self)}"
+        return title, head, [change_row(c) for c in self.changes], contrast_notes(self)
+
+    def __repr__(self) -> str:
+        names = f" ({', '.join(c.name for c in self.changes)})" if self.changes else ""
+        return f"Contrast of {self.study.name}: {self.verdict}{names}"
 
     def __str__(self) -> str:
         return contrast_text(self)
@@ -112,7 +168,7 @@ def change_row(change: Change) -> tuple[str, str, str, str, str]:
     """Name, what happened, values by group, p, what it cannot be told from."""
     lines = []
     for name, by_group in change.parameters.items():
-        values = ", ".join(f"{g} {quantity(p.value, p.std, p.unit) if p.std else 'none'}" for g, p in by_group.items())
+        values = ", ".join(f"{g} {estimate_text(p) if p.std else 'none'}" for g, p in by_group.items())
         lines.append(f"{name}: {values}")
     shown = probability(change.p_value)
     return change.name, change.words, "\n".join(lines), shown, ", ".join(change.equivalents) or "-"

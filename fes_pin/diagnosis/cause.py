@@ -2,23 +2,71 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+from fes_pin.data.read_only import ReadOnly
+from fes_pin.data.results import shown
 from fes_pin.diagnosis.decide.chosen_again import is_chosen
 from fes_pin.diagnosis.decide.held_out import Evidence, Gain, speaks_for
+from fes_pin.identify.fit import Fit
+from fes_pin.infer.levels import CONFIDENCE_95
 
 
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """A value with its standard deviation (infinite: not identified) and unit."""
+    """A value with its standard deviation and unit.
+
+    Attributes
+    ----------
+    std
+        Infinite of a value that is not identified, 0 of one that is held; NaN of one at its bound.
+    at_bound
+        Of a value at a bound of what the parameter can be, its 95 % interval, which is one-sided; None of others.
+    """
 
     value: float
     std: float
     unit: str
+    at_bound: tuple[float, float] | None = None
+
+    @classmethod
+    def of(cls, fitted: Fit, name: str, unit: str, wider: float = 1.0) -> ParameterEstimate:
+        """A parameter of a fit by name, with its deviation so many times."""
+        value = fitted.values[name]
+        if name in fitted.at_bound:
+            return cls(value, math.nan, unit, fitted.interval(name))
+        return cls(value, wider * fitted.std(name) if name in fitted.free else 0.0, unit)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval."""
+        half = CONFIDENCE_95 * self.std
+        return self.at_bound or (self.value - half, self.value + half)
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it: `at_bound` stands only where it is true, with the interval."""
+        low, high = (shown(end) for end in self.interval)
+        own = {"at_bound": True, "low": low, "high": high} if self.at_bound else {}
+        return {"value": shown(self.value), "std": shown(self.std), **own}
+
+
+def estimate_columns(estimates: Sequence[ParameterEstimate]) -> dict[str, list[Any]]:
+    """Columns of a table of estimates: value, deviation, unit, 95 % interval, and whether it is at a bound."""
+    return {
+        "value": [p.value for p in estimates],
+        "std": [p.std for p in estimates],
+        "unit": [p.unit for p in estimates],
+        "low": [p.interval[0] for p in estimates],
+        "high": [p.interval[1] for p in estimates],
+        "at_bound": [p.at_bound is not None for p in estimates],
+    }
 
 
 @dataclass(frozen=True)
-class Cause:
+class Cause(ReadOnly):
     """One named cause; see contract: `equivalents` cannot be told from it by these data.
 
     `chosen_again` says in how many folds it, or an equivalent, was chosen without the trials that were held out there,
@@ -29,7 +77,7 @@ class Cause:
 
     name: str
     stage: str
-    parameters: dict[str, ParameterEstimate]
+    parameters: Mapping[str, ParameterEstimate]
     equivalents: tuple[str, ...]
     p_value: float
     gain_fit: float
@@ -38,6 +86,9 @@ class Cause:
     chosen_again: tuple[int, int] | None = None
     trial: str | None = None
     words: str = ""
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.trial, self.p_value))
 
     @property
     def chosen_in_some(self) -> tuple[int, int] | None:

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from fes_pin.data.log import Log
 from fes_pin.data.provenance import Provenance
-from fes_pin.data.show import explaining, frame, from_to, table_html
+from fes_pin.data.results import Result, shown
+from fes_pin.data.show import explaining, from_to
 from fes_pin.data.study import Study
-from fes_pin.diagnosis.cause import Cause, Ranked
+from fes_pin.diagnosis.cause import Cause, Ranked, estimate_columns
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnosis.experiment import NextExperiment
+from fes_pin.diagnosis.recorded import (
+    ahead_record,
+    cause_record,
+    errors_record,
+    experiment_record,
+    left_out_record,
+    library_record,
+    p_shown,
+    parameters_record,
+)
 from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.text import (
     ahead_notes,
@@ -26,11 +38,9 @@ from fes_pin.diagnosis.text import (
     probability,
 )
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.stored import log_table
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
-
-if TYPE_CHECKING:
-    import pandas
 
 STOPPED = "stopped"
 """The verdict where a limit of time ended the search, or fits did not converge: the set is the best so far."""
@@ -52,8 +62,8 @@ NOTHING = "nothing: every gain is that on what was fitted"
 """What trials are held out by: `Diagnosis.held_out_by`."""
 
 
-@dataclass(frozen=True, repr=False)
-class Diagnosis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Result):
     """What a simulation gets wrong.
 
     Attributes
@@ -97,9 +107,9 @@ class Diagnosis:
     extended_error: tuple[float | None, float | None]
     ceiling_percent: float
     next_experiment: NextExperiment | None
-    ranking: dict[str, tuple[Ranked, ...]]
+    ranking: Mapping[str, tuple[Ranked, ...]]
     held_out_by: str
-    left_out: dict[str, dict[str, tuple[int, ...]]]
+    left_out: Mapping[str, Mapping[str, tuple[int, ...]]]
     wall_s: float = field(compare=False)
     warnings: tuple[str, ...] = ()
     reason: str | None = None
@@ -161,8 +171,8 @@ class Diagnosis:
 
     def footnotes(self) -> list[str]:
         """What stands beneath the table."""
-        shown = from_to(self.nominal_error, self.extended_error, ("fitted", "held out"))
-        lines = [f"error E {shown}; noise floor {percent(self.ceiling_percent)}"] if shown else []
+        pairs = from_to(self.nominal_error, self.extended_error, ("fitted", "held out"))
+        lines = [f"error E {pairs}; noise floor {percent(self.ceiling_percent)}"] if pairs else []
         lines += ahead_notes(self.ahead, self.random, self.model.rig.units().get("effort", ""))
         left = self.remainder
         where = f", most on {left.where}" if left.where else ""
@@ -190,27 +200,56 @@ class Diagnosis:
         names = f" ({', '.join(c.name for c in self.causes)})" if self.causes else ""
         return f"Diagnosis of {self.study.name}: {self.verdict}{names}"
 
-    def _repr_html_(self) -> str:
-        title = f"{self.study.name}: {self.headline()}"
-        return table_html(title, cause_columns(self.gain_name), [cause_row(c) for c in self.causes], self.footnotes())
+    def record(self) -> dict[str, Any]:
+        """`diagnosis.json` as a dictionary, without the text and the table that a saved result has as well."""
+        return {
+            "study": self.study.name,
+            "verdict": self.verdict,
+            "causes": [cause_record(c, self.was_held_out or c.trial is not None) for c in self.causes],
+            "remainder": {
+                "unexplained": self.remainder.unexplained,
+                "p_value": p_shown(self.remainder.p_value),
+                "where": self.remainder.where,
+            },
+            "absorbed": list(self.absorbed),
+            "nominal": self._model("nominal"),
+            "extended": self._model("extended"),
+            "noise": {n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in self.extended.noise.items()},
+            "ceiling_percent": shown(self.ceiling_percent),
+            "next_experiment": experiment_record(self.next_experiment),
+            **left_out_record(self.left_out),
+            **({"reason": self.reason} if self.reason else {}),
+            **({"log": log_table(self.log)} if self.log != Log() else {}),
+            **library_record(self.catalogue),
+            **ahead_record(self.ahead, self.is_driven, self.random),
+            "warnings": list(self.warnings),
+            "wall_s": round(self.wall_s, 2),
+            **({"provenance": self.provenance.record()} if self.provenance else {}),
+        }
 
-    def to_frame(self) -> pandas.DataFrame:
-        """One row a parameter of each cause as a frame of pandas; see `data.show.frame`. No row without a cause."""
+    def _model(self, which: str) -> dict[str, Any]:
+        free: tuple[float | None, float | None] = getattr(self, f"{which}_error")
+        fitted: Fit = getattr(self, which)
+        return {"parameters": parameters_record(fitted), "error_percent": errors_record(free, self.ahead, which)}
+
+    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        rows = [cause_row(c) for c in self.causes]
+        return f"{self.study.name}: {self.headline()}", cause_columns(self.gain_name), rows, self.footnotes()
+
+    def columns(self) -> dict[str, list[Any]]:
+        """The table of `to_frame`, by columns: a row a parameter of each cause, none without a cause."""
         rows = [(c, n, one) for c in self.causes for n, one in c.parameters.items()]
-        columns = {
+        return {
             "cause": [c.name for c, _, _ in rows],
             "stage": [c.stage for c, _, _ in rows],
             "parameter": [n for _, n, _ in rows],
-            "value": [one.value for _, _, one in rows],
-            "std": [one.std for _, _, one in rows],
-            "unit": [one.unit for _, _, one in rows],
+            **estimate_columns([one for _, _, one in rows]),
             "p_value": [c.p_value for c, _, _ in rows],
             "gain_percent": [c.gain_held_out.percent for c, _, _ in rows],
             "gain_low": [c.gain_held_out.low for c, _, _ in rows],
             "gain_high": [c.gain_held_out.high for c, _, _ in rows],
             "equivalents": [", ".join(c.equivalents) for c, _, _ in rows],
         }
-        return frame(columns)
 
     def __str__(self) -> str:
         lines = [f"{self.study.name}: {self.headline()}", *cause_table(self.causes, self.gain_name)]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.cause import Cause
+from fes_pin.diagnosis.cause import Cause, ParameterEstimate
 from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
 
 LEAST_P, LEAST_PERCENT = 1e-12, 1e-3
@@ -41,6 +41,15 @@ def quantity(value: float, std: float, unit: str) -> str:
     return f"{value:.{digits}f} +- {std:.{digits}f} {unit}".strip()
 
 
+def estimate_text(one: ParameterEstimate) -> str:
+    """A value with its standard deviation; at a bound with the other end of its interval, at 97.5 % one-sided."""
+    if one.at_bound is None:
+        return quantity(one.value, one.std, one.unit)
+    low, high = one.at_bound
+    end = f"at most {high:.3g}" if high - one.value > one.value - low else f"at least {low:.3g}"
+    return f"{one.value:.4g} {one.unit} (at its bound, {end})".replace("  ", " ")
+
+
 def cause_columns(gain: str) -> tuple[str, str, str, str, str]:
     """Names of what `cause_row` gives; `gain` is that of its gain."""
     return "cause", "stage", "parameters", gain, "cannot be told from"
@@ -48,7 +57,7 @@ def cause_columns(gain: str) -> tuple[str, str, str, str, str]:
 
 def cause_row(cause: Cause) -> tuple[str, str, str, str, str]:
     """Cause, stage, parameters, gain, what it cannot be told from."""
-    values = "\n".join(f"{n} {quantity(p.value, p.std, p.unit)}" for n, p in cause.parameters.items())
+    values = "\n".join(f"{n} {estimate_text(p)}" for n, p in cause.parameters.items())
     if cause.trial is not None:
         values = f"trial {cause.trial}: {values}"
     return cause.name, cause.stage, values, str(cause.gain_held_out), ", ".join(cause.equivalents) or "-"
@@ -96,7 +105,7 @@ def _of_noise(ahead: Ahead) -> str:
     return "" if ahead.noise is None else f" (noise alone {ahead.noise:.2g} %)"
 
 
-def left_out_text(left_out: dict[str, dict[str, tuple[int, ...]]], trials: Sequence[Trial]) -> str:
+def left_out_text(left_out: Mapping[str, Mapping[str, Sequence[int]]], trials: Sequence[Trial]) -> str:
     """How many samples of which column were taken for spikes, and in which trials if they are few."""
     lengths = {t.name: len(t) for t in trials}
     found: dict[str, dict[str, int]] = {}

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from fes_pin.contrasts.result import Change, Contrast, contrast_headline, contrast_notes
 from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.text import probability
-from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.page import Content, Markup, element, figure, html_table, joined, page, section, unit_text, value_text
@@ -82,9 +81,8 @@ def _value(by_group: Mapping[str, ParameterEstimate], group: str) -> str:
     one = by_group[group]
     if not one.std:
         return "none"
-    half = CONFIDENCE_95 * one.std
-    low, high = value_text(one.value - half, one.std), value_text(one.value + half, one.std)
-    return f"{value_text(one.value, one.std)} [{low}, {high}]"
+    low, high = (value_text(end, one.std) for end in one.interval)
+    return f"{value_text(one.value, one.std)} [{low}, {high}]{' at its bound' if one.at_bound else ''}"
 
 
 def _drawing(change: Change, groups: tuple[str, ...]) -> Drawing:
@@ -93,8 +91,8 @@ def _drawing(change: Change, groups: tuple[str, ...]) -> Drawing:
     rows: list[tuple[str, float, float, float]] = []
     for group in (g for g in groups if g in by_group):
         one = by_group[group]
-        half = CONFIDENCE_95 * (one.std if math.isfinite(one.std) else 0.0)
-        rows.append((group, one.value, one.value - half, one.value + half))
+        low, high = (end if math.isfinite(end) else one.value for end in one.interval)
+        rows.append((group, one.value, low, high))
     low, high = min(r[2] for r in rows), max(r[3] for r in rows)
     room = 0.08 * max(high - low, 1e-12)
     panel = Panel(NAMES, 8, WIDE - NAMES - 14, ROW * len(rows), (low - room, high + room), (0.5 - len(rows), 0.5))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from fes_pin.data.files import write_text
 from fes_pin.data.log import Log
 from fes_pin.diagnosis.errors_ahead import Ahead
-from fes_pin.diagnosis.record import NEXT_FILE
+from fes_pin.diagnosis.recorded import NEXT_FILE
 from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.text import left_out_text, percent, probability

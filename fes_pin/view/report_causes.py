@@ -6,7 +6,6 @@ from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.result import EACH_TRIAL, Diagnosis
 from fes_pin.diagnosis.text import probability
 from fes_pin.identify.fit import Fit
-from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.mathml import equations_mathml
 from fes_pin.view.page import Content, Markup, element, figure, html_table, unit_text, value_text
@@ -112,11 +111,8 @@ def _estimates(fitted: Fit, cause: Cause) -> Markup:
         if key in fitted.values:
             shown, interval = value_and_interval(fitted, key, one.value)
         else:  # a mean over trials
-            low, high = one.value - CONFIDENCE_95 * one.std, one.value + CONFIDENCE_95 * one.std
-            shown, interval = (
-                value_text(one.value, one.std),
-                f"[{value_text(low, one.std)}, {value_text(high, one.std)}]",
-            )
+            low, high = (value_text(end, one.std) for end in one.interval)
+            shown, interval = value_text(one.value, one.std), f"[{low}, {high}]"
         rows.append([element("code", name), shown, unit_text(one.unit), interval])
     return html_table(("parameter", "value", "unit", "95 % interval"), rows, (1, 3))
 

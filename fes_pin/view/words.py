@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
 from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.errors_ahead import Ahead
-from fes_pin.diagnosis.record import NEXT_FILE
+from fes_pin.diagnosis.recorded import NEXT_FILE
 from fes_pin.diagnosis.result import STOPPED, Diagnosis
-from fes_pin.diagnosis.text import LEAST_P, percent, probability, quantity
+from fes_pin.diagnosis.text import LEAST_P, estimate_text, percent, probability
 from fes_pin.models.describe import sentence
 from fes_pin.models.stage import Effect
 from fes_pin.view.page import Content, Markup, element, joined, unit_text
@@ -81,7 +82,7 @@ def _size(diagnosis: Diagnosis, cause: Cause) -> Markup:
     """Values with their standard deviations; the first parameter is what gives the cause its size."""
     told = []
     for name, one in cause.parameters.items():
-        said = quantity(one.value, one.std, unit_text(one.unit) if one.unit else "").replace("+-", "±")
+        said = estimate_text(replace(one, unit=unit_text(one.unit) if one.unit else "")).replace("+-", "±")
         told.append(f"{plain(_without_unit(name))} {said}")
     return _text(", ".join(told) + " (± one standard deviation).")
 

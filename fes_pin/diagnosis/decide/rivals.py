@@ -18,7 +18,7 @@ from fes_pin.infer.levels import ABSORBED_BELOW, SEPARABLE
 
 def estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
     """Values of a cause's parameters, by name; of amplitudes that each trial has its own their size."""
-    info, values, out = fitted.model.parameter_info(), fitted.values, {}
+    info, out = fitted.model.parameter_info(), {}
     (one,) = (e for e in fitted.model.effects if e.name == name)
     refined = one.refined()
     if one.each_trial:
@@ -28,8 +28,7 @@ def estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
         key = f"{name}.{n}"
         if info[key].optional and n not in refined:
             continue
-        std = fitted.std(key) if key in fitted.free else 0.0
-        out[n] = ParameterEstimate(values[key], std, info[key].unit)
+        out[n] = ParameterEstimate.of(fitted, key, info[key].unit)
     return out
 
 

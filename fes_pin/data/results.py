@@ -1,0 +1,185 @@
+"""What every result can do: it is read-only, compared, copied, shown as a table, saved as JSON and loaded again."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.files import read_text, write_text
+from fes_pin.data.numbers import printed
+from fes_pin.data.read_only import ReadOnly, plain
+from fes_pin.data.show import frame, table_html
+
+if TYPE_CHECKING:
+    import pandas
+
+DIGITS = 6
+"""Significant digits printed: the last that does not depend on how sums are ordered."""
+RESULT, TEXT, TABLE = "result", "text", "table"
+"""Keys that every saved result has, beside those of its kind: which kind, its text by lines, its table by columns."""
+UNCOMPARED = ("wall_s", "provenance")
+"""Keys of a record that say how a result was made, not what it is."""
+
+
+class Recorded(ReadOnly):
+    """Base of what has a record. Two are equal if they say the same: the same record, to the digits that are printed,
+    whatever time they took and however they were made."""
+
+    def _kind(self) -> str:
+        return type(self).__name__
+
+    def record(self) -> dict[str, Any]:
+        """What it says, as plain values for JSON."""
+        raise NotImplementedError
+
+    def _said(self) -> str:
+        known = {n: v for n, v in self.record().items() if n not in UNCOMPARED}
+        return json.dumps([self._kind(), known], sort_keys=True)
+
+    def __eq__(self, other: object) -> bool:
+        return self._said() == other._said() if isinstance(other, Recorded) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._said())
+
+
+class Result(Recorded):
+    """Base of results: what has a record and a table. A loaded result equals the one that was saved."""
+
+    def columns(self) -> dict[str, list[Any]]:
+        """The table of `to_frame`, by columns."""
+        raise NotImplementedError
+
+    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        """Title, head, rows and notes of the table that a notebook shows."""
+        raise NotImplementedError
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The result as a frame of pandas: a row a parameter of each cause or change, a model, or a study.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame(self.columns())
+
+    def to_json(self) -> str:
+        """The text of the JSON file that `save_result` writes."""
+        table = {n: [_cell(v) for v in values] for n, values in self.columns().items()}
+        saved = {**self.record(), RESULT: self._kind(), TEXT: str(self).split("\n"), TABLE: table}
+        return json.dumps(saved, indent=1, allow_nan=False) + "\n"
+
+    def _repr_html_(self) -> str:
+        return table_html(*self._notebook())
+
+
+def shown(value: float | None) -> float | None:
+    """A number as printed; None for what is not finite."""
+    return printed(value, DIGITS)
+
+
+def _cell(value: Any) -> Any:
+    return shown(value) if isinstance(value, float) else value
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SavedResult(Result):
+    """A result as it was saved: what it said, to the digits that are printed, without the study, fits and models.
+
+    It has the verdict, the causes or changes, every value, the text and the table, and equals what was saved.
+    It cannot simulate or draw a report: keep `model.toml` and the report beside it, or the result itself by `pickle`.
+
+    Attributes
+    ----------
+    kind
+        "Diagnosis", "WalkDiagnosis", "Contrast", "Comparison" or "Cohort".
+    found
+        The record, read-only, by the keys of the JSON file.
+    text
+        What `print` showed of the result.
+    table
+        The columns of its frame; None for a number that is not finite.
+    """
+
+    kind: str
+    found: Mapping[str, Any]
+    text: str
+    table: Mapping[str, tuple[Any, ...]]
+
+    def _kind(self) -> str:
+        return self.kind
+
+    @property
+    def verdict(self) -> str | None:
+        """The verdict; None of a result that has none."""
+        return self.found.get("verdict")
+
+    @property
+    def causes(self) -> tuple[Mapping[str, Any], ...]:
+        """Causes of a diagnosis, or changes of a contrast, as mappings by the keys of the JSON file."""
+        return tuple(self.found.get("causes", self.found.get("changes", ())))
+
+    def record(self) -> dict[str, Any]:
+        """What was saved of the result, as plain values."""
+        return dict(plain(self.found))
+
+    def columns(self) -> dict[str, list[Any]]:
+        """The table of `to_frame`, by columns."""
+        return {n: list(values) for n, values in self.table.items()}
+
+    def __repr__(self) -> str:
+        return f"saved {self.kind} of {self.found.get('study', 'studies')}: {self.verdict or 'no verdict'}"
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(self.text)}</pre>"
+
+
+def save_result(result: Result, path: str | Path) -> None:
+    """Write a result as JSON, whole or not at all; `load_result` reads it.
+
+    Parameters
+    ----------
+    result
+        What `diagnose`, `contrast`, `compare` or a cohort gave. Numbers are written to the digits that are printed.
+    path
+        Of the file; `fes-pin diagnose`, `contrast` and `compare` write the same as `diagnosis.json` and so on.
+
+    Raises
+    ------
+    InputError
+        It is no such result, or the file cannot be written.
+    """
+    if not isinstance(result, Result):
+        kind = type(result).__name__
+        raise InputError(f"expected a result of diagnose, contrast, compare or a cohort, found {kind}", column="result")
+    write_text(path, result.to_json())
+
+
+def load_result(path: str | Path) -> SavedResult:
+    """Read a result that `save_result` or a command wrote: see `SavedResult` for what it can do.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is no result.
+    """
+    text = read_text(path)
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"expected JSON: {error}", file=path, row=getattr(error, "lineno", None)) from None
+    found = found if isinstance(found, dict) else {}
+    kind, lines, table = (found.pop(n, None) for n in (RESULT, TEXT, TABLE))
+    whole = isinstance(kind, str) and isinstance(lines, list) and isinstance(table, dict)
+    if not whole or not all(isinstance(column, list) for column in table.values()):
+        raise InputError(f"expected a result that fes-pin saved, with {RESULT}, {TEXT} and {TABLE}", file=path)
+    return SavedResult(kind, found, "\n".join(map(str, lines)), table)

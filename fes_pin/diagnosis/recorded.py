@@ -1,0 +1,101 @@
+"""Parts of a diagnosis as plain values, as `diagnosis.json` has them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from fes_pin.data.results import shown
+from fes_pin.diagnosis.cause import Cause, ParameterEstimate
+from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
+from fes_pin.diagnosis.experiment import NextExperiment
+from fes_pin.identify.fit import Fit
+from fes_pin.models.catalogue import Catalogue
+
+LEAST_P = 1e-300
+"""What stands for a p-value that is too small for a number: it is at most this."""
+NEXT_FILE = "next_trial.csv"
+
+
+def p_shown(value: float) -> float | None:
+    """A p-value as printed: no chance is zero."""
+    return shown(max(value, LEAST_P)) if math.isfinite(value) else None
+
+
+def cause_record(cause: Cause, held_out: bool) -> dict[str, Any]:
+    """A cause; `held_out` says whether its gain is one on trials held out."""
+    held = cause.gain_held_out
+    return {
+        "name": cause.name,
+        "stage": cause.stage,
+        **({"trial": cause.trial, "words": cause.words} if cause.trial is not None else {}),
+        "parameters": {n: p.record() for n, p in cause.parameters.items()},
+        "equivalents": list(cause.equivalents),
+        "p_value": p_shown(cause.p_value),
+        **({"chosen_again": list(some)} if (some := cause.chosen_in_some) else {}),
+        "gain_percent": {
+            "fit": shown(cause.gain_fit),
+            "held_out": shown(held.percent) if held_out else None,
+            "ci95": [shown(held.low), shown(held.high)],
+            **({"ahead_s": shown(held.ahead_s)} if held.ahead_s is not None else {}),
+        },
+    }
+
+
+def left_out_record(left_out: Mapping[str, Mapping[str, Sequence[int]]]) -> dict[str, Any]:
+    """Samples left out as spikes by trial and column; no key where there are none."""
+    found = {t: {n: len(k) for n, k in columns.items()} for t, columns in left_out.items()}
+    return {"left_out_samples": found} if found else {}
+
+
+def library_record(catalogue: Catalogue) -> dict[str, Any]:
+    """Causes and rigs that are not written here, by the file or module that holds them; no key where there are none."""
+    found = {Path(where).name: names for where, names in catalogue.origins().items()}
+    return {"library": found} if found else {}
+
+
+def parameters_record(fitted: Fit) -> dict[str, Any]:
+    """What was fitted, with deviations, by name."""
+    return {n: ParameterEstimate.of(fitted, n, "").record() for n in fitted.free}
+
+
+def errors_record(
+    free: tuple[float | None, float | None], ahead: AheadErrors | None, which: str
+) -> dict[str, float | None]:
+    """E of one of the two models, by the names of `identify.error_measures`."""
+    out = {"fit": shown(free[0]), "held_out": shown(free[1])}
+    if ahead is not None:
+        told = getattr(ahead, f"{which}_held_out") or getattr(ahead, which)
+        out.update({n: shown(getattr(told, n)) for n in ("one_step", "horizon", "free")})
+    return out
+
+
+def ahead_record(ahead: AheadErrors | None, driven: bool, random: Sequence[RandomPart]) -> dict[str, Any]:
+    """How far ahead a horizon looks, and what acts on a driven rig at random; no key without errors ahead."""
+    if ahead is None:
+        return {}
+    horizon = {"horizon_s": shown(ahead.horizon_s)}
+    if not driven:
+        return horizon
+    parts = {
+        r.name: {
+            "std": shown(r.std),
+            "time_constant_s": shown(r.time_constant_s),
+            "share_percent": shown(100.0 * r.share),
+        }
+        for r in random
+    }
+    told = ahead.extended_held_out or ahead.extended
+    return {**horizon, "horizon_ceiling_percent": shown(told.noise), "random": parts}
+
+
+def experiment_record(plan: NextExperiment | None) -> dict[str, Any] | None:
+    """The next experiment; its inputs are in `NEXT_FILE`."""
+    if plan is None:
+        return None
+    trial = None
+    if plan.trial is not None:
+        trial = {"file": NEXT_FILE, "kind": plan.trial.kind, **{n: shown(v) for n, v in plan.trial.conditions.items()}}
+    return {"why": plan.why, "separates": list(plan.separates), "trial": trial}
