@@ -17,6 +17,8 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.contrasts.contrast import contrast as contrast
     from fes_pin.contrasts.result import Contrast as Contrast
     from fes_pin.data.errors import InputError as InputError
+    from fes_pin.data.results import load_result as load_result
+    from fes_pin.data.results import save_result as save_result
     from fes_pin.data.study import Study as Study
     from fes_pin.data.study import read_study as read_study
     from fes_pin.data.study import write_study as write_study
@@ -72,6 +74,8 @@ _WHERE = {
     "Contrast": "fes_pin.contrasts.result",
     "diagnose_walk": "fes_pin.walk.diagnosis",
     "report": "fes_pin.view.report",
+    "save_result": "fes_pin.data.results",
+    "load_result": "fes_pin.data.results",
     "Body": "fes_pin.body.build",
     "linearize": "fes_pin.body.linearize",
     "minimal_sets": "fes_pin.body.minimal_sets",

@@ -109,6 +109,7 @@ LONG = {
     "imposed/test_imposed_muscle.py": ("test_beside_a_form",),
     "imposed/test_session.py": ("named[potentiation-imposed]",),
     "models/test_model_objects.py": ("test_every_model_is_read_as_it_was_saved[1000]",),
+    "test_results.py": ("test_a_walk_comes_back",),
     "test_shared_diagnoses.py": (
         *("[p02", "[p04", "[p06", "[p08", "[p09", "[p11", "[p12", "[p14", "[p19", "[p20"),
         *("[n00", "[n02", "test_a_servo_rubs"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fes_pin.cohort.pool import pooled
@@ -16,7 +16,7 @@ from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.page import Content, Markup, element, figure, folded, html_table, joined, page, section, value_text
 from fes_pin.view.report_causes import stage_mark
 
-PageRow = dict[str, Any]
+PageRow = Mapping[str, Any]
 FOREST = 40
 """Studies of one forest plot; of more only the pooled value is drawn."""
 ROW, NAMES, WIDE = 20.0, 150.0, 420.0

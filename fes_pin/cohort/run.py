@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fes_pin.cohort.cluster import on_cluster
 from fes_pin.cohort.found import find_studies
@@ -26,6 +27,7 @@ from fes_pin.cohort.tables import (
 )
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import Outputs
+from fes_pin.data.results import Saveable, shown
 from fes_pin.models.catalogue import load_library
 
 
@@ -50,19 +52,42 @@ class CohortProgress:
     name: str
 
 
-@dataclass(frozen=True)
-class Cohort:
-    """What came of the studies; each table is a list of rows."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Cohort(Saveable):
+    """What came of the studies; each table is a sequence of rows, by the columns of its CSV file."""
 
-    studies: list[Row]
-    causes: list[Row]
-    pooled: list[Row]
-    prevalence: list[Row]
+    studies: Sequence[Row]
+    causes: Sequence[Row]
+    pooled: Sequence[Row]
+    prevalence: Sequence[Row]
 
     @property
     def failed(self) -> list[Row]:
         """Studies that could not be diagnosed."""
         return [r for r in self.studies if r["verdict"] == "failed"]
+
+    def record(self) -> dict[str, Any]:
+        """The tables as lists of rows, numbers as printed; None for what is not known."""
+        return {
+            n: [{k: shown(v) if isinstance(v, float) else v for k, v in r.items() if k != "wall_s"} for r in rows]
+            for n, rows in vars(self).items()
+        }
+
+    def columns(self) -> dict[str, list[Any]]:
+        """The table of `to_frame`, by columns: `studies`."""
+        return {n: [r[n] for r in self.studies] for n in HEADS["studies"]}
+
+    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        rows = [(r["cause"], str(r["studies"]), f"{r['share_percent']:.0f} %") for r in self.prevalence]
+        failed = [f"failed: {r['study']}: {r['error']}" for r in self.failed]
+        return repr(self), ("cause", "studies", "share"), rows, failed
+
+    def __repr__(self) -> str:
+        return f"{len(self.studies) - len(self.failed)} of {len(self.studies)} studies diagnosed"
+
+    def __str__(self) -> str:
+        title, _, rows, failed = self._notebook()
+        return "\n".join([title, *(f"  {cause:28s} in {count} ({share})" for cause, count, share in rows), *failed])
 
 
 def run_cohort(
@@ -158,7 +183,7 @@ def _answers(
 def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
     out: dict[str, str | bytes] = {}
     for name in ("studies", "causes", "pooled", "prevalence"):
-        rows: list[Row] = getattr(made, name)
+        rows: Sequence[Row] = getattr(made, name)
         out[f"{name}.csv"] = csv_text(rows, HEADS[name])
         parquet = parquet_bytes(rows, HEADS[name])
         if parquet is not None:

@@ -14,7 +14,7 @@ from fes_pin.cohort.pool import discovery_rates, pooled, share_interval
 from fes_pin.identify.error_measures import MEASURES
 from fes_pin.models.catalogue import Catalogue
 
-Row = dict[str, Any]
+Row = Mapping[str, Any]
 RATE = 0.05
 """False discovery rate below which a cause counts as found in the cohort."""
 
@@ -108,8 +108,8 @@ def pooled_rows(causes: Sequence[Row], nominal: Sequence[Row], studies: int) -> 
         found = pooled([r["value"] for r in rows], [r["std"] for r in rows])
         if found is None:
             continue
-        out.append({"cause": cause, "parameter": parameter, "studies": found.count, "of": studies, **vars(found)})
-        del out[-1]["count"]
+        known = {n: v for n, v in vars(found).items() if n != "count"}
+        out.append({"cause": cause, "parameter": parameter, "studies": found.count, "of": studies, **known})
     return sorted(out, key=lambda r: (r["cause"] == "", r["cause"]))
 
 

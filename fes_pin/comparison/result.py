@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from fes_pin.data.results import Recorded, Result, shown
+from fes_pin.data.results import Recorded, Saveable, shown
 from fes_pin.data.study import Study
 from fes_pin.identify.fit import Fit
 
@@ -99,7 +99,7 @@ class Compared(Recorded):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Result):
+class Comparison(Saveable):
     """Models ranked on held-out trials.
 
     Attributes

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from fes_pin.data.results import Recorded, Result, shown
+from fes_pin.data.results import Recorded, Saveable, shown
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.cause import ParameterEstimate, estimate_columns
 from fes_pin.diagnosis.remainder.open_set import Remainder
@@ -65,7 +65,7 @@ class Change(Recorded):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Contrast(Result):
+class Contrast(Saveable):
     """What differs between the groups of a study.
 
     Attributes

@@ -21,7 +21,7 @@ class ReadOnly:
             vars(self)[name] = _held(value)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {n: plain(v) for n, v in vars(self).items()}
+        return {n: as_dicts(v) for n, v in vars(self).items()}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         vars(self).update(state)
@@ -39,8 +39,8 @@ def _held(value: Any) -> Any:
     return value
 
 
-def plain(value: Any) -> Any:
+def as_dicts(value: Any) -> Any:
     """A value with dictionaries for its mappings, all the way down: as pickle and JSON need it."""
     if isinstance(value, Mapping):
-        return {n: plain(v) for n, v in value.items()}
-    return tuple(map(plain, value)) if type(value) is tuple else value
+        return {n: as_dicts(v) for n, v in value.items()}
+    return tuple(map(as_dicts, value)) if type(value) is tuple else value

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text, write_text
 from fes_pin.data.numbers import printed
-from fes_pin.data.read_only import ReadOnly, plain
+from fes_pin.data.read_only import ReadOnly, as_dicts
 from fes_pin.data.show import frame, table_html
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Recorded(ReadOnly):
         return hash(self._said())
 
 
-class Result(Recorded):
+class Saveable(Recorded):
     """Base of results: what has a record and a table. A loaded result equals the one that was saved."""
 
     def columns(self) -> dict[str, list[Any]]:
@@ -89,7 +89,7 @@ def _cell(value: Any) -> Any:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SavedResult(Result):
+class SavedResult(Saveable):
     """A result as it was saved: what it said, to the digits that are printed, without the study, fits and models.
 
     It has the verdict, the causes or changes, every value, the text and the table, and equals what was saved.
@@ -127,7 +127,7 @@ class SavedResult(Result):
 
     def record(self) -> dict[str, Any]:
         """What was saved of the result, as plain values."""
-        return dict(plain(self.found))
+        return dict(as_dicts(self.found))
 
     def columns(self) -> dict[str, list[Any]]:
         """The table of `to_frame`, by columns."""
@@ -143,7 +143,7 @@ class SavedResult(Result):
         return f"<pre>{html.escape(self.text)}</pre>"
 
 
-def save_result(result: Result, path: str | Path) -> None:
+def save_result(result: Saveable, path: str | Path) -> None:
     """Write a result as JSON, whole or not at all; `load_result` reads it.
 
     Parameters
@@ -158,7 +158,7 @@ def save_result(result: Result, path: str | Path) -> None:
     InputError
         It is no such result, or the file cannot be written.
     """
-    if not isinstance(result, Result):
+    if not isinstance(result, Saveable):
         kind = type(result).__name__
         raise InputError(f"expected a result of diagnose, contrast, compare or a cohort, found {kind}", column="result")
     write_text(path, result.to_json())

@@ -11,7 +11,7 @@ import numpy as np
 
 from fes_pin.data.log import Log
 from fes_pin.data.provenance import Provenance
-from fes_pin.data.results import Result, shown
+from fes_pin.data.results import Saveable, shown
 from fes_pin.data.show import explaining, from_to
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.cause import Cause, Ranked, estimate_columns
@@ -63,7 +63,7 @@ NOTHING = "nothing: every gain is that on what was fitted"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Result):
+class Diagnosis(Saveable):
     """What a simulation gets wrong.
 
     Attributes

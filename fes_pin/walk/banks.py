@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -67,6 +68,12 @@ class Banks:
         self.as_read = self._bank(scenes, 0.0)
         self.turn(self.as_read.y)
         self.shifted = self._shifted()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {n: v for n, v in vars(self).items() if n != "forms"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, forms=walk_library())  # forms hold functions, which are the library's own
 
     def _bank(self, scenes: list[Scene], later_s: float) -> Bank:
         x = [self.strides.mean([form.columns(s) for s in scenes]) for form in self.forms]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.walk.banks import Banks
 from fes_pin.walk.dynamics import about, centre_of_mass, required
 from fes_pin.walk.fits import Set
@@ -22,7 +23,7 @@ ENOUGH = 6.0
 
 
 @dataclass(frozen=True)
-class NextWalk:
+class NextWalk(ReadOnly):
     """A trial to do next.
 
     Attributes

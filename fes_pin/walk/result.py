@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from fes_pin.body.build import Body
+from fes_pin.data.numbers import printed
+from fes_pin.data.results import Recorded, Saveable
 from fes_pin.data.show import explaining, from_to
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
@@ -13,10 +19,13 @@ from fes_pin.walk.effect import STAGE
 from fes_pin.walk.experiment import NextWalk
 from fes_pin.walk.extended import extended_body
 from fes_pin.walk.fits import Set
-from fes_pin.walk.judge import WalkGain
+from fes_pin.walk.judge import CHANNELS, WalkGain
 from fes_pin.walk.nulls import LEVEL
 from fes_pin.walk.search import WalkSearch
 
+DIGITS = 5
+"""Significant digits printed."""
+NEXT_FILE = "next_trial.csv"
 CERTAIN = 1e-6
 """Level of a cause in a single stride."""
 STOPPED = "stopped"
@@ -36,8 +45,8 @@ class Estimate(NamedTuple):
     unit: str
 
 
-@dataclass(frozen=True)
-class WalkCause:
+@dataclass(frozen=True, eq=False)
+class WalkCause(Recorded):
     """One named cause.
 
     Attributes
@@ -62,7 +71,7 @@ class WalkCause:
 
     name: str
     site: str
-    parameters: dict[str, Estimate]
+    parameters: Mapping[str, Estimate]
     equivalents: tuple[str, ...]
     elsewhere: tuple[str, ...]
     p_value: float
@@ -71,6 +80,26 @@ class WalkCause:
     evidence: WalkGain | None = None
     other_leg_percent: float | None = None
     stage: str = STAGE
+
+    def record(self) -> dict[str, Any]:
+        """The cause as `diagnosis.json` has it."""
+        held = self.gain_held_out
+        return {
+            "name": self.name,
+            "stage": self.stage,
+            "site": self.site,
+            "parameters": {
+                n: {"value": walk_shown(v), "std": walk_shown(s), "unit": u} for n, (v, s, u) in self.parameters.items()
+            },
+            "equivalents": list(self.equivalents),
+            "p_value": walk_shown(self.p_value),
+            "gain_percent": {
+                "fit": walk_shown(self.gain_fit),
+                "held_out": walk_shown(held.percent) if held else None,
+                "ci95": [walk_shown(held.low), walk_shown(held.high)] if held else None,
+                "other_leg": walk_shown(self.other_leg_percent),
+            },
+        }
 
     def helps(self) -> bool:
         """Whether what took no part speaks for it: strides held out; for what belongs to neither leg, other stances.
@@ -90,6 +119,11 @@ class WalkCause:
         )
 
 
+def walk_shown(value: float | None) -> float | None:
+    """A number as printed; None for what is not finite."""
+    return printed(value, DIGITS)
+
+
 @dataclass(frozen=True)
 class WalkRemainder:
     """Whether what is left comes again in every stride, its p-value, and where it is largest."""
@@ -107,8 +141,8 @@ def walk_cause_row(cause: WalkCause) -> tuple[str, str, str, str, str]:
     return cause.name, cause.site, values, shown, ", ".join(cause.equivalents) or "-"
 
 
-@dataclass(frozen=True)
-class WalkDiagnosis:
+@dataclass(frozen=True, eq=False, repr=False)
+class WalkDiagnosis(Saveable):
     """What a model of walking gets wrong.
 
     Attributes
@@ -138,16 +172,82 @@ class WalkDiagnosis:
     extended_error: tuple[float, float | None]
     ceiling_percent: float
     next_experiment: NextWalk | None
-    search: WalkSearch = field(repr=False, compare=False)
-    best: Set = field(repr=False, compare=False)
+    search: WalkSearch
+    best: Set
     cutoff_hz: float = CUTOFF_HZ
-    wall_s: float = field(default=0.0, compare=False)
+    wall_s: float = 0.0
     warnings: tuple[str, ...] = ()
 
     @property
     def model(self) -> Body:
         """The body with the masses, centres and inertias that were found."""
         return extended_body(self.search.fits, self.best)
+
+    def record(self) -> dict[str, Any]:
+        """`diagnosis.json` as a dictionary, without the text and the table that a saved result has as well."""
+        plan = self.next_experiment
+        trial = None
+        if plan and plan.conditions is not None:
+            trial = {"coordinates": NEXT_FILE, "file": NEXT_FILE, "kind": "motion", **plan.conditions}
+        parameters = {
+            f"{c.name}.{n}": {"value": walk_shown(v), "std": walk_shown(s)}
+            for c in self.causes
+            for n, (v, s, _) in c.parameters.items()
+        }
+        nominal, extended = (
+            {"fit": walk_shown(f), "held_out": walk_shown(h)} for f, h in (self.nominal_error, self.extended_error)
+        )
+        return {
+            "study": self.study.name,
+            "verdict": self.verdict,
+            "causes": [c.record() for c in self.causes],
+            "remainder": {
+                "unexplained": self.remainder.unexplained,
+                "p_value": walk_shown(self.remainder.p_value),
+                "where": self.remainder.where,
+            },
+            "absorbed": list(self.absorbed),
+            "nominal": {"parameters": {}, "error_percent": nominal},
+            "extended": {"parameters": parameters, "error_percent": extended},
+            "noise": self._noise(),
+            "ceiling_percent": walk_shown(self.ceiling_percent),
+            "next_experiment": {"why": plan.why, "separates": list(plan.separates), "trial": trial} if plan else None,
+            "cutoff_hz": self.cutoff_hz,
+            "warnings": list(self.warnings),
+            "wall_s": round(self.wall_s, 2),
+        }
+
+    def _noise(self) -> dict[str, Any]:
+        """Root mean square of what the extended model leaves in the mean stride, by channel: N and N m."""
+        banks, best = self.search.banks, self.best
+        left = banks.bank(best.forms).y
+        if best.forms:
+            columns = np.concatenate([banks.bank(best.forms).x[i] for i in best.forms], axis=3)
+            left = left - columns @ best.fitted.values
+        size = np.sqrt(np.sum(left[0] ** 2, axis=1))
+        return {
+            name.replace(" ", "_"): {"std": walk_shown(float(s)), "ar": []}
+            for name, s in zip(CHANNELS, size, strict=True)
+        }
+
+    def columns(self) -> dict[str, list[Any]]:
+        """The table of `to_frame`, by columns: a row a parameter of each cause, none without a cause."""
+        rows = [(c, n, one) for c in self.causes for n, one in c.parameters.items()]
+        nothing = WalkGain(math.nan, math.nan, math.nan)
+        gains = [c.gain_held_out or nothing for c, _, _ in rows]
+        return {
+            "cause": [c.name for c, _, _ in rows],
+            "site": [c.site for c, _, _ in rows],
+            "parameter": [n for _, n, _ in rows],
+            "value": [one.value for _, _, one in rows],
+            "std": [one.std for _, _, one in rows],
+            "unit": [one.unit for _, _, one in rows],
+            "p_value": [c.p_value for c, _, _ in rows],
+            "gain_percent": [g.percent for g in gains],
+            "gain_low": [g.low for g in gains],
+            "gain_high": [g.high for g in gains],
+            "equivalents": [", ".join(c.equivalents) for c, _, _ in rows],
+        }
 
     def headline(self) -> str:
         """The verdict in one sentence."""
@@ -179,11 +279,18 @@ class WalkDiagnosis:
             lines.append(f"next experiment: {self.next_experiment.why}")
         return [*lines, *(f"warning: {words}" for words in self.warnings)]
 
+    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        head = ("cause", "site", "parameters", "held-out gain", "cannot be told from")
+        return f"{self.study.name}: {self.headline()}", head, [walk_cause_row(c) for c in self.causes], self.footnotes()
+
+    def __repr__(self) -> str:
+        names = f" ({', '.join(c.name for c in self.causes)})" if self.causes else ""
+        return f"WalkDiagnosis of {self.study.name}: {self.verdict}{names}"
+
     def __str__(self) -> str:
-        lines = [f"{self.study.name}: {self.headline()}"]
-        rows = [("cause", "site", "parameters", "held-out gain", "cannot be told from")]
-        rows += [walk_cause_row(c) for c in self.causes]
-        if len(rows) > 1:
+        title, head, causes, notes = self._notebook()
+        lines, rows = [title], [head, *causes]
+        if causes:
             widths = [max(len(r[k]) for r in rows) for k in range(5)]
             lines += [" " + "  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows]
-        return "\n".join(lines + [f" {note}" for note in self.footnotes()])
+        return "\n".join(lines + [f" {note}" for note in notes])

@@ -12,6 +12,7 @@ import pytest
 from data import studies, test_bad_studies
 from diagnosis.hidden import study_of
 
+import fes_pin as fp
 from fes_pin.cli import main
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.study import read_study, write_study
@@ -26,6 +27,8 @@ from fes_pin.models.simulate import simulate
 from fes_pin.models.store import load_model, model_toml, save_model
 
 FILES = {"diagnosis.json", "model.toml", "report.html"}
+SAVED = ("result", "text", "table")
+"""Keys by which `fp.load_result` reads the file."""
 
 
 def run(monkeypatch, *words):
@@ -72,7 +75,7 @@ def record(folder):
     found = json.loads((folder / "diagnosis.json").read_text())
     assert found.pop("wall_s") > 0.0
     assert found.pop("provenance")["seed"] == 0
-    return found
+    return {n: v for n, v in found.items() if n not in SAVED}
 
 
 def test_the_answer_does_not_depend_on_threads(made):
@@ -91,6 +94,12 @@ def test_the_library_says_the_same(made, diagnosis):
     assert diagnosis_files(diagnosis)["model.toml"] == (made / "one/model.toml").read_text()
 
 
+def test_what_the_command_wrote_is_loaded(made, diagnosis):
+    loaded = fp.load_result(made / "one/diagnosis.json")
+    assert loaded == diagnosis and hash(loaded) == hash(diagnosis)
+    assert str(loaded) == str(diagnosis) and loaded.verdict == diagnosis.verdict == "causes_found"
+
+
 def test_the_seed_changes_only_what_is_simulated(made):
     found = diagnosis_record(diagnose_joint(read_study(made / "study"), seed=7))
     usual = record(made / "one")
@@ -107,7 +116,7 @@ def test_the_record_is_as_the_contract_says(made):
     found = json.loads((made / "one/diagnosis.json").read_text())
     assert list(found) == [
         *("study", "verdict", "causes", "remainder", "absorbed", "nominal", "extended", "noise"),
-        *("ceiling_percent", "next_experiment", "horizon_s", "warnings", "wall_s", "provenance"),
+        *("ceiling_percent", "next_experiment", "horizon_s", "warnings", "wall_s", "provenance", *SAVED),
     ]
     (cause,) = found["causes"]
     assert list(cause) == ["name", "stage", "parameters", "equivalents", "p_value", "gain_percent"]
