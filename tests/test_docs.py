@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 import fes_pin as fp
 from fes_pin.cli.own import new_study
 from fes_pin.data.recorded.columns import FILE_KEYS, columns_of
+from fes_pin.data.results import RESULT, TABLE, TEXT
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.units import UNITS
 
@@ -187,11 +188,12 @@ def test_the_benchmarks_that_are_listed_are_those_that_can_be_run():
 
 def test_the_study_format_has_every_key_of_a_diagnosis():
     text = (DOCS / "study_format.md").read_text()
-    made = ast.walk(ast.parse((ROOT / "fes_pin" / "diagnosis" / "record.py").read_text()))
-    keys = {
-        key.value for node in made if isinstance(node, ast.Dict) for key in node.keys if isinstance(key, ast.Constant)
-    }
-    assert {"verdict", "equivalents", "ci95"} <= keys
+    files = [ROOT / "fes_pin/diagnosis" / f"{name}.py" for name in ("result", "recorded", "cause")]
+    every = [node for file in files for node in ast.walk(ast.parse(file.read_text()))]
+    records = [f for f in every if isinstance(f, ast.FunctionDef) and f.name.endswith("record")]
+    made = [node for record in records for node in ast.walk(record) if isinstance(node, ast.Dict)]
+    keys = {key.value for node in made for key in node.keys if isinstance(key, ast.Constant)} | {RESULT, TEXT, TABLE}
+    assert {"verdict", "equivalents", "ci95", "at_bound"} <= keys
     assert not [key for key in keys if f"`{key}`" not in text]
 
 
