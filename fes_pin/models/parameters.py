@@ -67,8 +67,13 @@ class ParameterInfo:
     def holds(self, value: float) -> bool:
         """Whether a value is within the bounds, or beyond one by no more than rounding, as a fit may end at it."""
         return self.lower <= value <= self.upper or any(
-            math.isclose(value, bound, rel_tol=ROUNDING) for bound in (self.lower, self.upper)
+            math.isclose(value, bound, rel_tol=ROUNDING, abs_tol=ROUNDING * self.scale)
+            for bound in (self.lower, self.upper)
         )
+
+    def nearest(self, value: float) -> float:
+        """The value within the bounds that is nearest to one."""
+        return min(max(value, self.lower), self.upper)
 
     def in_units(self, units: Mapping[str, str]) -> ParameterInfo:
         """The same with the unit that it has on a rig.

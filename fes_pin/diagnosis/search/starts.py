@@ -52,8 +52,8 @@ def started(
         assert null is not None
         nothing = abs(value - null) < 1e-6 * one.scale
         if not nothing:
-            limits = (one.lower, one.upper) if reach is None else (null - reach * one.scale, null + reach * one.scale)
-            values[name] = float(np.clip(value, *limits))
+            away = np.inf if reach is None else reach * one.scale
+            values[name] = one.nearest(float(np.clip(value, null - away, null + away)))
         elif step is None:
             values[name] = near_null(type(effect), name)
         else:

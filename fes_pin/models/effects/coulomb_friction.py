@@ -112,13 +112,12 @@ class CoulombFriction(Effect):
     @classmethod
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
         """Of a joint, speeds in the measure of its own, which a sine is below for a fifth of the time, more or less."""
-        grids, speed = super().grids(measured), _usual_speed(measured)
-        grids["presliding"] = tuple(k * _imposed_way(measured) for k in WAYS)
-        grids["stretch"] = tuple(k * _free_way(measured) for k in STRETCHES)
-        if not speed > 0.0:
-            return grids
-        speeds = {"stribeck_speed": (0.3, 0.1, 1.0), "creep_speed": (0.1, 0.5, 0.02)}
-        return {**grids, **{n: tuple(k * speed for k in shares) for n, shares in speeds.items()}}
+        grids, speed, info = super().grids(measured), _usual_speed(measured), cls.parameters()
+        tried = {"presliding": (WAYS, _imposed_way(measured)), "stretch": (STRETCHES, _free_way(measured))}
+        if speed > 0.0:
+            tried |= {"stribeck_speed": ((0.3, 0.1, 1.0), speed), "creep_speed": ((0.1, 0.5, 0.02), speed)}
+        own = {n: tuple(info[n].nearest(k * unit) for k in shares) for n, (shares, unit) in tried.items()}
+        return {**grids, **own}
 
     @classmethod
     def forms(cls, measured: Mapping[str, np.ndarray]) -> tuple[Mapping[str, float], ...]:
