@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -113,7 +113,10 @@ class CoulombFriction(Effect):
     def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
         """Of a joint, speeds in the measure of its own, which a sine is below for a fifth of the time, more or less."""
         grids, speed, info = super().grids(measured), _usual_speed(measured), cls.parameters()
-        tried = {"presliding": (WAYS, _imposed_way(measured)), "stretch": (STRETCHES, _free_way(measured))}
+        tried: dict[str, tuple[Sequence[float], float]] = {
+            "presliding": (WAYS, _imposed_way(measured)),
+            "stretch": (STRETCHES, _free_way(measured)),
+        }
         if speed > 0.0:
             tried |= {"stribeck_speed": ((0.3, 0.1, 1.0), speed), "creep_speed": ((0.1, 0.5, 0.02), speed)}
         own = {n: tuple(info[n].nearest(k * unit) for k in shares) for n, (shares, unit) in tried.items()}
