@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fes_pin.cli.options import Force, Libraries, output
+from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study_of
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
 
 
@@ -26,6 +26,8 @@ def compare(
         float | None, typer.Option(metavar="SECONDS", help="Also foretell the rest of each trial from its beginning.")
     ] = None,
     out: Annotated[Path | None, output("Folder for compare.json.")] = None,
+    trials: Trials = None,
+    exclude: Exclude = None,
     library: Libraries = None,
     force: Force = False,
 ) -> None:
@@ -34,10 +36,9 @@ def compare(
     from fes_pin.comparison.record import FILE, comparison_json
     from fes_pin.comparison.result import comparison_text
     from fes_pin.data.outputs import Outputs
-    from fes_pin.data.study import read_study
 
     catalogue = catalogue_with(library)
-    measured = read_study(study, rigs=catalogue.schemas())
+    measured = study_of(study, catalogue, trials, exclude)
     outputs = Outputs("compare", force)
     if out is not None:
         outputs.check(out, (FILE,))  # what cannot be read or written is said before any work

@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 
 from fes_pin.cli.group import needs
-from fes_pin.cli.options import Force, Libraries, output
+from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study_of
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
 
 
-@needs(by="not after")
+@needs(by="not after", trials="not after", exclude="not after")
 def contrast(
     study: Annotated[Path, typer.Argument(help="Folder of a study whose trials have groups, or of what was before.")],
     out: Annotated[Path, output("Folder for contrast.json and report.html.")],
@@ -25,6 +25,8 @@ def contrast(
     limit: Annotated[
         float | None, typer.Option(min=0.0, help="Seconds of search; then the best set of changes so far.")
     ] = None,
+    trials: Trials = None,
+    exclude: Exclude = None,
     library: Libraries = None,
     force: Force = False,
 ) -> None:
@@ -33,13 +35,11 @@ def contrast(
     from fes_pin.contrasts.record import FILE, contrast_json
     from fes_pin.contrasts.result import contrast_text
     from fes_pin.data.outputs import Outputs
-    from fes_pin.data.study import read_study
     from fes_pin.view.contrast_report import contrast_html
 
     catalogue = catalogue_with(library)
-    schemas = catalogue.schemas()
-    before = read_study(study, rigs=schemas)
-    now = None if after is None else read_study(after, rigs=schemas)
+    before = study_of(study, catalogue, trials, exclude)
+    now = None if after is None else study_of(after, catalogue)
     outputs = Outputs("contrast", force)
     outputs.check(out, (FILE, "report.html"))  # what cannot be read or written is said before any work
     wanted = [g.strip() for g in groups.split(",") if g.strip()] if groups is not None else None

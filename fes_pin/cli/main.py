@@ -15,16 +15,15 @@ from fes_pin.cli.compare import compare
 from fes_pin.cli.contrast import contrast
 from fes_pin.cli.datasets import datasets
 from fes_pin.cli.group import App
-from fes_pin.cli.options import Force, Libraries, output, pairs
+from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study_of
 from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
+from fes_pin.cli.predict import predict
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
 from fes_pin.cli.walk import diagnose_walking, print_effects
 
 if TYPE_CHECKING:
-    from fes_pin.data.trial import Trial
     from fes_pin.diagnosis.result import Diagnosis
-    from fes_pin.models.model import Model
 
 app = App(pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
@@ -37,6 +36,7 @@ app.command()(pulses)
 app.command()(cohort)
 app.command()(contrast)
 app.command()(compare)
+app.command()(predict)
 
 ANSWER = ("diagnosis.json", "model.toml", "report.html", "next_trial.csv")
 """What a diagnosis writes, the last where it proposes a trial."""
@@ -75,17 +75,18 @@ def diagnose(
     tables: Annotated[
         str | None, typer.Option(help="csv or parquet: also trajectories.csv, every sample beside both models.")
     ] = None,
+    trials: Trials = None,
+    exclude: Exclude = None,
     library: Libraries = None,
     force: Force = False,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
     from fes_pin.data.errors import InputError
     from fes_pin.data.outputs import Outputs
-    from fes_pin.data.study import read_study
     from fes_pin.data.tabular import SUFFIXES, check_table, table_bytes
 
     catalogue = catalogue_with(library)
-    measured = read_study(study, rigs=catalogue.schemas())
+    measured = study_of(study, catalogue, trials, exclude)
     table = None if tables is None else f"trajectories.{tables}"
     if table is not None:
         if f".{tables}" not in SUFFIXES:
@@ -94,8 +95,8 @@ def diagnose(
     outputs = Outputs("diagnose", force)
     outputs.check(out, (*ANSWER, *([table] if table else [])))  # what cannot be written is said before any work
     if measured.rig == "body":
-        if library:
-            raise InputError("--library brings causes of rigs; walking has none but its own")
+        if tables is not None:
+            raise InputError("goes only with a rig; walking has no such tables", column="--tables")
         with progress() as tell:
             verdict = diagnose_walking(measured, outputs, out, seed, limit, tell)
         typer.echo(f"{verdict}\nreport: {out / 'report.html'}")
@@ -119,85 +120,13 @@ def diagnose(
         tell(DIAGNOSING, "report")
         files: dict[str, str | bytes] = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
         if table is not None:
-            trials, columns = trajectories(diagnosis)
-            files[table] = table_bytes(columns, table, {"trial": trials})
+            names, columns = trajectories(diagnosis)
+            files[table] = table_bytes(columns, table, {"trial": names})
         tell(1.0, "done")
     old = {NEXT_FILE, *(f"trajectories{suffix}" for suffix in SUFFIXES)}
     outputs.write(out, files, without=old - set(files))  # what an earlier diagnosis proposed is not this one's
     _print_verdict(diagnosis)
     typer.echo(f"report: {out / 'report.html'}")
-
-
-@app.command()
-def predict(
-    model: Annotated[Path, typer.Argument(help="model.toml of a diagnosis.")],
-    trial: Annotated[Path, typer.Argument(help="CSV with time_s and the inputs, or as --columns-of says.")],
-    out: Annotated[Path, output("CSV or Parquet to write: time_s and what is predicted.")],
-    setting: Annotated[
-        list[str] | None, typer.Option("--set", help="A condition of the trial: load_kg=1.5, kind=isometric ...")
-    ] = None,
-    columns_of: Annotated[
-        Path | None, typer.Option(help="A study whose [columns] says how the trial's file is written.")
-    ] = None,
-    residuals: Annotated[
-        bool, typer.Option("--residuals", help="Also what was measured, and measured minus predicted.")
-    ] = False,
-    horizon: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0,
-            metavar="SECONDS",
-            help="Foretell each sample from what the trial measured up to so long before it.",
-        ),
-    ] = None,
-    library: Libraries = None,
-    force: Force = False,
-) -> None:
-    """Predict a trial from its inputs with a saved model, or so far ahead along a trial that has its outputs."""
-    from fes_pin.data.errors import InputError
-    from fes_pin.data.outputs import Outputs
-    from fes_pin.data.study import read_columns
-    from fes_pin.data.tabular import check_table, table_bytes
-    from fes_pin.data.trial import read_trial
-    from fes_pin.identify.stored import load_log
-    from fes_pin.models.predict import predict as run
-    from fes_pin.models.store import load_model
-
-    catalogue = catalogue_with(library)
-    check_table(out)
-    loaded = load_model(model, library=catalogue)
-    kind, conditions = _settings(setting)
-    own = None if columns_of is None else read_columns(columns_of, rigs=catalogue.schemas())
-    rig = loaded.rig.described()
-    given = read_trial(trial, rig=rig, kind=kind, conditions=conditions, inputs_only=horizon is None, own=own)
-    outputs = Outputs("predict", force)
-    outputs.check_file(out)
-    given = load_log(model).applied(given)
-    found = run(loaded, given) if horizon is None else _along(model, loaded, given, horizon)
-    columns = {"time_s": found.time, **found.columns}
-    if residuals:
-        measured = [n for n in found.columns if n in given]
-        if not measured:
-            raise InputError(f"expected a column {' or '.join(found.columns)} to compare with", file=trial)
-        columns |= {f"{n}_measured": given[n] for n in measured}
-        columns |= {f"{n}_residual": given.residual(found, n) for n in measured}
-    outputs.write_file(out, table_bytes(columns, out))
-    say_whose_code(catalogue)
-
-
-def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
-    """A trial's outputs foretold from what was measured so long before."""
-    from fes_pin.data.errors import InputError
-    from fes_pin.data.trial import derived_trial
-    from fes_pin.identify.ahead import foretell
-    from fes_pin.identify.stored import load_random
-
-    random = load_random(path)
-    if random is None:
-        raise InputError(
-            "expected a table [random], as diagnose writes it: --horizon needs to know the noise", file=path
-        )
-    return derived_trial(trial, columns=foretell(model, trial, random, horizon_s))
 
 
 @app.command()
@@ -212,22 +141,6 @@ def effects(library: Libraries = None) -> None:
         typer.echo(describe(one))
     typer.echo(MISREAD)
     print_effects()
-
-
-def _settings(words: list[str] | None) -> tuple[str | None, dict[str, float]]:
-    """`--set` options as the kind of trial and its numbers."""
-    from fes_pin.data.errors import InputError
-    from fes_pin.data.numbers import number_in
-
-    given = pairs("--set", words)
-    kind = given.pop("kind", None)
-    numbers: dict[str, float] = {}
-    for name, value in given.items():
-        try:
-            numbers[name] = number_in(value)
-        except ValueError as problem:
-            raise InputError(str(problem), column=f"--set {name}") from None
-    return kind, numbers
 
 
 def _print_verdict(diagnosis: Diagnosis) -> None:

@@ -3,18 +3,62 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from fes_pin.data.errors import InputError
+
+if TYPE_CHECKING:
+    from fes_pin.data.study import Study
+    from fes_pin.models.catalogue import Catalogue
 
 Libraries = Annotated[
     list[str] | None,
     typer.Option("--library", help="A Python file, or the name of a module, with causes or rigs. Its code is run."),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Write over files that this command did not write as they are.")]
+
+Trials = Annotated[str | None, typer.Option("--trials", help="Only these trials: a,b, or a* for all that begin so.")]
+Exclude = Annotated[str | None, typer.Option("--exclude", help="All trials but these: a,b, or a*.")]
+
+
+def study_of(path: Path, catalogue: Catalogue, trials: str | None = None, exclude: str | None = None) -> Study:
+    """The study that a command was given, with the trials that --trials and --exclude leave.
+
+    Raises
+    ------
+    InputError
+        As `read_study`; a trial that it has not, no trial left; --library for walking, which has no causes but its own.
+    """
+    from fes_pin.data.study import read_study
+
+    study = read_study(path, rigs=catalogue.schemas())
+    if study.schema.owner is None and catalogue.origins():
+        raise InputError("brings causes of rigs; walking has none but its own", column="--library")
+    if trials is None and exclude is None:
+        return study
+    names = [t.name for t in study.trials]
+    wanted = names if trials is None else _named(trials, names, "--trials")
+    left_out = [] if exclude is None else _named(exclude, names, "--exclude")
+    if not (kept := [name for name in names if name in wanted and name not in left_out]):
+        raise InputError("leaves no trial", column="--exclude")
+    files = {key: file for key, file in study.files.items() if key.rpartition(".")[0] in ("", *kept)}
+    return replace(study, trials=tuple(study.trial(name) for name in kept), files=files)
+
+
+def _named(words: str, names: Sequence[str], option: str) -> list[str]:
+    """Those of the names that words with commas between them are, or patterns of."""
+    found: list[str] = []
+    for word in [words] if words in names else [one.strip() for one in words.split(",")]:
+        some = [word] if word in names else [name for name in names if fnmatchcase(name, word)]
+        if not some:
+            raise InputError(f"expected trials of {', '.join(names)}; found {word!r}", column=option)
+        found += some
+    return found
 
 
 def output(help: str, *names: str) -> Any:

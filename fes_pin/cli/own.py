@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fes_pin.cli.group import needs, release_output
-from fes_pin.cli.options import Libraries, output, pairs
+from fes_pin.cli.options import Exclude, Libraries, Trials, output, pairs, study_of
+from fes_pin.cli.progress import catalogue_with
 from fes_pin.data.files import check_folder, write_files
 from fes_pin.data.outputs import Outputs
 
@@ -130,18 +131,17 @@ def new_study(
 def check(
     study: Annotated[Path, typer.Argument(help="Folder of a study, or its study.toml.")],
     as_json: Annotated[bool, typer.Option("--json", help="The same as JSON.")] = False,
+    trials: Trials = None,
+    exclude: Exclude = None,
     library: Libraries = None,
 ) -> None:
     """Say what is odd about a study before anything is looked for, and what its trials can and cannot show."""
     import json
 
-    from fes_pin.data.study import read_study
     from fes_pin.diagnosis.checked import check as find
-    from fes_pin.models.catalogue import load_library
 
-    catalogue = load_library(*(library or []))
-    measured = read_study(study, rigs=catalogue.schemas())
-    found = find(measured, library=catalogue)
+    catalogue = catalogue_with(library)
+    found = find(study_of(study, catalogue, trials, exclude), library=catalogue)
     typer.echo(json.dumps(found.as_dict(), indent=1) if as_json else str(found))
 
 

@@ -58,6 +58,12 @@ def table_bytes(
         return stream.getvalue()
     lines = format_csv(columns).replace("nan", "").split("\n")
     if names:
-        words = [",".join(names), *map(",".join, zip(*names.values(), strict=True))]
+        words = [",".join(names), *(",".join(map(_quoted, row)) for row in zip(*names.values(), strict=True))]
         lines = [f"{word},{line}" for word, line in zip(words, lines[:-1], strict=True)] + [""]
     return "\n".join(lines).encode()
+
+
+def _quoted(word: str) -> str:
+    """A word as a cell of CSV."""
+    escaped = word.replace('"', '""')
+    return f'"{escaped}"' if {",", '"'} & set(word) else word

@@ -12,6 +12,7 @@ from fes_pin.diagnosis.decide.held_out import within
 from fes_pin.diagnosis.errors_ahead import AheadErrors
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.ahead import over_horizon
+from fes_pin.identify.error_measures import percent_of_spread
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
@@ -77,13 +78,15 @@ def _shown(readings: np.ndarray, trial: Trial, name: str) -> np.ndarray:
 
 
 def trial_error_percent(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> float:
-    """E of eq. (2): squared error over the measurement's squares about its mean, percent.
+    """E of a prediction of one trial, percent."""
+    return percent_of_spread(*squares_of(measured, simulated, outputs, noise))
 
-    With more than one output each is taken in units of its noise.
-    """
+
+def squares_of(measured: Trial, simulated: Trial, outputs: Sequence[str], noise: NoiseModel) -> tuple[float, float]:
+    """Squared error of a trial, and the measurement's squares about its mean; each output in units of its noise."""
     squares = spread = 0.0
     for name in outputs:
         variance = noise[name].std ** 2 if name in noise else 1.0
         squares += float(np.sum(measured.residual(simulated, name) ** 2)) / variance
         spread += float(np.sum((measured[name] - measured[name].mean()) ** 2)) / variance
-    return 100.0 * squares / max(spread, 1e-300)
+    return squares, spread

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
+from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.diagnosis.result import Diagnosis
 
@@ -20,7 +23,7 @@ def trajectories(diagnosis: Diagnosis) -> tuple[list[str], dict[str, np.ndarray]
         `<output>_residual`: the reading minus the extended model. NaN where a trial has no such column. Where the
         effort answers the reading, predictions are those over the horizon of the diagnosis.
     """
-    trials: list[str] = []
+    trials: list[Trial] = []
     rows: list[dict[str, np.ndarray]] = []
     for one in replayed_trials(diagnosis):
         columns = {"time_s": one.measured.time, **one.measured.columns}
@@ -28,8 +31,16 @@ def trajectories(diagnosis: Diagnosis) -> tuple[list[str], dict[str, np.ndarray]
             columns[f"{name}_nominal"], columns[f"{name}_extended"] = one.nominal[name], one.extended[name]
             if name in one.measured:
                 columns[f"{name}_residual"] = one.measured.residual(one.extended, name)
-        trials += [one.measured.name] * len(one.measured)
+        trials.append(one.measured)
         rows.append(columns)
+    return trial_table(trials, rows)
+
+
+def trial_table(
+    trials: Sequence[Trial], rows: Sequence[Mapping[str, np.ndarray]]
+) -> tuple[list[str], dict[str, np.ndarray]]:
+    """Columns of several trials as one long table: the trial of each row, and columns, NaN where a trial has none."""
     names = dict.fromkeys(n for columns in rows for n in columns)
     absent = [np.full(len(columns["time_s"]), np.nan) for columns in rows]
-    return trials, {n: np.concatenate([c.get(n, a) for c, a in zip(rows, absent, strict=True)]) for n in names}
+    words = [trial.name for trial, columns in zip(trials, rows, strict=True) for _ in columns["time_s"]]
+    return words, {n: np.concatenate([c.get(n, a) for c, a in zip(rows, absent, strict=True)]) for n in names}

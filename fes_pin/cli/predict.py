@@ -1,0 +1,207 @@
+"""`fes-pin predict`: a trial, or all trials of a study, from their inputs with a saved model."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from fes_pin.cli.group import remark
+from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, pairs, study_of
+from fes_pin.cli.progress import catalogue_with, say_whose_code
+from fes_pin.data.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from fes_pin.data.trial import Trial
+    from fes_pin.models.catalogue import Catalogue
+    from fes_pin.models.model import Model
+
+STANDARD = Path("-")
+"""Standard input as a trial, standard output as a table."""
+
+
+def predict(
+    model: Annotated[Path, typer.Argument(help="model.toml of a diagnosis.")],
+    trial: Annotated[
+        Path,
+        typer.Argument(help="CSV with time_s and the inputs, or as --columns-of says; - for standard input; a study."),
+    ],
+    out: Annotated[
+        Path | None, output("CSV or Parquet to write: time_s and what is predicted; - for standard output.")
+    ] = None,
+    setting: Annotated[
+        list[str] | None, typer.Option("--set", help="A condition of the trial: load_kg=1.5, kind=isometric ...")
+    ] = None,
+    columns_of: Annotated[
+        Path | None, typer.Option(help="A study whose [columns] says how the trial's file is written.")
+    ] = None,
+    trials: Trials = None,
+    exclude: Exclude = None,
+    residuals: Annotated[
+        bool, typer.Option("--residuals", help="Also what was measured, and measured minus predicted.")
+    ] = False,
+    horizon: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            metavar="SECONDS",
+            help="Predict each sample from what the trial measured up to so long before it.",
+        ),
+    ] = None,
+    library: Libraries = None,
+    force: Force = False,
+) -> None:
+    """Predict a trial from its inputs with a saved model, or so far ahead along a trial that has its outputs.
+
+    Of a study all trials are predicted, each under its own conditions, and their errors are said; of one trial it is
+    said with --residuals, or without --out.
+    """
+    from fes_pin.data.outputs import Outputs
+    from fes_pin.data.plausibility import ToPredict
+    from fes_pin.data.tabular import check_table, table_bytes
+    from fes_pin.diagnosis.plausibility import check_study
+    from fes_pin.diagnosis.trajectories import trial_table
+    from fes_pin.identify.stored import load_log
+    from fes_pin.models.predict import predict as run
+    from fes_pin.models.store import load_model
+
+    catalogue = catalogue_with(library)
+    if out is not None:
+        check_table(out)
+    loaded = load_model(model, library=catalogue)
+    is_study = trial.is_dir() or trial.suffix.lower() == ".toml"
+    _refuse_ignored(is_study, setting=setting, columns_of=columns_of, trials=trials, exclude=exclude)
+    if is_study:
+        study = study_of(trial, catalogue, trials, exclude)
+        if study.rig != loaded.rig.name:
+            raise InputError(f"expected a study of the rig {loaded.rig.name}, found {study.rig}", file=trial)
+        measured: Sequence[Trial] = study.trials
+    else:
+        measured = [_trial(trial, loaded, setting, columns_of, catalogue, horizon is None)]
+    outputs = Outputs("predict", force)
+    if out is not None and out != STANDARD:
+        outputs.check_file(out)
+    schema = loaded.rig.described()
+    odd = check_study(ToPredict(measured, schema, loaded.rig.constants, trial), loaded)
+    given = [load_log(model).applied(one) for one in measured]
+    found = [run(loaded, one) if horizon is None else _along(model, loaded, one, horizon) for one in given]
+    errors = _errors(model, given, found, horizon)
+    if (residuals or out is None) and not errors:
+        columns = " or ".join(dict.fromkeys(n for one in found for n in one.columns))
+        raise InputError(f"expected a column {columns} to compare with{'' if residuals else ', or --out'}", file=trial)
+    if out is not None:
+        names, columns_out = trial_table(given, [_columns(*pair, residuals) for pair in zip(given, found, strict=True)])
+        table = table_bytes(columns_out, out, {"trial": names} if is_study else None)
+        if out == STANDARD:
+            typer.echo(table.decode(), nl=False)
+        else:
+            outputs.write_file(out, table)
+    say_whose_code(catalogue)
+    for line in odd:
+        remark(f"odd: {line}")
+    for line in errors if is_study or residuals or out is None else ():
+        remark(line) if out == STANDARD else typer.echo(line)
+
+
+def _refuse_ignored(is_study: bool, **given: object) -> None:
+    """A study says of each trial what it is; one trial is not chosen among others."""
+    for name, value in given.items():
+        if value and is_study != (name in ("trials", "exclude")):
+            what = "one trial: a study says it of each" if is_study else "a study"
+            raise InputError(
+                f"goes only with {what}", column="--set" if name == "setting" else f"--{name}".replace("_", "-")
+            )
+
+
+def _trial(
+    path: Path,
+    model: Model,
+    setting: list[str] | None,
+    columns_of: Path | None,
+    catalogue: Catalogue,
+    inputs_only: bool,
+) -> Trial:
+    """The trial to predict; what is wrong with it names the file or the option that was given."""
+    from fes_pin.data.numbers import number_in
+    from fes_pin.data.study import read_columns
+    from fes_pin.data.trial import read_trial
+
+    said = pairs("--set", setting)
+    kind = said.pop("kind", None)
+    conditions: dict[str, float] = {}
+    for name, value in said.items():
+        try:
+            conditions[name] = number_in(value)
+        except ValueError as problem:
+            raise InputError(str(problem), column=f"--set {name}") from None
+    schema = model.rig.described()
+    own = None if columns_of is None else read_columns(columns_of, rigs=catalogue.schemas())
+    with _readable(path) as file:
+        try:
+            return read_trial(file, rig=schema, kind=kind, conditions=conditions, inputs_only=inputs_only, own=own)
+        except InputError as error:
+            if error.row is None and error.column in {"kind", *conditions, *schema.conditions}:
+                raise InputError(error.message, column=f"--set {error.column}") from None
+            if file == path or error.file != file:
+                raise
+            raise InputError(error.message, file="standard input", row=error.row, column=error.column) from None
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[Path]:
+    """The file, or a copy of standard input."""
+    if path != STANDARD:
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="fes-pin-") as folder:
+        copy = Path(folder) / "stdin.csv"
+        copy.write_bytes(sys.stdin.buffer.read())
+        yield copy
+
+
+def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
+    """A trial's outputs predicted from what was measured so long before."""
+    from fes_pin.data.trial import derived_trial
+    from fes_pin.identify.ahead import foretell
+    from fes_pin.identify.stored import load_random
+
+    random = load_random(path)
+    if random is None:
+        raise InputError(
+            "expected a table [random], as diagnose writes it: --horizon needs to know the noise", file=path
+        )
+    return derived_trial(trial, columns=foretell(model, trial, random, horizon_s))
+
+
+def _errors(path: Path, measured: Sequence[Trial], found: Sequence[Trial], horizon_s: float | None) -> list[str]:
+    """E of each trial whose outputs were measured, and of all of them, in words."""
+    from fes_pin.diagnosis.replay import squares_of
+    from fes_pin.identify.error_measures import percent_of_spread
+    from fes_pin.identify.stored import load_random
+
+    random = load_random(path)
+    noise = random if isinstance(random, dict) else {}
+    squares = {}
+    for one, predicted in zip(measured, found, strict=True):
+        if names := [n for n in predicted.columns if n in one]:
+            squares[one.name] = squares_of(one, predicted, names, noise)
+    ahead = "" if horizon_s is None else f", {horizon_s:g} s ahead"
+    lines = [f"{name}: E {percent_of_spread(*both):.3g} %{ahead}" for name, both in squares.items()]
+    if len(squares) > 1:
+        lines.append(f"all trials: E {percent_of_spread(*zip(*squares.values(), strict=True)):.3g} %{ahead}")
+    return lines
+
+
+def _columns(measured: Trial, found: Trial, residuals: bool) -> dict[str, np.ndarray]:
+    """Columns of the table of one trial."""
+    columns = {"time_s": found.time, **found.columns}
+    compared = [n for n in found.columns if residuals and n in measured]
+    columns |= {f"{n}_measured": measured[n] for n in compared}
+    return columns | {f"{n}_residual": measured.residual(found, n) for n in compared}
