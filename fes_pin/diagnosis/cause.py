@@ -24,27 +24,33 @@ class ParameterEstimate:
     std
         Infinite of a value that is not identified, 0 of one that is held; NaN of one at its bound.
     at_bound
-        Of a value at a bound of what the parameter can be, its 95 % interval, which is one-sided; None of others.
+        True of a value at a bound of what the parameter can be. Then its 95 % interval is one-sided: from the bound to
+        the other end.
+    ends
+        Of its 95 % interval, where that is not 1.96 deviations to either side.
     """
 
     value: float
     std: float
     unit: str
-    at_bound: tuple[float, float] | None = None
+    at_bound: bool = False
+    ends: tuple[float, float] | None = None
 
     @classmethod
     def of(cls, fitted: Fit, name: str, unit: str, wider: float = 1.0) -> ParameterEstimate:
         """A parameter of a fit by name, with its deviation so many times."""
         value = fitted.values[name]
+        if name not in fitted.free:
+            return cls(value, 0.0, unit)
         if name in fitted.at_bound:
-            return cls(value, math.nan, unit, fitted.interval(name))
-        return cls(value, wider * fitted.std(name) if name in fitted.free else 0.0, unit)
+            return cls(value, math.nan, unit, True, fitted.interval(name))
+        return cls(value, wider * fitted.std(name), unit, ends=fitted.interval(name) if wider == 1.0 else None)
 
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval."""
         half = CONFIDENCE_95 * self.std
-        return self.at_bound or (self.value - half, self.value + half)
+        return self.ends or (self.value - half, self.value + half)
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it: `at_bound` stands only where it is true, with the interval."""
@@ -61,7 +67,7 @@ def estimate_columns(estimates: Sequence[ParameterEstimate]) -> dict[str, list[A
         "unit": [p.unit for p in estimates],
         "low": [p.interval[0] for p in estimates],
         "high": [p.interval[1] for p in estimates],
-        "at_bound": [p.at_bound is not None for p in estimates],
+        "at_bound": [p.at_bound for p in estimates],
     }
 
 

@@ -172,7 +172,7 @@ class Diagnosis(Saveable):
     def footnotes(self) -> list[str]:
         """What stands beneath the table."""
         pairs = from_to(self.nominal_error, self.extended_error, ("fitted", "held out"))
-        lines = [f"error E {pairs}; noise floor {percent(self.ceiling_percent)}"] if pairs else []
+        lines = [f"free error E {pairs}; noise floor {percent(self.ceiling_percent)}"] if pairs else []
         lines += ahead_notes(self.ahead, self.random, self.model.rig.units().get("effort", ""))
         left = self.remainder
         where = f", most on {left.where}" if left.where else ""

@@ -43,11 +43,15 @@ def quantity(value: float, std: float, unit: str) -> str:
 
 def estimate_text(one: ParameterEstimate) -> str:
     """A value with its standard deviation; at a bound with the other end of its interval, at 97.5 % one-sided."""
-    if one.at_bound is None:
+    if not one.at_bound:
         return quantity(one.value, one.std, one.unit)
-    low, high = one.at_bound
-    end = f"at most {high:.3g}" if high - one.value > one.value - low else f"at least {low:.3g}"
-    return f"{one.value:.4g} {one.unit} (at its bound, {end})".replace("  ", " ")
+    return f"{one.value:.4g} {one.unit} (at its bound, {one_sided(one)})".replace("  ", " ")
+
+
+def one_sided(one: ParameterEstimate) -> str:
+    """The end of the interval of a value at its bound that is not the bound."""
+    low, high = one.interval
+    return f"at most {high:.3g}" if high - one.value >= one.value - low else f"at least {low:.3g}"
 
 
 def cause_columns(gain: str) -> tuple[str, str, str, str, str]:

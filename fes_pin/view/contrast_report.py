@@ -10,7 +10,8 @@ from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.text import probability
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
-from fes_pin.view.page import Content, Markup, element, figure, html_table, joined, page, section, unit_text, value_text
+from fes_pin.view.page import Content, Markup, element, figure, html_table, joined, page, section, unit_text
+from fes_pin.view.report_causes import value_and_interval
 
 NAMES, WIDE, ROW = 176.0, 420.0, 24.0
 """Room for names, width of a figure, height of a row."""
@@ -79,10 +80,7 @@ def _value(by_group: Mapping[str, ParameterEstimate], group: str) -> str:
     if group not in by_group:
         return "-"
     one = by_group[group]
-    if not one.std:
-        return "none"
-    low, high = (value_text(end, one.std) for end in one.interval)
-    return f"{value_text(one.value, one.std)} [{low}, {high}]{' at its bound' if one.at_bound else ''}"
+    return " ".join(value_and_interval(one)) if one.std else "none"
 
 
 def _drawing(change: Change, groups: tuple[str, ...]) -> Drawing:

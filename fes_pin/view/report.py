@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from fes_pin.data.files import write_text
 from fes_pin.data.log import Log
+from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.errors_ahead import Ahead
 from fes_pin.diagnosis.recorded import NEXT_FILE
 from fes_pin.diagnosis.replay import replayed_trials
@@ -192,7 +193,7 @@ def _parameters(diagnosis: Diagnosis) -> list[Markup]:
     rows: list[list[Content]] = []
     for name in fits[-1].free:
         start = f"{diagnosis.study.start[name]:.4g}" if name in diagnosis.study.start else "-"
-        cells = [value_and_interval(f, name, f.values[name]) if name in f.free else ("-", "-") for f in fits]
+        cells = [value_and_interval(ParameterEstimate.of(f, name, "")) if name in f.free else ("-", "-") for f in fits]
         rows.append(
             [element("code", name), unit_text(info[name].unit), start, *(text for pair in cells for text in pair)]
         )

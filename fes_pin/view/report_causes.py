@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from fes_pin.diagnosis.cause import Cause
+import math
+
+from fes_pin.diagnosis.cause import Cause, ParameterEstimate
 from fes_pin.diagnosis.result import EACH_TRIAL, Diagnosis
-from fes_pin.diagnosis.text import probability
-from fes_pin.identify.fit import Fit
+from fes_pin.diagnosis.text import one_sided, probability
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.mathml import equations_mathml
 from fes_pin.view.page import Content, Markup, element, figure, html_table, unit_text, value_text
@@ -59,7 +60,7 @@ def _of_one_trial(diagnosis: Diagnosis, cause: Cause) -> Markup:
             "div",
             element("h3", element("code", cause.name), " ", stage_mark(cause.stage)),
             element("p", f"{cause.words[0].upper()}{cause.words[1:]}."),
-            _estimates(diagnosis.extended, cause),
+            _estimates(cause),
             element("p", gain, " Everything else here is told with that value in its place."),
         ),
         class_=f"cause {cause.stage}",
@@ -86,7 +87,7 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
             element("h3", element("code", cause.name), " ", stage_mark(cause.stage)),
             element("p", sentence(kind)),
             equations_mathml(equation(kind)),
-            _estimates(diagnosis.extended, cause),
+            _estimates(cause),
             element("p", gain, " ", told, *_notes(diagnosis, cause)),
             element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}", class_="soft"),
             _rivals(diagnosis, cause),
@@ -104,26 +105,21 @@ def _notes(diagnosis: Diagnosis, cause: Cause) -> list[str]:
     return notes
 
 
-def _estimates(fitted: Fit, cause: Cause) -> Markup:
+def _estimates(cause: Cause) -> Markup:
     rows: list[list[Content]] = []
     for name, one in cause.parameters.items():
-        key = f"{cause.name}.{name}"
-        if key in fitted.values:
-            shown, interval = value_and_interval(fitted, key, one.value)
-        else:  # a mean over trials
-            low, high = (value_text(end, one.std) for end in one.interval)
-            shown, interval = value_text(one.value, one.std), f"[{low}, {high}]"
+        shown, interval = value_and_interval(one)
         rows.append([element("code", name), shown, unit_text(one.unit), interval])
     return html_table(("parameter", "value", "unit", "95 % interval"), rows, (1, 3))
 
 
-def value_and_interval(fitted: Fit, name: str, value: float) -> tuple[str, str]:
+def value_and_interval(one: ParameterEstimate) -> tuple[str, str]:
     """Value and interval of a parameter as printed."""
-    if name not in fitted.free:
-        return f"{value:.4g}", "held"
-    std = fitted.std(name)
-    if name in fitted.not_identified():
-        return f"{value:.3g}", "not identified"
-    low, high = fitted.interval(name)
-    at = " at its bound" if name in fitted.at_bound else ""
-    return value_text(value, std), f"[{value_text(low, std)}, {value_text(high, std)}]{at}"
+    if one.at_bound:
+        return f"{one.value:.4g}", f"{one_sided(one)}, at its bound"
+    if one.std == 0.0:
+        return f"{one.value:.4g}", "held"
+    if not math.isfinite(one.std):
+        return f"{one.value:.3g}", "not identified"
+    low, high = (value_text(end, one.std) for end in one.interval)
+    return value_text(one.value, one.std), f"[{low}, {high}]"

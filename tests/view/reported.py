@@ -58,9 +58,9 @@ def joint_study(folder: Path, kind: str = "revolute") -> Study:
     return Study("joint", "joint", {}, start, trials, files={"urdf": path})
 
 
-def measured(study: Study, names: tuple[str, ...], noise: float = 1e-3) -> Study:
+def measured(study: Study, names: tuple[str, ...], noise: float = 1e-3, seed: int = 5) -> Study:
     """The study with outputs as its nominal model with some effects gives them, and noise."""
-    model, rng = _extended(study, names), np.random.default_rng(5)
+    model, rng = _extended(study, names), np.random.default_rng(seed)
     trials = []
     for trial in study.trials:
         made = simulate(model, trial)

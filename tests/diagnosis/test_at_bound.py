@@ -1,0 +1,80 @@
+"""A value at its bound says so wherever it is shown, with a one-sided interval and never a deviation of 0."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from view.reported import ankle_diagnosis, ankle_study, measured
+
+import fes_pin as fp
+from fes_pin.contrasts.result import Change, change_row
+from fes_pin.diagnosis.cause import ParameterEstimate
+from fes_pin.diagnosis.decide.rivals import estimates
+from fes_pin.diagnosis.text import estimate_text
+from fes_pin.models.nominal import nominal_model
+from fes_pin.view.contrast_report import _change
+from fes_pin.view.report import report_html
+
+AT_ITS_BOUND = ParameterEstimate(0.0, math.nan, "N m", True, (0.0, 0.0123))
+
+
+@pytest.fixture(scope="module")
+def diagnosis():
+    """A diagnosis that names friction whose torque is at its bound, 0."""
+    found = ankle_diagnosis()
+    key = "coulomb_friction.torque_nm"
+    extended = replace(found.extended, at_bound=(key,))
+    cause = replace(found.causes[0], parameters={**found.causes[0].parameters, "torque_nm": AT_ITS_BOUND})
+    return replace(found, extended=extended, causes=(cause,))
+
+
+def test_the_text_says_so(diagnosis):
+    assert estimate_text(AT_ITS_BOUND) == "0 N m (at its bound, at most 0.0123)"
+    assert estimate_text(replace(AT_ITS_BOUND, value=9.0, ends=(4.5, 9.0))) == "9 N m (at its bound, at least 4.5)"
+    assert "torque_nm 0 N m (at its bound, at most 0.0123)" in str(diagnosis)
+    assert "at its bound" in diagnosis._repr_html_()
+
+
+def test_the_frame_says_so(diagnosis):
+    pytest.importorskip("pandas")
+    (row,) = diagnosis.to_frame().query("parameter == 'torque_nm'").to_dict("records")
+    assert row["at_bound"] and np.isnan(row["std"]) and (row["low"], row["high"]) == (0.0, 0.0123)
+
+
+def test_the_record_says_so(diagnosis, tmp_path):
+    known = {"value": 0.0, "std": None, "at_bound": True, "low": 0.0, "high": 0.0123}
+    assert diagnosis.record()["causes"][0]["parameters"]["torque_nm"] == known
+    extended = diagnosis.record()["extended"]["parameters"]
+    assert extended["coulomb_friction.torque_nm"]["at_bound"] and extended["coulomb_friction.torque_nm"]["std"] is None
+    assert set(extended["gain"]) == {"value", "std"} and extended["gain"]["std"] > 0.0
+    fp.save_result(diagnosis, tmp_path / "d.json")
+    assert fp.load_result(tmp_path / "d.json").causes[0]["parameters"]["torque_nm"]["at_bound"] is True
+
+
+def test_the_report_says_so(diagnosis):
+    page = report_html(diagnosis)
+    assert "at most 0.0123, at its bound" in page and "0 N m (at its bound, at most 0.0123)" in page
+
+
+def test_a_change_says_so():
+    one = {"before": AT_ITS_BOUND, "after": ParameterEstimate(0.05, 0.002, "N m")}
+    change = Change("coulomb_friction", "effect", "after", "new", {"torque_nm": one}, (), 1e-9)
+    assert "before 0 N m (at its bound, at most 0.0123)" in change_row(change)[2]
+    assert change.record()["parameters"]["torque_nm"]["before"]["at_bound"]
+    page = _change(change, ("before", "after")).text
+    assert "at most 0.0123, at its bound" in page and "none" not in page
+
+
+def test_friction_that_is_not_there_is_fitted_at_its_bound_or_with_a_deviation():
+    """Noise pushes the fit to either side of the bound, half of the time each."""
+    at_bound = 0
+    for seed in range(8):
+        study = measured(ankle_study(), (), seed=seed)
+        fitted = fp.fit(nominal_model(study) + fp.effects.CoulombFriction(torque_nm=0.01), study.trials)
+        one = estimates(fitted, "coulomb_friction")["torque_nm"]
+        assert one.at_bound == ("coulomb_friction.torque_nm" in fitted.at_bound)
+        assert one.std > 0.0 or (one.at_bound and math.isnan(one.std))
+        assert one.interval == fitted.interval("coulomb_friction.torque_nm")
+        at_bound += one.at_bound
+    assert at_bound
