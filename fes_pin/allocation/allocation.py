@@ -156,7 +156,10 @@ class Allocation:
         return f"more {by_name[i]} would spoil {self.joints[k].replace('_', ' ')}"
 
     def as_dict(self) -> dict[str, Any]:
-        """The answer in plain types, by name: pulse widths us, recruitments, torques N m with their band, reasons."""
+        """The answer in plain types, by name: pulse widths us, recruitments, torques N m with their band, reasons.
+
+        `strength_band` holds the factors on the strength assumed that the bands of the torques belong to.
+        """
         low, high = self.achieved_band
         return {
             "pulse_width_us": self.pulse_widths_us,
@@ -170,6 +173,7 @@ class Allocation:
                 for j, joint in enumerate(self.joints)
                 if self.wanted[j] or self.achieved[j]
             },
+            "strength_band": list(self.problem.band),
             "reasons": self.reasons,
             "held": list(self.held),
             "residual": float(self.certificate.residual),

@@ -7,10 +7,12 @@ from typing import Annotated
 
 import typer
 
+from fes_pin.cli.group import python_names
 from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study_of
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
 
 
+@python_names(horizon_s="--horizon", given_s="--given")
 def compare(
     study: Annotated[Path, typer.Argument(help="Folder of a study of a muscle or an ankle, or its study.toml.")],
     models: Annotated[

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
-from fes_pin.cli.group import needs
+from fes_pin.cli.group import needs, python_names
 from fes_pin.cli.options import Force, output
 
 
-@needs(out="names", unverified="names")
+@needs(out="names", unverified="names", force="names")
+@python_names(**{"unverified=True": "--unverified"})
 def datasets(
     names: Annotated[list[str] | None, typer.Argument(help="To fetch. [default: list them]")] = None,
     out: Annotated[Path | None, output("Folder to fetch into. [default: FES_PIN_DATA, or the user's cache]")] = None,

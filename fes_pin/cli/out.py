@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fes_pin.cli.options import Force, output
+from fes_pin.cli.group import python_names
+from fes_pin.cli.options import Force, Libraries, output
+from fes_pin.cli.progress import catalogue_with, say_whose_code
+
+if TYPE_CHECKING:
+    from fes_pin.data.trial import Trial
 
 
 def urdf(
     model: Annotated[Path, typer.Argument(help="model.toml of a diagnosis of a joint.")],
     believed: Annotated[Path, typer.Argument(help="The URDF of its study.")],
     out: Annotated[Path, output("URDF to write.")],
+    library: Libraries = None,
     force: Force = False,
 ) -> None:
     """Write a fitted joint as URDF: inertia and weight as fitted, damping and friction in <dynamics>."""
@@ -21,8 +27,10 @@ def urdf(
     from fes_pin.models.store import load_model
     from fes_pin.models.urdf_out import extended_urdf
 
-    text, left_out, changed = extended_urdf(load_model(model), believed)
+    catalogue = catalogue_with(library)
+    text, left_out, changed = extended_urdf(load_model(model, library=catalogue), believed)
     Outputs("urdf", force).write_file(out, text)
+    say_whose_code(catalogue)
     typer.echo(f"wrote {out}")
     if changed:
         typer.echo(changed)
@@ -30,6 +38,10 @@ def urdf(
         typer.echo(f"URDF has no words for {', '.join(left_out)}: what is simulated with it lacks that")
 
 
+@python_names(
+    **{"limits.width_us": "--max-width", "limits.rate_hz": "--max-rate", "limits.charge_uc": "--max-charge"},
+    **{"limits.current_ma": "--current", "rate_hz": "--rate", "width_us": "--width"},
+)
 def pulses(
     trial: Annotated[Path, typer.Argument(help="CSV of a trial with pulse_width_us or stim: next_trial.csv.")],
     out: Annotated[Path, output("CSV or Parquet to write, one row a pulse.")],
@@ -45,11 +57,27 @@ def pulses(
     from fes_pin.data.outputs import Outputs
     from fes_pin.data.pulses import PulseLimits, pulse_list
     from fes_pin.data.tabular import check_table, table_bytes
-    from fes_pin.data.trial import read_trial
 
     check_table(out)
     limits = PulseLimits(max_width, max_rate, max_charge, current)
-    given = read_trial(trial, rig="muscle", inputs_only=True)
-    listed = pulse_list(given, limits, rate, width)
+    listed = pulse_list(_stimulated(trial), limits, rate, width)
     Outputs("pulses", force).write_file(out, table_bytes(listed, out))
     typer.echo(f"wrote {len(listed['time_s'])} pulses to {out}")
+
+
+def _stimulated(path: Path) -> Trial:
+    """A trial of any rig that is stimulated, whatever else its file holds of the rig."""
+    from dataclasses import replace
+
+    from fes_pin.data.plausibility import PULSES
+    from fes_pin.data.recorded.hint import read_csv_or_hint
+    from fes_pin.data.schema import known_rigs, schema_of
+    from fes_pin.data.trial import read_trial
+
+    names = set(read_csv_or_hint(path).names)
+    kinds = [
+        (one, kind) for one in known_rigs().values() for kind in one.outputs if set(PULSES) & set(one.stimuli(kind))
+    ]
+    fits = [(one, kind) for one, kind in kinds if names <= set(one.columns_of(kind))]
+    schema, kind = fits[0] if fits else (schema_of("muscle"), None)
+    return read_trial(path, rig=replace(schema, needed={}), kind=kind, inputs_only=True)

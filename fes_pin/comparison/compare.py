@@ -83,7 +83,7 @@ def compare(
     every = [*fitted, *held]
     horizon = _horizon(study, every, horizon_s)
     if given_s is not None:
-        _check_time(given_s, every, "--given")
+        _check_time(given_s, every, "given_s")
     chosen = _chosen(models, extended, nominal, every, library)
     parts = partings(fitted, held)
     scale, floor = spreads(nominal, every), rough_noise(nominal, every)
@@ -137,7 +137,7 @@ def _chosen(
         rig = replace(own.rig, constants=nominal.rig.constants)
         out.append(_Chosen(name, Model(rig, own.effects)))
     if not out:
-        raise InputError("expected at least one model to compare", column="--models")
+        raise InputError("expected at least one model to compare", column="models")
     return out
 
 
@@ -195,15 +195,15 @@ def _with_apart(ranked: Sequence[Compared], folds: int) -> list[Compared]:
 def _horizon(study: Study, trials: Sequence[Trial], asked: float | None) -> float:
     if asked is None:
         return study.horizon_s or default_horizon(trials)
-    _check_time(asked, trials, "--horizon")
+    _check_time(asked, trials, "horizon_s")
     return asked
 
 
-def _check_time(value: float, trials: Sequence[Trial], option: str) -> None:
+def _check_time(value: float, trials: Sequence[Trial], name: str) -> None:
     shortest = min(t.duration for t in trials)
     if not 0.0 < value < shortest:
         raise InputError(
-            f"expected seconds between 0 and {shortest:.4g}, the shortest trial; found {value:g}", column=option
+            f"expected seconds between 0 and {shortest:.4g}, the shortest trial; found {value:g}", column=name
         )
 
 

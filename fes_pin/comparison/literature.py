@@ -204,7 +204,7 @@ def published_model(name: str) -> Published:
         if one.name == name:
             return one
     known = ", ".join((NOMINAL, *(m.name for m in LITERATURE)))
-    raise InputError(f"no model {name!r}; expected some of {known}", column="--models")
+    raise InputError(f"no model {name!r}; expected some of {known}", column="models")
 
 
 def possible(trials: Sequence[Trial]) -> tuple[str, ...]:

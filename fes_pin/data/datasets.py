@@ -167,7 +167,7 @@ def download(name: str, folder: str | Path | None = None, unverified: bool = Fal
     other = [p for p, known in dataset.converted.items() if _sha256(made.get(p, "")) != known]
     if not trusted and other and not unverified:
         found = f"{len(other)} of {len(dataset.converted)} trials differ from those that the documentation was written"
-        hint = "--unverified keeps them all the same"
+        hint = "unverified=True keeps them all the same"
         raise InputError(
             f"{found} with ({other[0]} is one), and no checksum of its origin is known; {hint}", column=name
         )

@@ -34,7 +34,7 @@ class PulseLimits:
     def __post_init__(self) -> None:
         for name in ("width_us", "rate_hz", "charge_uc", "current_ma"):
             if not 0.0 < getattr(self, name) < np.inf:
-                raise InputError(f"expected a number above 0, found {getattr(self, name):g}", column=name)
+                raise InputError(f"expected a number above 0, found {getattr(self, name):g}", column=f"limits.{name}")
 
 
 def pulse_list(
@@ -58,11 +58,13 @@ def pulse_list(
     Raises
     ------
     InputError
-        No such column, a rate or width that is not said, a pulse beyond a limit, with its time.
+        No such column; a rate or width that is not said, or that the trial says; a pulse beyond a limit, with its time.
     """
     if "pulse_width_us" in trial:
         if rate_hz is None or not 0.0 < rate_hz < np.inf:
-            raise InputError("expected the rate of the pulses, whose widths the trial says", column="rate")
+            raise InputError("expected the rate of the pulses, whose widths the trial says", column="rate_hz")
+        if width_us is not None:
+            raise InputError("goes only with a trial of single pulses; this one says their widths", column="width_us")
         count = int(np.floor((trial.duration + trial.dt) * rate_hz * (1 - 1e-9))) + 1
         time = np.arange(count) / rate_hz
         samples = np.minimum((time / trial.dt + 1e-6).astype(int), len(trial) - 1)
@@ -70,7 +72,9 @@ def pulse_list(
         time, width = time[width > 0.0], width[width > 0.0]
     elif "stim" in trial:
         if width_us is None or not 0.0 < width_us < np.inf:
-            raise InputError("expected the width of the pulses, whose times the trial says", column="width")
+            raise InputError("expected the width of the pulses, whose times the trial says", column="width_us")
+        if rate_hz is not None:
+            raise InputError("goes only with a trial of pulse widths; this one says when pulses come", column="rate_hz")
         time = trial.time[trial["stim"] > 0.5] - trial.time[0]
         width = np.full(len(time), width_us)
     else:

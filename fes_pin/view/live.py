@@ -113,7 +113,7 @@ def _listening_socket() -> socket.socket:
             continue
         found.setblocking(False)
         return found
-    raise InputError(f"no port is free between {FIRST_PORT} and {FIRST_PORT + PORTS - 1}", column="--live")
+    raise InputError(f"no port is free between {FIRST_PORT} and {FIRST_PORT + PORTS - 1}")
 
 
 def _bridge() -> type:

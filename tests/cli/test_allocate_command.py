@@ -72,6 +72,10 @@ def test_a_moving_joint_and_a_posture_at_the_edge_are_taken_into_account():
     assert still["recruitment"]["left_femoral"] < moving["recruitment"]["left_femoral"]
     knee = still["torque_nm"]["left_knee_flexion"]
     assert knee["band"] == pytest.approx([1.4 * knee["achieved"], 0.6 * knee["achieved"]]) and still["held"] == []
+    weak, strong = still["strength_band"]
+    assert (weak, strong) == (0.6, 1.4) and f"with {weak:.2g} to {strong:.2g} of the strength assumed" in run(
+        *words[:-1]
+    ).output
     edge = json.loads(run("left_knee_flexion=-40", "--angle", "left_knee_flexion=115", "--json").output)
     assert edge["held"] == ["moment arms at left knee flexion 115 degrees are not known: those at 110 are used"]
 

@@ -60,6 +60,7 @@ IGNORED = {  # words of the command line, the option that would be ignored, what
     "workers_of_a_cluster": ("cohort a --out b --workers 2 --scheduler tcp://a:1", "--workers", "--scheduler"),
     "by_of_two_studies": ("contrast a b --out c --by group", "--by", "AFTER"),
     "out_of_a_list": ("datasets --out a", "--out", "NAMES"),
+    "force_of_a_list": ("datasets --force", "--force", "NAMES"),
     "unverified_of_a_list": ("datasets --unverified", "--unverified", "NAMES"),
     "set_without_recordings": ("new-study --pendulum 1 1 --set a=1", "--set", "FILES"),
     "column_without_recordings": ("new-study --pendulum 1 1 --column a=b", "--column", "FILES"),

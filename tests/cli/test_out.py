@@ -6,11 +6,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from cli.test_own import fails, german, recordings, run  # noqa: F401
+from cli.test_said_of_recordings import CAUSE
 from data import studies
 from diagnosis.hidden import study_of
 
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import read_trial
+from fes_pin.models.catalogue import load_library
+from fes_pin.models.store import load_model, save_model
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +71,53 @@ def test_the_extended_joint_as_urdf(made, monkeypatch, capsys):
     assert run(monkeypatch, *words) == 0
     assert pin.buildModelFromUrdf(str(out)).friction[0] > 0.0
     assert "found one of rig muscle" not in capsys.readouterr().out
+
+
+def test_a_model_with_a_cause_of_a_library_is_written_as_urdf_with_that_library(made, monkeypatch, capsys, tmp_path):
+    library, believed = tmp_path / "own.py", next((made / "study").glob("*.urdf"))
+    library.write_text(CAUSE)
+    own = load_library(library)
+    model = load_model(made / "one" / "model.toml")
+    save_model(model + own.effect("own_friction")(torque_nm=0.1), tmp_path / "model.toml")
+    words = ("urdf", tmp_path / "model.toml", believed, "--out", tmp_path / "out.urdf")
+    assert "own.py; expected --library" in fails(monkeypatch, capsys, *words)
+    assert run(monkeypatch, *words, "--library", library) == 0
+    assert f"runs the code of {library}" in capsys.readouterr().err and (tmp_path / "out.urdf").exists()
+
+
+PULSES = ("--max-width", 400, "--max-rate", 50, "--max-charge", 20, "--current", 40)
+
+
+@pytest.mark.parametrize("more", ["angle_rad", "force_n", "load"])
+def test_pulses_of_a_trial_that_an_ankle_was_measured_with(monkeypatch, capsys, tmp_path, more):
+    """Its file holds the outputs of its rig as well; its conditions do not matter."""
+    names = ["time_s", "pulse_width_us", *([] if more == "load" else [more])]
+    rows = "".join(f"{0.01 * k:.2f},300,1.5\n" if len(names) == 3 else f"{0.01 * k:.2f},300\n" for k in range(100))
+    (tmp_path / "a.csv").write_text(",".join(names) + "\n" + rows)
+    assert run(monkeypatch, "pulses", tmp_path / "a.csv", *PULSES, "--rate", 20, "--out", tmp_path / "p.csv") == 0
+    assert "wrote 20 pulses" in capsys.readouterr().out
+
+
+WRONG_PULSES = {  # columns, options, the option that is named
+    "no rate": ("pulse_width_us", (), "--rate"),
+    "a width beside widths": ("pulse_width_us", ("--rate", 20, "--width", 200), "--width"),
+    "a rate beside pulses": ("stim", ("--rate", 20, "--width", 200), "--rate"),
+    "no current": ("stim", ("--width", 200, "--current", 0), "--current"),
+    "no limit": ("stim", ("--width", 200, "--max-charge", "inf"), "--max-charge"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_PULSES)
+def test_an_error_of_pulses_names_the_option(monkeypatch, capsys, tmp_path, case):
+    column, more, option = WRONG_PULSES[case]
+    rows = "".join(
+        f"{0.01 * k:.2f},{k % 5 == 0:d}\n" if column == "stim" else f"{0.01 * k:.2f},300\n" for k in range(99)
+    )
+    (tmp_path / "a.csv").write_text(f"time_s,{column}\n{rows}")
+    given = dict(zip(PULSES[::2], PULSES[1::2], strict=True)) | dict(zip(more[::2], more[1::2], strict=True))
+    words = [word for pair in given.items() for word in pair]
+    said = fails(monkeypatch, capsys, "pulses", tmp_path / "a.csv", *words, "--out", tmp_path / "p.csv")
+    assert said.startswith(f"fes-pin: {option}: ")
 
 
 def test_pulses_of_a_proposed_trial(made, monkeypatch, capsys):

@@ -144,7 +144,7 @@ def test_a_wrong_checksum_keeps_nothing(server, here, monkeypatch):
 
 
 def test_without_checksums_of_the_origin_the_conversion_must_have_its_own(here):
-    with pytest.raises(InputError, match=r"12 of 12 trials differ from those .*--unverified keeps them"):
+    with pytest.raises(InputError, match=r"12 of 12 trials differ from those .*unverified=True keeps them"):
         download("friction_damper")
     assert not list(here.iterdir())
     assert (download("friction_damper", unverified=True) / "trials" / "d1_20lb_1hz.csv").is_file()

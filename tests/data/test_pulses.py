@@ -40,7 +40,9 @@ def test_pulses_keep_their_times():
         (WIDTHS, {}, {}, "expected the rate"),
         (PULSES, {}, {}, "expected the width"),
         (PULSES, {"rate_hz": 19.0}, {"width_us": 300.0}, "closer than at 19 Hz"),
-        (PULSES, {"current_ma": 0.0}, {"width_us": 300.0}, "current_ma: expected a number above 0"),
+        (PULSES, {"current_ma": 0.0}, {"width_us": 300.0}, "limits.current_ma: expected a number above 0"),
+        (WIDTHS, {}, {"rate_hz": 25.0, "width_us": 300.0}, "width_us: goes only with a trial of single pulses"),
+        (PULSES, {}, {"rate_hz": 25.0, "width_us": 300.0}, "rate_hz: goes only with a trial of pulse widths"),
         (PULSES.without("stim"), {}, {"width_us": 300.0}, "expected a column"),
     ],
 )
