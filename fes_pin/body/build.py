@@ -145,7 +145,7 @@ class Body:
         """
         moving_joints(path)  # links, masses and joints that no body has are said with their row
         try:
-            text = read_text(Path(path))
+            text = read_text(path)
             body = cls(text, _stance_of(_parsed(text)), None, Path(path).name)
         except InputError as error:
             raise InputError(error.message, file=path, column=error.column) from None

@@ -11,7 +11,7 @@ import numpy as np
 
 from fes_pin.body.joints import JOINTS, SEGMENT_NAMES, SIDES
 from fes_pin.data.errors import InputError
-from fes_pin.data.read_files import note_read
+from fes_pin.data.files import read_text
 
 
 @dataclass(frozen=True)
@@ -108,9 +108,8 @@ def read_segments(path: str | Path) -> Skeleton:
         The file cannot be read, or a segment or joint is missing or impossible.
     """
     try:
-        note_read(path)
-        table = json.loads(Path(path).read_text())
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        table = json.loads(read_text(path))
+    except (json.JSONDecodeError, RecursionError) as error:
         raise InputError(f"cannot be read as a table of segments: {error}", file=path) from None
     try:
         return skeleton_of_table(table)

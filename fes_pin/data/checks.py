@@ -55,6 +55,19 @@ def checked_label(value: object, error: KeyFault, key: str = "group", what: str 
     return value
 
 
+def checked_remarks(value: object, error: KeyFault) -> tuple[str, ...]:
+    """Remarks on a trial, each one line of text.
+
+    Raises
+    ------
+    InputError
+        Made by `error`, for anything else.
+    """
+    if not isinstance(value, Sequence) or isinstance(value, str):
+        raise error("remarks", "expected texts, one for each remark")
+    return tuple(checked_label(one, error, "remarks", "a remark") for one in value)
+
+
 def check_columns(names: Sequence[str], schema: RigSchema, kind: str, inputs_only: bool, error: Fault) -> None:
     """Require the columns of this rig and kind, and no others: another unit and a likely typo are told as such.
 

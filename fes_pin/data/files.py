@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
+from fes_pin.data.as_read import HeldFile, note_bytes
 from fes_pin.data.errors import InputError
 from fes_pin.data.read_files import note_read, note_written, refuse_inputs
 
@@ -26,16 +27,20 @@ def read_bytes(path: str | Path) -> bytes:
     InputError
         Missing, a folder, not a regular file, larger than 1 GiB, or not readable.
     """
+    if isinstance(path, HeldFile) and path.content is not None:
+        return path.content
     path = Path(path)
     try:
         if not path.exists():
-            raise InputError("no such file", file=path)
+            raise InputError(missing(path), file=path)
         if not path.is_file():
             raise InputError(f"expected a file, found {'a folder' if path.is_dir() else 'a special file'}", file=path)
         if path.stat().st_size > MAX_BYTES:
             raise InputError("expected at most 1 GiB", file=path)
         note_read(path)
-        return path.read_bytes()
+        content = path.read_bytes()
+        note_bytes(path, content)
+        return content
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
@@ -59,11 +64,27 @@ def read_text(path: str | Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
+def hold(path: str | Path) -> HeldFile:
+    """A file with its bytes as they are now.
+
+    Raises
+    ------
+    InputError
+        As `read_bytes`.
+    """
+    return path if isinstance(path, HeldFile) else HeldFile.holding(path, read_bytes(path))
+
+
+def missing(path: Path) -> str:
+    """What to say where no file is: a link of git-annex or DVC whose content was not fetched is one as well."""
+    return "no such file" if not path.is_symlink() else f"a link to {os.readlink(path)}, which is not there"
+
+
 def what_is_at(path: Path) -> str:
     """ "a file", "a folder", "a special file", "nothing", or "a name that no file can have"."""
     try:
         if not path.exists():
-            return "nothing"
+            return missing(path) if path.is_symlink() else "nothing"
         return "a file" if path.is_file() else ("a folder" if path.is_dir() else "a special file")
     except (OSError, ValueError):
         return "a name that no file can have"
@@ -75,7 +96,8 @@ def inside(folder: Path, relative: object) -> Path:
     Raises
     ------
     ValueError
-        Not text, empty, absolute, with `..`, or leaving the folder through a symbolic link. The message says which.
+        Not text, empty, absolute, with `..`, or in a folder that is a link to one elsewhere. The message says which.
+        The file itself may be a link: git-annex and DVC keep recordings so.
     """
     if not isinstance(relative, str) or not relative.strip() or not relative.isprintable():
         raise ValueError("expected a path relative to the study, as text")
@@ -84,7 +106,7 @@ def inside(folder: Path, relative: object) -> Path:
         raise ValueError(f"path leaves the study's folder: {relative!r}; expected a path inside it")
     root = folder.resolve()
     try:
-        path = (root / relative).resolve()
+        path = (root / relative).parent.resolve() / (root / relative).name
     except (OSError, RuntimeError) as error:
         raise ValueError(f"path cannot be resolved: {_reason(error)}") from error
     if not path.is_relative_to(root):

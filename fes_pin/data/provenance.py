@@ -33,7 +33,8 @@ class Provenance:
     versions
         Of Python and the packages that it depends on.
     inputs
-        SHA-256 of each file that was read, by its path in the study; empty for a study that was made in memory.
+        SHA-256 of each file as it was when it was read, by its path in the study; "edited after it was read" for one
+        whose trial or table was changed in memory; empty for a study that was made in memory.
     seed
         Of what is simulated.
     command
@@ -59,7 +60,7 @@ def this_command() -> str:
 
 def provenance_now(study: Study, seed: int) -> Provenance:
     """Where what is made of a study now comes from."""
-    return Provenance(today(), versions(), hashes(study.folder), seed)
+    return Provenance(today(), versions(), study.inputs(), seed)
 
 
 def today() -> str:

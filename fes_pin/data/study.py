@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
+import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from fes_pin.data.checks import check_constants, check_same_inputs, checked_kind, checked_label, known_constants
+from fes_pin.data.as_read import AsRead, digest_of, hashing
+from fes_pin.data.checks import (
+    check_constants,
+    check_same_inputs,
+    checked_kind,
+    checked_label,
+    checked_remarks,
+    known_constants,
+)
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_bytes, write_files
+from fes_pin.data.files import hold, write_files
 from fes_pin.data.motion import GROUND_REACTION
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
@@ -28,14 +38,23 @@ from fes_pin.data.schema import (
     known_rigs,
     one_of,
     schema_of,
+    unknown,
 )
 from fes_pin.data.show import frame, table_html
-from fes_pin.data.study_tables import HORIZON, StudyTables
+from fes_pin.data.study_tables import HORIZON, StudyTables, check_files
+from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.data.trial import Trial, check_trial, read_body_trial, read_trial, trial_csv
 
 if TYPE_CHECKING:
     import pandas
+
+EDITED = "edited after it was read"
+"""What stands in the place of a hash of a file that is no longer what its study holds."""
+LOW_PASS = "low_pass_hz"
+POSITIVE_HZ = NumberKey("Hz", 0.0, required=False)
+_PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
+"""Names of trials that are names of files as they are."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,14 +74,15 @@ class Study(ReadOnly):
     trials
         Measured trials, in the order of the study.
     folder
-        That the study was read from.
+        That the study was read from, absolute; `Path()` of one that was made in memory.
     files
-        Other files of the study by key: `urdf`, `segments`; for a body also `<trial>.coordinates` and
-        `<trial>.ground_reaction`, which hold the recordings at their own sample rates.
+        Other files of the study by key: `urdf`, `segments`. They are read when the study is built, and held.
     described
         What studies of the rig must and may hold, if it is not one that is written here or installed.
     horizon_s
         How far ahead errors over a horizon look, s; None leaves it to the diagnosis.
+    as_read
+        The study.toml that it was read from; None of a study that was made in memory. Not compared.
 
     Raises
     ------
@@ -81,6 +101,7 @@ class Study(ReadOnly):
     files: Mapping[str, Path] = field(default_factory=dict)
     described: RigSchema | None = None
     horizon_s: float | None = None
+    as_read: AsRead | None = None
 
     def __post_init__(self) -> None:
         checked_label(self.name, lambda _, message: InputError(message, column="name"), what="a name")
@@ -95,14 +116,18 @@ class Study(ReadOnly):
             fault = partial(_fault, where)
             numbers[where] = checked_numbers(getattr(self, where), keys, fault)
         check_constants(schema, numbers["constants"], self.files, partial(_fault, "constants or files"))
+        if odd := [key for key in self.files if key not in schema.files]:
+            raise _fault("files", odd[0], unknown(odd[0], schema.files))
+        files = {key: hold(path) for key, path in self.files.items()}
+        if any(files[key] is not path for key, path in self.files.items()):
+            check_files(schema, files)
         trials = tuple(self.trials)
         self._check_trials(trials, schema)
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
         horizon = {HORIZON: self.horizon_s} if self.horizon_s is not None else {}
         checked_numbers(horizon, {HORIZON: NumberKey("s", 0.0, required=False)}, partial(_fault, "Study"))
-        held = {**numbers, "files": {key: Path(path) for key, path in self.files.items()}}
-        vars(self).update(held, trials=trials, described=schema)
+        vars(self).update(numbers, files=files, folder=Path(self.folder), trials=trials, described=schema)
         self._freeze()
 
     def _schema(self) -> RigSchema:
@@ -127,10 +152,35 @@ class Study(ReadOnly):
         if not isinstance(other, Study) or self is other:
             return self is other
         same = ("name", "rig", "constants", "start", "trials", "horizon_s")
-        return all(getattr(self, one) == getattr(other, one) for one in same) and list(self.files) == list(other.files)
+        return all(getattr(self, one) == getattr(other, one) for one in same) and self._contents() == other._contents()
 
     def __hash__(self) -> int:
         return hash((self.name, self.rig, self.trials))
+
+    def _contents(self) -> dict[str, bytes]:
+        return {key: path.read_bytes() for key, path in self.files.items()}
+
+    def digest(self) -> bytes:
+        """A short hash of what its study.toml says."""
+        said = (self.name, self.rig, sorted(self.constants.items()), sorted(self.start.items()), self.horizon_s)
+        each = [(t.name, t.kind, sorted(t.conditions.items()), t.role, t.group, t.low_pass_hz) for t in self.trials]
+        return digest_of((said, each))
+
+    def inputs(self) -> dict[str, str]:
+        """SHA-256 of each file as it was when it was read, by its path in the study; `EDITED` of what was changed then.
+
+        Empty for a study that was made in memory, but for files that were read for it.
+        """
+        out: dict[str, str] = {}
+        parts: tuple[Study | Trial, ...] = (self, *self.trials)
+        for one in parts:
+            if one.as_read is not None:
+                edited = one.as_read.digest != one.digest()
+                out |= {path: EDITED if edited else sha for path, sha in one.as_read.sha256.items()}
+        out |= {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in self.files.values()}
+        names = {path: Path(path) for path in out}
+        near = {p: n.relative_to(self.folder).as_posix() for p, n in names.items() if n.is_relative_to(self.folder)}
+        return {near.get(path, path): sha for path, sha in out.items()}
 
     @property
     def schema(self) -> RigSchema:
@@ -218,7 +268,10 @@ def read_study(path: str | Path, *, rigs: Rigs | None = None) -> Study:
         folder = path.is_dir()
     except (OSError, ValueError) as error:
         raise error if isinstance(error, InputError) else InputError(f"cannot be read: {error}", file=path) from error
-    return _Reader(read_toml(path / "study.toml" if folder else path), known_rigs(rigs)).study()
+    with hashing() as sha256:
+        document = read_toml(path / "study.toml" if folder else path)
+    study = _Reader(document, known_rigs(rigs)).study()
+    return replace(study, as_read=AsRead(sha256, study.digest()))
 
 
 def read_columns(path: str | Path, *, rigs: Rigs | None = None) -> Columns | None:
@@ -248,10 +301,11 @@ class _Reader(StudyTables):
         names = self._trial_names()
         trials = []
         for index, table in enumerate(self._trial_tables()):
-            trials.append(self._trial(f"trial[{index}]", table, names[index], files))
+            trials.append(self._trial(f"trial[{index}]", table, names[index]))
         check_same_inputs([(t.kind, t.columns) for t in trials], self.schema, constants, self._fault_of)
         horizon = self.horizon()
-        return Study(self.name, self.rig, constants, start, tuple(trials), self.folder, files, self.schema, horizon)
+        folder = self.folder.absolute()
+        return Study(self.name, self.rig, constants, start, tuple(trials), folder, files, self.schema, horizon)
 
     def _trial_tables(self) -> list[dict[str, Any]]:
         tables = self.document.data.get("trial", [])
@@ -262,7 +316,7 @@ class _Reader(StudyTables):
         return tables
 
     def _trial_names(self) -> list[str]:
-        """Stems of the trials' files; their paths without the suffix where stems are the same."""
+        """What trials call themselves, else the stems of their files, or their paths where stems are the same."""
         main = self.schema.recordings[0]
         paths: list[PurePosixPath] = []
         seen: dict[Path, str] = {}
@@ -276,36 +330,38 @@ class _Reader(StudyTables):
             seen[path] = key
             paths.append(PurePosixPath(table[main].replace("\\", "/")))
         stems = Counter(path.stem for path in paths)
-        return [path.stem if stems[path.stem] == 1 else str(path.with_suffix("")) for path in paths]
+        names = [path.stem if stems[path.stem] == 1 else str(path.with_suffix("")) for path in paths]
+        return [table.get("name", name) for table, name in zip(self._trial_tables(), names, strict=True)]
 
-    def _trial(self, where: str, table: Mapping[str, Any], name: str, files: dict[str, Path]) -> Trial:
+    def _trial(self, where: str, table: Mapping[str, Any], name: str) -> Trial:
         def error(key: str, message: str) -> InputError:
             return self.error(f"{where}.{key}", message)
 
         named = self.schema.recordings
+        checked_label(name, error, "name", "a name")
         kind = checked_kind(self.schema, table.get("kind"), error)
-        role = table.get("role")
+        role, group = table.get("role"), table.get("group")
         if role is not None:
             try:
                 one_of(role, ROLES)
             except ValueError as problem:
                 raise error("role", str(problem)) from None
-        group = table.get("group")
         if group is not None:
             checked_label(group, error)
-        rest = {key: value for key, value in table.items() if key not in (*named, "kind", "role", "group")}
+        remarks = checked_remarks(table.get("remarks", ()), error)
+        passed = checked_numbers({k: table[k] for k in (LOW_PASS,) if k in table}, {LOW_PASS: POSITIVE_HZ}, error)
+        about = ("name", "kind", "role", "group", "remarks", LOW_PASS)
+        rest = {key: value for key, value in table.items() if key not in (*named, *about)}
         numbers = check_conditions(self.schema, kind, rest, error)
-        if len(named) == 1:
-            path = self.document.path_of(f"{where}.{named[0]}", table[named[0]])
-            return read_trial(
-                path, rig=self.schema, kind=kind, conditions=numbers, role=role, name=name, group=group, own=self.own
-            )
+        labels: dict[str, Any] = {"name": name, "role": role, "group": group, "conditions": numbers}
+        labels |= {"remarks": remarks, LOW_PASS: passed.get(LOW_PASS)}
         for key in named:
             if key not in table:
                 raise error(key, "missing; expected the path of a file inside the study")
-            files[f"{name}.{key}"] = self.document.path_of(f"{where}.{key}", table[key])
-        moves, pushes = (files[f"{name}.{key}"] for key in named)
-        return read_body_trial(moves, pushes, name=name, conditions=numbers, role=role, group=group)
+        paths = [self.document.path_of(f"{where}.{key}", table[key]) for key in named]
+        if len(paths) == 1:
+            return read_trial(paths[0], rig=self.schema, kind=kind, own=self.own, **labels)
+        return read_body_trial(paths[0], paths[1], **labels)
 
     def _fault_of(self, place: int | None, key: str, message: str) -> InputError:
         return self.error(f"rig.{key}" if place is None else f"trial[{place}].{key}", message)
@@ -314,7 +370,8 @@ class _Reader(StudyTables):
 def write_study(study: Study, folder: str | Path) -> None:
     """Write a study as a folder that `read_study` reads: all of its files, or none.
 
-    A body's recordings are written on the times of its trials.
+    A body's recordings are written at their own rates where its trials are as they were read, else on the times of its
+    trials.
 
     Parameters
     ----------
@@ -326,7 +383,8 @@ def write_study(study: Study, folder: str | Path) -> None:
     Raises
     ------
     InputError
-        If a file of the study cannot be read, or the folder cannot be written.
+        If the folder cannot be written, or what would be written could not be read: samples that were not measured, an
+        input that some trials lack.
     """
     schema = study.schema
     check_same_inputs([(t.kind, t.columns) for t in study.trials], schema, study.constants, _fault_of(study.trials))
@@ -335,27 +393,35 @@ def write_study(study: Study, folder: str | Path) -> None:
     for key, value in study.constants.items():
         (rig.setdefault("passive", {}) if key in schema.passive else rig)[key] = float(value)
     for key, path in study.files.items():
-        if key in schema.files:
-            rig[key] = f"{key}{path.suffix}"
-            contents[rig[key]] = read_bytes(path)
+        rig[key] = f"{key}{path.suffix}"
+        contents[rig[key]] = path.read_bytes()
     tables = []
-    for trial in study.trials:
-        named = _trial_files(schema, trial)
+    for place, trial in enumerate(study.trials):
+        file = trial.name if _PLAIN.fullmatch(trial.name) else f"trial~{place + 1}"  # which is no plain name
+        named = _trial_files(schema, trial, file)
         contents |= named
-        labels = {n: label for n, label in (("role", trial.role), ("group", trial.group)) if label}
-        conditions = {key: float(value) for key, value in trial.conditions.items()}
-        tables.append({**dict(zip(schema.recordings, named, strict=True)), "kind": trial.kind, **conditions, **labels})
+        labels: dict[str, Any] = {
+            "role": trial.role,
+            "group": trial.group,
+            LOW_PASS: trial.low_pass_hz,
+            "remarks": list(trial.remarks),
+        }
+        labels["name"] = trial.name if file != trial.name else None
+        known = {"kind": trial.kind, **trial.conditions, **{n: v for n, v in labels.items() if v}}
+        tables.append({**dict(zip(schema.recordings, named, strict=True)), **known})
     head = {"name": study.name, "rig": study.rig, **({HORIZON: study.horizon_s} if study.horizon_s else {})}
     document = {"study": head, "rig": rig, "start": dict(study.start)}
     contents["study.toml"] = tomli_w.dumps({**document, "trial": tables})
     write_files(folder, contents)
 
 
-def _trial_files(schema: RigSchema, trial: Trial) -> dict[str, str | bytes]:
+def _trial_files(schema: RigSchema, trial: Trial, file: str) -> dict[str, str | bytes]:
+    alone = replace(trial, as_read=None)  # which checks it by itself, as it will be read
     if len(schema.recordings) == 1:
-        return {f"trials/{trial.name}.csv": trial_csv(trial)}
-    moves = tuple(name for name in trial.columns if name not in GROUND_REACTION)
-    return {
-        f"coordinates/{trial.name}.csv": trial_csv(trial, moves),
-        f"ground_reaction/{trial.name}.csv": trial_csv(trial, GROUND_REACTION),
-    }
+        return {f"trials/{file}.csv": trial_csv(alone)}
+    whole = trial.as_read.recordings if trial.as_read is not None and not trial.is_edited else ()
+    moves = {name: values for name, values in trial.columns.items() if name not in GROUND_REACTION}
+    pushes = {name: trial[name] for name in GROUND_REACTION}
+    recordings = whole or ((trial.time, moves), (trial.time, pushes))
+    texts = [format_csv({"time_s": time, **columns}) for time, columns in recordings]
+    return {f"{key}/{file}.csv": text for key, text in zip(schema.recordings, texts, strict=True)}

@@ -6,17 +6,40 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+from fes_pin.data.as_read import HeldFile
 from fes_pin.data.checks import check_constants, checked_label, known_constants
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_text
+from fes_pin.data.files import hold, read_text
 from fes_pin.data.recorded.columns import Columns, columns_of
-from fes_pin.data.schema import NumberKey, Rigs, one_of, unknown
+from fes_pin.data.schema import NumberKey, Rigs, RigSchema, one_of, unknown
 from fes_pin.data.toml import Document
 from fes_pin.data.urdf import is_revolute, moving_joints
 
 NOTES = ("description", "subject", "source", "licence", "license", "date", "notes")
 HORIZON = "horizon_s"
 """Key of `[study]`: how far ahead errors over a horizon look."""
+
+
+def check_files(schema: RigSchema, files: Mapping[str, Path]) -> None:
+    """Require of a study's files that they are what the rig needs.
+
+    Raises
+    ------
+    InputError
+        Names the file, and the row.
+    """
+    if schema.check_files is not None:
+        schema.check_files(files)
+    elif "urdf" in files:
+        moving_joints(files["urdf"])
+    if "segments" in files:
+        try:
+            json.loads(read_text(files["segments"]))
+        except (ValueError, RecursionError) as error:
+            if isinstance(error, InputError):
+                raise
+            row = getattr(error, "lineno", None)
+            raise InputError("expected JSON", file=files["segments"], row=row) from None
 
 
 class StudyTables:
@@ -60,7 +83,7 @@ class StudyTables:
         except ValueError as problem:
             raise self.error("study.rig", str(problem)) from None
 
-    def rig_table(self) -> tuple[dict[str, float], dict[str, Path]]:
+    def rig_table(self) -> tuple[dict[str, float], dict[str, HeldFile]]:
         """Constants of the rig, and its files, by key."""
         table = dict(self.document.table("rig"))
         passive = self.document.table("rig.passive", table) if self.schema.passive else {}
@@ -71,23 +94,9 @@ class StudyTables:
         constants = self.document.numbers("rig", table, known, also=(*self.schema.files,))
         constants |= self.document.numbers("rig.passive", passive, self.schema.passive)
         check_constants(self.schema, constants, paths, lambda key, message: self.error(f"rig.{key}", message))
-        files = {key: self.document.path_of(f"rig.{key}", value) for key, value in paths.items()}
-        self._check_files(files)
+        files = {key: hold(self.document.path_of(f"rig.{key}", value)) for key, value in paths.items()}
+        check_files(self.schema, files)
         return constants, files
-
-    def _check_files(self, files: Mapping[str, Path]) -> None:
-        if self.schema.check_files is not None:
-            self.schema.check_files(files)
-        elif "urdf" in files:
-            moving_joints(files["urdf"])
-        if "segments" in files:
-            try:
-                json.loads(read_text(files["segments"]))
-            except (ValueError, RecursionError) as error:
-                if isinstance(error, InputError):
-                    raise
-                row = getattr(error, "lineno", None)
-                raise InputError("expected JSON", file=files["segments"], row=row) from None
 
     def start_table(self, constants: Mapping[str, float]) -> dict[str, float]:
         """Start values of what the nominal model fits, by key."""

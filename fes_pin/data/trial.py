@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fes_pin.data.checks import KeyFault, check_columns, check_values, checked_kind, checked_label
+from fes_pin.data.as_read import AsRead, digest_of, hashing
+from fes_pin.data.checks import (
+    KeyFault,
+    check_columns,
+    check_values,
+    checked_kind,
+    checked_label,
+    checked_remarks,
+)
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
@@ -58,6 +66,8 @@ class Trial(ReadOnly):
     low_pass_hz
         Where its readings were low-passed, without delay, before they were stored, Hz; None where they were not. What
         is simulated of the trial is low-passed there as well.
+    as_read
+        The files that it was read from; None of a trial that was made in memory. Not compared.
 
     Raises
     ------
@@ -76,6 +86,7 @@ class Trial(ReadOnly):
     group: str | None = None
     remarks: tuple[str, ...] = ()
     low_pass_hz: float | None = None
+    as_read: AsRead | None = None
 
     def __post_init__(self) -> None:
         def error(key: str, message: str) -> InputError:
@@ -87,8 +98,7 @@ class Trial(ReadOnly):
             _checked("role", self.role, ROLES, error)
         if self.group is not None:
             checked_label(self.group, error)
-        if isinstance(self.remarks, str) or not all(isinstance(one, str) for one in self.remarks):
-            raise error("remarks", "expected texts, one for each remark")
+        remarks = checked_remarks(self.remarks, error)
         try:
             conditions = {key: NumberKey("").check(value) for key, value in dict(self.conditions).items()}
             low_pass = None if self.low_pass_hz is None else NumberKey("Hz", 0.0).check(self.low_pass_hz)
@@ -100,8 +110,8 @@ class Trial(ReadOnly):
             raise self.error(f"expected at least {MIN_ROWS} samples, found {len(time)}", "time_s")
         if odd := [name for name, values in columns.items() if values.shape != time.shape]:
             raise self.error(f"expected shape {time.shape} as of the time, found {columns[odd[0]].shape}", odd[0])
-        check_times(time, self.error)
-        vars(self).update(time=time, columns=columns, conditions=conditions, low_pass_hz=low_pass)
+        check_times(time, self.error, half_digit=self.as_read.half_digit if self.as_read else None)
+        vars(self).update(time=time, columns=columns, conditions=conditions, low_pass_hz=low_pass, remarks=remarks)
         self._freeze()
 
     def _freeze(self) -> None:
@@ -120,13 +130,15 @@ class Trial(ReadOnly):
         labels = ("name", "kind", "conditions", "role", "group", "remarks", "low_pass_hz")
         return (
             all(getattr(self, label) == getattr(other, label) for label in labels)
-            and list(self.columns) == list(other.columns)
+            and self.columns.keys() == other.columns.keys()
             and np.array_equal(self.time, other.time)
             and all(np.array_equal(self[name], other[name], equal_nan=True) for name in self.columns)
         )
 
     def __hash__(self) -> int:
-        return hash((self.name, self.kind, len(self), tuple(self.columns), float(self.time[0]), float(self.time[-1])))
+        return hash(
+            (self.name, self.kind, len(self), frozenset(self.columns), float(self.time[0]), float(self.time[-1]))
+        )
 
     def __len__(self) -> int:
         return len(self.time)
@@ -139,6 +151,15 @@ class Trial(ReadOnly):
 
     def __contains__(self, column: object) -> bool:
         return column in self.columns
+
+    @property
+    def is_edited(self) -> bool:
+        """True if its numbers are not those of the files that it was read from."""
+        return self.as_read is not None and self.as_read.digest != self.digest()
+
+    def digest(self) -> bytes:
+        """A short hash of its numbers."""
+        return digest_of((self.time, *(part for name in sorted(self.columns) for part in (name, self[name]))))
 
     @cached_property
     def dt(self) -> float:
@@ -287,6 +308,8 @@ def read_trial(
     name: str | None = None,
     group: str | None = None,
     own: Columns | None = None,
+    remarks: Sequence[str] = (),
+    low_pass_hz: float | None = None,
 ) -> Trial:
     """Read one trial from its file.
 
@@ -298,8 +321,8 @@ def read_trial(
         Its name ("ankle", "muscle", "joint", "body" ...), or what its studies must and may hold.
     kind
         Of those that the rig has, "motion", "isometric" or "imposed"; without it the rig's default.
-    conditions, role, group
-        As a `[[trial]]` table gives them.
+    conditions, role, group, remarks, low_pass_hz
+        As a `[[trial]]` table gives them; see `Trial`.
     inputs_only
         Do not require the measured outputs, to predict them; they are kept if they are there.
     name
@@ -326,29 +349,24 @@ def read_trial(
     if role is not None:
         _checked("role", role, ROLES, error)
     numbers = check_conditions(schema, kind, conditions or {}, error)
-    if len(schema.recordings) > 1:
-        columns, time = _body_columns(path, inputs_only)
-        check_values(columns, schema, lambda message, column, _: error(column, message))
-        return _as_read(name or path.stem, kind, columns, time, numbers, role, group)
-    table, said = (read_csv_or_hint(path), "") if own is None else own.read(path, schema, kind, inputs_only)
+    labels: dict[str, Any] = {"name": name or path.stem, "kind": kind, "conditions": numbers}
+    labels |= {"role": role, "group": group, "low_pass_hz": low_pass_hz}
+    with hashing() as sha256:
+        if len(schema.recordings) > 1:
+            columns, time = _body_columns(path, inputs_only)
+            check_values(columns, schema, lambda message, column, _: error(column, message))
+            return _made(columns, time, AsRead(sha256, b""), remarks=checked_remarks(remarks, error), **labels)
+        table, said = (read_csv_or_hint(path), "") if own is None else own.read(path, schema, kind, inputs_only)
     columns, time = _checked_columns(table, schema, kind, inputs_only)
-    return _as_read(name or path.stem, kind, columns, time, numbers, role, group, (said,) if said else ())
+    labels["remarks"] = (*checked_remarks(remarks, error), *([said] if said else []))
+    return _made(columns, time, AsRead(sha256, b"", table.half_digit), **labels)
 
 
-def _as_read(
-    name: str,
-    kind: str,
-    columns: Mapping[str, np.ndarray],
-    time: np.ndarray,
-    conditions: Mapping[str, float],
-    role: str | None,
-    group: str | None,
-    remarks: tuple[str, ...] = (),
-) -> Trial:
+def _made(columns: Mapping[str, np.ndarray], time: np.ndarray, as_read: AsRead, **labels: Any) -> Trial:
     """A trial of what the reader of its file has checked."""
-    labels = {"name": name, "kind": kind, "conditions": conditions, "role": role, "group": group, "remarks": remarks}
     made = object.__new__(Trial)
-    made.__setstate__({**labels, "low_pass_hz": None, "time": time.copy(), "columns": columns})
+    made.__setstate__({**labels, "time": time.copy(), "columns": {n: v.copy() for n, v in columns.items()}})
+    vars(made)["as_read"] = replace(as_read, digest=made.digest())
     return made
 
 
@@ -387,25 +405,28 @@ def read_body_trial(
     *,
     name: str,
     conditions: Mapping[str, float],
-    role: str | None,
-    group: str | None = None,
+    **labels: Any,
 ) -> Trial:
-    """Read a walking trial from its two files, on the coordinates' times.
+    """Read a walking trial from its two files, on the coordinates' times; `labels` are further fields of it.
 
     Raises
     ------
     InputError
         As `read_coordinates`, `read_ground_reaction`; the two were not recorded at the same time.
     """
-    moves, in_degrees = read_motion(coordinates)
-    pushes, _ = read_motion(ground_reaction)
-    time, columns = on_common_time(
-        moves.values[:, 0], coordinates_of(moves, in_degrees), pushes.values[:, 0], ground_reaction_of(pushes)
+    with hashing() as sha256:
+        moves, in_degrees = read_motion(coordinates)
+        pushes, _ = read_motion(ground_reaction)
+    recordings = (
+        (moves.values[:, 0], coordinates_of(moves, in_degrees)),
+        (pushes.values[:, 0], ground_reaction_of(pushes)),
     )
+    time, columns = on_common_time(*recordings[0], *recordings[1])
     if len(time) < MIN_ROWS:
         message = f"expected at least {MIN_ROWS} samples in the time of {coordinates.name}, found {len(time)}"
         raise pushes.error(message, pushes.names[0], 0)
-    return _as_read(name, "motion", columns, time, conditions, role, group)
+    as_read = AsRead(sha256, b"", recordings=recordings)
+    return _made(columns, time, as_read, name=name, kind="motion", conditions=conditions, **labels)
 
 
 def write_trial(trial: Trial, path: str | Path) -> None:
@@ -414,9 +435,9 @@ def write_trial(trial: Trial, path: str | Path) -> None:
     Raises
     ------
     InputError
-        If the file cannot be written.
+        If the file cannot be written, or could not be read: a trial with samples that were not measured.
     """
-    write_text(path, trial_csv(trial))
+    write_text(path, trial_csv(replace(trial, as_read=None)))  # which checks it by itself
 
 
 def trial_csv(trial: Trial, columns: tuple[str, ...] | None = None) -> str:

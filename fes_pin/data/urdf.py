@@ -46,7 +46,7 @@ def moving_joints(path: str | Path) -> list[tuple[str, str]]:
     """
     return [
         (joint.get("name", ""), joint.get("type", ""))
-        for joint in _Urdf(Path(path)).joints
+        for joint in _Urdf(path).joints
         if joint.get("type") in MOVING and joint.find("mimic") is None
     ]
 
@@ -80,7 +80,7 @@ def check_one_joint(path: str | Path) -> tuple[str, str]:
     name, kind = joints[0]
     if kind not in ONE_JOINT:
         raise InputError(f"expected a revolute, continuous or prismatic joint, found {kind}", file=path, column=name)
-    urdf = _Urdf(Path(path))
+    urdf = _Urdf(path)
     if not urdf.moved_mass(name) > 0:
         raise InputError("expected a link with mass beyond this joint", file=path, column=name)
     for joint in urdf.joints:
@@ -100,13 +100,13 @@ def mechanics(path: str | Path) -> str:
     InputError
         As `moving_joints`.
     """
-    return _Urdf(Path(path)).mechanics()
+    return _Urdf(path).mechanics()
 
 
 class _Urdf:
     """The parts of one URDF, checked as they are read."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: str | Path) -> None:
         self.path = path
         content = read_bytes(path)
         self.lines = content.decode("utf-8", errors="replace").split("\n")

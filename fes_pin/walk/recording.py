@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
-from fes_pin.data.motion import read_coordinates, read_ground_reaction
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
@@ -46,9 +47,9 @@ class WalkRecording:
     motion: Motion
     plates: Plates
     raw_time: np.ndarray = field(repr=False)
-    raw_plates: dict[str, np.ndarray] = field(repr=False)
+    raw_plates: Mapping[str, np.ndarray] = field(repr=False)
     coordinates_time: np.ndarray = field(repr=False)
-    coordinates: dict[str, np.ndarray] = field(repr=False)
+    coordinates: Mapping[str, np.ndarray] = field(repr=False)
     hip: np.ndarray = field(repr=False)
     cutoff_hz: float | None = CUTOFF_HZ
     belt_speed_mps: float = 0.0
@@ -109,16 +110,16 @@ def recordings_of(
     """
     believed, hip = body_of(study, stance)
     body = believed if body is None else body
-    return body, [_recording(study, trial, body, hip, cutoff_hz) for trial in study.trials]
+    return body, [_recording(trial, body, hip, cutoff_hz) for trial in study.trials]
 
 
-def _recording(study: Study, trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float | None) -> WalkRecording:
-    if f"{trial.name}.coordinates" in study.files:
-        source = study.files[f"{trial.name}.coordinates"]
-        time, columns = read_coordinates(source)
-        raw_time, raw = read_ground_reaction(study.files[f"{trial.name}.ground_reaction"])
+def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float | None) -> WalkRecording:
+    paths = list(map(Path, trial.as_read.sha256)) if trial.as_read is not None else []
+    source, reaction = paths[0] if paths else None, paths[-1] if paths else None
+    if trial.as_read is not None and trial.as_read.recordings and not trial.is_edited:
+        (time, columns), (raw_time, raw) = trial.as_read.recordings
     else:
-        source, time, raw_time = study.folder, trial.time, trial.time
+        time, raw_time = trial.time, trial.time
         columns = {n: v for n, v in trial.columns.items() if n.startswith(("q_", "qd_", "qdd_"))}
         raw = {n: v for n, v in trial.columns.items() if n not in columns}
     belt = trial.conditions.get("belt_speed_mps", 0.0)
@@ -137,8 +138,7 @@ def _recording(study: Study, trial: Trial, body: Body, hip: np.ndarray, cutoff_h
         check_together(motion, plates)
         rows = carried_along(motion, plates)
     except InputError as error:
-        read = study.files.get(f"{trial.name}.ground_reaction", source)
-        raise InputError(error.message, file=read, column=error.column) from None
+        raise InputError(error.message, file=reaction, column=error.column) from None
     motion, plates = motion.part(rows), plates.part(rows)
     return WalkRecording(
         trial.name, motion, plates, raw_time, raw, time, columns, hip, cutoff_hz, belt, float(time[0]), trial.role

@@ -200,7 +200,7 @@ def test_bad_input_is_one_line(monkeypatch, capsys, tmp_path, case):
     rig, file, old, new = case
     folder = getattr(studies, rig)(tmp_path / "study")
     (tmp_path / "10.csv").write_text(studies.MOTION)
-    (folder / "link.csv").symlink_to(tmp_path / "10.csv")
+    (folder / "link.csv").symlink_to("nowhere.csv")
     (folder / "out").symlink_to(tmp_path)
     test_bad_studies.make_fifo(folder / "pipe")
     test_bad_studies.spoil(folder / file, old, new)

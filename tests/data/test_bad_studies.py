@@ -66,7 +66,7 @@ TOML = {  # old text, new text, row, key, words
     "above": ("trials/10.csv", "../10.csv", 31, "trial[1].file", "leaves the study's folder"),
     "above_and_back": ("trials/10.csv", "trials/../trials/10.csv", 31, "trial[1].file", "leaves the study's folder"),
     "drive": ("trials/10.csv", "C:/10.csv", 31, "trial[1].file", "leaves the study's folder"),
-    "through_a_link": ("trials/10.csv", "link.csv", 31, "trial[1].file", "through a link"),
+    "a_link_to_nothing": ("trials/10.csv", "link.csv", 31, "trial[1].file", "a link to nowhere.csv, which is not there"),
     "through_a_linked_folder": ("trials/10.csv", "out/10.csv", 31, "trial[1].file", "through a link"),
     "fifo": ("trials/10.csv", "pipe", 31, "trial[1].file", "special file"),
     "unknown_kind": ('"isometric"', '"isotonic"', 32, "trial[1].kind", "motion, isometric"),
@@ -88,7 +88,7 @@ def test_bad_toml(tmp_path, case):
     old, new, row, key, words = TOML[case]
     folder = studies.ankle(tmp_path / "study")
     (tmp_path / "10.csv").write_text(studies.MOTION)
-    (folder / "link.csv").symlink_to(tmp_path / "10.csv")
+    (folder / "link.csv").symlink_to("nowhere.csv")
     (folder / "out").symlink_to(tmp_path)
     make_fifo(folder / "pipe")
     spoil(folder / "study.toml", old, new)

@@ -23,7 +23,8 @@ def test_every_file_of_the_study_is_hashed(tmp_path):
     assert made.seed == 3 and made.versions["numpy"] and "command" not in made.record()
     first = next(iter(folder.glob("trials/*.csv")))
     first.write_text(first.read_text() + "\n")
-    changed = provenance_now(study, 3).inputs
+    assert provenance_now(study, 3).inputs == made.inputs
+    changed = provenance_now(read_study(folder), 3).inputs
     assert {n for n in changed if changed[n] != made.inputs[n]} == {f"trials/{first.name}"}
 
 

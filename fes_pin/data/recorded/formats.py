@@ -69,6 +69,7 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
     found = what_is_at(path)
     if found != "a file":
         raise InputError(f"expected a file, found {found}", file=path)
+    read_bytes(path)  # their libraries open it themselves
     recording = _READERS[suffix](path, wanted)
     sizes = {len(values) for values in recording.columns.values()}
     if len(sizes) > 1:
