@@ -51,7 +51,17 @@ def model_toml(model: Model, further: Mapping[str, Mapping[str, Any]] | None = N
 
 
 def save_model(model: Model, path: str | Path) -> None:
-    """Write `model.toml`, whole or not at all."""
+    """Write `model.toml`, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        It is no `Model`: the body of a diagnosis of walking is saved as URDF, by its `write`. Or the file cannot be
+        written.
+    """
+    if not isinstance(model, Model):
+        how = ": its write() saves it as URDF, which Body.from_urdf reads" if hasattr(model, "urdf") else ""
+        raise InputError(f"expected a Model, found a {type(model).__name__}{how}", column="model")
     write_text(path, model_toml(model))
 
 
@@ -71,6 +81,8 @@ def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = 
     document, catalogue = read_toml(path), catalogue_of(library)
     kinds = {rig.name: rig for rig in catalogue.rigs}
     found = document.data.get("format")
+    if found is None and "model" in document.data:
+        raise document.error("model", "of a diagnosis of walking: Body.from_urdf reads the URDF that it names")
     if found != FORMAT or isinstance(found, bool):
         raise document.error("format", f"expected format = {FORMAT}: a model that fes-pin saved")
     name = document.data.get("rig")

@@ -1,6 +1,7 @@
 """The diagnosis of walking: what is hidden is named, what is not hidden is not, and all of it is said."""
 
 import json
+import re
 import tomllib
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 
 import fes_pin as fp
 from fes_pin.body.build import Body
+from fes_pin.cohort.one import Work, diagnose_one
 from fes_pin.data.study import read_study
+from fes_pin.view.walk_report import walk_report_html
 from fes_pin.walk.diagnosis import diagnose_walk
 from fes_pin.walk.dynamics import required, segment_parameters
 from fes_pin.walk.extended import extended_body, with_segments
@@ -52,6 +55,39 @@ def test_files_are_as_the_contract_says(heavy):
         assert set(plan["separates"]) <= {heavy.causes[0].name, *heavy.causes[0].equivalents}
         assert plan["trial"] is None or plan["trial"]["file"] in files
     assert heavy.causes[0].name in str(heavy)
+
+
+def test_the_body_is_saved_as_urdf_and_a_model_that_is_none_is_refused(heavy, tmp_path):
+    """`save_model` says how a body is saved; what it says works; `load_model` says the same of a walk's model.toml."""
+    with pytest.raises(
+        fp.InputError, match=r"found a Body: its write\(\) saves it as URDF, which Body\.from_urdf reads"
+    ):
+        fp.save_model(heavy.model, tmp_path / "model.toml")
+    assert not (tmp_path / "model.toml").exists()
+    heavy.model.write(tmp_path / "body.urdf")
+    assert fp.Body.from_urdf(tmp_path / "body.urdf").mass_kg == pytest.approx(heavy.model.mass_kg)
+    (tmp_path / "model.toml").write_text(walk_files(heavy)["model.toml"])
+    with pytest.raises(fp.InputError, match=r"Body\.from_urdf reads the URDF"):
+        fp.load_model(tmp_path / "model.toml")
+    with pytest.raises(fp.InputError, match="found a dict"):
+        fp.save_model({}, tmp_path / "model.toml")
+
+
+def test_a_cohort_stops_a_walk_at_its_limit_and_writes_its_playback(heavy):
+    answer = diagnose_one(Work("walk", str(heavy.study.folder), limit=0.0), "key")
+    assert not answer.error
+    assert {"diagnosis.json", "model.toml", "body.urdf", "report.html", "playback.html"} <= set(answer.files)
+    record = json.loads(answer.files["diagnosis.json"])
+    assert record["verdict"] == "stopped" and any("limit of 0 s" in words for words in record["warnings"])
+
+
+def test_the_report_has_a_style_for_all_that_it_shows(heavy):
+    """A class without a rule in the style sheet is shown as plain text."""
+    page = walk_report_html(heavy)
+    style = page[page.index("<style>") : page.index("</style>")]
+    for name in set(re.findall(r'class="(\w+)', page)) - {"eyebrow"}:
+        assert f".{name}" in style, name
+    assert 'class="facts"' in page
 
 
 def test_one_question_for_every_study_and_its_limit_of_time_holds(heavy, tmp_path):
