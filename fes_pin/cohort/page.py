@@ -22,7 +22,8 @@ FOREST = 40
 ROW, NAMES, WIDE = 20.0, 150.0, 420.0
 MODELS = (
     "Of the nominal, then of the extended model, on trials held out where there are such. Free: from the inputs alone; "
-    "ahead: each sample from what was measured up to the study's horizon before it."
+    "ahead: each sample from what was measured up to the study's horizon before it. Of walking E is that of the ground "
+    "reaction which the motion requires."
 )
 """What is said of the errors of studies."""
 

@@ -80,7 +80,8 @@ def _value(by_group: Mapping[str, ParameterEstimate], group: str) -> str:
     if group not in by_group:
         return "-"
     one = by_group[group]
-    return " ".join(value_and_interval(one)) if one.std else "none"
+    value, interval = value_and_interval(one)
+    return f"{value} {interval if interval.startswith('[') else f'({interval})'}" if one.std else "none"
 
 
 def _drawing(change: Change, groups: tuple[str, ...]) -> Drawing:

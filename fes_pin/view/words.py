@@ -84,7 +84,7 @@ def _size(diagnosis: Diagnosis, cause: Cause) -> Markup:
     for name, one in cause.parameters.items():
         said = estimate_text(replace(one, unit=unit_text(one.unit) if one.unit else "")).replace("+-", "±")
         told.append(f"{plain(_without_unit(name))} {said}")
-    return _text(", ".join(told) + " (± one standard deviation).")
+    return _text(", ".join(told) + (" (± one standard deviation)." if any("±" in one for one in told) else "."))
 
 
 def _without_unit(name: str) -> str:

@@ -54,7 +54,7 @@ def test_the_record_says_so(diagnosis, tmp_path):
 
 def test_the_report_says_so(diagnosis):
     page = report_html(diagnosis)
-    assert "at most 0.0123, at its bound" in page and "0 N m (at its bound, at most 0.0123)" in page
+    assert "at most 0.0123, at its bound" in page and "0 N m (at its bound, at most 0.0123)." in page
 
 
 def test_a_change_says_so():
@@ -63,7 +63,7 @@ def test_a_change_says_so():
     assert "before 0 N m (at its bound, at most 0.0123)" in change_row(change)[2]
     assert change.record()["parameters"]["torque_nm"]["before"]["at_bound"]
     page = _change(change, ("before", "after")).text
-    assert "at most 0.0123, at its bound" in page and "none" not in page
+    assert "0 (at most 0.0123, at its bound)" in page and "none" not in page
 
 
 def test_friction_that_is_not_there_is_fitted_at_its_bound_or_with_a_deviation():
