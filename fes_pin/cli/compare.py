@@ -12,7 +12,7 @@ from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
 
 
-@python_names(horizon_s="--horizon", given_s="--given")
+@python_names(horizon_s="--horizon", given_s="--given", library="--library")
 def compare(
     study: Annotated[Path, typer.Argument(help="Folder of a study of a muscle or an ankle, or its study.toml.")],
     models: Annotated[

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fes_pin.cli.group import remark
+from fes_pin.cli.group import python_names, remark
 from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, pairs, study_of
 from fes_pin.cli.progress import catalogue_with, say_whose_code
 from fes_pin.data.errors import InputError
@@ -27,6 +27,7 @@ STANDARD = Path("-")
 """Standard input as a trial, standard output as a table."""
 
 
+@python_names(library="--library", **{"position0 among the conditions": "--set position0=..."})
 def predict(
     model: Annotated[Path, typer.Argument(help="model.toml of a diagnosis.")],
     trial: Annotated[

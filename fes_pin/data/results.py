@@ -98,7 +98,7 @@ class SavedResult(Saveable):
     Attributes
     ----------
     kind
-        "Diagnosis", "WalkDiagnosis", "Contrast", "Comparison" or "Cohort".
+        "Diagnosis", "WalkDiagnosis", "Contrast", "Comparison", "Fit" or "Cohort".
     found
         The record, read-only, by the keys of the JSON file.
     text
@@ -149,7 +149,8 @@ def save_result(result: Saveable, path: str | Path) -> None:
     Parameters
     ----------
     result
-        What `diagnose`, `contrast`, `compare` or a cohort gave. Numbers are written to the digits that are printed.
+        What `diagnose`, `contrast`, `compare`, `fit` or a cohort gave. Numbers are written to the digits that are
+        printed.
     path
         Of the file; `fes-pin diagnose`, `contrast` and `compare` write the same as `diagnosis.json` and so on.
 
@@ -160,7 +161,9 @@ def save_result(result: Saveable, path: str | Path) -> None:
     """
     if not isinstance(result, Saveable):
         kind = type(result).__name__
-        raise InputError(f"expected a result of diagnose, contrast, compare or a cohort, found {kind}", column="result")
+        raise InputError(
+            f"expected a result of diagnose, contrast, compare, fit or a cohort, found {kind}", column="result"
+        )
     write_text(path, result.to_json())
 
 

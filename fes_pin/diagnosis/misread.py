@@ -25,7 +25,7 @@ from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Linearized, Problem, normal_equations
 from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.models.model import Model
-from fes_pin.models.simulate import simulate
+from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import in_parallel
 
 NAME = "condition_misread"
@@ -152,8 +152,8 @@ def _sizes(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
 
 def _is_felt(model: Model, trial: Trial, name: str, size: float) -> bool:
     """True if the model's answer to a trial depends on what it states."""
-    moved = simulate(model, model.rig.restated(trial, name, model.rig.stated(trial)[name] + size))
-    plain = simulate(model, trial)
+    moved = simulated_trial(model, model.rig.restated(trial, name, model.rig.stated(trial)[name] + size))
+    plain = simulated_trial(model, trial)
     names = [n for n in model.rig.outputs(trial.kind) if n in trial.columns]
     return any(np.max(np.abs(moved[n] - plain[n])) > UNFELT * max(np.ptp(plain[n]), 1e-12) for n in names)
 

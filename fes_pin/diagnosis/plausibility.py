@@ -13,7 +13,7 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import RUN_OUT
-from fes_pin.models.simulate import simulate
+from fes_pin.models.simulate import simulated_trial
 
 COARSE = 5.0
 """Time constants that a sample step may be long: a first-order lag has then settled to less than a hundredth, and
@@ -81,7 +81,7 @@ def _turned(study: Study | ToPredict, model: Model) -> Iterable[str]:
         name = model.rig.output(trial.kind)
         if trial.kind == IMPOSED or name not in trial or not any(n in trial and np.ptp(trial[n]) for n in PULSES):
             continue
-        simulated, measured = simulate(model, trial)[name], trial[name]
+        simulated, measured = simulated_trial(model, trial)[name], trial[name]
         if not np.isfinite(simulated).all() or not np.ptp(simulated) > 0.0 or not np.ptp(measured) > 0.0:
             continue
         if np.corrcoef(simulated, measured)[0, 1] < TURNED:

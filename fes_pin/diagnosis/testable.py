@@ -24,7 +24,7 @@ from fes_pin.infer.levels import ABSORBED_BELOW
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.simulate import simulate
+from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import one_thread_each
 
 ALIKE = 0.99
@@ -195,7 +195,7 @@ def _shift(model: Model, trial: Trial) -> tuple[float, float]:
     name = model.rig.output(trial.kind)
     if name not in trial or not model.rig.input_columns(trial):
         return 0.0, 1.0
-    measured, simulated = trial[name], simulate(model, trial)[name]
+    measured, simulated = trial[name], simulated_trial(model, trial)[name]
     most = int(LONGEST_SHIFT * len(trial))
     lags = np.arange(-most, most + 1, max(1, most // 200))
     inside = simulated[most : len(trial) - most]

@@ -91,6 +91,10 @@ class Descent:
         held = ((self.x <= self.lower) & (gradient < 0)) | ((self.x >= self.upper) & (gradient > 0))
         return ~held
 
+    def run(self, max_iterations: int) -> bool:
+        """Go down so often at most; True if it ended at a minimum."""
+        return any(self.step() for _ in range(max_iterations)) and bool(np.isfinite(self.sse))
+
     def step(self) -> bool:
         """Go down once; True when there is nothing left to gain.
 

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fes_pin.data.show import frame, table_html
+from fes_pin.data.errors import InputError
+from fes_pin.data.results import Saveable, shown
+from fes_pin.data.schema import unknown
+from fes_pin.data.show import frame
 from fes_pin.data.trial import Trial
 from fes_pin.identify.covariance import covariance_of, promised_gain
 from fes_pin.identify.descent import Descent
 from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
+from fes_pin.identify.profile import profile_interval, reach_at_bound
 from fes_pin.infer.levels import CONFIDENCE_95, PARAMETER_PRICE
+from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import one_thread_each
@@ -37,7 +42,7 @@ GROSS = 10.0
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Fit:
+class Fit(Saveable):
     """A model with fitted parameters; it can prove its own quality.
 
     Attributes
@@ -51,7 +56,9 @@ class Fit:
     free
         Names of the fitted parameters.
     covariance
-        Shape (free, free); infinite where the data identify nothing.
+        Shape (free, free); infinite where the data identify nothing, 0 of what is at its bound. Read-only.
+    at_bound
+        Names of the fitted parameters that ended at a bound, and would go beyond it.
     sse
         Sum of squared whitened residuals: minus twice the log-likelihood, but for a constant.
     samples
@@ -66,6 +73,8 @@ class Fit:
         What is random, of a fit by `identify.turns`: its `sse` holds the log-determinant.
     together
         True where slopes for gains as they are lead no further: parameters and what is random move together from there.
+    bounds
+        By name, where somebody asked for narrower ones than the parameters have.
     """
 
     model: Model
@@ -82,22 +91,86 @@ class Fit:
     parts: tuple[Linearized, ...] = field(repr=False)
     doubt: Doubt | None = None
     together: bool = False
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+    def _freeze(self) -> None:
+        super()._freeze()
+        for part in self.parts:
+            for array in (part.residual, part.jacobian, part.local):
+                array.setflags(write=False)
 
     @property
     def values(self) -> dict[str, float]:
         """Every parameter by name."""
         return self.model.parameters()
 
-    def std(self, name: str) -> float:
-        """Standard deviation of a fitted parameter."""
-        k = self.free.index(name)
-        return float(np.sqrt(self.covariance[k, k]))
+    def _place(self, name: str) -> int:
+        if name not in self.free:
+            raise InputError(unknown(name, self.free), column=name)
+        return self.free.index(name)
 
-    def interval(self, name: str) -> tuple[float, float]:
-        """95 % interval of a fitted parameter, cut at its bounds."""
-        value, half = self.values[name], CONFIDENCE_95 * self.std(name)
-        info = self.model.parameter_info()[name]
-        return max(value - half, info.lower), min(value + half, info.upper)
+    def std(self, name: str) -> float:
+        """Standard deviation of a fitted parameter: infinite where the data say nothing of it, NaN at its bound.
+
+        An estimate at its bound does not scatter about it; `interval` says how far the parameter may be from there.
+
+        Raises
+        ------
+        InputError
+            If the parameter was not fitted.
+        """
+        variance = self.covariance[(k := self._place(name)), k]
+        return math.nan if name in self.at_bound else float(np.sqrt(variance))
+
+    def interval(self, name: str, method: str = "wald") -> tuple[float, float]:
+        """95 % interval of a fitted parameter, cut at its bounds; one-sided, by profile, of one that is at its bound.
+
+        Parameters
+        ----------
+        name
+            Of the parameter.
+        method
+            "wald": value +- 1.96 std. "profile": where twice the log-likelihood, all other parameters fitted again,
+            falls by 3.84; see `identify.profile`. The fits of a diagnosis of driven rigs, and of a contrast, have no
+            such profile: their intervals at a bound are those of the parabola that the fit ended on.
+
+        Raises
+        ------
+        InputError
+            If the parameter was not fitted, the method is another, or the fit has no profile.
+        """
+        is_plain = isinstance(self.model, Model) and self.doubt is None
+        self._place(name)
+        if method not in ("wald", "profile"):
+            raise InputError(f"expected wald or profile, found {method!r}", column="method")
+        if method == "profile" and not is_plain:
+            raise InputError("expected wald: this fit is of random processes or of groups", column="method")
+        if is_plain and (method == "profile" or name in self.at_bound):
+            return self._one_sided[name] if name in self.at_bound else self._profile(name)
+        info, value, reach = self.model.parameter_info()[name], self.values[name], self._reach(name)
+        low, high = self.bounds.get(name, (info.lower, info.upper))
+        return max(value - reach, low), min(value + reach, high)
+
+    @cached_property
+    def _one_sided(self) -> dict[str, tuple[float, float]]:
+        return {n: self._profile(n) for n in self.at_bound}
+
+    def _reach(self, name: str) -> float:
+        """Half of a parameter's 95 % interval, all of it at a bound, by the parabola that the fit ended on."""
+        if name not in self.at_bound:
+            return CONFIDENCE_95 * self.std(name)
+        return reach_at_bound(self.parts, self.free.index(name), [n in self.at_bound for n in self.free])
+
+    def _profile(self, name: str) -> tuple[float, float]:
+        problem = Problem(self.model, self.trials, self.noise, self.free)
+        problem.limits |= self.bounds
+        if not math.isfinite(reach := self._reach(name)):
+            return problem.limits[name]
+        with one_thread_each():
+            return profile_interval(problem, name, self.values, self.unknowns, reach, name in self.at_bound)
 
     def is_optimal(self, tolerance: float = 0.1) -> bool:
         """True if no free parameter's Newton step would gain more than `tolerance` in twice the log-likelihood."""
@@ -105,53 +178,83 @@ class Fit:
 
     def not_identified(self) -> tuple[str, ...]:
         """Parameters that these data say nothing about."""
-        return tuple(n for n in self.free if not math.isfinite(self.std(n)))
+        return tuple(n for n in self.free if math.isinf(self._reach(n)))
+
+    def _note(self, name: str) -> str:
+        at = "at its bound" if name in self.at_bound else ""
+        return "not identified" if name in self.not_identified() else at
+
+    def _estimate(self, name: str) -> str:
+        """A value with its deviation, or with its interval where it is at its bound."""
+        value, (low, high) = f"{self.values[name]:.4g}", self.interval(name)
+        if name in self.at_bound:
+            return f"{value} (at its bound, 95 % in [{low:.3g}, {high:.3g}])"
+        return f"{value} +- {self.std(name):.2g}"
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{n} = {self.values[n]:.4g} +- {self.std(n):.2g}" for n in self.free)
+        values = ", ".join(f"{n} = {self._estimate(n)}" for n in self.free)
         return f"Fit {' + '.join(self.model.structure())}: {self.samples} samples, chi2 {self.reduced:.3f}; {values}"
 
-    def _repr_html_(self) -> str:
-        info, rows = self.model.parameter_info(), []
-        for name in self.free:
-            low, high = self.interval(name)
-            note = (
-                "not identified" if name in self.not_identified() else "at its bound" if name in self.at_bound else ""
-            )
-            rows.append((name, f"{self.values[name]:.5g}", f"[{low:.5g}, {high:.5g}]", info[name].unit or "-", note))
-        notes = [] if self.is_optimal() else ["The fit did not end at an optimum."]
-        return table_html(
-            f"{' + '.join(self.model.structure())}: {self.samples} samples, reduced chi2 {self.reduced:.3f}",
-            ("parameter", "value", "95 % interval", "unit", ""),
-            rows,
-            notes,
-        )
-
-    def to_frame(self) -> pandas.DataFrame:
-        """The fitted parameters with deviations and 95 % intervals as a frame of pandas; see `data.show.frame`."""
+    def __str__(self) -> str:
         info = self.model.parameter_info()
-        columns = {
+        lines = [self._title()]
+        for name in self.free:
+            note = " (not identified)" if name in self.not_identified() else ""
+            lines.append(f"  {name:40s} {self._estimate(name):>24s} {info[name].unit}{note}".rstrip())
+        return "\n".join(lines)
+
+    def _title(self) -> str:
+        return f"{' + '.join(self.model.structure())}: {self.samples} samples, reduced chi2 {self.reduced:.3f}"
+
+    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        rows = [
+            (n, f"{value:.5g}", f"[{low:.5g}, {high:.5g}]", unit or "-", note)
+            for n, value, _, low, high, unit, note in zip(*self.columns().values(), strict=True)
+        ]
+        notes = [] if self.is_optimal() else ["The fit did not end at an optimum."]
+        return self._title(), ("parameter", "value", "95 % interval", "unit", ""), rows, notes
+
+    def columns(self) -> dict[str, list[Any]]:
+        """The fitted parameters with deviations, 95 % intervals and units.
+
+        `std` is NaN, and `note` "at its bound", where a value is at its bound; "not identified" where nothing is known.
+        """
+        info = self.model.parameter_info()
+        return {
             "parameter": list(self.free),
-            "value": self.to_numpy(),
+            "value": [self.values[n] for n in self.free],
             "std": [self.std(n) for n in self.free],
             "low": [self.interval(n)[0] for n in self.free],
             "high": [self.interval(n)[1] for n in self.free],
             "unit": [info[n].unit for n in self.free],
+            "note": [self._note(n) for n in self.free],
         }
-        return frame(columns, index="parameter")
+
+    def record(self) -> dict[str, Any]:
+        """What JSON holds of it: see `fes_pin.data.results`."""
+        names, *cells = self.columns().values()
+        said = [shown(x) if isinstance(x, float) else x for column in cells for x in column]
+        rows = (said[k :: len(names)] for k in range(len(names)))
+        keys = ("value", "std", "low", "high", "unit", "note")
+        return {
+            "model": list(self.model.structure()),
+            "parameters": {n: dict(zip(keys, row, strict=True)) for n, row in zip(names, rows, strict=True)},
+            "held": {n: shown(v) for n, v in self.values.items() if n not in names},
+            "samples": self.samples,
+            "reduced_chi2": shown(self.reduced),
+            "converged": self.converged,
+            "noise": {n: {"std": shown(one.std), "ar": [shown(a) for a in one.ar]} for n, one in self.noise.items()},
+        }
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The fitted parameters with deviations and 95 % intervals as a frame of pandas: see `columns`."""
+        return frame(self.columns(), index="parameter")
+
+    __eq__, __hash__ = object.__eq__, object.__hash__  # two fits are not compared by what they print while one searches
 
     def to_numpy(self) -> NDArray[np.float64]:
         """Values of the fitted parameters, shape (free,), in the order of `free` and of `covariance`."""
         return np.array([self.values[n] for n in self.free], dtype=np.float64)
-
-    def __str__(self) -> str:
-        info = self.model.parameter_info()
-        lines = [f"{' + '.join(self.model.structure())}: {self.samples} samples, reduced chi2 {self.reduced:.3f}"]
-        for name in self.free:
-            note = " (not identified)" if name in self.not_identified() else ""
-            note += " (at its bound)" if name in self.at_bound else ""
-            lines.append(f"  {name:40s} {self.values[name]:12.6g} +- {self.std(name):9.2g} {info[name].unit}{note}")
-        return "\n".join(lines)
 
     @property
     def reduced(self) -> float:
@@ -239,11 +342,7 @@ def go_on(problem: Problem, fitted: Fit, max_iterations: int = MAX_ITERATIONS) -
 
 
 def _run(search: Descent, max_iterations: int) -> Fit:
-    problem, done = search.problem, False
-    for _ in range(max_iterations):
-        done = search.step()
-        if done:
-            break
+    problem, done = search.problem, search.run(max_iterations)
     with np.errstate(all="ignore"):
         system = normal_equations(search.parts)
         free = search.free_now(system.gradient)
@@ -257,7 +356,7 @@ def _run(search: Descent, max_iterations: int) -> Fit:
         covariance=covariance_of(system.hessian, free),
         sse=search.sse,
         samples=sum(len(p.residual) for p in search.parts),
-        converged=bool(done and np.isfinite(search.sse)),
+        converged=done,
         gradient_norm=decrement,
         unknowns=search.unknowns,
         at_bound=tuple(n for n, f in zip(problem.free, free, strict=True) if not f),
@@ -267,9 +366,12 @@ def _run(search: Descent, max_iterations: int) -> Fit:
 
 def fit(
     model: Model,
-    trials: Sequence[Trial],
+    trials: Trial | Iterable[Trial],
     noise: NoiseModel | None = None,
     max_iterations: int = MAX_ITERATIONS,
+    *,
+    fixed: Iterable[str] | Mapping[str, float] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
 ) -> Fit:
     """Fit a model's parameters to trials, from the model's own values.
 
@@ -282,19 +384,69 @@ def fit(
     noise
         By output column. Without it the noise is taken for white, fitted, and estimated from the residuals; then the
         fit is repeated with it.
+    max_iterations
+        Steps, at most; what has not converged then says so.
+    fixed
+        Names of parameters that are not fitted, or values that they are held at by name: `("gain",)`,
+        `{"gain": 0.65}`.
+    bounds
+        Lower and upper bounds of fitted parameters by name, within those that they have: `{"damping": (0.0, 1.0)}`.
 
     Returns
     -------
     Fit
+
+    Raises
+    ------
+    InputError
+        No trials, trials that are not of the model's rig or were not measured, names of no fitted parameter, values or
+        bounds that cannot be.
     """
+    measured = accepted_trials(model, trials, inputs_only=False)
+    model = model.with_parameters(fixed) if isinstance(fixed, Mapping) else model
+    free = _less(model.fitted_parameters(), [fixed] if isinstance(fixed, str) else fixed)
+    narrower = _checked_bounds(model, free, bounds or {})
+
+    def problem(noise: NoiseModel) -> Problem:
+        made = Problem(model, measured, noise, free)
+        made.limits |= narrower
+        return made
+
     with one_thread_each():  # products this small are slower on several threads
-        if noise is None:
-            first = fit_multistart(Problem(model, trials, rough_noise(model, trials)), model.parameters())
-            if not math.isfinite(first.sse):  # the simulation runs away wherever the fit began
-                return first
-            model, noise = first.model, noise_of(first)
-            return fit_problem(Problem(model, trials, noise), first.values, first.unknowns, max_iterations)
-        return fit_multistart(Problem(model, trials, noise), model.parameters(), max_iterations=max_iterations)
+        if noise is not None:
+            found = fit_multistart(problem(noise), model.parameters(), max_iterations=max_iterations)
+        else:
+            found = fit_multistart(problem(rough_noise(model, measured)), model.parameters())
+            if math.isfinite(found.sse):  # else the simulation runs away wherever the fit began
+                model = found.model
+                found = fit_problem(problem(noise_of(found)), found.values, found.unknowns, max_iterations)
+    return replace(found, bounds=narrower)
+
+
+def _less(fitted: tuple[str, ...], fixed: Iterable[str]) -> tuple[str, ...]:
+    """The parameters that are fitted where some of them are fixed."""
+    for name in (listed := tuple(fixed)):
+        if name not in fitted:
+            raise InputError(unknown(str(name), fitted), column="fixed")
+    return tuple(n for n in fitted if n not in listed)
+
+
+def _checked_bounds(
+    model: Model, free: tuple[str, ...], bounds: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """Bounds that somebody asks for, within those of the parameters."""
+    out, info = {}, model.parameter_info()
+    for name, ends in bounds.items():
+        if name not in free:
+            raise InputError(unknown(name, free), column="bounds")
+        if not isinstance(ends, tuple | list) or len(ends) != 2 or not ends[0] < ends[1]:
+            raise InputError(f"expected (lower, upper) of {name}, found {ends!r}", column="bounds")
+        low, high = max(float(ends[0]), info[name].lower), min(float(ends[1]), info[name].upper)
+        if not low < high:
+            told = f"expected part of {info[name].lower:g} to {info[name].upper:g} for {name}, found {ends!r}"
+            raise InputError(told, column="bounds")
+        out[name] = (low, high)
+    return out
 
 
 def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.linalg
 from numpy.lib.stride_tricks import as_strided
 
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.infer.levels import PARAMETER_PRICE
 
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
@@ -24,7 +25,7 @@ sinusoid still leaves a deep notch."""
 
 
 @dataclass(frozen=True)
-class Noise:
+class Noise(ReadOnly):
     """Autoregressive noise e_t = ar_1 e_(t-1) + ... + ar_p e_(t-p) + innovation, Gaussian.
 
     Attributes
@@ -73,7 +74,9 @@ class Noise:
     def _stretch(self) -> np.ndarray:
         """What whitens `BLOCK` samples from these and the p before, shape (BLOCK, p + BLOCK)."""
         taps = [*(-a / self.innovation_std for a in reversed(self.ar)), 1.0 / self.innovation_std]
-        return np.array([[0.0] * k + taps + [0.0] * (BLOCK - 1 - k) for k in range(BLOCK)])
+        made = np.array([[0.0] * k + taps + [0.0] * (BLOCK - 1 - k) for k in range(BLOCK)])
+        made.setflags(write=False)
+        return made
 
 
 def estimate_noise(

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.schema import unknown
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
@@ -23,9 +24,13 @@ def nominal_model(study: Study) -> Model:
     Raises
     ------
     InputError
-        If the rig has no model of trials.
+        If the rig has no model of trials, no parameter of a name in `start`, or lacks its URDF; a value that cannot be.
     """
-    rig = rig_of(study).of_study(study)
+    kind = rig_of(study)
+    for name in study.start:
+        if name not in kind.parameters():
+            raise InputError(unknown(name, kind.parameters()), file=study.folder, column=f"start.{name}")
+    rig = kind.of_study(study)
     stimulated = [t for t in study.trials if rig.recruited(t) is not None]
     return Model(replace(rig, session=session_of(stimulated, rig.recruited)))  # type: ignore[arg-type]
 

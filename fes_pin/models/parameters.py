@@ -26,7 +26,7 @@ HELD = {"q": "m", "y": "N", "effort": "N"}
 """Units of a muscle, whose force is read."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ParameterInfo:
     """What is known of a parameter beside its value.
 
@@ -63,6 +63,12 @@ class ParameterInfo:
     optional: bool = False
     rigs: tuple[str, ...] = ()
     times: str = ""
+
+    def __repr__(self) -> str:
+        rotary, sliding = (self.in_units(units).unit or "a pure number" for units in (ROTARY, SLIDING))
+        unit = rotary if rotary == sliding else f"{rotary} ({sliding} of a slide)"
+        absent = "" if self.null is None else f", absent at {self.null:g}"
+        return f"ParameterInfo: {unit} in [{self.lower:g}, {self.upper:g}]{absent}"
 
     def holds(self, value: float) -> bool:
         """Whether a value is within the bounds, or beyond one by no more than rounding, as a fit may end at it."""

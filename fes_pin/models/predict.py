@@ -20,21 +20,12 @@ def predict(model: Model, trial: Trial) -> Trial:
     Raises
     ------
     InputError
-        If the trial lacks an input, a condition or its initial state, or the prediction does not stay finite.
+        As `simulate`, or if the prediction does not stay finite.
     """
-    rig = model.rig
-    _check(model, trial)
     simulated = simulate(model, trial)
-    outputs = {n: simulated[n] for n in rig.outputs(trial.kind)}
+    outputs = {n: simulated[n] for n in model.rig.outputs(trial.kind)}
     for name, values in outputs.items():
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values)))
             raise InputError(f"the prediction of {name} is not finite from sample {row} on: the model is unstable here")
     return derived_trial(trial, columns=outputs)
-
-
-def _check(model: Model, trial: Trial) -> None:
-    for name in model.rig.schema.needed.get(trial.kind, ()):
-        if name not in trial.conditions:
-            raise InputError(f"expected --set {name}=... for a {trial.kind} trial of this rig")
-    model.rig.check_prediction(trial)

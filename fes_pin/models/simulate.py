@@ -11,6 +11,7 @@ import numpy as np
 
 from fes_pin.data.imposed import MOTION, driving_values
 from fes_pin.data.trial import Trial, derived_trial
+from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.compile.layout import Layout, widest, width_of
 from fes_pin.models.compile.program import Program, compiled_program
 from fes_pin.models.least_squares import least_squares
@@ -339,7 +340,18 @@ def simulate(model: Model, trial: Trial) -> Trial:
     -------
     Trial
         The same time and inputs, with the predicted outputs. For a joint the velocity is predicted as well.
+
+    Raises
+    ------
+    InputError
+        If the rig cannot have such a trial: it lacks an input, a condition or its initial state, has a column that the
+        rig does not read, or values in another unit.
     """
+    return simulated_trial(model, *accepted_trials(model, trial))
+
+
+def simulated_trial(model: Model, trial: Trial) -> Trial:
+    """What `simulate` gives of a trial that is known to be one of the model's rig."""
     (simulated,) = Simulator(model, [trial]).run(model.parameters())
     rig = model.rig
     columns = {name: trial[name] for name in rig.input_columns(trial)}

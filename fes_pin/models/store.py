@@ -121,8 +121,7 @@ def _missing(document: Document, name: object, otherwise: str) -> str:
     where = document.table(NEEDS).get(name) if isinstance(name, str) else None
     if not isinstance(where, str) or not where:
         return otherwise
-    given = f"--library {'PATH/' if where.endswith('.py') else ''}{where}, or library= in Python"
-    return f"{name} is of the library {where}; expected {given}"
+    return f"{name} is of {where}; expected library='{'PATH/' if where.endswith('.py') else ''}{where}'"
 
 
 def _effect(document: Document, catalogue: Catalogue, name: str, listed: dict[str, Any]) -> Effect:

@@ -106,9 +106,9 @@ def test_a_cause_and_a_rig_of_ones_own_files_work_end_to_end(own, study):
     trial = fp.Trial("new", "motion", {"motor_nm": motor}, time)
     assert np.abs(fp.predict(model, trial)["angle_rad"] - angle).max() < 2e-3
     assert np.abs(fp.predict(model - "door_closer", trial)["angle_rad"] - angle).max() > 0.05
-    with pytest.raises(fp.InputError, match=r"row \d+, column rig: tail is of the library tail.py; expected --lib"):
+    with pytest.raises(fp.InputError, match=r"column rig: tail is of tail.py; expected library='PATH/tail.py'"):
         fp.load_model(own / "model.toml")
-    with pytest.raises(fp.InputError, match=r"row \d+, column effects.door_closer: door_closer is of the libr"):
+    with pytest.raises(fp.InputError, match=r"row \d+, column effects.door_closer: door_closer is of door_closer.py;"):
         fp.load_model(own / "model.toml", library=own / "tail.py")
 
 
@@ -151,7 +151,7 @@ def test_a_package_brings_both_by_its_entry_points(package, study, tmp_path):
     given = ("predict", tmp_path / "out" / "model.toml", tmp_path / "new.csv", "--out", tmp_path / "made.csv")
     without = fes_pin(*given)
     assert (without.returncode, without.stdout, without.stderr.count("\n")) == (2, "", 1)
-    assert "tail is of the library mylab.tail; expected --library mylab.tail" in without.stderr
+    assert "tail is of mylab.tail; expected --library='mylab.tail'" in without.stderr
     assert not (tmp_path / "made.csv").exists()
     assert fes_pin(*given, site=package).returncode == 0
     made = np.loadtxt(tmp_path / "made.csv", delimiter=",", skiprows=1)[:, 1]

@@ -80,7 +80,8 @@ class Joint(Rig):
 
     @classmethod
     def of_study(cls, study: Study) -> Joint:
-        assert study.urdf is not None
+        if study.urdf is None:
+            raise InputError("missing; expected the joint's URDF", file=study.folder, column="urdf")
         driven = any("effort" in t.columns for t in study.trials)
         return joint_model(study.urdf, study.constants, study.start, driven)
 
@@ -98,7 +99,7 @@ class Joint(Rig):
         if trial.kind == IMPOSED:
             return
         if "position" not in trial.columns and "position0" not in trial.conditions:
-            raise InputError("expected a column position (its first sample) or --set position0=...")
+            raise trial.error("missing; expected it (its first sample) or position0 among the conditions", "position")
 
     @classmethod
     def conditions_to_try(cls, study: Study) -> set[tuple[str, tuple[tuple[str, float], ...]]]:
