@@ -26,6 +26,7 @@ from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equat
 from fes_pin.infer.levels import CONFIDENCE_95
 
 RISE = CONFIDENCE_95**2
+"""95 % quantile of a chi-square with one degree of freedom."""
 RISE_AT_A_BOUND = 1.6448536269514722**2
 """The normal's 95 % quantile, squared."""
 STEPS = 20

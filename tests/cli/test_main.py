@@ -400,3 +400,13 @@ def test_effects_lists_every_cause(monkeypatch, capsys):
 def test_help_is_not_an_error(monkeypatch):
     assert run(monkeypatch, "--help") == 0
     assert run(monkeypatch, "diagnose") == 2
+
+
+def test_a_joint_that_begins_nowhere_is_told_in_options(tmp_path, monkeypatch, capsys):
+    rig = fp.rigs.Joint(constants={"inertia": 0.02, "gravity_cos": 0.1, "gravity_sin": 0.6, "revolute": 1.0})
+    save_model(fp.Model(rig), tmp_path / "model.toml")
+    (tmp_path / "free.csv").write_text("time_s,effort\n" + "".join(f"{0.01 * k:.2f},0.1\n" for k in range(50)))
+    given = ("predict", tmp_path / "model.toml", tmp_path / "free.csv", "--out", tmp_path / "p.csv")
+    said = fails(monkeypatch, capsys, *given)
+    assert "expected it (its first sample) or --set position0=..." in said
+    assert "among the conditions" not in said
