@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+from datetime import UTC, datetime
 
 from fes_pin.data.errors import InputError
 
 ENGINES = ("llvm", "casadi")
 PROCESSORS = ("native", "generic")
+LAST_SECOND = 253402300799
+"""Of the year 9999, the last that dates have."""
 
 
 def engine() -> str:
@@ -61,6 +64,23 @@ def threads() -> int:
     return int(chosen)
 
 
+def source_date() -> datetime | None:
+    """The moment that replaces the clock: `SOURCE_DATE_EPOCH`, seconds since 1970, UTC; None where it is not set.
+
+    Raises
+    ------
+    InputError
+        Not a whole number of seconds, or one beyond the year 9999.
+    """
+    chosen = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if not chosen:
+        return None
+    if not re.fullmatch("[0-9]{1,12}", chosen) or int(chosen) > LAST_SECOND:
+        expected = f"expected whole seconds since 1970, at most {LAST_SECOND}, found {chosen[:40]!r}"
+        raise InputError(expected, column="SOURCE_DATE_EPOCH")
+    return datetime.fromtimestamp(int(chosen), UTC)
+
+
 def check_settings() -> None:
     """Read every setting, so that a wrong one is said before any work.
 
@@ -72,6 +92,7 @@ def check_settings() -> None:
     engine()
     processor()
     threads()
+    source_date()
 
 
 def _one_of(variable: str, known: tuple[str, ...]) -> str:

@@ -16,6 +16,7 @@ from scipy import linalg
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import ModeSet, modes
+from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number
 
 RELATIVE_TOLERANCE = 1e-9
@@ -105,9 +106,11 @@ def modal_controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> M
     Raises
     ------
     InputError
-        Inputs that are none, or a horizon that is not positive.
+        Inputs that are none, or a horizon outside 1 ms to 1000 s.
     """
     horizon = positive_number(horizon, "horizon")
+    if not 1e-3 <= horizon <= 1e3:
+        raise InputError(f"must lie between 0.001 and 1000 s, got {horizon:g}", column="horizon")
     inputs = Inputs.of(inputs, linear)
     found = modes(linear)
     torque = inputs.on(linear)

@@ -41,7 +41,7 @@ def ground_normal(slope: Sequence[float]) -> np.ndarray:
         alpha, beta = (float(value) for value in slope)
     except (TypeError, ValueError):
         raise InputError(f"must be two numbers (alpha, beta), got {slope!r}", column="slope") from None
-    up = 1.0 - alpha**2 - beta**2
+    up = 1.0 - alpha * alpha - beta * beta
     if not up > 0.0:
         raise InputError(f"alpha^2 + beta^2 must be below 1, got ({alpha}, {beta})", column="slope")
     return np.array([alpha, beta, np.sqrt(up)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import re
 import sys
@@ -157,6 +158,10 @@ def _run_by_group(command: Callable[..., Any]) -> Callable[..., Any]:
         words = {one.name: _word(one) for one in ctx.command.params if one.name is not None}
         if quiet and verbose:
             raise InputError("does not go with --verbose", column="--quiet")
+        for name, value in given.items():
+            for one in value if isinstance(value, tuple | list) else (value,):
+                if isinstance(one, float) and not math.isfinite(one):
+                    raise InputError(f"expected a finite number, found {one:g}", column=words[name])
         _check_needs(ctx, words, getattr(command, "rules", {}))
         if quiet and str(given.get("out") or "-") != "-" and isinstance(sys.stdout, Held):
             sys.stdout.is_silent = True
@@ -213,6 +218,7 @@ class Commands(TyperGroup):
         """Run the command line, as typer's own; it ends by SystemExit unless `standalone_mode` is False."""
         if not standalone_mode:
             return super().main(args, standalone_mode=False, **given)
+        _make_streams_whole()
         with one_command(), redirect_stdout(Held(sys.stdout)) as held:
             code = self._run(held, args, given)
         raise SystemExit(code)
@@ -234,6 +240,16 @@ class Commands(TyperGroup):
         except BaseException:
             held.release()
             raise
+
+
+def _make_streams_whole() -> None:
+    """Let what is printed to a stream that is closed go nowhere, and what a stream has no sign for become "?"."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - for good
+        elif mode == "w" and hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
 
 
 def _refuse(line: str) -> int:

@@ -206,6 +206,8 @@ def _wanted(
         raise InputError(f"expected {told} for rig {schema.name}", column="--urdf")
     if urdf_file is not None and schema.check_files is not None:
         schema.check_files({"urdf": urdf_file})
+    if resample == 0.0:
+        raise InputError("expected a rate above 0 Hz", column="--resample")
     doubles = [f for k, f in enumerate(files) if f.absolute() in [g.absolute() for g in files[:k]]]
     if doubles:
         raise InputError("was named twice", file=doubles[0])
@@ -222,7 +224,7 @@ def _wanted(
         settings=settings,
         kind=None if schema.owner is None else settings.pop("kind", None),
         labels={key: given[key] for key in ("role", "group")},
-        resample_hz=resample or None,
+        resample_hz=resample,
         fill=fill,
         ask=_ask if sys.stdin.isatty() and sys.stdout.isatty() else None,
     )

@@ -5,6 +5,8 @@ A worker that is lost has its studies diagnosed elsewhere by the scheduler; answ
 
 from __future__ import annotations
 
+import re
+import socket
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
@@ -27,13 +29,20 @@ def on_cluster(
     Raises
     ------
     InputError
-        dask.distributed is not installed, or no scheduler answers at the address.
+        What is given is no address, dask.distributed is not installed, or no scheduler answers at the address.
     """
+    host = re.fullmatch(r"(?:(?:tcp|tls)://)?\[?([^\s/]+?)\]?:\d{1,5}|(?!tcp:|tls:)\w+://\S+", address)
+    if host is None:
+        raise InputError(
+            f"expected the address of a Dask scheduler, as tcp://host:8786, found {address!r}", column="scheduler"
+        )
     try:
         from distributed import Client, as_completed  # noqa: PLC0415
     except ImportError:
         raise InputError("a cluster needs dask.distributed: pip install 'fes-pin[cohort]'") from None
     try:
+        if host[1]:
+            socket.getaddrinfo(host[1], None)  # a name that is none is said at once
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as problem:
         raise InputError(f"no Dask scheduler answers at {address}: {type(problem).__name__}") from None

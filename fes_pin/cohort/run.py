@@ -177,7 +177,7 @@ def _answers(
 ) -> Iterator[Answer]:
     if not todo:
         return iter(())
-    return on_cluster(todo, scheduler, run) if scheduler else in_processes(todo, workers, run)
+    return on_cluster(todo, scheduler, run) if scheduler is not None else in_processes(todo, workers, run)
 
 
 def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:

@@ -49,7 +49,6 @@ class Outputs:
         InputError
             The folder cannot be written, or one of the files must not be written over.
         """
-        check_folder(folder)
         self._check(Path(folder), names if isinstance(names, Mapping) else dict.fromkeys(names))
 
     def check_file(self, path: str | Path) -> None:
@@ -89,6 +88,7 @@ class Outputs:
 
     def _check(self, folder: Path, contents: Mapping[str, str | bytes | None]) -> dict[str, Any]:
         """The record of the folder, where all files may be written."""
+        check_folder(folder)
         record = _record(folder)
         if RECORD in contents:
             raise InputError("is where fes-pin notes what it wrote; expected another name", file=folder / RECORD)

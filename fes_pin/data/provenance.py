@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import datetime
 import hashlib
-import os
 import platform
 import shlex
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.study import Study
+from fes_pin.settings import source_date
 
 PACKAGES = ("fes-pin", "pin", "casadi", "numpy", "scipy", "llvmlite")
 """Whose versions a result depends on."""
@@ -65,9 +65,7 @@ def provenance_now(study: Study, seed: int) -> Provenance:
 
 def today() -> str:
     """The moment, UTC, to the second; that of `SOURCE_DATE_EPOCH` where it is set."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
-    moment = datetime.datetime.fromtimestamp(int(epoch), datetime.UTC) if epoch.isdigit() else None
-    return (moment or datetime.datetime.now(datetime.UTC)).isoformat(timespec="seconds").replace("+00:00", "Z")
+    return (source_date() or datetime.now(UTC)).isoformat(timespec="seconds").replace("+00:00", "Z")
 
 
 def versions() -> dict[str, str]:

@@ -9,6 +9,9 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 
+MOST = {"width_us": 1e5, "rate_hz": 1e4, "charge_uc": 1e4, "current_ma": 1e3}
+"""What no stimulator of nerves or muscles comes near: a limit beyond it is a slip of units."""
+
 
 @dataclass(frozen=True)
 class PulseLimits:
@@ -32,9 +35,10 @@ class PulseLimits:
     current_ma: float
 
     def __post_init__(self) -> None:
-        for name in ("width_us", "rate_hz", "charge_uc", "current_ma"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise InputError(f"expected a number above 0, found {getattr(self, name):g}", column=f"limits.{name}")
+        for name, most in MOST.items():
+            if not 0.0 < getattr(self, name) <= most:
+                words = f"expected a number above 0 and at most {most:g}, found {getattr(self, name):g}"
+                raise InputError(words, column=f"limits.{name}")
 
 
 def pulse_list(
@@ -61,8 +65,9 @@ def pulse_list(
         No such column; a rate or width that is not said, or that the trial says; a pulse beyond a limit, with its time.
     """
     if "pulse_width_us" in trial:
-        if rate_hz is None or not 0.0 < rate_hz < np.inf:
-            raise InputError("expected the rate of the pulses, whose widths the trial says", column="rate_hz")
+        if rate_hz is None or not 0.0 < rate_hz <= MOST["rate_hz"]:
+            words = f"expected the rate of the pulses, whose widths the trial says, at most {MOST['rate_hz']:g} Hz"
+            raise InputError(words, column="rate_hz")
         if width_us is not None:
             raise InputError("goes only with a trial of single pulses; this one says their widths", column="width_us")
         count = int(np.floor((trial.duration + trial.dt) * rate_hz * (1 - 1e-9))) + 1

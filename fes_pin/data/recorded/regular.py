@@ -9,6 +9,8 @@ import numpy as np
 
 from fes_pin.data.recorded.recording import Recording
 
+MOST_PER_SAMPLE = 100
+"""Samples for each that was recorded, at most: beyond that nothing but straight lines is added."""
 LONGEST_GAP = 5
 """Sample steps over which a straight line is drawn: what a rig does in longer ones nobody measured."""
 
@@ -63,9 +65,14 @@ def resampled(
     Raises
     ------
     InputError
-        Times that do not increase, a step of more than `LONGEST_GAP` usual ones, two pulses in one new sample.
+        Times that do not increase, a step of more than `LONGEST_GAP` usual ones, two pulses in one new sample; a rate
+        that makes fewer than 3 samples, or more than `MOST_PER_SAMPLE` for each that was recorded.
     """
-    grid = time[0] + np.arange(int((time[-1] - time[0]) * rate_hz + 1e-6) + 1) / rate_hz
+    count = (time[-1] - time[0]) * rate_hz + 1e-6
+    if not 2.0 <= count <= MOST_PER_SAMPLE * len(time):
+        low, high = (f"{n / (time[-1] - time[0]):.3g}" for n in (2.0, MOST_PER_SAMPLE * len(time)))
+        raise recording.error(f"expected to resample at {low} to {high} Hz, found {rate_hz:g} Hz", called["time_s"])
+    grid = time[0] + np.arange(int(count) + 1) / rate_hz
     out = {}
     for name, values in columns.items():
         if name != "stim":
