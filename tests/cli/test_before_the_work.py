@@ -93,6 +93,7 @@ def test_without_a_stream_the_work_is_done(sandbox, monkeypatch, name):  # noqa:
     for words, code in ((PREDICT, 0), (("check", "study"), 0), (("diagnose", "nowhere", "--out", "new"), 2)):
         monkeypatch.setattr(sys, name, None)
         assert run(monkeypatch, *words) == code
+        getattr(sys, name).close()
     assert (sandbox / "new.csv").read_text().startswith("time_s,")
 
 
