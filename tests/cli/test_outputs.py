@@ -102,6 +102,11 @@ ONE_FILE = {  # words, the option that says where to write, the inputs among the
         ("model.toml", "study/a.csv", "study/study.toml", "own.py"),
     ),
     "predict ahead": (("predict", "model.toml", "study/a.csv", "--residuals"), "--out", ("model.toml", "study/a.csv")),
+    "predict a study": (
+        ("predict", "model.toml", "study", "--library", "own.py"),
+        "--out",
+        ("model.toml", "study/study.toml", "study/a.csv", "study/rig.urdf", "own.py"),
+    ),
     "urdf": (("urdf", "model.toml", "study/rig.urdf"), "--out", ("model.toml", "study/rig.urdf")),
     "pulses": (("pulses", "pulses.csv", *PULSES), "--out", ("pulses.csv",)),
     "body view": (("body", "view", "--urdf", "body.svg"), "--out", ("body.svg",)),
@@ -249,6 +254,7 @@ def test_a_prediction_replaces_an_earlier_one_and_no_recording(sandbox, monkeypa
         assert run(monkeypatch, *words, out) == 0
     (sandbox / "v.csv").write_text(swing())
     before = hashes(sandbox)
+    capsys.readouterr()
     assert "--force" in fails(monkeypatch, capsys, *words, "v.csv")
     assert hashes(sandbox) == before
     (sandbox / "gone.csv").symlink_to("nowhere.csv")  # as of data that are kept elsewhere
