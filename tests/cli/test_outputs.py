@@ -260,6 +260,7 @@ def test_a_prediction_replaces_an_earlier_one_and_no_recording(sandbox, monkeypa
     (sandbox / "gone.csv").symlink_to("nowhere.csv")  # as of data that are kept elsewhere
     assert run(monkeypatch, *words, "gone.csv") == 0 and (sandbox / "nowhere.csv").is_file()
     assert run(monkeypatch, *words, "/dev/null") == 0 and not Path("/dev", RECORD).exists()
+    capsys.readouterr()
     assert "notes what it wrote" in fails(monkeypatch, capsys, *words, RECORD)
 
 
