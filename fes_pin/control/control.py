@@ -24,6 +24,7 @@ from fes_pin.control.angles import reading as read
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.control.endurance import EnduranceWatch, fatigue_of
 from fes_pin.control.faults import FaultMonitor, Status
+from fes_pin.control.given import GivenAnkle, RunningAnkle
 from fes_pin.control.limits import StimulationLimits
 from fes_pin.control.observer import JointObserver
 from fes_pin.control.oscillation import OscillationWatch
@@ -55,6 +56,10 @@ FARTHEST_BEYOND_RAD = math.radians(0.5)
 RISE_PULSES = 23
 """0.5 s after the first pulse after a pause, in which the reference is let in: a joint that came to rest is not thrown
 to where the reference has gone."""
+REHEARSED_RAD = math.radians(15.0)
+REHEARSED = (0.0, 0.8, 0.0, 1.0, 0.3)
+"""Height of what is followed on a model with other effects before it may be used, and its levels as shares of that,
+each for a second; then come two seconds of a sine."""
 REACH_ANGLES = 200
 """Angles that the muscle's reach is tabulated at: to half a degree."""
 
@@ -66,7 +71,9 @@ class PositionController:
     ----------
     model
         The ankle as identified, or the fit or diagnosis that holds it. Of its effects, `recruitment_hysteresis` is
-        compensated, `frame_vibration` is tuned for, and `fatigue` says how long the muscle will last.
+        compensated, `frame_vibration` is tuned for, and `fatigue` says how long the muscle will last. All others the
+        controller does not know, a delay or a lag for example: its gains are chosen so that the loop is stable with
+        them, and it must follow steps and a sine on the model as given without a fault.
     load_kg
         M.
     observer
@@ -102,7 +109,8 @@ class PositionController:
     ------
     InputError
         For another rig, a load that is none or that rests nowhere, an observer of another ankle, limits that allow no
-        pulses or do not hold the angle at rest, or an ankle that no gains hold.
+        pulses or do not hold the angle at rest, an ankle that no gains hold, or a model with effects that the loop
+        fails with.
 
     Examples
     --------
@@ -142,7 +150,8 @@ class PositionController:
                 column="range_of_motion_rad",
             )
         self.observer = copy.deepcopy(observer) if observer is not None else JointObserver(dynamics)
-        self.gains = tune(dynamics, self.observer)
+        given = GivenAnkle(model, dynamics)
+        self.gains = tune(dynamics, self.observer, given if given.names else None)
         self.monitor = FaultMonitor(
             dynamics, self.limits.range_of_motion_rad, self.observer.angle_std_rad, resolution_rad
         )
@@ -151,6 +160,8 @@ class PositionController:
         self.reachable = angles, np.maximum.accumulate([dynamics.activation_for(q) for q in angles.tolist()])
         self.fatigue = fatigue_of(model)
         self.reset()
+        if given.names:
+            self._rehearse(given)
 
     def reset(self) -> None:
         """Begin anew, after a fault or for another bout: waiting for readings, fresh, without a trajectory.
@@ -166,6 +177,28 @@ class PositionController:
         self.clock = PulseClock()
         self.beyond_rad = self.paused_s = 0.0
         self._begin()
+
+    def _rehearse(self, given: GivenAnkle) -> None:
+        """Follow steps and a sine on the model as it was given, with effects that observer and faults' tests leave out.
+
+        Raises
+        ------
+        InputError
+            If the loop does not begin, is at fault, or swings.
+        """
+        joint, other = RunningAnkle(given), copy.deepcopy(self)
+        height = min(REHEARSED_RAD, 0.8 * (self.highest - MARGIN_RAD - self.lowest))
+        wave = 0.5 * (1.0 - np.cos(math.pi * PULSE_S * np.arange(90)))
+        other.follow(self.lowest + height * np.r_[np.repeat(REHEARSED, 45), wave])
+        noise = np.random.default_rng(0).normal(0.0, self.observer.angle_std_rad, len(other.trajectory))
+        for k, error in enumerate(noise.tolist()):
+            joint.step(other.step(joint.angle_rad + error, time_s=k * PULSE_S), PULSE_S)
+        if other.status is not Status.RUNNING or other.calm < 1.0:
+            why = "the loop swings by itself" if other.status is Status.RUNNING else str(other.status)
+            raise InputError(
+                f"with {', '.join(given.names)}, which the controller's equations leave out, the loop fails on this "
+                f"model itself: {why}"
+            )
 
     def _begin(self) -> None:
         """Wait for readings of a joint at rest, at the start and after a pause."""

@@ -19,6 +19,7 @@ import numpy as np
 import scipy.linalg
 
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
+from fes_pin.control.given import GivenAnkle, Moved
 from fes_pin.control.observer import JointObserver
 from fes_pin.data.errors import InputError
 
@@ -82,12 +83,11 @@ def plant(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray, fl
     return a, b, dynamics.pull_nm * math.sin(q)
 
 
-def moved(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray]:
-    """Transition and input of what truly moves: (activation, angle, rate), and the frame where there is one."""
-    if dynamics.frame_coupling:
-        return swinging(dynamics, q)
-    a, b, _ = plant(dynamics, q)
-    return a[:3, :3], b[:3]
+def moved(dynamics: AnkleDynamics, q: float) -> Moved:
+    """What truly moves: (activation, angle, rate), and the frame where there is one."""
+    a, b = swinging(dynamics, q) if dynamics.frame_coupling else plant(dynamics, q)[:2]
+    n = 5 if dynamics.frame_coupling else 3
+    return a[:n, :n], b[:n], np.eye(n)[1]
 
 
 def swinging(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray]:
@@ -123,11 +123,15 @@ def regulator(dynamics: AnkleDynamics, q: float, boldness: float) -> np.ndarray:
     return np.linalg.solve(np.eye(1) + b.T @ p @ b, b.T @ p @ a)[0]
 
 
+_ENDS = (1.0 - UNCERTAINTY, 1.0 + UNCERTAINTY)
+CORNERS = tuple(itertools.product(_ENDS, _ENDS, _ENDS))
+"""Factors on gain, time constant and stiffness."""
+
+
 def corners(dynamics: AnkleDynamics) -> list[AnkleDynamics]:
     """Ankles that differ by +-30 % in gain, time constant and stiffness."""
-    low, high = 1.0 - UNCERTAINTY, 1.0 + UNCERTAINTY
     found = []
-    for gain, tau, stiff in itertools.product((low, high), repeat=3):
+    for gain, tau, stiff in CORNERS:
         other = replace(dynamics, pull_nm=dynamics.pull_nm * gain, time_constant=dynamics.time_constant * tau)
         stiffer = {**dynamics.known, "f1_per_rad": dynamics.known["f1_per_rad"] * stiff}
         found.append(replace(other, known=stiffer))
@@ -136,12 +140,13 @@ def corners(dynamics: AnkleDynamics) -> list[AnkleDynamics]:
 
 @dataclass(frozen=True)
 class Loop:
-    """The linear loop at one angle: x+ = a x + b r of the truth, z+ = own z + seen angle and r = law z + direct angle
-    of observer and feedback.
+    """The linear loop at one angle: x+ = a x + b r of the truth, of which the sensor sees angle = see x; z+ = own z +
+    seen angle and r = law z + direct angle of observer and feedback.
     """
 
     a: np.ndarray
     b: np.ndarray
+    see: np.ndarray
     own: np.ndarray
     seen: np.ndarray
     law: np.ndarray
@@ -150,7 +155,7 @@ class Loop:
     @classmethod
     def of(
         cls,
-        truth: tuple[np.ndarray, np.ndarray],
+        truth: Moved,
         believed: tuple[np.ndarray, np.ndarray, float],
         k: np.ndarray,
         observer: np.ndarray,
@@ -165,10 +170,8 @@ class Loop:
 
     def radius(self) -> float:
         """Largest modulus of its eigenvalues, per pulse."""
-        see = np.zeros(len(self.a))
-        see[1] = 1.0
-        top = np.hstack([self.a + np.outer(self.b, self.direct * see), np.outer(self.b, self.law)])
-        bottom = np.hstack([np.outer(self.seen, see), self.own])
+        top = np.hstack([self.a + np.outer(self.b, self.direct * self.see), np.outer(self.b, self.law)])
+        bottom = np.hstack([np.outer(self.seen, self.see), self.own])
         return float(np.abs(np.linalg.eigvals(np.vstack([top, bottom]))).max())
 
     def opened(self, frequencies_hz: np.ndarray) -> np.ndarray:
@@ -178,7 +181,7 @@ class Loop:
         """
         found = []
         for z in np.exp(2j * math.pi * frequencies_hz * PULSE_S):
-            angle = np.linalg.solve(z * np.eye(len(self.a)) - self.a, self.b)[1]
+            angle = self.see @ np.linalg.solve(z * np.eye(len(self.a)) - self.a, self.b)
             found.append(-(self.law @ np.linalg.solve(z * np.eye(4) - self.own, self.seen) + self.direct) * angle)
         return np.array(found)
 
@@ -190,8 +193,13 @@ def loop_at(truth: AnkleDynamics, observer: JointObserver, gains: Gains, q: floa
     return Loop.of(moved(truth, q), plant(believed, q), np.array(gains.at(q)), steady)
 
 
-def tune(dynamics: AnkleDynamics, observer: JointObserver) -> Gains:
+def tune(dynamics: AnkleDynamics, observer: JointObserver, given: GivenAnkle | None = None) -> Gains:
     """The gains of the rule; see the module. The observer is made slower where that is needed.
+
+    Parameters
+    ----------
+    given
+        The model with effects that `dynamics` leaves out: the loop must be stable with them as well.
 
     Raises
     ------
@@ -200,7 +208,7 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver) -> Gains:
     """
     angles = np.linspace(dynamics.rest_angle(), dynamics.rest_angle(1.0), ANGLES)
     tables = [np.array([regulator(dynamics, q, boldness) for q in angles]) for boldness in LADDER]
-    around, quickest = _Around(dynamics, angles[::2]), observer.torque_wander
+    around, quickest = _Around(dynamics, angles[::2], given), observer.torque_wander
     tried: list[Gains] = []
     for share in SLOWER:
         observer.torque_wander = share * quickest
@@ -214,6 +222,7 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver) -> Gains:
         observer.torque_wander = best.torque_wander
         return best
     frame = f" with its frame at {dynamics.frame_hz:.3g} Hz" if dynamics.frame_coupling else ""
+    frame += f" with {', '.join(given.names)}" if given is not None else ""
     raise InputError(
         f"no gains hold this ankle{frame} over +-{100 * UNCERTAINTY:.0f} % in gain, time constant and stiffness: "
         f"at best its swing grows by {100 * (least - 1.0):.2g} % a pulse"
@@ -223,9 +232,10 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver) -> Gains:
 class _Around:
     """An ankle and its corners at some angles."""
 
-    def __init__(self, dynamics: AnkleDynamics, angles: np.ndarray) -> None:
-        self.dynamics, self.angles = dynamics, angles
+    def __init__(self, dynamics: AnkleDynamics, angles: np.ndarray, given: GivenAnkle | None) -> None:
         self.truths = [[moved(other, q) for other in (dynamics, *corners(dynamics))] for q in angles]
+        if given is not None:
+            self.truths = [[m for f in ((1.0, 1.0, 1.0), *CORNERS) for m in given.moved(q, f)] for q in angles.tolist()]
         self.believed = [plant(dynamics, q) for q in angles]
 
     def radii(self, tables: list[np.ndarray], observer: JointObserver) -> list[float]:

@@ -109,7 +109,7 @@ def delayed(loop, pulses):
     a = np.zeros((n + pulses, n + pulses))
     a[:n, :n], a[:n, n] = loop.a, loop.b
     a[n:-1, n + 1 :] = np.eye(pulses - 1)
-    return replace(loop, a=a, b=np.eye(n + pulses)[-1])
+    return replace(loop, a=a, b=np.eye(n + pulses)[-1], see=np.eye(n + pulses)[1])
 
 
 def test_delay_margin_is_where_the_loop_becomes_unstable():
