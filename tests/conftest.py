@@ -35,6 +35,7 @@ LONG = {
     "contrasts/test_long_groups.py": ("thinned_alike", "change_nothing"),
     "contrasts/test_noisy_groups.py": ("test_nothing_changed", "test_it_is_said"),
     "control/test_control.py": ("test_five_minutes",),
+    "control/test_given.py": ("held_or_refused_by_its_name",),
     "control/test_tuning.py": ("test_the_delay_margin_that_is_stated",),
     "data/test_spikes.py": ("test_a_clean_study_is_left_alone[ankle]",),
     "diagnosis/test_adequate.py": (

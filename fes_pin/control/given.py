@@ -32,7 +32,7 @@ ASIDE = 0.05
 NEWTON_STEPS = 4
 HANDLED = ("recruitment_hysteresis", "frame_vibration", "fatigue")
 """Effects that the controller compensates, is tuned for, or watches."""
-Moved = tuple[np.ndarray, np.ndarray, np.ndarray]
+Sampled = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Transition (n, n) over a pulse, what recruitment adds in it (n,), and what the sensor reads of the state (n,)."""
 
 
@@ -86,7 +86,7 @@ class GivenAnkle:
         )
         return [p[n] for n in self.layout.values], [c[n] for n in self.layout.constants]
 
-    def moved(self, q: float, factors: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Iterator[Moved]:
+    def moved(self, q: float, factors: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Iterator[Sampled]:
         """What moves at an angle, still and moving, with gain, time constant and stiffness times factors; where the
         stimulus recruits nothing there is no loop, and nothing is given."""
         values = self._values(*factors)
@@ -95,7 +95,7 @@ class GivenAnkle:
             if into.any():
                 yield self._sampled(slope, into, seen)
 
-    def _linear(self, q: float, v: float, values: tuple[list[float], list[float]]) -> Moved:
+    def _linear(self, q: float, v: float, values: tuple[list[float], list[float]]) -> Sampled:
         low, high = self.constants["threshold_us"], self.constants["saturation_us"]
         r = min(max(self.dynamics.activation_for(q), ASIDE), 1.0 - 2.0 * ASIDE)
         u, at = low + r * (high - low), (0.0, 0.0, 0.0, *values)
@@ -109,7 +109,7 @@ class GivenAnkle:
         slope, into = (np.array(each) for each in self.slopes(x, m, u, *at))
         return slope, (high - low) * into[:, 0], np.array(self.reading(x, m, u, *at)[1])[0]
 
-    def _sampled(self, f: np.ndarray, g: np.ndarray, seen: np.ndarray) -> Moved:
+    def _sampled(self, f: np.ndarray, g: np.ndarray, seen: np.ndarray) -> Sampled:
         """Over a pulse, where each pulse acts later by some whole ones and a part of one."""
         n, whole, late = len(f), *self._late()
         both = np.zeros((n + 1, n + 1))

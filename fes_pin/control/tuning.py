@@ -19,7 +19,7 @@ import numpy as np
 import scipy.linalg
 
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
-from fes_pin.control.given import GivenAnkle, Moved
+from fes_pin.control.given import GivenAnkle, Sampled
 from fes_pin.control.observer import JointObserver
 from fes_pin.data.errors import InputError
 
@@ -83,7 +83,7 @@ def plant(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray, fl
     return a, b, dynamics.pull_nm * math.sin(q)
 
 
-def moved(dynamics: AnkleDynamics, q: float) -> Moved:
+def moved(dynamics: AnkleDynamics, q: float) -> Sampled:
     """What truly moves: (activation, angle, rate), and the frame where there is one."""
     a, b = swinging(dynamics, q) if dynamics.frame_coupling else plant(dynamics, q)[:2]
     n = 5 if dynamics.frame_coupling else 3
@@ -155,7 +155,7 @@ class Loop:
     @classmethod
     def of(
         cls,
-        truth: Moved,
+        truth: Sampled,
         believed: tuple[np.ndarray, np.ndarray, float],
         k: np.ndarray,
         observer: np.ndarray,
