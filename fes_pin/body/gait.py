@@ -97,6 +97,32 @@ def ankle_rotation(side: str, dorsiflexion: np.ndarray, inversion: np.ndarray, r
     return _turn(-left, dorsiflexion) @ _turn(sign * forward, inversion) @ _turn(sign * up, rotated)
 
 
+def ankle_torques(side: str, angles: np.ndarray, torques: np.ndarray, dorsiflexion, inversion) -> np.ndarray:
+    """Torques about our ankle's dorsiflexion, inversion and rotation, (N, 3) N m, of torques about OpenSim's two axes.
+
+    About the direction across both of OpenSim's axes that foot has no joint: bones carry what acts there, and it is
+    taken as 0. Both torques do the same work in any motion about OpenSim's axes.
+
+    Parameters
+    ----------
+    side
+        `left` or `right`.
+    angles, torques
+        About OpenSim's ankle and subtalar axes: (N, 2) rad, (N, 2) N m.
+    dorsiflexion, inversion
+        Our angles of the same foot: (N,) rad (see `ankle_angles`).
+    """
+    sign = 1.0 if side == "right" else -1.0
+    forward, left, up = np.eye(3)
+    mirror = np.array([sign, 1.0, sign])
+    first, second = (axis * mirror / np.linalg.norm(axis) for axis in (_ANKLE_AXIS, _SUBTALAR_AXIS))
+    theirs = np.stack([np.broadcast_to(first, (len(angles), 3)), _turn(first, angles[:, 0]) @ second], axis=1)
+    bent = _turn(-left, dorsiflexion)
+    inverted = bent @ _turn(sign * forward, inversion)
+    ours = np.stack([np.broadcast_to(-left, (len(angles), 3)), bent @ (sign * forward), inverted @ (sign * up)], axis=1)
+    return (ours @ np.linalg.pinv(theirs) @ torques[..., None])[..., 0]
+
+
 def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_foot: bool = True) -> NamedArray:
     """Measured OpenSim coordinates as postures of our body: (N, 19) rad by joint name.
 

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.gait import ankle_torques, postures_of_walk
+from fes_pin.body.joints import JOINT_NAMES, SIDES
 from fes_pin.body.passive import Passive
 from fes_pin.data.datasets import VARIABLE, WALKING
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
+from fes_pin.data.named import NamedArray
 from fes_pin.data.table import check_time, parse_rows
 
 ANGLES, TORQUES = "coords_mtpfree.csv", "reference/grf_id_mtpfree.csv"
@@ -30,7 +32,8 @@ REFERENCE = {
     "ankle_inversion": ("subtalar_angle", 1.0),
     "mtp_extension": ("mtp_angle", 1.0),
 }
-"""This project's leg joints and the reference's coordinates, which extend the knee positively."""
+"""This project's leg joints and the reference's coordinates, which extend the knee positively; the ankle's are about
+other axes and are converted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,16 +43,21 @@ class MeasuredWalk:
     Attributes
     ----------
     time, q, torque
-        (samples,) s, (samples, 19) rad and N m in the order of `JOINT_NAMES`; what the reference does not know is 0.
+        (samples,) s, (samples, 19) rad and N m by joint name; what the reference does not know is 0. The ankle's are
+        about the body's own axes (`fes_pin.body.gait.ankle_torques`), not the reference's oblique ones.
     known
         (19,) bool, joints whose torque the reference knows: not `ankle_rotation` (it has no such joint), nor
         `mtp_extension` (it puts the whole ground reaction on the hindfoot).
     """
 
     time: np.ndarray
-    q: np.ndarray
-    torque: np.ndarray
+    q: NamedArray
+    torque: NamedArray
     known: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name in ("q", "torque"):
+            object.__setattr__(self, name, NamedArray(getattr(self, name), JOINT_NAMES))
 
     @property
     def known_joints(self) -> tuple[str, ...]:
@@ -57,9 +65,9 @@ class MeasuredWalk:
         return tuple(name for name, known in zip(JOINT_NAMES, self.known, strict=True) if known)
 
     @property
-    def rates(self) -> np.ndarray:
-        """Joint rates, (samples, 19) rad/s."""
-        return np.gradient(self.q, self.time, axis=0)
+    def rates(self) -> NamedArray:
+        """Joint rates, (samples, 19) rad/s by joint name."""
+        return NamedArray(np.gradient(np.asarray(self.q), self.time, axis=0), JOINT_NAMES)
 
     def active(self, passive: Passive) -> MeasuredWalk:
         """The same walk with the torque that muscles must make: what inverse dynamics gives less the passive torque.
@@ -71,7 +79,7 @@ class MeasuredWalk:
             known stay at 0.
         """
         order = list(JOINT_NAMES)
-        given = np.array([passive.torque(q, order) for q in self.q]) - self.rates @ passive.damping(order)
+        given = np.array([passive.torque(q, order) for q in np.asarray(self.q)]) - self.rates @ passive.damping(order)
         return replace(self, torque=np.where(self.known, self.torque - given, 0.0))
 
 
@@ -142,8 +150,13 @@ def read_walk(folder: str | Path | None = None) -> MeasuredWalk:
     time = angles["time"]
     if len(time) != len(torques["time"]) or np.abs(time - torques["time"]).max() > SAME_TIME:
         raise InputError(f"expected the times of {ANGLES}", file=folder / TORQUES, column="time")
-    q, torque, known = (np.zeros((len(time), len(JOINT_NAMES))) for _ in range(3))
+    q = postures_of_walk(angles, "right", flat_foot=False)
+    torque = NamedArray(np.zeros(q.shape), JOINT_NAMES)
     for i, (coordinate, sign) in sources.items():
-        q[:, i], torque[:, i] = sign * angles[f"q_{coordinate}"], sign * torques[f"ID_{coordinate}_moment"]
-        known[:, i] = not JOINT_NAMES[i].endswith("mtp_extension")
-    return MeasuredWalk(time, q, torque * known, known[0].astype(bool))
+        torque[:, i] = sign * torques[f"ID_{coordinate}_moment"]
+    for side in SIDES:
+        ankle = [f"{side}_ankle_{name}" for name in ("dorsiflexion", "inversion", "rotation")]
+        theirs = np.stack([angles[f"q_{name}_{side[0]}"] for name in ("ankle_angle", "subtalar_angle")], axis=1)
+        torque[ankle] = ankle_torques(side, theirs, torque[ankle[:2]], q[ankle[0]], q[ankle[1]])
+    known = np.array([i in sources and not name.endswith("mtp_extension") for i, name in enumerate(JOINT_NAMES)])
+    return MeasuredWalk(time, q, torque * known, known)

@@ -20,6 +20,7 @@ KNOWN_DEG = {
     "knee_flexion": (-10.0, 110.0),
     "ankle_dorsiflexion": (-50.0, 40.0),
     "ankle_inversion": (-25.0, 35.0),
+    "ankle_rotation": (-20.0, 20.0),
     "mtp_extension": (-30.0, 80.0),
 }
 """Angles at which the paths are anatomy: a joint's whole range (`joint_limits`), but for what runs straight where bone

@@ -19,7 +19,7 @@ from scipy.optimize import nnls
 
 from fes_pin.muscles.muscles import standard_muscles
 from fes_pin.muscles.nerves import SUBJECT_HEIGHT, SUBJECT_MASS
-from fes_pin.muscles.paths import leg_paths
+from fes_pin.muscles.paths import COORDINATES, leg_paths
 from fes_pin.muscles.published import ANDERSON_2007, muscle_torques
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -76,7 +76,7 @@ def write(name: str, header: list[str], rows: list[list]) -> None:
 
 def growth() -> dict[str, float]:
     """How much longer each leg muscle is in the subject than in the unscaled model, at the neutral posture."""
-    subject, neutral = leg_paths(), np.zeros((1, 7))
+    subject, neutral = leg_paths(), np.zeros((1, len(COORDINATES)))
     unscaled = leg_paths(tuple((body, 1.0 / scale) for body, scale in SCALES.items()))
     return dict(zip(subject.names, (subject.lengths(neutral) / unscaled.lengths(neutral))[0], strict=True))
 

@@ -189,7 +189,7 @@ def test_words_name_the_saturated_nerve():
 @pytest.mark.parametrize(
     ("torque", "nerves", "options", "words"),
     [
-        ({"left_ankle_rotation": 5.0}, ["left_tibial"], {}, "no stimulated nerve turns it"),
+        ({"left_hip_rotation": 5.0}, ["left_tibial"], {}, "no stimulated nerve turns it"),
         ({"left_knee_flexion": 30.0}, ["left_femoral"], {}, "no stimulated nerve pulls that way"),
         ({"left_knee_flexion": -30.0}, ["left_femoral"], {"dead": "left_femoral"}, "left femoral dead"),
         ({"left_knee_flexion": -300.0}, ["left_femoral"], {"upper": 0.4}, "left femoral limited"),

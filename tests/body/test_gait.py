@@ -4,6 +4,7 @@ import importlib.util
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from fes_pin.body.build import Body
@@ -11,14 +12,18 @@ from fes_pin.body.gait import (
     TABLE,
     ankle_angles,
     ankle_rotation,
+    ankle_torques,
     mirror,
     posture_angles,
     posture_names,
     postures_of_walk,
 )
 from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.measured_walk import read_walk
 from fes_pin.data.errors import InputError
 
+AXES = np.array([-0.10501355, -0.97912632, -0.17402245]), np.array([0.78717961, 0.12094949, 0.60474746])
+"""Of OpenSim's right ankle and subtalar joint, in our axes."""
 SIX = ("initial_contact", "loading", "mid_stance", "terminal_stance", "pre_swing", "mid_swing")
 
 
@@ -86,3 +91,35 @@ def test_missing_coordinates_say_so():
         postures_of_walk({}, "right")
     with pytest.raises(InputError, match="stance"):
         postures_of_walk({}, "both")
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_ankle_torques_about_our_axes_do_the_work_of_those_about_opensims(side):
+    mirror = np.array([1.0, 1.0, 1.0]) if side == "right" else np.array([-1.0, 1.0, -1.0])
+    axes = [axis * mirror for axis in AXES]
+    rng = np.random.default_rng(0)
+    angles, torques = rng.uniform(-0.4, 0.4, (5, 2)), 50.0 * rng.normal(size=(5, 2))
+
+    def ours(angles):
+        turned = [
+            pin.exp3(a * axes[0] / np.linalg.norm(axes[0])) @ pin.exp3(b * axes[1] / np.linalg.norm(axes[1]))
+            for a, b in angles
+        ]
+        return np.stack(ankle_angles(np.array(turned), side), axis=1)
+
+    dorsiflexion, inversion, _ = ours(angles).T
+    found = ankle_torques(side, angles, torques, dorsiflexion, inversion)
+    for k, step in enumerate(1e-6 * np.eye(2)):
+        rates = (ours(angles + step) - ours(angles - step)) / 2e-6
+        assert np.allclose((rates * found).sum(axis=1), torques[:, k], atol=1e-7)
+
+
+def test_the_measured_walks_ankle_is_in_the_bodys_frames(walk):
+    measured = read_walk(walk)
+    theirs = np.genfromtxt(walk / "coords_mtpfree.csv", delimiter=",", names=True)
+    names = ("ankle_dorsiflexion", "ankle_inversion", "ankle_rotation")
+    found = ankle_rotation("right", *(measured.q[f"right_{name}"] for name in names))
+    for row in (0, 100, -1):
+        angles = theirs["q_ankle_angle_r"][row], theirs["q_subtalar_angle_r"][row]
+        turned = [pin.exp3(q * axis / np.linalg.norm(axis)) for q, axis in zip(angles, AXES, strict=True)]
+        assert np.allclose(found[row], turned[0] @ turned[1], atol=1e-9)
