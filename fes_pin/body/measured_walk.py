@@ -80,7 +80,8 @@ class MeasuredWalk:
         """
         order = list(JOINT_NAMES)
         given = np.array([passive.torque(q, order) for q in np.asarray(self.q)]) - self.rates @ passive.damping(order)
-        return replace(self, torque=np.where(self.known, self.torque - given, 0.0))
+        active = np.where(self.known, self.torque - given, 0.0)
+        return replace(self, torque=NamedArray(active, JOINT_NAMES))
 
 
 def data_folder() -> Path:

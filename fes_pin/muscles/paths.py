@@ -160,8 +160,9 @@ class Edge:
         along = straight[:, 2]
         size = np.where(along.real < 0.0, -along, along)
         held = _smooth(depth / DEEP_M) * _smooth(2.0 - size / GROOVE_M)
-        on = 1.0 - _smooth((angle - self.high) / LEAVE) if np.isfinite(self.high) else 1.0
-        on = on * (_smooth((angle - self.low - TURN_ON[0]) / np.ptp(TURN_ON)) if np.isfinite(self.low) else 1.0)
+        on = 1.0 - _smooth((angle - self.high) / LEAVE) if np.isfinite(self.high) else np.ones_like(angle)
+        if np.isfinite(self.low):
+            on = on * _smooth((angle - self.low - TURN_ON[0]) / np.ptp(TURN_ON))
         over = np.stack([0.0 * along, 0.0 * along, along * (1.0 - held)], axis=-1)
         return (depth.real > 0.0) & (on.real > 0.0), straight + on[:, None] * (over - straight)
 
