@@ -152,14 +152,18 @@ def _template(
     from fes_pin.data import templates
     from fes_pin.data.errors import InputError
 
-    asked = [one for one in (pendulum, rod, slide) if one is not None]
-    if len(asked) > 1:
+    asked = {"pendulum": pendulum, "rod": rod, "slide": slide}
+    given = [name for name, value in asked.items() if value is not None]
+    if len(given) > 1:
         raise InputError("expected one of --pendulum, --rod and --slide, found several")
-    if pendulum is not None:
-        return "pendulum.urdf", templates.pendulum(*pendulum, upright)
-    if rod is not None:
-        return "rod.urdf", templates.rod(*rod, upright)
-    return None if slide is None else ("slide.urdf", templates.slide(slide))
+    try:
+        if pendulum is not None:
+            return "pendulum.urdf", templates.pendulum(*pendulum, upright)
+        if rod is not None:
+            return "rod.urdf", templates.rod(*rod, upright)
+        return None if slide is None else ("slide.urdf", templates.slide(slide))
+    except InputError as error:
+        raise InputError(error.message, column=f"--{given[0]}") from None
 
 
 @contextmanager

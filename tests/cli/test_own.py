@@ -204,7 +204,7 @@ WRONG = {
     "no_files": ((), "expected recordings, or --pendulum LENGTH MASS"),
     "no_urdf": (("FILE",), "--urdf: expected --urdf FILE, or --pendulum"),
     "two_urdfs": (("FILE", "--rod", 1, 1, "--slide", 2), "expected one of --pendulum, --rod and --slide"),
-    "no_mass": (("FILE", "--rod", 1, 0), "mass: expected a mass above 0 kg"),
+    "no_mass": (("FILE", "--rod", 1, 0), "--rod: expected a mass above 0 kg"),
     "unknown_rig": (("FILE", "--rig", "knee"), "--rig: expected one of"),
     "body": (("FILE", "--rig", "body"), "expected UTF-8 text"),
     "body_with_a_urdf": (("FILE", "--rig", "body", "--rod", 1, 1), "expected no URDF, --column"),
