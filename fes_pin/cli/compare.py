@@ -36,7 +36,6 @@ def compare(
     """Rank models from the literature by their errors on whole trials left out."""
     from fes_pin.comparison.compare import compare as find
     from fes_pin.comparison.record import FILE, comparison_json
-    from fes_pin.comparison.result import comparison_text
     from fes_pin.data.outputs import Outputs
 
     catalogue = catalogue_with(library)
@@ -51,4 +50,4 @@ def compare(
     if out is not None:
         outputs.write(out, {FILE: comparison_json(found)})
     say_whose_code(catalogue)
-    typer.echo(comparison_text(found))
+    typer.echo(str(found))

@@ -85,10 +85,6 @@ class Cohort(Saveable):
     def __repr__(self) -> str:
         return f"{len(self.studies) - len(self.failed)} of {len(self.studies)} studies diagnosed"
 
-    def __str__(self) -> str:
-        title, _, rows, failed = self._notebook()
-        return "\n".join([title, *(f"  {cause:28s} in {count} ({share})" for cause, count, share in rows), *failed])
-
 
 def run_cohort(
     places: Sequence[Path],

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from scipy import special
 
+from fes_pin.data.errors import InputError
 from fes_pin.data.results import Recorded, Saveable, shown
+from fes_pin.data.show import by_columns
 from fes_pin.data.study import Study
 from fes_pin.identify.fit import Fit
 
@@ -128,13 +130,13 @@ class Comparison(Saveable):
 
         Raises
         ------
-        KeyError
+        InputError
             If it was not compared.
         """
         for one in self.models:
             if one.name == name:
                 return one
-        raise KeyError(f"no model {name}; there are {', '.join(m.name for m in self.models)}")
+        raise InputError(f"no model {name!r}; there are {', '.join(m.name for m in self.models)}", column="name")
 
     def best(self, kind: str = "free") -> tuple[str, ...]:
         """The models that no held-out trial tells from the best by "free" or "horizon" error, the best first."""
@@ -157,14 +159,17 @@ class Comparison(Saveable):
     def columns(self) -> dict[str, list[Any]]:
         """The table of `to_frame`, by columns: a row a model, its errors E in percent."""
         kinds = dict.fromkeys(k for m in self.models for k in m.percent)
-        apart = {kind: [m.apart[kind] or Apart(0.0, 0.0, 0.0) for m in self.models] for kind in ("free", "horizon")}
-        return {
-            "model": [m.name for m in self.models],
-            "parameters": [m.parameters for m in self.models],
-            **{f"{k}_percent": [m.percent.get(k, math.nan) for m in self.models] for k in kinds},
-            **{f"{k}_{n}": [getattr(a, n) for a in many] for k, many in apart.items() for n in ("more", "low", "high")},
-            "converged": [m.converged for m in self.models],
-        }
+        apart = [(kind, n) for kind in ("free", "horizon") for n in ("more", "low", "high")]
+        head = ("model", "parameters", *(f"{k}_percent" for k in kinds), *(f"{k}_{n}" for k, n in apart), "converged")
+        best = Apart(0.0, 0.0, 0.0)
+        rows = [
+            (
+                *(m.name, m.parameters, *(m.percent.get(k, math.nan) for k in kinds)),
+                *(*(getattr(m.apart[k] or best, n) for k, n in apart), m.converged),
+            )
+            for m in self.models
+        ]
+        return by_columns(head, rows)
 
     def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         rows = [_row(self, m) for m in self.models]
@@ -172,9 +177,6 @@ class Comparison(Saveable):
 
     def __repr__(self) -> str:
         return f"Comparison of {', '.join(m.name for m in self.models)} on {self.study.name}"
-
-    def __str__(self) -> str:
-        return comparison_text(self)
 
 
 def apart_from(best: np.ndarray, other: np.ndarray, rivals: int, folds: int) -> Apart:
@@ -200,15 +202,6 @@ def apart_from(best: np.ndarray, other: np.ndarray, rivals: int, folds: int) -> 
     deviation = float(more.std(ddof=1)) * math.sqrt(wider / count)
     half = float(special.stdtrit(count - 1, 1.0 - 0.5 * LEVEL / max(rivals, 1))) * deviation
     return Apart(mean, mean - half, mean + half)
-
-
-def comparison_text(found: Comparison) -> str:
-    """The whole answer as a plain table."""
-    rows = [_head(found), *(_row(found, m) for m in found.models)]
-    widths = [max(len(r[k]) for r in rows) for k in range(len(rows[0]))]
-    lines = [f"{found.study.name}: {headline(found)}"]
-    lines += [" " + "  ".join(cell.ljust(w) for cell, w in zip(r, widths, strict=True)).rstrip() for r in rows]
-    return "\n".join(lines + [f" {note}" for note in notes(found)])
 
 
 def headline(found: Comparison) -> str:

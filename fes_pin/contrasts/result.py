@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fes_pin.data.results import Recorded, Saveable, shown
+from fes_pin.data.show import by_columns
 from fes_pin.data.study import Study
-from fes_pin.diagnosis.cause import ParameterEstimate, estimate_columns
+from fes_pin.diagnosis.cause import CELLS, ParameterEstimate
 from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.text import estimate_text, probability
 from fes_pin.identify.fit import Fit
@@ -126,16 +127,14 @@ class Contrast(Saveable):
 
     def columns(self) -> dict[str, list[Any]]:
         """The table of `to_frame`, by columns: a row a parameter of each change in each group."""
-        rows = [(c, n, g, p) for c in self.changes for n, groups in c.parameters.items() for g, p in groups.items()]
-        return {
-            "change": [c.name for c, _, _, _ in rows],
-            "kind": [c.kind for c, _, _, _ in rows],
-            "parameter": [n for _, n, _, _ in rows],
-            "group": [g for _, _, g, _ in rows],
-            **estimate_columns([p for _, _, _, p in rows]),
-            "p_value": [c.p_value for c, _, _, _ in rows],
-            "equivalents": [", ".join(c.equivalents) for c, _, _, _ in rows],
-        }
+        head = ("change", "kind", "parameter", "group", *CELLS, "p_value", "equivalents")
+        rows = [
+            (c.name, c.kind, n, group, *one.cells(), c.p_value, ", ".join(c.equivalents))
+            for c in self.changes
+            for n, groups in c.parameters.items()
+            for group, one in groups.items()
+        ]
+        return by_columns(head, rows)
 
     def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         head = ("change", "what happened", "values", "p", "cannot be told from")

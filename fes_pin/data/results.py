@@ -13,7 +13,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text, write_text
 from fes_pin.data.numbers import printed
 from fes_pin.data.read_only import ReadOnly, as_dicts
-from fes_pin.data.show import frame, table_html
+from fes_pin.data.show import frame, table_html, table_text
 
 if TYPE_CHECKING:
     import pandas
@@ -74,6 +74,9 @@ class Saveable(Recorded):
         table = {n: [_cell(v) for v in values] for n, values in self.columns().items()}
         saved = {**self.record(), RESULT: self._kind(), TEXT: str(self).split("\n"), TABLE: table}
         return json.dumps(saved, indent=1, allow_nan=False) + "\n"
+
+    def __str__(self) -> str:
+        return table_text(*self._notebook())
 
     def _repr_html_(self) -> str:
         return table_html(*self._notebook())

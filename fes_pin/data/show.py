@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 from fes_pin.data.errors import InputError
@@ -23,6 +24,19 @@ def table_html(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], n
     table = f"<table><thead>{cells('th', head)}</thead><tbody>{body}</tbody></table>" if rows else ""
     said = "".join(f"<p>{html.escape(n)}</p>" for n in notes)
     return f"<div><p><strong>{html.escape(title)}</strong></p>{table}{said}</div>"
+
+
+def table_text(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> str:
+    """The same as text: columns flush left, cells of several lines beneath each other, no head without rows."""
+    lines = [row for one in (head, *rows) for row in zip_longest(*(cell.split("\n") for cell in one), fillvalue="")]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    table = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in lines]
+    return "\n ".join([title, *(table if rows else ()), *notes])
+
+
+def by_columns(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> dict[str, list[Any]]:
+    """A table given by rows as columns by name."""
+    return {name: [row[k] for row in rows] for k, name in enumerate(head)}
 
 
 def frame(columns: Mapping[str, Any], index: str | None = None) -> pandas.DataFrame:

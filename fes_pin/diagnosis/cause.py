@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,9 @@ from fes_pin.diagnosis.decide.chosen_again import is_chosen
 from fes_pin.diagnosis.decide.held_out import Evidence, Gain, speaks_for
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.levels import CONFIDENCE_95
+
+CELLS = ("value", "std", "unit", "low", "high", "at_bound")
+"""Columns of tables of estimates; `low` and `high` are the ends of the 95 % interval."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,8 @@ class ParameterEstimate:
         if name not in fitted.free:
             return cls(value, 0.0, unit)
         if name in fitted.at_bound:
-            return cls(value, math.nan, unit, True, fitted.interval(name))
+            low, high = (value + wider * (end - value) for end in fitted.interval(name))
+            return cls(value, math.nan, unit, True, (low, high))
         return cls(value, wider * fitted.std(name), unit, ends=fitted.interval(name) if wider == 1.0 else None)
 
     @property
@@ -52,23 +56,15 @@ class ParameterEstimate:
         half = CONFIDENCE_95 * self.std
         return self.ends or (self.value - half, self.value + half)
 
+    def cells(self) -> tuple[Any, ...]:
+        """What tables hold of it, by `CELLS`."""
+        return self.value, self.std, self.unit, *self.interval, self.at_bound
+
     def record(self) -> dict[str, Any]:
         """As JSON files have it: `at_bound` stands only where it is true, with the interval."""
         low, high = (shown(end) for end in self.interval)
         own = {"at_bound": True, "low": low, "high": high} if self.at_bound else {}
         return {"value": shown(self.value), "std": shown(self.std), **own}
-
-
-def estimate_columns(estimates: Sequence[ParameterEstimate]) -> dict[str, list[Any]]:
-    """Columns of a table of estimates: value, deviation, unit, 95 % interval, and whether it is at a bound."""
-    return {
-        "value": [p.value for p in estimates],
-        "std": [p.std for p in estimates],
-        "unit": [p.unit for p in estimates],
-        "low": [p.interval[0] for p in estimates],
-        "high": [p.interval[1] for p in estimates],
-        "at_bound": [p.at_bound for p in estimates],
-    }
 
 
 @dataclass(frozen=True)

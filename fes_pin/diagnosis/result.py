@@ -12,27 +12,17 @@ import numpy as np
 from fes_pin.data.log import Log
 from fes_pin.data.provenance import Provenance
 from fes_pin.data.results import Saveable, shown
-from fes_pin.data.show import explaining, from_to
+from fes_pin.data.show import by_columns, explaining, from_to
 from fes_pin.data.study import Study
-from fes_pin.diagnosis.cause import Cause, Ranked, estimate_columns
+from fes_pin.diagnosis import recorded
+from fes_pin.diagnosis.cause import CELLS, Cause, Ranked
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnosis.experiment import NextExperiment
-from fes_pin.diagnosis.recorded import (
-    ahead_record,
-    cause_record,
-    errors_record,
-    experiment_record,
-    left_out_record,
-    library_record,
-    p_shown,
-    parameters_record,
-)
 from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.text import (
     ahead_notes,
     cause_columns,
     cause_row,
-    cause_table,
     left_out_text,
     percent,
     probability,
@@ -205,10 +195,10 @@ class Diagnosis(Saveable):
         return {
             "study": self.study.name,
             "verdict": self.verdict,
-            "causes": [cause_record(c, self.was_held_out or c.trial is not None) for c in self.causes],
+            "causes": [recorded.cause_record(c, self.was_held_out or c.trial is not None) for c in self.causes],
             "remainder": {
                 "unexplained": self.remainder.unexplained,
-                "p_value": p_shown(self.remainder.p_value),
+                "p_value": recorded.p_shown(self.remainder.p_value),
                 "where": self.remainder.where,
             },
             "absorbed": list(self.absorbed),
@@ -216,12 +206,12 @@ class Diagnosis(Saveable):
             "extended": self._model("extended"),
             "noise": {n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in self.extended.noise.items()},
             "ceiling_percent": shown(self.ceiling_percent),
-            "next_experiment": experiment_record(self.next_experiment),
-            **left_out_record(self.left_out),
+            "next_experiment": recorded.experiment_record(self.next_experiment),
+            **recorded.left_out_record(self.left_out),
             **({"reason": self.reason} if self.reason else {}),
             **({"log": log_table(self.log)} if self.log != Log() else {}),
-            **library_record(self.catalogue),
-            **ahead_record(self.ahead, self.is_driven, self.random),
+            **recorded.library_record(self.catalogue),
+            **recorded.ahead_record(self.ahead, self.is_driven, self.random),
             "warnings": list(self.warnings),
             "wall_s": round(self.wall_s, 2),
             **({"provenance": self.provenance.record()} if self.provenance else {}),
@@ -230,7 +220,10 @@ class Diagnosis(Saveable):
     def _model(self, which: str) -> dict[str, Any]:
         free: tuple[float | None, float | None] = getattr(self, f"{which}_error")
         fitted: Fit = getattr(self, which)
-        return {"parameters": parameters_record(fitted), "error_percent": errors_record(free, self.ahead, which)}
+        return {
+            "parameters": recorded.parameters_record(fitted),
+            "error_percent": recorded.errors_record(free, self.ahead, which),
+        }
 
     def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         rows = [cause_row(c) for c in self.causes]
@@ -238,22 +231,14 @@ class Diagnosis(Saveable):
 
     def columns(self) -> dict[str, list[Any]]:
         """The table of `to_frame`, by columns: a row a parameter of each cause, none without a cause."""
-        rows = [(c, n, one) for c in self.causes for n, one in c.parameters.items()]
-        return {
-            "cause": [c.name for c, _, _ in rows],
-            "stage": [c.stage for c, _, _ in rows],
-            "parameter": [n for _, n, _ in rows],
-            **estimate_columns([one for _, _, one in rows]),
-            "p_value": [c.p_value for c, _, _ in rows],
-            "gain_percent": [c.gain_held_out.percent for c, _, _ in rows],
-            "gain_low": [c.gain_held_out.low for c, _, _ in rows],
-            "gain_high": [c.gain_held_out.high for c, _, _ in rows],
-            "equivalents": [", ".join(c.equivalents) for c, _, _ in rows],
-        }
-
-    def __str__(self) -> str:
-        lines = [f"{self.study.name}: {self.headline()}", *cause_table(self.causes, self.gain_name)]
-        return "\n".join(lines + [f" {note}" for note in self.footnotes()])
+        head = "cause", "stage", "parameter", *CELLS, "p_value", "gain_percent", "gain_low", "gain_high", "equivalents"
+        rows = [
+            (c.name, c.stage, n, *one.cells(), c.p_value, g.percent, g.low, g.high, ", ".join(c.equivalents))
+            for c in self.causes
+            for n, one in c.parameters.items()
+            for g in (c.gain_held_out,)
+        ]
+        return by_columns(head, rows)
 
 
 def _explained(before: float, after: float, noise: float) -> float:

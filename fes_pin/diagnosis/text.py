@@ -67,19 +67,6 @@ def cause_row(cause: Cause) -> tuple[str, str, str, str, str]:
     return cause.name, cause.stage, values, str(cause.gain_held_out), ", ".join(cause.equivalents) or "-"
 
 
-def cause_table(causes: Sequence[Cause], gain: str) -> list[str]:
-    """The causes as lines of a table, their gain by this name; none without causes."""
-    if not causes:
-        return []
-    rows = [cause_columns(gain)]
-    for cause in causes:
-        name, stage, values, gain, others = cause_row(cause)
-        for k, value in enumerate(values.split("\n")):
-            rows.append((name, stage, value, gain, others) if k == 0 else ("", "", value, "", ""))
-    widths = [max(len(r[k]) for r in rows) for k in range(5)]
-    return [" " + "  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows]
-
-
 def ahead_notes(ahead: AheadErrors | None, random: Sequence[RandomPart], unit: str) -> list[str]:
     """What is said of a rig that a recorded effort drives: errors ahead, and what acts at random.
 

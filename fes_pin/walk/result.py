@@ -12,7 +12,7 @@ import numpy as np
 from fes_pin.body.build import Body
 from fes_pin.data.numbers import printed
 from fes_pin.data.results import Recorded, Saveable
-from fes_pin.data.show import explaining, from_to
+from fes_pin.data.show import by_columns, explaining, from_to
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.walk.effect import STAGE
@@ -232,22 +232,26 @@ class WalkDiagnosis(Saveable):
 
     def columns(self) -> dict[str, list[Any]]:
         """The table of `to_frame`, by columns: a row a parameter of each cause, none without a cause."""
-        rows = [(c, n, one) for c in self.causes for n, one in c.parameters.items()]
-        nothing = WalkGain(math.nan, math.nan, math.nan)
-        gains = [c.gain_held_out or nothing for c, _, _ in rows]
-        return {
-            "cause": [c.name for c, _, _ in rows],
-            "site": [c.site for c, _, _ in rows],
-            "parameter": [n for _, n, _ in rows],
-            "value": [one.value for _, _, one in rows],
-            "std": [one.std for _, _, one in rows],
-            "unit": [one.unit for _, _, one in rows],
-            "p_value": [c.p_value for c, _, _ in rows],
-            "gain_percent": [g.percent for g in gains],
-            "gain_low": [g.low for g in gains],
-            "gain_high": [g.high for g in gains],
-            "equivalents": [", ".join(c.equivalents) for c, _, _ in rows],
-        }
+        head = (
+            "cause",
+            "site",
+            "parameter",
+            "value",
+            "std",
+            "unit",
+            "p_value",
+            "gain_percent",
+            "gain_low",
+            "gain_high",
+            "equivalents",
+        )
+        rows = [
+            (c.name, c.site, n, *one, c.p_value, g.percent, g.low, g.high, ", ".join(c.equivalents))
+            for c in self.causes
+            for n, one in c.parameters.items()
+            for g in (c.gain_held_out or WalkGain(math.nan, math.nan, math.nan),)
+        ]
+        return by_columns(head, rows)
 
     def headline(self) -> str:
         """The verdict in one sentence."""
@@ -286,11 +290,3 @@ class WalkDiagnosis(Saveable):
     def __repr__(self) -> str:
         names = f" ({', '.join(c.name for c in self.causes)})" if self.causes else ""
         return f"WalkDiagnosis of {self.study.name}: {self.verdict}{names}"
-
-    def __str__(self) -> str:
-        title, head, causes, notes = self._notebook()
-        lines, rows = [title], [head, *causes]
-        if causes:
-            widths = [max(len(r[k]) for r in rows) for k in range(5)]
-            lines += [" " + "  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows]
-        return "\n".join(lines + [f" {note}" for note in notes])
