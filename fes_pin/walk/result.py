@@ -232,19 +232,8 @@ class WalkDiagnosis(Saveable):
 
     def columns(self) -> dict[str, list[Any]]:
         """The table of `to_frame`, by columns: a row a parameter of each cause, none without a cause."""
-        head = (
-            "cause",
-            "site",
-            "parameter",
-            "value",
-            "std",
-            "unit",
-            "p_value",
-            "gain_percent",
-            "gain_low",
-            "gain_high",
-            "equivalents",
-        )
+        gain = ("gain_percent", "gain_low", "gain_high")
+        head = ("cause", "site", "parameter", "value", "std", "unit", "p_value", *gain, "equivalents")
         rows = [
             (c.name, c.site, n, *one, c.p_value, g.percent, g.low, g.high, ", ".join(c.equivalents))
             for c in self.causes
