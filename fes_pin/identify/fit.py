@@ -232,18 +232,14 @@ class Fit(Saveable):
 
     def record(self) -> dict[str, Any]:
         """What JSON holds of it: see `fes_pin.data.results`."""
-        names, *cells = self.columns().values()
-        said = [shown(x) if isinstance(x, float) else x for column in cells for x in column]
-        rows = (said[k :: len(names)] for k in range(len(names)))
-        keys = ("value", "std", "low", "high", "unit", "note")
+        (_, names), *others = self.columns().items()
+        cells = {n: [shown(x) if isinstance(x, float) else x for x in column] for n, column in others}
         return {
             "model": list(self.model.structure()),
-            "parameters": {n: dict(zip(keys, row, strict=True)) for n, row in zip(names, rows, strict=True)},
-            "held": {n: shown(v) for n, v in self.values.items() if n not in names},
+            "parameters": {one: {n: column[k] for n, column in cells.items()} for k, one in enumerate(names)},
             "samples": self.samples,
             "reduced_chi2": shown(self.reduced),
             "converged": self.converged,
-            "noise": {n: {"std": shown(one.std), "ar": [shown(a) for a in one.ar]} for n, one in self.noise.items()},
         }
 
     def to_frame(self) -> pandas.DataFrame:

@@ -21,6 +21,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.optimize import brentq
 
+from fes_pin.identify.covariance import covariance_of
 from fes_pin.identify.descent import Descent
 from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations
 from fes_pin.infer.levels import CONFIDENCE_95
@@ -95,14 +96,10 @@ def reach_at_bound(parts: Sequence[Linearized], k: int, held: Sequence[bool]) ->
         Which parameters stand at a bound.
     """
     system = normal_equations(parts)
-    if not (np.isfinite(system.hessian).all() and np.isfinite(system.gradient).all()):
+    free = np.array([not at or j == k for j, at in enumerate(held)])
+    covariance = covariance_of(system.hessian, free)
+    if not np.isfinite(covariance[k, k]):
         return math.inf
-    free = ~np.array(held)
-    moved = np.linalg.pinv(system.hessian[np.ix_(free, free)], rcond=1e-12, hermitian=True) @ system.hessian[free, k]
-    curvature = float(system.hessian[k, k] - system.hessian[k, free] @ moved)
-    slope = abs(float(system.gradient[k] - system.gradient[free] @ moved))
-    own = max(float(system.hessian[k, k]), 0.0)
-    if not (curvature > 1e-10 * own or slope > 1e-8 * math.sqrt(own)) or own == 0.0:
-        return math.inf
-    curvature = max(curvature, 0.0)
-    return RISE_AT_A_BOUND / (slope + math.sqrt(slope**2 + curvature * RISE_AT_A_BOUND))
+    known = np.isfinite(np.diag(covariance))
+    slope = abs(float(covariance[k, known] @ system.gradient[known])) / covariance[k, k]
+    return float(RISE_AT_A_BOUND / (slope + math.sqrt(slope**2 + RISE_AT_A_BOUND / covariance[k, k])))

@@ -14,7 +14,7 @@ from fes_pin.data.schema import RigSchema
 from fes_pin.models import effects, rigs
 from fes_pin.models.outside import check_effect, check_rig, classes_of, load_module, origin
 from fes_pin.models.rigs.base import Rig
-from fes_pin.models.stage import Effect, in_order
+from fes_pin.models.stage import Effect, by_name, in_order
 
 GROUPS = ("fes_pin.effects", "fes_pin.rigs")
 """Entry points of packages: each names a class, or a module that holds classes."""
@@ -40,13 +40,10 @@ class Catalogue:
 
         Raises
         ------
-        KeyError
+        InputError
             If there is none.
         """
-        for one in self.effects:
-            if one.name == name:
-                return one
-        raise KeyError(f"no effect {name!r}; there are {', '.join(e.name for e in self.effects)}")
+        return by_name(self.effects, name)
 
     def effects_for(self, rig: Rig | type[Rig]) -> tuple[type[Effect], ...]:
         """The effects that a rig can have."""

@@ -37,6 +37,8 @@ class Model:
     effects: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.rig, Rig):
+            raise InputError(f"expected a rig, found a {type(self.rig).__name__}", column="rig")
         names = [e.name for e in self.effects]
         if missing := set(self.rig.needed) - set(self.rig.constants):
             raise InputError(f"expected {', '.join(sorted(missing))} as well", column="constants")

@@ -5,22 +5,34 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from fes_pin.data.counts import SAME, begins_of_runs, count_of, hunts, lengths_of_runs
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.models.autoregression import noise_ahead
-from fes_pin.models.compile.layout import doubt_constants, widest, width_of
+from fes_pin.models.compile.layout import doubt_constants, width_of
 from fes_pin.models.compile.program import compiled_program
 from fes_pin.models.disturbance import disturbed
 from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial, Readings
 from fes_pin.models.model import Model
-from fes_pin.models.simulate import is_delayed, lane_inputs, lane_values, max_step, substeps, timing, total_delay
+from fes_pin.models.simulate import (
+    LatestInputs,
+    is_delayed,
+    lane_inputs,
+    lane_values,
+    max_step,
+    side_by_side,
+    substeps,
+    timing,
+    total_delay,
+)
 
 
 @dataclass(frozen=True)
-class Doubt:
+class Doubt(ReadOnly):
     """What is random about a rig and its readings.
 
     Attributes
@@ -104,23 +116,13 @@ class Predictor:
         self.model, self.trials, self.columns = model, tuple(trials), columns
         self.max_step_s = min([max_step(model), *(e.foretold_step_s for e in model.effects)])
         self._delayed = is_delayed(model)
-        self._blocks = [
-            _Block(model, self.trials, lanes, columns, processes, priors, self.max_step_s, lasts_s)
-            for lanes in self._groups()
-        ]
+        together, own = side_by_side(self.trials, columns, self._key), (columns, processes, priors)
+        self._blocks = [_Block(model, self.trials, lanes, *own, self.max_step_s, lasts_s) for lanes in together]
 
-    def _groups(self) -> Iterator[list[int]]:
-        groups: dict[tuple, list[int]] = {}
-        for i, trial in enumerate(self.trials):
-            steps = substeps(self.model, trial.dt, self.max_step_s)
-            groups.setdefault(
-                (trial.kind, self.model.driven_by(trial), _measured(self.model, trial), steps), []
-            ).append(i)
-        for members in groups.values():
-            members.sort(key=lambda i: len(self.trials[i]))
-            most = widest(self.columns)
-            for start in range(0, len(members), most):
-                yield members[start : start + most]
+    def _key(self, trial: Trial) -> tuple[Any, ...]:
+        """What trials share that can share a block: kind, inputs, what was measured, integration steps per sample."""
+        steps = substeps(self.model, trial.dt, self.max_step_s)
+        return trial.kind, self.model.driven_by(trial), _measured(self.model, trial), steps
 
     def run(
         self,
@@ -225,20 +227,12 @@ class _Block:
                 self.repeated[: len(trial), k, lane] = repeated(column, hunting)
                 repeats[:, k] = self.repeated[: len(trial), k, lane] if count_of(column) > 0.0 else 1.0
             self.readings.append(Readings(self.outputs, judged.astype(bool), repeats))
-        self._given: tuple[tuple[int, ...] | None, np.ndarray] = None, np.empty(0)
+        self._latest = LatestInputs()
 
-    def _driven(self, shift: tuple[int, ...]) -> np.ndarray:
-        """Inputs of all lanes, later by whole samples, beside what was measured and whether it was.
-
-        The last ones are kept as in `models.simulate`: in one piece, since another thread may ask for others meanwhile.
-        """
-        known, u = self._given
-        if known == shift:
-            return u
+    def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
+        """Inputs of all lanes, later by whole samples, beside what was measured and whether it was."""
         driven = lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.width), shift)
-        u = np.concatenate([driven, self.measured, self.seen.astype(float), self.repeated], axis=1)
-        self._given = shift, u
-        return u
+        return np.concatenate([driven, self.measured, self.seen.astype(float), self.repeated], axis=1)
 
     def run(
         self,
@@ -255,7 +249,7 @@ class _Block:
         for name in self.doubtful:
             constants[self.layout.constants.index(name)] = [one[name] for one in known]
         constants[self.layout.constants.index("shift"), : len(shift)] = shift
-        return self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
+        return self.program.run(self._latest.of(shift, self._inputs), p, constants, self.guess, self.substeps)
 
     def innovations(self, y: np.ndarray, s: np.ndarray, width: int, doubts: Sequence[Doubt]) -> Iterator[ForetoldTrial]:
         """The innovations of each lane and under its doubt, with sensitivities to `width` columns."""

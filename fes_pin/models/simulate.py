@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -94,20 +95,13 @@ class Simulator:
         self.model, self.trials, self.columns = model, tuple(trials), columns
         self.max_step_s = max_step(model) if max_step_s is None else max_step_s
         self._delayed = is_delayed(model)
-        self._blocks = [_Block(model, self.trials, lanes, columns, self.max_step_s) for lanes in self._groups()]
+        steps, together = self.max_step_s, side_by_side(self.trials, columns, self._key)
+        self._blocks = [_Block(model, self.trials, lanes, columns, steps) for lanes in together]
         self._fixed = {n: value for block in self._blocks for n, value in block.layout.fixed}
 
-    def _groups(self) -> Iterator[list[int]]:
-        """Trials that can share a block: same kind, inputs and integration steps per sample, of similar length."""
-        groups: dict[tuple, list[int]] = {}
-        for i, trial in enumerate(self.trials):
-            key = (trial.kind, self.model.driven_by(trial), substeps(self.model, trial.dt, self.max_step_s))
-            groups.setdefault(key, []).append(i)
-        for members in groups.values():
-            members.sort(key=lambda i: len(self.trials[i]))
-            most = widest(self.columns)
-            for start in range(0, len(members), most):
-                yield members[start : start + most]
+    def _key(self, trial: Trial) -> tuple[Any, ...]:
+        """What trials share that can share a block: kind, inputs and integration steps per sample."""
+        return trial.kind, self.model.driven_by(trial), substeps(self.model, trial.dt, self.max_step_s)
 
     def run(
         self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]] | None = None
@@ -242,19 +236,11 @@ class _Block:
         self.constants = np.array([[c[n] for c in constants] for n in self.layout.constants])
         self.constants = self.constants.reshape(-1, self.layout.width)
         self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
-        self._shifted: tuple[tuple[int, ...] | None, np.ndarray] = None, np.empty(0)
+        self._latest = LatestInputs()
 
-    def _driven(self, shift: tuple[int, ...]) -> np.ndarray:
-        """Inputs of all lanes, later by whole samples; before the trial begins they are as at rest: zero.
-
-        The last ones are kept, in one piece with what they are for: another thread may ask for others meanwhile.
-        """
-        known, u = self._shifted
-        if known == shift:
-            return u
-        u = lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.layout.width), shift)
-        self._shifted = shift, u
-        return u
+    def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
+        """Inputs of all lanes, later by whole samples; before the trial begins they are as at rest: zero."""
+        return lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.layout.width), shift)
 
     def run(self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]], delay: float) -> Abreast:
         p = lane_values(self.layout, values, [unknowns[i] for i in self.lanes])
@@ -263,12 +249,41 @@ class _Block:
         if delay:
             constants = constants.copy()
             constants[self.layout.constants.index("shift"), : len(shift)] = shift
-        y, s = self.program.run(self._driven(shift), p, constants, self.guess, self.substeps)
+        y, s = self.program.run(self._latest.of(shift, self._inputs), p, constants, self.guess, self.substeps)
         for lane, trial in enumerate(self.trials):
             if len(trial) < self.count:
                 y[len(trial) :, :, lane] = s[len(trial) :, ..., lane] = 0.0
         pass_as_stored(self.trials, (y, s))
         return Abreast(tuple(self.lanes), self.places, y, s)
+
+
+class LatestInputs:
+    """The inputs of a block that were asked for last: in one piece with what they are for, since other threads ask."""
+
+    def __init__(self) -> None:
+        self._held: tuple[tuple[int, ...] | None, np.ndarray] = None, np.empty(0)
+
+    def of(self, shift: tuple[int, ...], make: Callable[[tuple[int, ...]], np.ndarray]) -> np.ndarray:
+        """Those for a shift, made if others are held."""
+        known, u = self._held
+        if known != shift:
+            u = make(shift)
+            self._held = shift, u
+        return u
+
+
+def side_by_side(
+    trials: Sequence[Trial], columns: tuple[str, ...], key: Callable[[Trial], Hashable]
+) -> Iterator[list[int]]:
+    """Places of trials that can share a block: those of the same key, of similar length."""
+    groups: dict[Hashable, list[int]] = {}
+    for i, trial in enumerate(trials):
+        groups.setdefault(key(trial), []).append(i)
+    for members in groups.values():
+        members.sort(key=lambda i: len(trials[i]))
+        most = widest(columns)
+        for start in range(0, len(members), most):
+            yield members[start : start + most]
 
 
 def max_step(model: Model) -> float:

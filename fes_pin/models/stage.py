@@ -11,6 +11,8 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
+from fes_pin.data.errors import InputError
+from fes_pin.data.schema import unknown
 from fes_pin.models.maths import sqrt, where
 from fes_pin.models.parameters import ParameterInfo, check_parameters, parameters_of
 
@@ -244,6 +246,20 @@ class Effect:
 
 
 Named = TypeVar("Named", Effect, type[Effect])
+
+
+def by_name(effects: Iterable[type[Effect]], name: str) -> type[Effect]:
+    """The effect of that name.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    known = {one.name: one for one in effects}
+    if name not in known:
+        raise InputError(f"no such effect: {unknown(str(name), known)}", column=str(name))
+    return known[name]
 
 
 def in_order(effects: Iterable[Named]) -> tuple[Named, ...]:

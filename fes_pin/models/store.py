@@ -101,8 +101,6 @@ def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = 
     for name in listed:
         try:
             model = model + _effect(document, catalogue, name, listed)
-        except KeyError as error:
-            raise document.error(f"effects.{name}", _missing(document, name, str(error.args[0]))) from None
         except InputError as problem:
             if problem.file is not None:
                 raise
@@ -125,7 +123,11 @@ def _missing(document: Document, name: object, otherwise: str) -> str:
 
 
 def _effect(document: Document, catalogue: Catalogue, name: str, listed: dict[str, Any]) -> Effect:
-    kind, key = catalogue.effect(name), f"effects.{name}"
+    key = f"effects.{name}"
+    try:
+        kind = catalogue.effect(name)
+    except InputError as problem:
+        raise document.error(key, _missing(document, name, problem.message)) from None
     each_trial = document.table(key, listed).pop(EACH_TRIAL, False)
     if not isinstance(each_trial, bool) or (each_trial and not kind.varies):
         raise document.error(f"{key}.{EACH_TRIAL}", f"expected {'true or false' if kind.varies else 'none'}")

@@ -12,6 +12,7 @@ import pytest
 from models.cases import CASES, EFFECTS_OF_RIGS, IMPOSED_CASES, JOINT, RIGS, everything, name_of, trial, with_effect
 from scipy.optimize import newton
 
+from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.models import effects
 from fes_pin.models.compile.equations import derive
@@ -103,7 +104,7 @@ def test_a_cause_is_one_file(tmp_path, monkeypatch):
 
 def test_effects_are_found_by_name_and_rig():
     assert effect_named("fatigue").name == "fatigue"
-    with pytest.raises(KeyError, match="no effect 'tiredness'"):
+    with pytest.raises(InputError, match="tiredness: no such effect: unknown; expected one of"):
         effect_named("tiredness")
     assert {e.name for e in effects_for("muscle")} == {e.name for e, rig in EFFECTS_OF_RIGS if rig == "muscle"}
 

@@ -242,7 +242,7 @@ def test_a_library_changes_nothing_for_others(own):
     assert installed() == before and "door_closer" not in {e.name for e in installed().effects}
     again = fp.load_library(library, own / "door_closer.py")
     assert [e.name for e in again.effects] == [e.name for e in library.effects]
-    with pytest.raises(KeyError, match="no effect 'door_closer'"):
+    with pytest.raises(fp.InputError, match="door_closer: no such effect"):
         shipped().effect("door_closer")
 
 

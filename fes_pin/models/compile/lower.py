@@ -22,35 +22,11 @@ KEPT = "%kept"
 """Name of the pointer to what earlier parts of a function leave to later ones."""
 _BINARY = {ca.OP_ADD: "fadd", ca.OP_SUB: "fsub", ca.OP_MUL: "fmul", ca.OP_DIV: "fdiv"}
 _COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
-_LANE_FUNCTIONS = {
-    ca.OP_EXP: "exp",
-    ca.OP_LOG: "log",
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_TANH: "tanh",
-    ca.OP_SQRT: "sqrt",
-    ca.OP_FABS: "fabs",
-    ca.OP_FLOOR: "floor",
-    ca.OP_CEIL: "ceil",
-    ca.OP_COPYSIGN: "copysign",
-    ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin",
-    ca.OP_ACOS: "acos",
-    ca.OP_ATAN: "atan",
-    ca.OP_ATAN2: "atan2",
-    ca.OP_SINH: "sinh",
-    ca.OP_COSH: "cosh",
-    ca.OP_ERF: "erf",
-    ca.OP_POW: "pow",
-    ca.OP_FMOD: "fmod",
-    ca.OP_REMAINDER: "remainder",
-    ca.OP_HYPOT: "hypot",
-    ca.OP_LOG1P: "log1p",
-    ca.OP_EXPM1: "expm1",
-    ca.OP_ASINH: "asinh",
-    ca.OP_ACOSH: "acosh",
-    ca.OP_ATANH: "atanh",
-}
+_NAMED = (
+    *("exp", "log", "sin", "cos", "tanh", "sqrt", "fabs", "floor", "ceil", "copysign", "tan", "asin", "acos", "atan"),
+    *("atan2", "sinh", "cosh", "erf", "pow", "fmod", "remainder", "hypot", "log1p", "expm1", "asinh", "acosh", "atanh"),
+)
+_LANE_FUNCTIONS = {getattr(ca, f"OP_{name.upper()}"): name for name in _NAMED}
 
 
 @dataclass(frozen=True)

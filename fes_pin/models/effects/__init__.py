@@ -10,7 +10,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
 
-from fes_pin.models.stage import Effect, in_order
+from fes_pin.models.stage import Effect, by_name, in_order
 
 
 def find_effects() -> tuple[type[Effect], ...]:
@@ -47,13 +47,10 @@ def effect_named(name: str) -> type[Effect]:
 
     Raises
     ------
-    KeyError
+    InputError
         If the catalogue has none.
     """
-    for one in EFFECTS:
-        if one.name == name:
-            return one
-    raise KeyError(f"no effect {name!r}; there are {', '.join(e.name for e in EFFECTS)}")
+    return by_name(EFFECTS, name)
 
 
 def effects_for(rig: str) -> tuple[type[Effect], ...]:
