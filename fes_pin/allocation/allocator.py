@@ -124,7 +124,7 @@ class Allocator:
         if p.least is not None:
             return self._choose(f, wanted, lower, upper, before)
         if p.cubes:
-            accuracy = self.certify.unseen(self.certify.rounding(wanted))
+            accuracy = self.certify.unseen(float(np.abs(wanted).max()))
             r, note = least_cubes(self.squares, f, p.prices, p.change, lower, upper, accuracy)
             return self.result(r, wanted, lower, upper, before, note, accuracy)
         r = self.program.solve(f, lower, upper) if solver == "daqp" else self._ask(solver, f, lower, upper)
@@ -149,9 +149,9 @@ class Allocator:
         solve: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> Allocation:
         """The allocation with its certificate, recomputed from the moment arms."""
-        rounding = self.certify.rounding(wanted)
-        r = self.certify.at_limits(before, wanted, r, lower, upper, rounding, accuracy, solve)
-        certificate, achieved, gradient = self.certify(before, wanted, r, lower, upper, rounding)
+        most = float(np.abs(wanted).max(initial=0.0))
+        r = self.certify.at_limits(before, wanted, r, lower, upper, most, accuracy, solve)
+        certificate, achieved, gradient = self.certify(before, wanted, r, lower, upper, most)
         width = self.problem.curves.pulse_width_us(r)
         return Allocation(
             r,
@@ -215,12 +215,12 @@ class Allocator:
         start = np.zeros(p.n) if previous is None else recruitments(previous, p.names)
         F = wanted @ self.pull
 
-        rounding = self.certify.rounding(wanted)
+        most = float(np.abs(wanted).max(initial=0.0))
 
         def settle(k: int, r: np.ndarray, before: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
             f = F[k] - p.change * before
             return self.certify.at_limits(
-                before, wanted[k], r, low, high, rounding, solve=lambda least, most: exact(self.H, f, r, least, most)
+                before, wanted[k], r, low, high, most, solve=lambda least, most: exact(self.H, f, r, least, most)
             )
 
         carried: dict[str, Any] = {"keep": p.change, "rate": p.rate, "previous": start}
@@ -229,7 +229,7 @@ class Allocator:
         lower, upper = p.limits(before)
         if not p.change and p.rate == np.inf:  # else each was settled before the next followed from it
             slack = np.minimum(r - lower, upper - r)
-            for k in np.flatnonzero(((slack > 0.0) & (slack <= self.certify.room(rounding))).any(1)):
+            for k in np.flatnonzero(self.certify.close(slack, most).any(1)):
                 r[k] = settle(int(k), r[k], start, lower, upper)
         achieved = r @ p.matrix.T
         residual = self.certify.residual(before, wanted, r, lower, upper)

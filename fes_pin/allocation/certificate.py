@@ -101,18 +101,22 @@ class Certifier:
         arms = np.abs(problem.matrix) * self.weighed[:, None]
         unit = (joints + n + 4) * EPSILON  # n products in a torque, as many sums over joints, prices and change
         self.unit, self.arms = unit * (arms.T @ np.abs(problem.matrix).sum(1) + prices), unit * arms.sum(0)
+        self.paid = problem.prices + problem.change
+        self.hidden, self.free = (
+            (float((self.unit / c).max()), float((self.arms / c).max())) for c in (self.curvature, self.paid)
+        )
 
-    def rounding(self, wanted: np.ndarray) -> np.ndarray:
-        """Bound on the rounding error of the gradient (n,) anywhere within the limits.
+    def rounding(self, most: float) -> np.ndarray:
+        """Bound on the rounding error of the gradient (n,) anywhere within the limits, for torques up to `most`, N m.
 
         A sum of k products errs by k units of rounding of the sum of their sizes at most (Higham 2002, Accuracy and
         Stability of Numerical Algorithms, section 3.1).
         """
-        return self.unit + self.arms * float(np.abs(wanted).max())
+        return self.unit + self.arms * most
 
-    def unseen(self, rounding: np.ndarray) -> float:
+    def unseen(self, most: float) -> float:
         """Residual up to which rounding of the gradient, or a recruitment that is nothing, hides the optimum."""
-        return max(float((rounding / self.curvature).max()), NOTHING)
+        return max(self.hidden[0] + self.hidden[1] * most, NOTHING)
 
     def gradient(self, achieved: np.ndarray, wanted: np.ndarray, r: np.ndarray, previous: np.ndarray) -> np.ndarray:
         """Slope of the cost over recruitment, (..., n), at `achieved` (..., joints) N m."""
@@ -140,16 +144,17 @@ class Certifier:
         r: np.ndarray,
         lower: np.ndarray,
         upper: np.ndarray,
-        rounding: np.ndarray | None = None,
+        most: float | None = None,
     ) -> tuple[Certificate, np.ndarray, np.ndarray]:
-        """Certificate, achieved torque and gradient of one sample; `rounding` of the torque, if it is known."""
+        """Certificate, achieved torque and gradient of one sample whose greatest torque is `most`, if it is known."""
         achieved = r @ self.turned
         gradient = self.gradient(achieved, wanted, r, previous)
         primal, dual, complementarity, gap = residuals(gradient, r, lower, upper, self.curvature)
         cost = self.cost(achieved, wanted, r, previous)
         parts = float(primal), float(dual), float(complementarity), float(gap)
-        unseen = self.unseen(self.rounding(wanted) if rounding is None else rounding)
-        return Certificate(*parts, cost, self.problem.scale, self.flattest, unseen), achieved, gradient
+        most = float(np.abs(wanted).max(initial=0.0)) if most is None else most
+        proof = Certificate(*parts, cost, self.problem.scale, self.flattest, self.unseen(most))
+        return proof, achieved, gradient
 
     def residual(
         self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray
@@ -158,12 +163,19 @@ class Certifier:
         gradient = self.gradient(r @ self.turned, wanted, r, previous)
         return np.maximum.reduce(residuals(gradient, r, lower, upper, self.curvature)[:3])
 
-    def room(self, rounding: np.ndarray) -> np.ndarray:
-        """Recruitments (n,) whose effort the certificate cannot see: its slope is rounding, or they are nothing."""
-        squares = rounding / (self.problem.prices + self.problem.change)
+    def close(self, slack: np.ndarray, most: float, accuracy: float = 0.0) -> np.ndarray:
+        """Which recruitments are so near to a limit that the certificate cannot see it, or that it is nothing."""
+        room = max(self.free[0] + self.free[1] * most, NOTHING)
+        if self.problem.cubes:
+            room = np.inf
+        near = (slack > 0.0) & (slack <= room)
+        if not near.any():
+            return near
+        rounding = np.maximum(self.rounding(most), accuracy * self.curvature)
+        squares = rounding / self.paid
         if self.problem.cubes:
             squares = np.maximum(squares, np.sqrt(rounding / self.problem.prices))
-        return np.maximum(squares, NOTHING)
+        return near & (slack <= np.maximum(squares, NOTHING))
 
     def at_limits(
         self,
@@ -172,7 +184,7 @@ class Certifier:
         r: np.ndarray,
         lower: np.ndarray,
         upper: np.ndarray,
-        rounding: np.ndarray,
+        most: float,
         accuracy: float = 0.0,
         solve: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> np.ndarray:
@@ -181,19 +193,19 @@ class Certifier:
         What is within the certificate's own rounding error of a limit, or within `NOTHING`, is at the limit: off is
         off, not a pulse at threshold. First all at once whose effort is rounding, if the certificate holds without
         them; else those whose move changes no slope by more than rounding. If some within `NOTHING` do more than that
-        to the others, `solve` gives the optimum between limits that hold them. `rounding` is that of the gradient,
-        `accuracy` the residual at which an iteration ended, if one did.
+        to the others, `solve` gives the optimum between limits that hold them. `most` is the greatest
+        torque, `accuracy` the residual at which an iteration ended, if one did.
         """
         slack = np.minimum(r - lower, upper - r)
-        rounding = np.maximum(rounding, accuracy * self.curvature)
-        near = (slack > 0.0) & (slack <= self.room(rounding))
+        near = self.close(slack, most, accuracy)
         if not near.any():
             return r
         limit = np.where(r - lower <= upper - r, lower, upper)
         moved = np.where(near, limit, r)
         before, after = (float(self.residual(previous, wanted, x, lower, upper)) for x in (r, moved))
-        if after <= max(before, self.unseen(rounding)):
+        if after <= max(before, self.unseen(most), accuracy):
             return moved
+        rounding = np.maximum(self.rounding(most), accuracy * self.curvature)
         turns = len(r) * (self.squares + np.diag(self.prices + self.change))
         stiff = (slack > 0.0) & (slack * turns <= rounding[:, None]).all(0)
         r, nothing = np.where(stiff, limit, r), near & ~stiff & (slack <= NOTHING)

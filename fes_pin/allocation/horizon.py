@@ -9,6 +9,7 @@ import numpy as np
 
 from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.bounded import known_solver
+from fes_pin.allocation.certificate import NOTHING
 from fes_pin.allocation.horizon_program import NO_ROOM, HorizonProgram
 from fes_pin.allocation.inputs import wanted_torques
 from fes_pin.allocation.problem import within_rate
@@ -193,15 +194,15 @@ class Horizon:
         """The plan, off where the proof cannot tell it from off, dual residual, gap; see `Certifier.at_limits`."""
         dual, gap = self.proof(u, y, f, low, high)
         certify = self.program.certify
-        rounding = self.steps * certify.rounding(wanted)
+        rounding = self.steps * certify.rounding(float(np.abs(wanted).max(initial=0.0)))
         least, most = low[: self.steps], high[: self.steps]
         limit = np.where(u - least <= most - u, least, most)
         slack = np.abs(u - limit)
-        near = (slack > 0.0) & (slack <= certify.room(rounding))
+        near = (slack > 0.0) & (slack <= np.maximum(rounding / certify.paid, NOTHING))
         if near.any():
             moved = self.feasible(np.where(near, limit, u), low, high)
             dual_then, gap_then = self.proof(moved, y, f, low, high)
-            hidden = float(rounding.max())
+            hidden = max(float(rounding.max()), NOTHING)
             if dual_then <= max(dual, hidden) and gap_then <= max(gap, u.size * hidden):
                 return moved, dual_then, gap_then
         return u, dual, gap
