@@ -18,7 +18,7 @@ from fes_pin.data.errors import InputError
 
 __all__ = ["Allocator"]
 
-SAME = 1e-9
+SAME = 1e-8
 """Recruitments are exact to this, times the number of channels; see `Certificate.flattest`."""
 
 

@@ -102,14 +102,15 @@ def best_choice(
     model.settings = {**model.settings, "primal_tol": FEASIBLE, "time_limit": min(seconds, WITHOUT_LIMIT)}
     model.setup(curvature, linear, rows, most, np.concatenate([fewest, np.zeros(k)]), sense)
     x, _, flag, info = model.solve()
+    on, nodes = upper > 0.0, info["nodes"]
+    if flag in (ENDED, STOPPED):
+        on[chooses] = x[n:] > 0.5
+        r = settled(H, f, lower, upper, least, on)
+        cost = cost_of(H, f, r)
+        if flag == ENDED:
+            return Choice(r, cost, 0.0, nodes)
     cheap = rounded_to_least(H, f, lower, upper, least)
-    if flag not in (ENDED, STOPPED):
-        return Choice(cheap.r, cheap.cost, cheap.gap, cheap.nodes + info["nodes"])
-    on = upper > 0.0
-    on[chooses] = x[n:] > 0.5
-    r = settled(H, f, lower, upper, least, on)
-    cost, nodes = cost_of(H, f, r), info["nodes"]
-    if flag == ENDED:
-        return Choice(r, cost, 0.0, nodes)
+    if flag != STOPPED:
+        return Choice(cheap.r, cheap.cost, cheap.gap, cheap.nodes + nodes)
     best, reached = (r, cost) if cost < cheap.cost else (cheap.r, cheap.cost)
     return Choice(best, reached, max(reached - (cheap.cost - cheap.gap), 0.0), nodes + cheap.nodes)

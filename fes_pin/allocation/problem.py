@@ -273,7 +273,8 @@ def recruitment_limits(options: Options, names: tuple[str, ...]) -> tuple[np.nda
     Raises
     ------
     InputError
-        Limits that are not 0 <= lower <= upper <= 1, a least recruitment outside, an unknown dead channel.
+        Limits that are not 0 <= lower <= upper <= 1, a least recruitment outside or above the upper limit of a channel
+        whose lower limit is not 0, an unknown dead channel.
     """
     lower = by_name(options.lower, names, "lower limits", 0.0)
     upper = by_name(options.upper, names, "upper limits", 1.0)
@@ -293,4 +294,11 @@ def recruitment_limits(options: Options, names: tuple[str, ...]) -> tuple[np.nda
     least = by_name(options.least, names, "least recruitment", 0.0)
     if ((least < 0.0) | (least > 1.0)).any():
         raise InputError("least recruitment must lie between 0 and 1")
+    never = (lower > 0.0) & (least > upper)
+    if never.any():
+        i = int(np.argmax(never))
+        raise InputError(
+            f"{names[i]} may not be off, for its lower limit is {lower[i]:g}, and not on, for its upper limit "
+            f"{upper[i]:g} lies below its least recruitment {least[i]:g}"
+        )
     return lower, upper, least
