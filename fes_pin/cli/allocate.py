@@ -15,8 +15,6 @@ from fes_pin.data.numbers import number_in
 
 MOST_NM, MOST_DEG_S = 1e5, 1e4
 """No body's joint has more torque, N m, nor turns faster, degrees per second."""
-MOST_US = 1e5
-"""No stimulator's pulse is longer, us."""
 
 
 def joint_numbers(words: list[str] | None, what: str, most: float) -> dict[str, float]:
@@ -87,15 +85,15 @@ def allocate(
     from fes_pin.allocation.allocate import allocate as solve
     from fes_pin.body.joints import joint_limits
     from fes_pin.muscles.nerves import STRONGEST, Nerves
-    from fes_pin.muscles.recruitment import LinearRecruitment
+    from fes_pin.muscles.recruitment import LONGEST_US, LinearRecruitment
 
     _alone(walk=walk is not None, nerves=nerves, torques=bool(torque))
     if strength is not None:
         within(strength, 0.0, STRONGEST, "--strength")
     if least is not None:
         within(least, 0.0, 1.0, "--least")
-    within(threshold_us, 0.0, MOST_US, "--threshold-us")
-    within(saturation_us, 0.0, MOST_US, "--saturation-us")
+    within(threshold_us, 0.0, LONGEST_US, "--threshold-us")
+    within(saturation_us, 0.0, LONGEST_US, "--saturation-us")
     if threshold_us >= saturation_us:
         raise InputError(f"--threshold-us must lie below --saturation-us, got {threshold_us:g} and {saturation_us:g}")
     channels = Nerves(tuple(nerve or ()), strength=strength)

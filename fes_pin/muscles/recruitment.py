@@ -13,8 +13,27 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between
+from fes_pin.data.numbers import between, numbers
 
+LONGEST_US = 5000.0
+"""Pulse width, us, beyond which no stimulator of nerves goes and recruitment of a nerve has long been complete: nerve
+fibres have chronaxies of 0.05 to 0.7 ms (Ranck 1975, Brain Res. 98:417-440); surface stimulators give up to 500 us
+(Valtin and others, Eur. J. Transl. Myol. 26:6076, 2016), section II of Dombre, Fournier and Coiffet uses 1000 us."""
+RANGES = {
+    "threshold_us": (0.0, LONGEST_US),
+    "saturation_us": (0.0, LONGEST_US),
+    "curvature": (-20.0, 20.0),
+    "steepness": (0.01, 30.0),
+    "middle": (0.0, 1.0),
+    "delay": (0.05, 20.0),
+    "growth": (0.05, 20.0),
+    "log_exponent": (-1.2, 2.0),
+    "log_bend": (-3.0, 5.0),
+}
+"""What parameters of curves can be: widths of a stimulator; a place on the way; shapes from a straight line to a step,
+as far as double precision inverts them. Hill's are those of the cause `recruitment_curvature`."""
+LEAST_CURVATURE = 1e-3
+"""A saturating curve with less curvature is straight to 0.01 % of recruitment."""
 STRAIGHT_BELOW = 1e-6
 """Fraction of the way below which a Hill curve is straight, as in the model of the same name."""
 
@@ -31,7 +50,7 @@ class LinearRecruitment:
     Raises
     ------
     InputError
-        Negative threshold, saturation not above threshold, or not a number.
+        A parameter that is not a number within `RANGES`, or saturation not above threshold.
     """
 
     threshold_us: Any = 180.0
@@ -39,17 +58,18 @@ class LinearRecruitment:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            try:
-                value = np.array(getattr(self, item.name), dtype=float)
-            except (TypeError, ValueError):
-                raise InputError(f"{item.name} of a recruitment curve must be a number") from None
-            if not np.isfinite(value).all():
-                raise InputError(f"{item.name} of a recruitment curve must be a finite number")
+            name = f"{item.name} of a recruitment curve"
+            value = numbers(getattr(self, item.name), name)
+            low, high = RANGES.get(item.name, (-np.inf, np.inf))
+            wrong = value[~(np.isfinite(value) & (value >= low) & (value <= high))]
+            if wrong.size:
+                raise InputError(f"must lie between {low:g} and {high:g}, got {wrong.flat[0]:g}", column=name)
+            value.setflags(write=False)
             object.__setattr__(self, item.name, value)
         if len({getattr(self, item.name).shape for item in fields(self)} - {()}) > 1:
             raise InputError("arrays of a recruitment curve must have one number per channel each")
-        if (self.threshold_us < 0.0).any() or (self.saturation_us <= self.threshold_us).any():
-            raise InputError("a recruitment curve needs 0 <= threshold_us < saturation_us")
+        if (self.saturation_us <= self.threshold_us).any():
+            raise InputError("a recruitment curve needs threshold_us < saturation_us")
 
     def _values(self) -> tuple:
         return type(self), *(getattr(self, f.name).tobytes() for f in fields(self))
@@ -90,8 +110,8 @@ class SaturatingRecruitment(LinearRecruitment):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if (self.curvature == 0.0).any():
-            raise InputError("curvature 0 is the straight line: use LinearRecruitment")
+        if (np.abs(self.curvature) < LEAST_CURVATURE).any():
+            raise InputError(f"a curvature below {LEAST_CURVATURE:g} is a straight line: use LinearRecruitment")
 
     def shape(self, x):
         """See the class."""
@@ -108,11 +128,6 @@ class SigmoidRecruitment(LinearRecruitment):
 
     steepness: Any = 10.0
     middle: Any = 0.5
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if (self.steepness <= 0.0).any():
-            raise InputError("steepness of a sigmoid must be more than 0")
 
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """The logistic at threshold and at saturation."""
@@ -138,11 +153,6 @@ class GompertzRecruitment(LinearRecruitment):
 
     delay: Any = 5.0
     growth: Any = 6.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if (self.delay <= 0.0).any() or (self.growth <= 0.0).any():
-            raise InputError("delay and growth of a Gompertz curve must be more than 0")
 
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """The curve at threshold and at saturation, unscaled."""
@@ -197,19 +207,19 @@ class Hysteresis:
     curve
         Recruitment of the acting width.
     half_width_us
-        0 or more.
+        Half the play, 0 to `LONGEST_US`.
     acting_us
-        The width that acts at the beginning.
+        The width that acts at the beginning, likewise.
 
     Raises
     ------
     InputError
-        Negative width, or none.
+        No such widths.
     """
 
     def __init__(self, curve: LinearRecruitment, half_width_us: float, acting_us: float = 0.0) -> None:
-        self.curve, self.half_width_us = curve, between(half_width_us, 0.0, np.inf, "half_width_us")
-        self.acting_us = between(acting_us, 0.0, np.inf, "acting_us")
+        self.curve, self.half_width_us = curve, between(half_width_us, 0.0, LONGEST_US, "half_width_us")
+        self.acting_us = between(acting_us, 0.0, LONGEST_US, "acting_us")
 
     def recruitment(self, pulse_width_us: float) -> float:
         """Recruitment by the next pulse, which moves the play."""
@@ -244,7 +254,7 @@ class MeasuredRecruitment:
     Parameters
     ----------
     pulse_widths_us, recruitments
-        At least two points; both must rise strictly; recruitments from 0 to 1.
+        At least two points, us up to `LONGEST_US`; both must rise strictly; recruitments from 0 to 1.
 
     Raises
     ------
@@ -253,16 +263,34 @@ class MeasuredRecruitment:
     """
 
     def __init__(self, pulse_widths_us: Sequence[float], recruitments: Sequence[float]) -> None:
-        try:
-            self.widths_us, self.values = np.array(pulse_widths_us, dtype=float), np.array(recruitments, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError("a measured recruitment curve needs numbers in both columns") from None
+        self.widths_us = numbers(pulse_widths_us, "pulse widths of a recruitment curve")
+        self.values = numbers(recruitments, "recruitments of a recruitment curve")
         good = self.widths_us.shape == self.values.shape and self.widths_us.ndim == 1 and len(self.values) >= 2
         if not good or not (np.diff(self.widths_us) > 0).all() or not (np.diff(self.values) > 0).all():
             raise InputError("a measured recruitment curve needs two or more points that rise in both columns")
         if self.values[0] != 0.0 or self.values[-1] != 1.0 or self.widths_us[0] < 0.0:
-            raise InputError("a measured recruitment curve must begin at recruitment 0 and end at 1")
+            raise InputError(
+                "a measured recruitment curve must begin at recruitment 0 and end at 1, with widths from 0"
+            )
+        if not self.widths_us[-1] <= LONGEST_US:
+            raise InputError(
+                f"pulse widths of a recruitment curve end at {LONGEST_US:g} us, got {self.widths_us[-1]:g}"
+            )
+        for array in (self.widths_us, self.values):
+            array.setflags(write=False)
         self.threshold_us, self.saturation_us = self.widths_us[0], self.widths_us[-1]
+
+    def _values(self) -> tuple:
+        return self.widths_us.tobytes(), self.values.tobytes()
+
+    def __eq__(self, other) -> bool:
+        return isinstance(other, MeasuredRecruitment) and self._values() == other._values()
+
+    def __hash__(self) -> int:
+        return hash(self._values())
+
+    def __repr__(self) -> str:
+        return f"MeasuredRecruitment({self.widths_us.tolist()}, {self.values.tolist()})"
 
     def recruitment(self, pulse_width_us) -> np.ndarray:
         """Recruitment, 0 to 1, at pulse widths in us."""

@@ -1,5 +1,9 @@
 """Recruitment curves and their exact inverses."""
 
+import copy
+import pickle
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,6 +11,8 @@ from hypothesis import strategies as st
 
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.recruitment import (
+    LONGEST_US,
+    RANGES,
     ChannelRecruitment,
     GompertzRecruitment,
     HillRecruitment,
@@ -142,3 +148,88 @@ def test_what_is_no_number_is_one_line(make):
     with pytest.raises(InputError) as caught:
         make()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: MeasuredRecruitment([100, 200, np.inf], [0, 0.5, 1]), "5000 us, got inf"),
+        (lambda: MeasuredRecruitment([100, 200, 1e6], [0, 0.5, 1]), "5000 us"),
+        (lambda: HillRecruitment(log_bend=800.0), "log_bend .* between -3 and 5, got 800"),
+        (lambda: HillRecruitment(log_exponent=9.0), "log_exponent"),
+        (lambda: SigmoidRecruitment(middle=50.0), "middle .* between 0 and 1, got 50"),
+        (lambda: SigmoidRecruitment(steepness=1e3), "steepness"),
+        (lambda: GompertzRecruitment(growth=1e3), "growth"),
+        (lambda: GompertzRecruitment(delay=np.array([5.0, 1e-9])), "delay"),
+        (lambda: SaturatingRecruitment(curvature=800.0), "curvature"),
+        (lambda: SaturatingRecruitment(curvature=1e-9), "straight line"),
+        (lambda: LinearRecruitment(180, 1e9), "saturation_us .* between 0 and 5000, got 1e\\+09"),
+        (lambda: LinearRecruitment(np.array([180.0, np.inf]), 1000.0), "threshold_us"),
+        (lambda: Hysteresis(LinearRecruitment(), 1e9), "half_width_us"),
+        (lambda: Hysteresis(LinearRecruitment(), 1.0, acting_us=1e9), "acting_us"),
+    ],
+)
+def test_widths_and_shapes_have_ranges_of_sanity(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
+
+
+def within(name):
+    low, high = RANGES[name]
+    return st.floats(low, high)
+
+
+@settings(max_examples=1000, deadline=None)
+@given(
+    st.sampled_from(
+        [LinearRecruitment, SaturatingRecruitment, SigmoidRecruitment, GompertzRecruitment, HillRecruitment]
+    ),
+    st.data(),
+)
+def test_every_curve_that_can_be_built_gives_finite_widths_between_threshold_and_saturation(kind, data):
+    """Also one with arrays of parameters, and at recruitments next to 0 and to 1."""
+    shaped = {f.name: data.draw(within(f.name), label=f.name) for f in fields(kind)[2:]}
+    threshold, saturation = sorted(data.draw(st.tuples(within("threshold_us"), within("saturation_us"))))
+    try:
+        curve = kind(threshold, saturation, **shaped)
+        both = kind([threshold, 0.0], [saturation, LONGEST_US], **{n: [v, v] for n, v in shaped.items()})
+    except InputError:
+        assert threshold == saturation or abs(shaped.get("curvature", 1.0)) < 1e-3
+        return
+    ends = np.array([0.0, 5e-324, 1e-300, 1e-16, 1e-9, 0.5, 1.0 - 1e-9, np.nextafter(1.0, 0.0), 1.0])
+    r = np.concatenate([ends, data.draw(st.lists(st.floats(0, 1), min_size=1, max_size=5))])
+    width = curve.pulse_width_us(r)
+    assert ((width == 0.0) == (r == 0.0)).all() or threshold == 0.0
+    assert np.isfinite(width).all() and ((width == 0.0) | (width >= threshold)).all() and (width <= saturation).all()
+    made = curve.recruitment(width)
+    assert ((made >= 0.0) & (made <= 1.0)).all()
+    np.testing.assert_array_equal(both.pulse_width_us(np.column_stack([r, r]))[:, 0], width)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.floats(0, LONGEST_US), min_size=2, max_size=6, unique=True), st.floats(-1, 2))
+def test_a_measured_curve_that_can_be_built_gives_finite_widths(widths, r):
+    curve = MeasuredRecruitment(sorted(widths), np.linspace(0, 1, len(widths)))
+    width = float(curve.pulse_width_us(r))
+    assert width == 0.0 if r <= 0.0 else min(widths) <= width <= max(widths)
+
+
+def test_curves_are_equal_by_value_and_cannot_be_changed():
+    for make in (
+        lambda: MeasuredRecruitment([120, 200, 500], [0, 0.2, 1]),
+        lambda: LinearRecruitment(np.array([100.0, 120.0]), 500.0),
+        lambda: HillRecruitment(log_bend=0.5),
+    ):
+        one, other = make(), make()
+        assert (
+            one == other and hash(one) == hash(other) and one == copy.deepcopy(one) == pickle.loads(pickle.dumps(one))
+        )
+        assert one != LinearRecruitment()
+    with pytest.raises(ValueError, match="read-only"):
+        LinearRecruitment(np.array([100.0, 120.0]), 500.0).threshold_us[0] = 7.0
+    with pytest.raises(ValueError, match="read-only"):
+        MeasuredRecruitment([120, 500], [0, 1]).widths_us[1] = np.inf
+    given = np.array([100.0, 120.0])
+    curve = LinearRecruitment(given, 500.0)
+    given[0] = -7.0
+    assert curve.threshold_us[0] == 100.0
