@@ -9,6 +9,12 @@ from fes_pin.data.schema import rigs_from
 
 if TYPE_CHECKING:  # the same names for type checkers; a test holds the two together
     from fes_pin.allocation.allocate import allocate as allocate
+    from fes_pin.allocation.allocator import Allocator as Allocator
+    from fes_pin.allocation.attainable_torques import AttainableTorques as AttainableTorques
+    from fes_pin.allocation.horizon import Horizon as Horizon
+    from fes_pin.allocation.horizon import StrengthFatigue as StrengthFatigue
+    from fes_pin.allocation.horizon import invert_lag as invert_lag
+    from fes_pin.allocation.walk import allocate_walk as allocate_walk
     from fes_pin.body.build import Body as Body
     from fes_pin.body.linearize import linearize as linearize
     from fes_pin.body.minimal_sets import minimal_sets as minimal_sets
@@ -41,6 +47,13 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.models.store import save_model as save_model
     from fes_pin.muscles.nerve_inputs import controllability as controllability
     from fes_pin.muscles.nerves import Nerves as Nerves
+    from fes_pin.muscles.recruitment import GompertzRecruitment as GompertzRecruitment
+    from fes_pin.muscles.recruitment import HillRecruitment as HillRecruitment
+    from fes_pin.muscles.recruitment import Hysteresis as Hysteresis
+    from fes_pin.muscles.recruitment import LinearRecruitment as LinearRecruitment
+    from fes_pin.muscles.recruitment import MeasuredRecruitment as MeasuredRecruitment
+    from fes_pin.muscles.recruitment import SaturatingRecruitment as SaturatingRecruitment
+    from fes_pin.muscles.recruitment import SigmoidRecruitment as SigmoidRecruitment
     from fes_pin.verdict.ask import diagnose as diagnose
     from fes_pin.view.report import report as report
     from fes_pin.walk.diagnosis import diagnose_walk as diagnose_walk
@@ -82,6 +95,19 @@ _WHERE = {
     "controllability": "fes_pin.muscles.nerve_inputs",
     "allocate": "fes_pin.allocation.allocate",
     "Nerves": "fes_pin.muscles.nerves",
+    "Allocator": "fes_pin.allocation.allocator",
+    "AttainableTorques": "fes_pin.allocation.attainable_torques",
+    "Horizon": "fes_pin.allocation.horizon",
+    "StrengthFatigue": "fes_pin.allocation.horizon",
+    "invert_lag": "fes_pin.allocation.horizon",
+    "allocate_walk": "fes_pin.allocation.walk",
+    "LinearRecruitment": "fes_pin.muscles.recruitment",
+    "SaturatingRecruitment": "fes_pin.muscles.recruitment",
+    "SigmoidRecruitment": "fes_pin.muscles.recruitment",
+    "GompertzRecruitment": "fes_pin.muscles.recruitment",
+    "HillRecruitment": "fes_pin.muscles.recruitment",
+    "MeasuredRecruitment": "fes_pin.muscles.recruitment",
+    "Hysteresis": "fes_pin.muscles.recruitment",
 }
 _CHAPTERS = {"effects": "fes_pin.models.effects", "rigs": "fes_pin.models.rigs"}
 

@@ -23,9 +23,10 @@ def allocate(
     Parameters
     ----------
     torque
-        Wanted joint torque, N m, by joint name (absent: 0) or (joints,).
+        Wanted joint torque, N m, by joint name (absent: 0). An array without names, (joints,), is in the order of
+        `nerves.joints`, which is no body's.
     nerves, q
-        `Nerves` and the posture, or an array (joints, n) of torque at full recruitment, N m.
+        `Nerves` and the posture by joint name, rad; or torque at full recruitment, N m (see `Allocator`).
     previous
         Recruitments in force until now, 0 to 1, by channel or (n,), for `rate` and `change`; 0 by default, whatever was
         asked before.
@@ -77,7 +78,7 @@ def recent(asked: Asked) -> Allocator:
 def frozen(value: Any) -> Any:
     """What tells two arguments apart, hashable: equal values, equal keys."""
     if isinstance(value, np.ndarray):
-        return value.shape, value.dtype.str, value.tobytes()
+        return value.shape, value.dtype.str, value.tobytes(), getattr(value, "names", None)
     if isinstance(value, Mapping):
         return tuple((key, frozen(value[key])) for key in sorted(value, key=str))
     if isinstance(value, (list, tuple)):

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fes_pin.allocation.certificate import Certificate
+from fes_pin.allocation.fixed import Fixed
 from fes_pin.allocation.problem import AllocationProblem
+from fes_pin.data.named import NamedArray
+from fes_pin.data.numbers import known_word
+from fes_pin.data.show import frame, table_html
+
+if TYPE_CHECKING:
+    import pandas
 
 REPORTED_NM = 0.5
 """A shortfall is put in words from this size on, N m."""
@@ -18,9 +25,46 @@ WORTH_NAMING = 0.1
 """A channel is named as a reason if it makes at least this fraction of what the most helpful limited one makes."""
 
 
+class ByName:
+    """What results say by name; they hold a `problem`, pulse widths (..., n) us and torques (..., joints) N m."""
+
+    __slots__ = ()
+    problem: AllocationProblem
+    pulse_width_us: np.ndarray
+    achieved: np.ndarray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Channels."""
+        return self.problem.names
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints."""
+        return self.problem.joints
+
+    def __getitem__(self, channel: str) -> Any:
+        """Pulse width of a channel, us: a number, or (samples,)."""
+        return NamedArray(self.pulse_width_us, self.names)[known_word(channel, self.names, "channel")]
+
+    def torque(self, joint: str) -> Any:
+        """Achieved torque of a joint, N m: a number, or (samples,)."""
+        return NamedArray(self.achieved, self.joints)[known_word(joint, self.joints, "joint")]
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Pulse widths, us, a row each sample, a column each channel, as a frame of pandas; see `data.show.frame`."""
+        return frame(dict(NamedArray(self.pulse_width_us, self.names).items()))
+
+    def _repr_html_(self) -> str:
+        each = zip(self.names, self.pulse_width_us.T, strict=True)
+        rows = [(name, f"{w.min():.0f} to {w.max():.0f} us") for name, w in each]
+        return table_html(f"{len(self.pulse_width_us)} allocations", ("channel", "pulse widths"), rows)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Allocation:
-    """Pulse widths for a wanted torque.
+class Allocation(Fixed, ByName):
+    """Pulse widths for a wanted torque; `allocation["left_femoral"]` is one, `allocation.torque("left_knee_flexion")`
+    what a joint gets. Arrays without names are in the order of `names` and `joints`.
 
     Attributes
     ----------
@@ -55,15 +99,11 @@ class Allocation:
     problem: AllocationProblem
     note: str = ""
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Channels."""
-        return self.problem.names
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joints."""
-        return self.problem.joints
+    def __post_init__(self) -> None:
+        for array in (self.recruitment, self.pulse_width_us, self.wanted, self.achieved, self.gradient):
+            array.setflags(write=False)
+        for array in (self.lower, self.upper, self.previous):
+            array.setflags(write=False)
 
     @property
     def shortfall(self) -> np.ndarray:
@@ -155,6 +195,25 @@ class Allocation:
             return f"more {by_name[i]} is not worth its effort"
         return f"more {by_name[i]} would spoil {self.joints[k].replace('_', ' ')}"
 
+    def to_frame(self) -> pandas.DataFrame:
+        """Pulse width, us, recruitment and what holds it at a limit, a row each channel, as a frame of pandas."""
+        columns = {"channel": self.names, "pulse_width_us": self.pulse_width_us, "recruitment": self.recruitment}
+        return frame({**columns, "limit": [self.limit(i) for i in range(len(self.names))]}, "channel")
+
+    def torques(self) -> pandas.DataFrame:
+        """Torque wanted, achieved, and achieved by the weakest and strongest muscles likely, N m, a row each joint."""
+        least, most = np.sort(self.achieved_band, axis=0)
+        columns = {"joint": self.joints, "wanted": self.wanted, "achieved": self.achieved}
+        return frame({**columns, "least": least, "greatest": most}, "joint")
+
+    def _repr_html_(self) -> str:
+        held = self.active
+        rows = [
+            (name, f"{width:.0f} us", f"{r:.3f}", held.get(name, ""))
+            for name, width, r in zip(self.names, self.pulse_width_us, self.recruitment, strict=True)
+        ]
+        return table_html("Allocation", ("channel", "pulse width", "recruitment", ""), rows, str(self).splitlines()[1:])
+
     def as_dict(self) -> dict[str, Any]:
         """The answer in plain types, by name: pulse widths us, recruitments, torques N m with their band, reasons.
 
@@ -207,17 +266,19 @@ class Allocation:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AllocationSequence:
+class AllocationSequence(Fixed, ByName):
     """Allocations of a torque over time, as arrays.
 
     Attributes
     ----------
-    recruitment, pulse_width_us, gradient
-        (samples, n).
+    recruitment, pulse_width_us
+        (samples, n), in the order of `names`.
     wanted, achieved
-        (samples, joints), N m.
+        (samples, joints), N m, in the order of `joints`.
     residual
         (samples,) recomputed greatest residual of the optimality conditions (see `Certificate`).
+    problem
+        Names, moment arms, weights, prices.
     """
 
     recruitment: np.ndarray

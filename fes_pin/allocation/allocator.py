@@ -11,13 +11,14 @@ from fes_pin.allocation.allocation import Allocation, AllocationSequence
 from fes_pin.allocation.bounded import PRECISE, BoundedProgram, exact, known_solver, solve_by, solve_sequence
 from fes_pin.allocation.certificate import Certifier
 from fes_pin.allocation.efforts import error_then_effort, least_cubes
-from fes_pin.allocation.inputs import recruitments, wanted_torque, wanted_torques
+from fes_pin.allocation.inputs import fractions, wanted_torque, wanted_torques
 from fes_pin.allocation.off_or_enough import best_choice, rounded_to_least
 from fes_pin.allocation.problem import AllocationProblem, Options, problem_of
 from fes_pin.data.errors import InputError
 
 __all__ = ["Allocator"]
 
+PREVIOUS = "previous recruitment"
 SAME = 1e-8
 """Recruitments are exact to this, times the number of channels; see `Certificate.flattest`."""
 
@@ -33,9 +34,11 @@ class Allocator:
     Parameters
     ----------
     nerves
-        `Nerves`, or an array (joints, n) of torque at full recruitment, N m.
+        `Nerves`, or torque at full recruitment, N m: a DataFrame (joints x channels), or an array whose joints are then
+        `joint_1` ... and channels `channel_1` ...
     q, v
-        Posture and, if it moves, its rates, if nerves are given: muscles that shorten pull less (`Nerves`).
+        Posture, rad, and, if it moves, its rates, rad/s, if nerves are given, by joint name: muscles that shorten pull
+        less (`Nerves`). Arrays without names are in the order of `joints`.
     options
         By name, see `fes_pin.allocation.problem.Options`.
 
@@ -46,8 +49,10 @@ class Allocator:
     """
 
     def __init__(self, nerves: Any, q: Any = None, *, v: Any = None, **options: Any) -> None:
-        self.problem: AllocationProblem = problem_of(nerves, q, v, Options.of(options))
-        p = self.problem
+        self._set_up(problem_of(nerves, q, v, Options.of(options)))
+
+    def _set_up(self, p: AllocationProblem) -> None:
+        self.problem = p
         self.certify = Certifier(p)
         self.precise = max(PRECISE, SAME * self.certify.flattest)
         self.squares, self.pull = p.squares, p.pull
@@ -55,6 +60,13 @@ class Allocator:
         self.program = BoundedProgram(self.H)
         self._previous = self.at_rest = np.zeros(p.n)
         self.at_rest.setflags(write=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"problem": self.problem, "previous": self._previous}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._set_up(state["problem"])
+        self.previous = state["previous"]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -73,7 +85,7 @@ class Allocator:
 
     @previous.setter
     def previous(self, values: Any) -> None:
-        self._previous = recruitments(values, self.problem.names)
+        self._previous = fractions(values, self.problem.names, PREVIOUS)
 
     @property
     def n(self) -> int:
@@ -86,7 +98,8 @@ class Allocator:
         Parameters
         ----------
         torque
-            Wanted joint torque, N m, by joint name (absent: 0) or (joints,).
+            Wanted joint torque, N m, by joint name (absent: 0), or (joints,) in the order of `joints`, which is no
+            body's.
         previous
             Recruitments in force until now, 0 to 1, by channel (absent: 0) or (n,), for `rate` and `change`; those of
             the last call by default (`Allocator.previous`). Without `rate` and `change` nothing depends on them.
@@ -107,7 +120,7 @@ class Allocator:
                 raise InputError(f"least recruitments, cubes and lexicographic are solved by daqp, not by {solver!r}")
         before = self._previous if previous is None else previous
         if before is not self._previous and before is not self.at_rest:
-            before = recruitments(before, p.names)
+            before = fractions(before, p.names, PREVIOUS)
         found = self._solve(wanted, before, solver)
         self._previous = found.recruitment
         return found
@@ -198,7 +211,7 @@ class Allocator:
         Parameters
         ----------
         torques
-            (samples, joints), N m.
+            (samples, joints), N m: by name (DataFrame, `NamedArray`, mapping), or in the order of `joints`.
         previous
             Recruitments before the first sample, 0 to 1, by channel or (n,); 0 by default.
 
@@ -212,7 +225,7 @@ class Allocator:
         wanted = wanted_torques(torques, p.joints)
         if not p.plain:
             raise InputError("least recruitments, cubes and lexicographic are allocated one torque at a time")
-        start = np.zeros(p.n) if previous is None else recruitments(previous, p.names)
+        start = np.zeros(p.n) if previous is None else fractions(previous, p.names, PREVIOUS)
         F = wanted @ self.pull
 
         most = float(np.abs(wanted).max(initial=0.0))

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import linprog
 
 from fes_pin.allocation.bounded import BoundedProgram
-from fes_pin.allocation.inputs import torque_matrix
+from fes_pin.allocation.inputs import fractions, torque_matrix
 from fes_pin.allocation.walk import allocate_walk
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import by_name
+from fes_pin.data.numbers import by_name, positive_number, shortened
+from fes_pin.data.show import frame, table_html
+
+if TYPE_CHECKING:
+    import pandas
 
 INSIDE_NM = 1e-6
 """A torque nearer to the set than this counts as inside, N m."""
@@ -56,23 +60,27 @@ class AttainableTorques:
     joints
         Names of the joints that count; all by default.
     upper
-        Greatest recruitment, by name or (n,).
+        Greatest recruitment, 0 to 1, by name or (n,).
 
     Raises
     ------
     InputError
-        Unknown joint, or a matrix that is not finite or out of any body's range.
+        No joint, an unknown or repeated one, a limit that is none, or a matrix that is not finite or out of any body's
+        range.
     """
 
     def __init__(self, nerves: Any, q: Any = None, joints: Sequence[str] | None = None, upper: Any = 1.0) -> None:
-        whole, names = torque_matrix(nerves, q)
-        known = JOINT_NAMES if len(whole) == len(JOINT_NAMES) else tuple(f"joint_{j + 1}" for j in range(len(whole)))
-        self.joints = tuple(joints) if joints is not None else known
+        whole, names, known = torque_matrix(nerves, q)
+        self.joints = known if joints is None else (joints,) if isinstance(joints, str) else tuple(joints)
         unknown = [name for name in self.joints if name not in known]
         if unknown:
             raise InputError(f"unknown joint {unknown[0]!r}; the joints are {', '.join(known)}")
-        self.names, self.upper = names, by_name(upper, names, "upper limits", 1.0)
+        if not self.joints or len(set(self.joints)) < len(self.joints):
+            raise InputError(f"joints must be different names, one or more, got {shortened(self.joints)}")
+        self.names, self.upper = names, fractions(upper, names, "upper limits", 1.0)
         self.columns = whole[[known.index(name) for name in self.joints]] * self.upper
+        for array in (self.upper, self.columns):
+            array.setflags(write=False)
 
     def support(self, direction: Any) -> float:
         """Greatest component of attainable torque along a direction (by joint name or array), times its length, N m."""
@@ -81,6 +89,15 @@ class AttainableTorques:
     def range(self, joint: str) -> tuple[float, float]:
         """Least and greatest torque of one joint, whatever the others do, N m."""
         return -self.support({joint: -1.0}), self.support({joint: 1.0})
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Least and greatest torque, N m, a row each joint, as a frame of pandas; see `data.show.frame`."""
+        least, greatest = zip(*map(self.range, self.joints), strict=True)
+        return frame({"joint": self.joints, "least": least, "greatest": greatest}, "joint")
+
+    def _repr_html_(self) -> str:
+        rows = [(joint, "{:.1f} to {:.1f} N m".format(*self.range(joint))) for joint in self.joints]
+        return table_html(f"Attainable by {len(self.names)} channels", ("joint", "torque"), rows)
 
     def nearest(self, torque: Any) -> Nearest:
         """The attainable torque nearest to one wanted (by joint name, absent 0, or array over those that count)."""
@@ -136,10 +153,18 @@ def gait_share(torques: Any, nerves: Any, q: Any, joints: Sequence[str], toleran
     Parameters
     ----------
     torques, q
-        (samples, 19), N m and rad.
+        (samples, 19), N m and rad, by name or in the order of `JOINT_NAMES`.
     joints
         The joints that count.
+    tolerance_nm
+        Above 0.
+
+    Raises
+    ------
+    InputError
+        Such arrays that do not fit, an unknown joint, a tolerance that is none.
     """
+    positive_number(tolerance_nm, "tolerance_nm")
     weights = by_name({name: 1.0 for name in joints}, JOINT_NAMES, "joints", 0.0)
     walk = allocate_walk(torques, nerves, q, weights=weights, effort=1e-8)
     return float((np.abs(walk.shortfall[:, weights > 0.0]) <= tolerance_nm).all(1).mean())

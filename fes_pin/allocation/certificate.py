@@ -68,12 +68,12 @@ def residuals(
     gradient: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray, curvature: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Primal, dual, complementarity and gap per sample, over the last axis."""
-    below, above, step = r - lower, upper - r, gradient / curvature
+    below, above, step = lower - r, upper - r, gradient / -curvature
     largest = np.maximum.reduce
-    primal = largest(np.maximum(-below, -above), -1)
-    dual = largest(np.abs(np.minimum(np.maximum(-step, -below), above)), -1)
-    products = np.maximum(step * below, -step * above)
-    return np.maximum(primal, 0.0), dual, largest(products, -1), np.add.reduce(products * curvature, -1)
+    primal = largest(np.maximum(below, -above), -1)
+    dual = largest(np.abs(np.minimum(np.maximum(step, below), above)), -1)
+    products = np.maximum(step * below, step * above)
+    return np.maximum(primal, 0.0), dual, largest(products, -1), np.vecdot(products, curvature)
 
 
 class Certifier:

@@ -7,17 +7,23 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.allocation.allocation import ByName
 from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.bounded import known_solver
 from fes_pin.allocation.certificate import NOTHING
+from fes_pin.allocation.fixed import Fixed
 from fes_pin.allocation.horizon_program import NO_ROOM, HorizonProgram
-from fes_pin.allocation.inputs import wanted_torques
-from fes_pin.allocation.problem import within_rate
+from fes_pin.allocation.inputs import fractions, wanted_torques
+from fes_pin.allocation.problem import AllocationProblem, within_rate
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between, positive_number, whole
+from fes_pin.data.numbers import between, numbers, positive_number, shortened, whole
 
 ROUNDED = 1e-13
 """A plan may exceed the rate by so much: its steps are sums, and solvers round; a pulse width by 1e-10 us."""
+STEP_S, LAG_S, FATIGUE_S = (0.002, 1.0), (0.002, 1.0), (0.2, 1000.0)
+"""Ranges of time between pulses (1 to 500 a second), of a muscle's lag (activation rises within 0.01 s and ends within
+some tenths; the paper has 0.05 s), of fatigue and recovery (Riener and others 1996: some ten seconds to minutes). Times
+in ms lie outside."""
 LONGEST = 1000
 """Steps ahead or under way, beyond which a horizon is no horizon: half a minute of pulses."""
 
@@ -37,7 +43,8 @@ class StrengthFatigue:
 
     def __post_init__(self) -> None:
         for name in ("fatigue_s", "recovery_s"):
-            positive_number(getattr(self, name), name, infinite=True)
+            if positive_number(getattr(self, name), name, infinite=True) < np.inf:
+                between(getattr(self, name), *FATIGUE_S, name)
         between(self.least, 0.0, 1.0, "least")
 
     def after(self, left: np.ndarray, act: np.ndarray, step_s: float) -> np.ndarray:
@@ -60,10 +67,20 @@ def invert_lag(
         Time between pulses, and of the lag, s.
     start
         (n,) activation at the beginning; by default that of the first sample.
+
+    Raises
+    ------
+    InputError
+        Times out of `STEP_S` and `LAG_S`, recruitments that are not numbers (samples, n).
     """
+    between(step_s, *STEP_S, "step_s")
+    between(time_constant_s, *LAG_S, "time_constant_s")
+    recruitment = numbers(recruitment, "recruitment")
+    if recruitment.ndim != 2 or not len(recruitment) or not np.isfinite(recruitment).all():
+        raise InputError(f"recruitment must be finite numbers, samples x channels, got shape {recruitment.shape}")
     keep = np.exp(-step_s / time_constant_s)
     act = np.array(recruitment[0] if start is None else start, dtype=float)
-    commands = np.empty_like(np.asarray(recruitment, dtype=float))
+    commands = np.empty_like(recruitment)
     for k, wanted in enumerate(recruitment):
         commands[k] = np.clip((wanted - keep * act) / (1.0 - keep), 0.0, 1.0)
         act = keep * act + (1.0 - keep) * commands[k]
@@ -71,8 +88,9 @@ def invert_lag(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
-    """Stimulation over the horizon; only its first step is meant to be applied.
+class Plan(Fixed, ByName):
+    """Stimulation over the horizon; only its first step is meant to be applied. `plan["left_femoral"]` are the steps of
+    a channel, us, `plan.torque("left_knee_flexion")` those of a joint, N m.
 
     Attributes
     ----------
@@ -86,6 +104,8 @@ class Plan:
         No plan costs less than this one by more (of the cost divided by `scale`).
     iterations, rounds
         Of the interior-point method; guesses at what is active until one was exact, 0 if none was.
+    problem
+        Names, moment arms, weights, prices.
     """
 
     recruitment: np.ndarray
@@ -96,6 +116,7 @@ class Plan:
     gap: float
     iterations: int
     rounds: int
+    problem: AllocationProblem
 
 
 @dataclass
@@ -122,7 +143,8 @@ class Horizon:
     Raises
     ------
     InputError
-        Times not positive, counts that are no whole numbers, least recruitments, cubes or lexicographic.
+        Times out of `STEP_S` and `LAG_S`, counts that are no whole numbers, a fatigue that is none, no Allocator, or
+        one with least recruitments, cubes or lexicographic.
     """
 
     program: Allocator
@@ -135,10 +157,12 @@ class Horizon:
     left: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        for name in ("step_s", "time_constant_s"):
-            positive_number(getattr(self, name), name)
+        between(self.step_s, *STEP_S, "step_s")
+        between(self.time_constant_s, *LAG_S, "time_constant_s")
         self.delay_steps = whole(self.delay_steps, "delay_steps", 0, LONGEST - 1)
         self.steps = whole(self.steps, "steps", 1, LONGEST - 1)
+        if not isinstance(self.fatigue, StrengthFatigue | None):
+            raise InputError(f"must be a StrengthFatigue or None, got {shortened(self.fatigue)}", column="fatigue")
         _check(self.program)
         n = self.program.n
         self.keep = float(np.exp(-self.step_s / self.time_constant_s))
@@ -162,16 +186,19 @@ class Horizon:
         Parameters
         ----------
         torques
-            (steps, joints) N m: wanted at the pulses `delay_steps` + 1 ... `delay_steps` + steps ahead.
+            (steps, joints) N m, by name or in the order of the program's joints: wanted at the pulses `delay_steps` + 1
+            ... `delay_steps` + steps ahead.
         solver
             `piqp`, whose plan is made exact, or any solver that qpsolvers knows (`osqp`, `daqp` ...).
 
         Raises
         ------
         InputError
-            Wrong shape, a torque that is not a number, unknown solver.
+            Wrong shape, a torque that is not a number, unknown solver, a state that is none.
         """
         p = self.program.problem
+        for name in ("act", "left", "before"):
+            fractions(getattr(self, name), p.names, name)
         known_solver(solver, "piqp", "a horizon")
         wanted = wanted_torques(torques, p.joints, f"{self.steps} steps")
         if len(wanted) != self.steps:
@@ -186,7 +213,7 @@ class Horizon:
         primal = float(np.abs(u - found.u).max())
         u, dual, gap = self._at_limits(u, found.y, f, low, high, wanted)
         achieved = (free + self.response @ u) @ self.matrix.T
-        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, found.iterations, found.rounds)
+        return Plan(u, p.curves.pulse_width_us(u), achieved, primal, dual, gap, found.iterations, found.rounds, p)
 
     def _at_limits(
         self, u: np.ndarray, y: np.ndarray, f: np.ndarray, low: np.ndarray, high: np.ndarray, wanted: np.ndarray
@@ -253,12 +280,12 @@ class Horizon:
         plan = self.plan(torques)
         command = plan.recruitment[0]
         acting = self.queue[0] if self.delay_steps else command
+        act = self.keep * self.act + (1.0 - self.keep) * acting
+        left = self.left if self.fatigue is None else self.fatigue.after(self.left, act, self.step_s)
         if self.delay_steps:
             self.queue = np.vstack([self.queue[1:], command])
-        self.act = self.keep * self.act + (1.0 - self.keep) * acting
-        self.before = command
+        self.act, self.before, self.left = act, command, left
         if self.fatigue is not None:
-            self.left = self.fatigue.after(self.left, self.act, self.step_s)
             self._assemble(self.exact)
         return plan
 

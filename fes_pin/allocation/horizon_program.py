@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import piqp
@@ -81,6 +82,12 @@ class HorizonProgram:
         self._stages(V, price, changes, keep, like)
         self._lock = threading.Lock()
         self._solver: piqp.SparseSolver | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in ("_lock", "_solver")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _lock=threading.Lock(), _solver=None)
 
     def _stages(
         self, V: np.ndarray, price: np.ndarray, changes: np.ndarray, keep: float, like: HorizonProgram | None

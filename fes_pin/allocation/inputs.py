@@ -17,8 +17,9 @@ ROUNDED = 1e-9
 """Recruitments that a caller computed may exceed 0 to 1 by so much."""
 
 
-def torque_matrix(nerves: Any, q: Any, v: Any = None) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Torque at full recruitment, (joints, n) N m, of `Nerves` (posture, rates) or as given, and the channels' names.
+def torque_matrix(nerves: Any, q: Any, v: Any = None) -> tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]:
+    """Torque at full recruitment, (joints, n) N m, names of channels and of joints: of `Nerves` (posture, rates), of a
+    DataFrame (joints x channels), or of an array, whose joints and channels are numbered.
 
     Raises
     ------
@@ -26,16 +27,21 @@ def torque_matrix(nerves: Any, q: Any, v: Any = None) -> tuple[np.ndarray, tuple
         Not such a matrix of finite numbers, or numbers out of any body's range.
     """
     if hasattr(nerves, "torque_matrix"):
-        names, matrix = tuple(nerves.names), np.array(nerves.torque_matrix(q, v), dtype=float)
+        names, joints = tuple(nerves.names), tuple(nerves.joints)
+        matrix = np.array(nerves.torque_matrix(q, v), dtype=float)
     else:
         if v is not None:
             raise InputError("a velocity goes with nerves: a torque matrix holds what muscles make at theirs")
         matrix = np.atleast_2d(numbers(nerves, "the torque matrix"))
-        names = tuple(f"channel_{i + 1}" for i in range(matrix.shape[-1]))
+        if hasattr(nerves, "columns"):
+            names, joints = tuple(map(str, nerves.columns)), tuple(map(str, nerves.index))
+        else:
+            names = tuple(f"channel_{i + 1}" for i in range(matrix.shape[-1]))
+            joints = tuple(f"joint_{j + 1}" for j in range(len(matrix)))
     if matrix.ndim != 2 or 0 in matrix.shape:
         raise InputError(f"the torque matrix must be joints x channels, got shape {matrix.shape}")
     in_range(matrix, "the torque matrix")
-    return matrix, names
+    return matrix, names, joints
 
 
 def in_range(matrix: np.ndarray, what: str) -> None:
@@ -56,13 +62,15 @@ def in_range(matrix: np.ndarray, what: str) -> None:
 
 
 def wanted_torque(torque: Any, joints: tuple[str, ...]) -> np.ndarray:
-    """A wanted torque, by name (absent joints: 0) or (joints,), as an array, N m.
+    """A wanted torque, by name (absent joints: 0) or (joints,) in the order of `joints`, as an array, N m.
 
     Raises
     ------
     InputError
-        Not such numbers, or beyond any body's range.
+        Not such numbers, one number for several joints, or beyond any body's range.
     """
+    if len(joints) > 1 and not hasattr(torque, "keys") and np.ndim(torque) == 0:
+        raise InputError(f"one torque for {len(joints)} joints: name its joint, as in {{{joints[0]!r}: -40}}")
     wanted = by_name(torque, joints, "wanted torque", 0.0)
     worst = int(np.abs(wanted).argmax())
     if abs(wanted[worst]) > LARGEST_NM:
@@ -70,32 +78,41 @@ def wanted_torque(torque: Any, joints: tuple[str, ...]) -> np.ndarray:
     return wanted
 
 
-def recruitments(values: Any, names: tuple[str, ...]) -> np.ndarray:
-    """Recruitments in force until now, by name (absent channels: off), one for all or (n,), as an array.
+def fractions(values: Any, names: tuple[str, ...], what: str, default: float = 0.0) -> np.ndarray:
+    """Recruitments or limits of them, by name, one for all or (n,), as an array.
 
     Raises
     ------
     InputError
         Not such numbers, or not within 0 and 1: pulse widths are none.
     """
-    found = by_name(values, names, "previous recruitment", 0.0)
+    found = by_name(values, names, what, default)
     inside = np.clip(found, 0.0, 1.0)
     wrong = np.abs(found - inside) > ROUNDED
     if wrong.any():
         i = int(np.argmax(wrong))
         must = "must lie between 0 and 1 (a recruitment, not a pulse width)"
-        raise InputError(f"previous recruitment of {names[i]} {must}, got {found[i]:g}")
+        raise InputError(f"{what} of {names[i]} {must}, got {found[i]:g}")
     return inside
 
 
 def wanted_torques(torques: Any, joints: tuple[str, ...], what: str = "samples") -> np.ndarray:
-    """Wanted torques over time, (samples, joints) N m.
+    """Wanted torques over time, (samples, joints) N m: columns by name (mapping, DataFrame, `NamedArray`; absent joints
+    get 0), or an array whose columns are in the order of `joints`.
 
     Raises
     ------
     InputError
         Not such numbers, or beyond any body's range.
     """
+    if hasattr(torques, "keys"):
+        columns = dict(torques.items())
+        by_name(dict.fromkeys(columns, 0.0), joints, "wanted torques", 0.0)
+        given = numbers(list(columns.values()), "wanted torques")
+        if given.ndim != 2:
+            raise InputError(f"wanted torques by name must be {what} each, got an array of shape {given.shape}")
+        torques = np.zeros((given.shape[1], len(joints)))
+        torques[:, [joints.index(name) for name in columns]] = given.T
     wanted = numbers(torques, "wanted torques")
     if wanted.ndim != 2 or wanted.shape[1] != len(joints):
         raise InputError(f"torques must be {what} x {len(joints)}, got shape {wanted.shape}")

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.allocation.inputs import torque_matrix
-from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.allocation.fixed import Fixed
+from fes_pin.allocation.inputs import fractions, torque_matrix
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between, by_name, positive_number
+from fes_pin.data.numbers import between, by_name, positive_number, shortened
 from fes_pin.muscles.recruitment import ChannelRecruitment, LinearRecruitment
 
 EFFORT = 1e-4
@@ -29,7 +29,7 @@ EPSILON = float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class Options:
-    """What an `Allocator` may be told.
+    """What an `Allocator` may be told; what does not need the channels is checked here.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Options:
         With `least`: only round the answer without it, cheaply; else stop the search after this time. The allocation's
         `gap` says how much better another choice could be.
     rate
-        Greatest change of a recruitment from one call to the next.
+        Greatest change of a recruitment from one call to the next, up to 1, or infinite.
     dead
         Names of channels that do not answer.
     """
@@ -81,7 +81,7 @@ class Options:
         Raises
         ------
         InputError
-            Unknown name.
+            Unknown name, or a value out of range.
         """
         known = [item.name for item in fields(cls)]
         for name in given:
@@ -89,9 +89,25 @@ class Options:
                 raise InputError(f"an allocation has no option {name!r}; there are {', '.join(known)}")
         return cls(**given)
 
+    def __post_init__(self) -> None:
+        for name in ("lexicographic", "rounding"):
+            if not isinstance(getattr(self, name), bool | np.bool_):
+                raise InputError(f"must be True or False, got {shortened(getattr(self, name))}", column=name)
+        kinds = ("squares", "cubes", "fatigue")
+        if self.effort_kind not in kinds:
+            raise InputError(f"effort_kind must be one of {', '.join(kinds)}, got {self.effort_kind!r}")
+        if self.effort_kind == "cubes" and self.lexicographic:
+            raise InputError("lexicographic goes with effort squares or fatigue, not with cubes")
+        if self.least is not None and (self.effort_kind == "cubes" or self.lexicographic):
+            raise InputError("least recruitments go with effort squares or fatigue, not with cubes or lexicographic")
+        if positive_number(self.rate, "rate", infinite=True) < np.inf:
+            between(self.rate, 0.0, 1.0, "rate (of recruitment, not of pulse width)")
+        positive_number(self.seconds, "seconds", infinite=True)
+        between(self.change, 0.0, LARGEST_PRICE, "change")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AllocationProblem:
+class AllocationProblem(Fixed):
     """The program of an allocation with its numbers checked; nothing in it changes.
 
         min over r of sum w (R r - torque)^2 / 2 + effort + change / 2 |r - previous|^2,  lower <= r <= upper
@@ -187,30 +203,17 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> AllocationProbl
     InputError
         Anything that `Options` or the matrix must not be.
     """
-    nominal, names = torque_matrix(nerves, q, v)
+    nominal, names, joints = torque_matrix(nerves, q, v)
     named = hasattr(nerves, "torque_matrix")
-    n, count = len(names), len(nominal)
-    joints = JOINT_NAMES if count == len(JOINT_NAMES) else tuple(f"joint_{j + 1}" for j in range(count))
+    n = len(names)
     curve = LinearRecruitment() if options.recruitment is None else options.recruitment
     lower, upper, least = recruitment_limits(options, names)
     weights = checked_weights(options.weights, joints)
-    kinds = ("squares", "cubes", "fatigue")
-    if options.effort_kind not in kinds:
-        raise InputError(f"effort_kind must be one of {', '.join(kinds)}, got {options.effort_kind!r}")
-    cubes, lexicographic = options.effort_kind == "cubes", bool(options.lexicographic)
-    if cubes and lexicographic:
-        raise InputError("lexicographic goes with effort squares or fatigue, not with cubes")
-    if least is not None and (cubes or lexicographic):
-        raise InputError("least recruitments go with effort squares or fatigue, not with cubes or lexicographic")
     prices = checked_prices(options.effort, names)
     if options.effort_kind == "fatigue":
         prices = prices / np.maximum(getattr(nerves, "left_over", np.ones(n)), LEAST_LEFT) ** 2
-    change = between(options.change, 0.0, LARGEST_PRICE, "change")
-    rate, seconds = (positive_number(getattr(options, n), n, infinite=True) for n in ("rate", "seconds"))
     matrix = np.where(upper == 0.0, 0.0, nominal)
     scale = float(np.einsum("ji,j,ji->i", matrix, weights, matrix).max()) or 1.0
-    for array in (nominal, matrix, weights, prices, lower, upper, *(() if least is None else (least,))):
-        array.setflags(write=False)
     return AllocationProblem(
         names=names,
         joints=joints,
@@ -222,12 +225,12 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> AllocationProbl
         lower=lower,
         upper=upper,
         least=least,
-        change=change,
-        rate=rate,
-        cubes=cubes,
-        lexicographic=lexicographic,
+        change=float(options.change),
+        rate=float(options.rate),
+        cubes=options.effort_kind == "cubes",
+        lexicographic=bool(options.lexicographic),
         rounding=bool(options.rounding),
-        seconds=seconds,
+        seconds=float(options.seconds),
         scale=scale,
         held=tuple(nerves.held(q)) if named else (),
         band=nerves.strength_band if named else (1.0, 1.0),
@@ -276,8 +279,8 @@ def recruitment_limits(options: Options, names: tuple[str, ...]) -> tuple[np.nda
         Limits that are not 0 <= lower <= upper <= 1, a least recruitment outside or above the upper limit of a channel
         whose lower limit is not 0, an unknown dead channel.
     """
-    lower = by_name(options.lower, names, "lower limits", 0.0)
-    upper = by_name(options.upper, names, "upper limits", 1.0)
+    lower = fractions(options.lower, names, "lower limits")
+    upper = fractions(options.upper, names, "upper limits", 1.0)
     dead = options.dead
     if not isinstance(dead, Iterable):
         raise InputError(f"dead must be names of channels, got {dead!r:.40}")
@@ -285,15 +288,13 @@ def recruitment_limits(options: Options, names: tuple[str, ...]) -> tuple[np.nda
         if name not in names:
             raise InputError(f"dead channel {name!r} is not one of {', '.join(names)}")
         lower[names.index(name)] = upper[names.index(name)] = 0.0
-    wrong = (lower < 0.0) | (upper > 1.0) | (lower > upper)
+    wrong = lower > upper
     if wrong.any():
         i = int(np.argmax(wrong))
         raise InputError(f"limits of {names[i]} must be 0 <= lower <= upper <= 1, got {lower[i]} and {upper[i]}")
     if options.least is None:
         return lower, upper, None
-    least = by_name(options.least, names, "least recruitment", 0.0)
-    if ((least < 0.0) | (least > 1.0)).any():
-        raise InputError("least recruitment must lie between 0 and 1")
+    least = fractions(options.least, names, "least recruitment")
     never = (lower > 0.0) & (least > upper)
     if never.any():
         i = int(np.argmax(never))

@@ -7,48 +7,29 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.allocation.allocation import Allocation
+from fes_pin.allocation.allocation import Allocation, AllocationSequence
 from fes_pin.allocation.bounded import solve_sequence
 from fes_pin.allocation.certificate import Certifier, residuals
 from fes_pin.allocation.inputs import in_range, wanted_torques
-from fes_pin.allocation.problem import AllocationProblem, Options, problem_of
+from fes_pin.allocation.problem import Options, problem_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import numbers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WalkAllocation:
-    """Allocations along a motion.
+class WalkAllocation(AllocationSequence):
+    """Allocations along a motion; `problem` has the options and the moment arms of the first sample.
 
     Attributes
     ----------
-    recruitment, pulse_width_us
-        (samples, n).
-    wanted, achieved
-        (samples, joints), N m.
-    residual
-        (samples,) greatest residual of the optimality conditions, recomputed from the moment arms.
     matrices
         (samples, joints, n) torque at full recruitment, N m.
-    problem
-        The options; its own moment arms are those of the first sample.
     scale
         (N m)^2, what prices are of along the whole motion.
     """
 
-    recruitment: np.ndarray
-    pulse_width_us: np.ndarray
-    wanted: np.ndarray
-    achieved: np.ndarray
-    residual: np.ndarray
     matrices: np.ndarray
-    problem: AllocationProblem
     scale: float
-
-    @property
-    def shortfall(self) -> np.ndarray:
-        """Wanted minus achieved torque, (samples, joints), N m."""
-        return self.wanted - self.achieved
 
     def at(self, k: int) -> Allocation:
         """Sample k with its reasons in words."""
@@ -68,7 +49,8 @@ def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: A
     Parameters
     ----------
     torques, q, v
-        (samples, joints) N m, rad, and rad/s; without rates muscles pull as at rest.
+        (samples, joints) N m, rad, and rad/s: with names (`NamedArray`), or in the order of `JOINT_NAMES`. Without
+        rates muscles pull as at rest.
     nerves
         `Nerves`, or their matrices (samples, joints, n) (then `q` is not read).
     options
@@ -86,7 +68,7 @@ def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: A
     in_range(matrices, "moment arms along the motion")
     if not named and v is not None:
         raise InputError("a velocity goes with nerves: matrices hold what muscles make at theirs")
-    q0, v0 = (None if a is None or not named else np.asarray(a)[0] for a in (q, v))
+    q0, v0 = (None if a is None or not named or np.ndim(a) < 2 else a[0] for a in (q, v))
     p = problem_of(nerves if named else matrices[0], q0, v0, Options.of(options))
     wanted = wanted_torques(torques, p.joints)
     if len(wanted) != len(matrices):
@@ -106,7 +88,7 @@ def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: A
     gradient = np.einsum("knj,kj->kn", weighed, achieved - wanted) / scale + p.prices * r + p.change * (r - before)
     curvature = np.einsum("kii->ki", H)
     residual = np.maximum.reduce(residuals(gradient, r, p.lower, p.upper, curvature)[:3])
-    return WalkAllocation(r, p.curves.pulse_width_us(r), wanted, achieved, residual, matrices, p, scale)
+    return WalkAllocation(r, p.curves.pulse_width_us(r), wanted, achieved, residual, p, matrices, scale)
 
 
 def clipped(matrix: np.ndarray, torque: np.ndarray) -> np.ndarray:

@@ -96,7 +96,7 @@ def allocate(
     within(saturation_us, 0.0, LONGEST_US, "--saturation-us")
     if threshold_us >= saturation_us:
         raise InputError(f"--threshold-us must lie below --saturation-us, got {threshold_us:g} and {saturation_us:g}")
-    channels = Nerves(tuple(nerve or ()), strength=strength)
+    channels = Nerves(nerve or None, strength=strength)
     if nerves:
         typer.echo(str(channels))
         return

@@ -139,7 +139,7 @@ def nerves(
     if map_to is not None:  # what cannot be written is said before any work
         check_image(map_to)
         outputs.check_file(map_to)
-    chosen = subject_nerves(linear.body, name or (), strength=strength)
+    chosen = subject_nerves(linear.body, name or None, strength=strength)
     inputs = Inputs.of(chosen, linear)
     result = modal_controllability(linear, inputs, horizon)
     lines = [f"{linear}\n{place_of_weight(linear)[1]}\n\n{result}\n"]

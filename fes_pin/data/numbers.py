@@ -143,7 +143,8 @@ def known_word(value: object, allowed: Collection[str], name: str) -> str:
     """
     if not isinstance(value, str) or value not in allowed:
         words = [repr(word) for word in allowed]
-        raise InputError(f"must be {', '.join(words[:-1])} or {words[-1]}, got {shortened(value)}", column=name)
+        some = f"{', '.join(words[:-1])} or {words[-1]}" if words[1:] else words[0]
+        raise InputError(f"must be {some}, got {shortened(value)}", column=name)
     return value
 
 

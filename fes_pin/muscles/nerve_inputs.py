@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from fes_pin.body.build import Body
 from fes_pin.body.controllability import ModalControllability
 from fes_pin.body.controllability import modal_controllability as _controllability
 from fes_pin.body.joints import JOINT_NAMES, SIDES
 from fes_pin.body.linearize import LinearBody
-from fes_pin.muscles.nerves import SUBJECT_HEIGHT, Nerves
+from fes_pin.muscles.nerves import SUBJECT_HEIGHT, Nerves, nerve_names
 
 
-def subject_nerves(body: Body, names: Iterable[str] = (), strength: float | None = None, **options) -> Nerves:
+def subject_nerves(body: Body, names: Iterable[str] | None = None, strength: float | None = None, **options) -> Nerves:
     """The nerves of a body of this size: strength as mass, moment arms as height (1.80 m where it is not known).
 
     Parameters
@@ -20,7 +20,7 @@ def subject_nerves(body: Body, names: Iterable[str] = (), strength: float | None
     body
         Whose nerves.
     names
-        `left_femoral`; `femoral` stands for both sides. All nerves of the table by default.
+        `left_femoral`; `femoral` stands for both sides. None: all nerves of the table.
     strength
         Of a healthy adult's of that size; not given: that of paralysed, stimulated muscle, as everywhere.
     options
@@ -29,13 +29,13 @@ def subject_nerves(body: Body, names: Iterable[str] = (), strength: float | None
     Raises
     ------
     InputError
-        Unknown nerve.
+        No nerve, or an unknown one.
     """
-    known = set(Nerves().names)
+    known = Nerves().names
     wanted: list[str] = []
-    for name in [names] if isinstance(names, str) else names:
+    for name in known if names is None else nerve_names(names):
         both = [f"{side}_{name}" for side in SIDES]
-        wanted += both if known.issuperset(both) else [name]
+        wanted += both if set(known).issuperset(both) else [name]
     height = body.height_m or SUBJECT_HEIGHT
     return Nerves.of_subject(body.mass_kg, height, tuple(dict.fromkeys(wanted)), strength, **options)
 
@@ -49,15 +49,17 @@ def controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> ModalCo
         From `linearize`.
     inputs
         Names of nerves (`left_femoral`, or `femoral` for both sides), of joints with a motor, `Nerves` or `Inputs`.
+        Several names may come in any collection.
     horizon
         Time allowed to bring a mode back, s.
 
     Raises
     ------
     InputError
-        Unknown nerve or joint.
+        No name, or that of no nerve and no joint.
     """
-    names = [inputs] if isinstance(inputs, str) else inputs
-    if isinstance(names, list | tuple) and names and not set(names) <= set(JOINT_NAMES):
-        inputs = subject_nerves(linear.body, names)
+    if isinstance(inputs, Iterable) and not isinstance(inputs, Mapping):
+        inputs = nerve_names(inputs)
+        if not set(inputs) <= set(JOINT_NAMES):
+            inputs = subject_nerves(linear.body, inputs)
     return _controllability(linear, inputs, horizon)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between
+from fes_pin.data.numbers import between, shortened
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.muscles.muscles import MuscleTable, angles_of, standard_muscles
 
 STRENGTH_FACTOR = 1.8
@@ -27,14 +28,31 @@ SUBJECT_MASS, SUBJECT_HEIGHT = 72.6, 1.80
 """The adult whose legs the table describes, kg and m."""
 
 
+def nerve_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Names that are given as one or several, as a tuple; those of a set by the alphabet.
+
+    Raises
+    ------
+    InputError
+        None is given, or something else.
+    """
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        names = (names,)
+    found = tuple(sorted(names, key=str) if isinstance(names, Set) else names)
+    if not found or not all(isinstance(name, str) for name in found):
+        what = "none is named" if not found else f"got {shortened(names)}"
+        raise InputError(f"nerves are given by their names, and {what}")
+    return found
+
+
 @dataclass(frozen=True)
-class Nerves:
+class Nerves(ReadOnly):
     """A choice of nerves (or of single muscles): the channels of a stimulator.
 
     Parameters
     ----------
     names
-        One per channel, with its side: `left_femoral`. All nerves of the table by default; also single muscles
+        One per channel, at least one, with its side: `left_femoral`. None: all nerves of the table. Also single muscles
         by their name in the table (`right_soleus`), as an intramuscular electrode reaches them.
     strength
         Factor on all strengths: 1 is the healthy young man of the table. Not given: `PARALYSED`, and the band is
@@ -51,7 +69,7 @@ class Nerves:
     Raises
     ------
     InputError
-        Unknown or repeated name, strength, length or size of no body, fatigue outside [0, 1].
+        No name, an unknown or repeated one, strength, length or size of no body, fatigue outside [0, 1].
 
     Examples
     --------
@@ -59,20 +77,20 @@ class Nerves:
     (19, 2)
     """
 
-    names: tuple[str, ...] = ()
+    names: tuple[str, ...] = None  # type: ignore[assignment]  # a tuple of names once it is built
     strength: float | None = None
     length: float = 1.0
     force_length: bool = True
-    fatigue: dict[str, float] = field(default_factory=dict)
+    fatigue: Mapping[str, float] = field(default_factory=dict)
     size: float = 1.0
     members: np.ndarray = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         table = standard_muscles()
         known = tuple(dict.fromkeys(table.nerves))
-        if not isinstance(self.names, Iterable) or not isinstance(self.fatigue, Mapping):
-            raise InputError("nerves are given by their names, and fatigue by what is left of each by name")
-        names = (self.names,) if isinstance(self.names, str) else tuple(self.names) or known
+        if not isinstance(self.fatigue, Mapping):
+            raise InputError("fatigue is given by what is left of each nerve by name")
+        names = known if self.names is None else nerve_names(self.names)
         for name in names:
             if name not in known and name not in table.names:
                 raise InputError(f"unknown nerve {name!r}; the nerves are {', '.join(known)}")
@@ -90,6 +108,9 @@ class Nerves:
         )
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "members", members.astype(float))
+        if not isinstance(self.force_length, bool | np.bool_):
+            raise InputError(f"must be True or False, got {shortened(self.force_length)}", column="force_length")
+        self._freeze()
 
     def __hash__(self) -> int:
         left = tuple(sorted(self.fatigue.items()))
@@ -97,7 +118,12 @@ class Nerves:
 
     @classmethod
     def of_subject(
-        cls, mass_kg: float, height_m: float, names: Iterable[str] = (), strength: float | None = None, **options
+        cls,
+        mass_kg: float,
+        height_m: float,
+        names: Iterable[str] | None = None,
+        strength: float | None = None,
+        **options,
     ) -> Nerves:
         """Nerves of an adult of other size: strength as mass, arms as height.
 
@@ -117,12 +143,12 @@ class Nerves:
         """
         size = between(mass_kg, 0.0, STRONGEST * SUBJECT_MASS, "mass_kg") / SUBJECT_MASS
         length = between(height_m, SHORTEST * SUBJECT_HEIGHT, LONGEST * SUBJECT_HEIGHT, "height_m") / SUBJECT_HEIGHT
-        return cls(tuple(names), strength=strength, length=length, size=size, **options)
+        return cls(names, strength=strength, length=length, size=size, **options)  # type: ignore[arg-type]
 
     @classmethod
     def muscles(cls, *nerves: str, **options) -> Nerves:
         """Every single muscle of the given nerves (all of them by default) as a channel of its own."""
-        wanted = cls(nerves).names
+        wanted = (cls(nerves) if nerves else cls()).names
         table = standard_muscles()
         return cls(tuple(m for m, n in zip(table.names, table.nerves, strict=True) if n in wanted), **options)
 
@@ -130,6 +156,11 @@ class Nerves:
     def table(self) -> MuscleTable:
         """The muscles behind the names."""
         return standard_muscles()
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The 19 joints in the order of the torque matrix: that of arrays without names, and of no body's."""
+        return JOINT_NAMES
 
     @property
     def n(self) -> int:
@@ -154,8 +185,17 @@ class Nerves:
         return 1.0 / STRENGTH_FACTOR, STRENGTH_FACTOR
 
     def select(self, names: Iterable[str]) -> Nerves:
-        """The same subject with only these nerves."""
-        names = tuple(names)
+        """The same subject with only these of its nerves.
+
+        Raises
+        ------
+        InputError
+            No name, or one that is not among these nerves.
+        """
+        names = nerve_names(names)
+        for name in names:
+            if name not in self.names:
+                raise InputError(f"{name!r} is not among the nerves {', '.join(self.names)}")
         return replace(self, names=names, fatigue={k: v for k, v in self.fatigue.items() if k in names})
 
     def tired(self, **left: float) -> Nerves:

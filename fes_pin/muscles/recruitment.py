@@ -14,6 +14,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, numbers
+from fes_pin.data.read_only import ReadOnly
 
 LONGEST_US = 5000.0
 """Pulse width, us, beyond which no stimulator of nerves goes and recruitment of a nerve has long been complete: nerve
@@ -39,7 +40,7 @@ STRAIGHT_BELOW = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class LinearRecruitment:
+class LinearRecruitment(ReadOnly):
     """Straight from threshold to saturation; the defaults are the paper's (section II: 180 us, 1 ms).
 
     Parameters
@@ -64,8 +65,8 @@ class LinearRecruitment:
             wrong = value[~(np.isfinite(value) & (value >= low) & (value <= high))]
             if wrong.size:
                 raise InputError(f"must lie between {low:g} and {high:g}, got {wrong.flat[0]:g}", column=name)
-            value.setflags(write=False)
             object.__setattr__(self, item.name, value)
+        self._freeze()
         if len({getattr(self, item.name).shape for item in fields(self)} - {()}) > 1:
             raise InputError("arrays of a recruitment curve must have one number per channel each")
         if (self.saturation_us <= self.threshold_us).any():
@@ -248,7 +249,7 @@ class Hysteresis:
         return float(min(max(aim, threshold), saturation))
 
 
-class MeasuredRecruitment:
+class MeasuredRecruitment(ReadOnly):
     """Straight lines between measured points (pulse width, recruitment).
 
     Parameters
@@ -276,9 +277,8 @@ class MeasuredRecruitment:
             raise InputError(
                 f"pulse widths of a recruitment curve end at {LONGEST_US:g} us, got {self.widths_us[-1]:g}"
             )
-        for array in (self.widths_us, self.values):
-            array.setflags(write=False)
         self.threshold_us, self.saturation_us = self.widths_us[0], self.widths_us[-1]
+        self._freeze()
 
     def _values(self) -> tuple:
         return self.widths_us.tobytes(), self.values.tobytes()
@@ -338,6 +338,12 @@ class ChannelRecruitment:
         for curve in self.curves:
             if all(curve is not g and type(curve) is not type(g) for _, g in self.groups):
                 self._group(curve)
+
+    def __eq__(self, other) -> bool:
+        return isinstance(other, ChannelRecruitment) and self.curves == other.curves
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.curves))
 
     def _each(self, name: str) -> np.ndarray:
         values = [np.asarray(getattr(curve, name)) for curve in self.curves]

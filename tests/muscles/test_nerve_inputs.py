@@ -27,6 +27,16 @@ def test_controllability_takes_names():
     assert controllability(linear, ["left_knee_flexion"]).inputs.names == ("left_knee_flexion",)
     assert controllability(linear, "tibial").inputs.n == 2
     assert controllability(linear, subject_nerves(linear.body)).controls_falls
-    for wrong in (["vagus"], ["left_knee_flexion", "femoral"]):
+    for names in ({"femoral"}, (n for n in ["femoral"]), np.array(["femoral"])):
+        assert controllability(linear, names).inputs.names == ("left_femoral", "right_femoral")
+    assert controllability(linear, {"left_knee_flexion"}).inputs.names == ("left_knee_flexion",)
+    for wrong in (["vagus"], ["left_knee_flexion", "femoral"], [], (n for n in ())):
         with pytest.raises(InputError):
             controllability(linear, wrong)
+
+
+def test_a_body_with_no_nerve_named_is_refused_and_none_means_all():
+    body = Body.from_subject(mass_kg=70.0, height_m=1.8)
+    assert subject_nerves(body).names == Nerves().names
+    with pytest.raises(InputError, match="none is named"):
+        subject_nerves(body, [])

@@ -1,8 +1,10 @@
 """The nerve table: signs, mirror, virtual work, agreement with the measured moment arms."""
 
+import copy
 import csv
 import json
 import os
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -306,3 +308,34 @@ def test_measured_postures_are_met_to_the_rounding_of_the_table():
             assert lengths[i] == pytest.approx(float(row["lmt_m"]), abs=2e-5)
             for column, (name, sign) in zip(arms[:, i], names, strict=True):
                 assert column == pytest.approx(sign * float(row.get(f"r_{name}_r_m", 0.0)), abs=5e-5)
+
+
+@pytest.mark.parametrize("none", [[], (), "", {}, iter(())])
+def test_a_selection_of_no_nerve_is_refused_and_not_all_of_them(none):
+    with pytest.raises(InputError, match="nerve"):
+        Nerves(none)
+    with pytest.raises(InputError, match="nerves"):
+        Nerves().select(none)
+
+
+def test_select_takes_only_what_is_there():
+    nerves = Nerves(["left_femoral", "left_tibial"], strength=1.0).tired(left_tibial=0.5)
+    assert nerves.select("left_tibial") == Nerves(["left_tibial"], strength=1.0, fatigue={"left_tibial": 0.5})
+    for names in (["right_femoral"], ["left_femoral", "left_soleus"], ["femoral"], [3]):
+        with pytest.raises(InputError):
+            nerves.select(names)
+    assert nerves.select({"left_tibial", "left_femoral"}).names == ("left_femoral", "left_tibial")
+
+
+def test_nerves_cannot_be_changed_nor_can_copies_of_them():
+    left = {"left_femoral": 0.5}
+    nerves = Nerves(["left_femoral"], fatigue=left)
+    left["left_femoral"] = 7.0
+    for same in (nerves, copy.deepcopy(nerves), pickle.loads(pickle.dumps(nerves))):
+        assert same == nerves and hash(same) == hash(nerves) and same.left_over == [0.5]
+        with pytest.raises(TypeError):
+            same.fatigue["left_femoral"] = 7.0
+        with pytest.raises(ValueError, match="read-only"):
+            same.members[0] = 7.0
+    with pytest.raises(InputError, match="force_length"):
+        Nerves(force_length="no")
