@@ -137,10 +137,12 @@ class Allocator:
         if p.least is not None:
             return self._choose(f, wanted, lower, upper, before)
         if p.cubes:
-            accuracy = self.certify.unseen(float(np.abs(wanted).max()))
-            r, note = least_cubes(self.squares, f, p.prices, p.change, lower, upper, accuracy)
-            return self.result(r, wanted, lower, upper, before, note, accuracy)
-        r = self.program.solve(f, lower, upper) if solver == "daqp" else self._ask(solver, f, lower, upper)
+            r, note = least_cubes(self.squares, f, p.prices, p.change, lower, upper, self.certify.unseen(wanted))
+            return self.result(r, wanted, lower, upper, before, note)
+        if solver == "daqp":
+            r = self.program.solve(f, lower, upper)
+        else:  # it proposes which limits hold; the answer is made exact
+            r = np.clip(solve_by(solver, self.H, f, lower=lower, upper=upper)[0], lower, upper)
 
         def solve(low: np.ndarray, high: np.ndarray) -> np.ndarray:
             return exact(self.H, f, r, low, high)
@@ -158,34 +160,13 @@ class Allocator:
         upper: np.ndarray,
         before: np.ndarray,
         note: str = "",
-        accuracy: float = 0.0,
         solve: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> Allocation:
         """The allocation with its certificate, recomputed from the moment arms."""
-        most = float(np.abs(wanted).max(initial=0.0))
-        r = self.certify.at_limits(before, wanted, r, lower, upper, most, accuracy, solve)
-        certificate, achieved, gradient = self.certify(before, wanted, r, lower, upper, most)
-        width = self.problem.curves.pulse_width_us(r)
-        return Allocation(
-            r,
-            width,
-            wanted,
-            achieved,
-            gradient,
-            lower,
-            upper,
-            before,
-            certificate,
-            certificate.gap,
-            self.problem,
-            note,
-        )
-
-    def _ask(self, solver: str, f: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """Solve through qpsolvers; a limit that a channel's step down its slope would reach is active."""
-        r = np.clip(solve_by(solver, self.H, f, lower=lower, upper=upper)[0], lower, upper)
-        step = r - (self.H @ r + f) / self.H.diagonal()
-        return np.where(step <= lower, lower, np.where(step >= upper, upper, r))
+        r = self.certify.at_limits(before, wanted, r, lower, upper, solve)
+        proof, achieved, gradient = self.certify(before, wanted, r, lower, upper)
+        width, p = self.problem.curves.pulse_width_us(r), self.problem
+        return Allocation(r, width, wanted, achieved, gradient, lower, upper, before, proof, proof.gap, p, note)
 
     def _choose(
         self, f: np.ndarray, wanted: np.ndarray, lower: np.ndarray, upper: np.ndarray, before: np.ndarray
@@ -199,11 +180,10 @@ class Allocator:
             choice = best_choice(self.H, f, lower, upper, p.least, seconds=p.seconds)
         on = choice.r > 0.0
         low, high = np.where(on, np.maximum(lower, p.least), 0.0), np.where(on, upper, 0.0)
-        certificate, achieved, gradient = self.certify(before, wanted, choice.r, low, high)
+        proof, achieved, gradient = self.certify(before, wanted, choice.r, low, high)
         width, note = p.curves.pulse_width_us(choice.r), f"{choice.nodes} choices compared"
-        return Allocation(
-            choice.r, width, wanted, achieved, gradient, lower, upper, before, certificate, choice.gap, p, note
-        )
+        held = lower, upper, before
+        return Allocation(choice.r, width, wanted, achieved, gradient, *held, proof, choice.gap, p, note)
 
     def sequence(self, torques: Any, previous: Any = None) -> AllocationSequence:
         """Allocate a torque over time, samples in order, each starting from the last.
@@ -228,13 +208,9 @@ class Allocator:
         start = np.zeros(p.n) if previous is None else fractions(previous, p.names, PREVIOUS)
         F = wanted @ self.pull
 
-        most = float(np.abs(wanted).max(initial=0.0))
-
         def settle(k: int, r: np.ndarray, before: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
             f = F[k] - p.change * before
-            return self.certify.at_limits(
-                before, wanted[k], r, low, high, most, solve=lambda least, most: exact(self.H, f, r, least, most)
-            )
+            return self.certify.at_limits(before, wanted[k], r, low, high, lambda *held: exact(self.H, f, r, *held))
 
         carried: dict[str, Any] = {"keep": p.change, "rate": p.rate, "previous": start}
         r = solve_sequence(self.H, F, p.lower, p.upper, **carried, precise=self.precise, settle=settle)
@@ -242,7 +218,7 @@ class Allocator:
         lower, upper = p.limits(before)
         if not p.change and p.rate == np.inf:  # else each was settled before the next followed from it
             slack = np.minimum(r - lower, upper - r)
-            for k in np.flatnonzero(self.certify.close(slack, most).any(1)):
+            for k in np.flatnonzero(self.certify.close(slack, wanted).any(1)):
                 r[k] = settle(int(k), r[k], start, lower, upper)
         achieved = r @ p.matrix.T
         residual = self.certify.residual(before, wanted, r, lower, upper)

@@ -128,9 +128,6 @@ class BoundedProgram:
         self._lock, self._bounds = threading.Lock(), (np.zeros(n), np.ones(n))
         self._model = new_model(unit, np.zeros(n), self._bounds[0], self.root)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return BoundedProgram, (self.H,)
-
     def solve(self, f: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
         """DAQP's answer (n,) for a linear term (n,); where it finds none, one within the limits to begin `exact` at."""
         with self._lock:

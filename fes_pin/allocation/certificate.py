@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.allocation.inputs import LARGEST_NM
 from fes_pin.allocation.problem import EPSILON, AllocationProblem
 
 NOTHING = 1e-12
@@ -94,29 +95,28 @@ class Certifier:
         self.change = 0.0 if self.first_only else problem.change
         self.turned = np.ascontiguousarray(problem.matrix.T)
         joints, n = problem.matrix.shape
-        self.squares, prices = np.abs(problem.squares), self.prices + self.change
-        curvature = self.squares.diagonal() + prices
+        prices = self.prices + self.change
+        curvature = problem.squares.diagonal() + prices
         self.curvature = np.where(curvature > 0.0, curvature, 1.0)
         self.flattest = 1.0 if self.first_only else float((prices / self.curvature).min())
         arms = np.abs(problem.matrix) * self.weighed[:, None]
         unit = (joints + n + 4) * EPSILON  # n products in a torque, as many sums over joints, prices and change
         self.unit, self.arms = unit * (arms.T @ np.abs(problem.matrix).sum(1) + prices), unit * arms.sum(0)
         self.paid = problem.prices + problem.change
-        self.hidden, self.free = (
-            (float((self.unit / c).max()), float((self.arms / c).max())) for c in (self.curvature, self.paid)
-        )
+        far = float(((self.unit + self.arms * LARGEST_NM) / self.paid).max())
+        self.farthest = np.inf if problem.cubes else max(far, NOTHING)
 
-    def rounding(self, most: float) -> np.ndarray:
-        """Bound on the rounding error of the gradient (n,) anywhere within the limits, for torques up to `most`, N m.
+    def rounding(self, wanted: np.ndarray) -> np.ndarray:
+        """Bound on the rounding error of the gradient (n,) anywhere within the limits.
 
         A sum of k products errs by k units of rounding of the sum of their sizes at most (Higham 2002, Accuracy and
         Stability of Numerical Algorithms, section 3.1).
         """
-        return self.unit + self.arms * most
+        return self.unit + self.arms * float(np.abs(wanted).max(initial=0.0))
 
-    def unseen(self, most: float) -> float:
+    def unseen(self, wanted: np.ndarray) -> float:
         """Residual up to which rounding of the gradient, or a recruitment that is nothing, hides the optimum."""
-        return max(self.hidden[0] + self.hidden[1] * most, NOTHING)
+        return max(float((self.rounding(wanted) / self.curvature).max()), NOTHING)
 
     def gradient(self, achieved: np.ndarray, wanted: np.ndarray, r: np.ndarray, previous: np.ndarray) -> np.ndarray:
         """Slope of the cost over recruitment, (..., n), at `achieved` (..., joints) N m."""
@@ -138,22 +138,15 @@ class Certifier:
         return cost
 
     def __call__(
-        self,
-        previous: np.ndarray,
-        wanted: np.ndarray,
-        r: np.ndarray,
-        lower: np.ndarray,
-        upper: np.ndarray,
-        most: float | None = None,
+        self, previous: np.ndarray, wanted: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray
     ) -> tuple[Certificate, np.ndarray, np.ndarray]:
-        """Certificate, achieved torque and gradient of one sample whose greatest torque is `most`, if it is known."""
+        """Certificate, achieved torque and gradient of one sample."""
         achieved = r @ self.turned
         gradient = self.gradient(achieved, wanted, r, previous)
         primal, dual, complementarity, gap = residuals(gradient, r, lower, upper, self.curvature)
         cost = self.cost(achieved, wanted, r, previous)
         parts = float(primal), float(dual), float(complementarity), float(gap)
-        most = float(np.abs(wanted).max(initial=0.0)) if most is None else most
-        proof = Certificate(*parts, cost, self.problem.scale, self.flattest, self.unseen(most))
+        proof = Certificate(*parts, cost, self.problem.scale, self.flattest, self.unseen(wanted))
         return proof, achieved, gradient
 
     def residual(
@@ -163,19 +156,15 @@ class Certifier:
         gradient = self.gradient(r @ self.turned, wanted, r, previous)
         return np.maximum.reduce(residuals(gradient, r, lower, upper, self.curvature)[:3])
 
-    def close(self, slack: np.ndarray, most: float, accuracy: float = 0.0) -> np.ndarray:
-        """Which recruitments are so near to a limit that the certificate cannot see it, or that it is nothing."""
-        room = max(self.free[0] + self.free[1] * most, NOTHING)
-        if self.problem.cubes:
-            room = np.inf
-        near = (slack > 0.0) & (slack <= room)
+    def close(self, slack: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        """Which recruitments (..., n) are so near to a limit that the certificate cannot see it, or nothing."""
+        near = (slack > 0.0) & (slack <= self.farthest)
         if not near.any():
             return near
-        rounding = np.maximum(self.rounding(most), accuracy * self.curvature)
-        squares = rounding / self.paid
+        room = self.rounding(wanted) / self.paid
         if self.problem.cubes:
-            squares = np.maximum(squares, np.sqrt(rounding / self.problem.prices))
-        return near & (slack <= np.maximum(squares, NOTHING))
+            room = np.maximum(room, np.sqrt(self.unseen(wanted) * self.curvature / self.problem.prices))
+        return near & (slack <= np.maximum(room, NOTHING))
 
     def at_limits(
         self,
@@ -184,31 +173,24 @@ class Certifier:
         r: np.ndarray,
         lower: np.ndarray,
         upper: np.ndarray,
-        most: float,
-        accuracy: float = 0.0,
         solve: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> np.ndarray:
         """The same recruitments (n,), at their limits where the certificate cannot tell them from these.
 
-        What is within the certificate's own rounding error of a limit, or within `NOTHING`, is at the limit: off is
-        off, not a pulse at threshold. First all at once whose effort is rounding, if the certificate holds without
-        them; else those whose move changes no slope by more than rounding. If some within `NOTHING` do more than that
-        to the others, `solve` gives the optimum between limits that hold them. `most` is the greatest
-        torque, `accuracy` the residual at which an iteration ended, if one did.
+        What is within the certificate's own rounding error of a limit is at the limit, if the certificate holds then;
+        what is within `NOTHING` is in any case: off is off, not a pulse at threshold. What that does to the others is
+        settled by `solve`, which gives the optimum between limits.
         """
         slack = np.minimum(r - lower, upper - r)
-        near = self.close(slack, most, accuracy)
+        near = self.close(slack, wanted)
         if not near.any():
             return r
         limit = np.where(r - lower <= upper - r, lower, upper)
         moved = np.where(near, limit, r)
         before, after = (float(self.residual(previous, wanted, x, lower, upper)) for x in (r, moved))
-        if after <= max(before, self.unseen(most), accuracy):
+        if after <= max(before, self.unseen(wanted)):
             return moved
-        rounding = np.maximum(self.rounding(most), accuracy * self.curvature)
-        turns = len(r) * (self.squares + np.diag(self.prices + self.change))
-        stiff = (slack > 0.0) & (slack * turns <= rounding[:, None]).all(0)
-        r, nothing = np.where(stiff, limit, r), near & ~stiff & (slack <= NOTHING)
+        nothing = near & (slack <= NOTHING)
         if solve is None or not nothing.any():
             return np.where(nothing, limit, r)
         return solve(np.where(nothing, limit, lower), np.where(nothing, limit, upper))

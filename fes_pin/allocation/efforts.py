@@ -17,11 +17,6 @@ PRESSED = 1e-10
 """A limit that the torque error presses on by less than this holds for the sake of effort."""
 
 
-def natural_residual(gradient: np.ndarray, r: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
-    """Greatest `|r - clip(r - gradient)|`."""
-    return float(np.abs(r - np.clip(r - gradient, lower, upper)).max())
-
-
 def least_cubes(
     squares: np.ndarray,
     f: np.ndarray,
@@ -85,7 +80,7 @@ def error_then_effort(
             r = least_norm(squares, f, total, target, guess, (guess > lower) & (guess < upper))
             outside = (r < lower) | (r > upper)
             missed = max(
-                natural_residual(squares @ r + f, r, lower, upper),
+                float(lone_steps(squares @ r + f, r, lower, upper, np.ones(len(f)))),
                 effort_unexplained(squares, f, total, target, r, lower, upper),
             )
             if missed < least:

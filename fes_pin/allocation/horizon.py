@@ -221,7 +221,7 @@ class Horizon:
         """The plan, off where the proof cannot tell it from off, dual residual, gap; see `Certifier.at_limits`."""
         dual, gap = self.proof(u, y, f, low, high)
         certify = self.program.certify
-        rounding = self.steps * certify.rounding(float(np.abs(wanted).max(initial=0.0)))
+        rounding = self.steps * certify.rounding(wanted)
         least, most = low[: self.steps], high[: self.steps]
         limit = np.where(u - least <= most - u, least, most)
         slack = np.abs(u - limit)

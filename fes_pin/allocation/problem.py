@@ -215,16 +215,7 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> AllocationProbl
     matrix = np.where(upper == 0.0, 0.0, nominal)
     scale = float(np.einsum("ji,j,ji->i", matrix, weights, matrix).max()) or 1.0
     return AllocationProblem(
-        names=names,
-        joints=joints,
-        nominal=nominal,
-        matrix=matrix,
-        curves=ChannelRecruitment(curve, n),
-        weights=weights,
-        prices=prices,
-        lower=lower,
-        upper=upper,
-        least=least,
+        *(names, joints, nominal, matrix, ChannelRecruitment(curve, n), weights, prices, lower, upper, least),
         change=float(options.change),
         rate=float(options.rate),
         cubes=options.effort_kind == "cubes",

@@ -39,8 +39,21 @@ STRAIGHT_BELOW = 1e-6
 """Fraction of the way below which a Hill curve is straight, as in the model of the same name."""
 
 
+class _Curve(ReadOnly):
+    """Base of frozen dataclasses whose fields are arrays: equal by value."""
+
+    def _values(self) -> tuple:
+        return type(self), *(getattr(self, f.name).tobytes() for f in fields(self))  # type: ignore[arg-type]
+
+    def __eq__(self, other) -> bool:
+        return isinstance(other, _Curve) and self._values() == other._values()
+
+    def __hash__(self) -> int:
+        return hash(self._values())
+
+
 @dataclass(frozen=True, eq=False)
-class LinearRecruitment(ReadOnly):
+class LinearRecruitment(_Curve):
     """Straight from threshold to saturation; the defaults are the paper's (section II: 180 us, 1 ms).
 
     Parameters
@@ -71,15 +84,6 @@ class LinearRecruitment(ReadOnly):
             raise InputError("arrays of a recruitment curve must have one number per channel each")
         if (self.saturation_us <= self.threshold_us).any():
             raise InputError("a recruitment curve needs threshold_us < saturation_us")
-
-    def _values(self) -> tuple:
-        return type(self), *(getattr(self, f.name).tobytes() for f in fields(self))
-
-    def __eq__(self, other) -> bool:
-        return isinstance(other, LinearRecruitment) and self._values() == other._values()
-
-    def __hash__(self) -> int:
-        return hash(self._values())
 
     def shape(self, x: np.ndarray) -> np.ndarray:
         """Recruitment at the fraction x of the way from threshold to saturation."""
@@ -249,7 +253,8 @@ class Hysteresis:
         return float(min(max(aim, threshold), saturation))
 
 
-class MeasuredRecruitment(ReadOnly):
+@dataclass(frozen=True, eq=False)
+class MeasuredRecruitment(_Curve):
     """Straight lines between measured points (pulse width, recruitment).
 
     Parameters
@@ -263,42 +268,43 @@ class MeasuredRecruitment(ReadOnly):
         The points are not of that kind.
     """
 
-    def __init__(self, pulse_widths_us: Sequence[float], recruitments: Sequence[float]) -> None:
-        self.widths_us = numbers(pulse_widths_us, "pulse widths of a recruitment curve")
-        self.values = numbers(recruitments, "recruitments of a recruitment curve")
-        good = self.widths_us.shape == self.values.shape and self.widths_us.ndim == 1 and len(self.values) >= 2
-        if not good or not (np.diff(self.widths_us) > 0).all() or not (np.diff(self.values) > 0).all():
+    pulse_widths_us: Any
+    recruitments: Any
+
+    def __post_init__(self) -> None:
+        widths = numbers(self.pulse_widths_us, "pulse widths of a recruitment curve")
+        values = numbers(self.recruitments, "recruitments of a recruitment curve")
+        good = widths.shape == values.shape and widths.ndim == 1 and len(values) >= 2
+        if not good or not (np.diff(widths) > 0).all() or not (np.diff(values) > 0).all():
             raise InputError("a measured recruitment curve needs two or more points that rise in both columns")
-        if self.values[0] != 0.0 or self.values[-1] != 1.0 or self.widths_us[0] < 0.0:
+        if values[0] != 0.0 or values[-1] != 1.0 or widths[0] < 0.0:
             raise InputError(
                 "a measured recruitment curve must begin at recruitment 0 and end at 1, with widths from 0"
             )
-        if not self.widths_us[-1] <= LONGEST_US:
-            raise InputError(
-                f"pulse widths of a recruitment curve end at {LONGEST_US:g} us, got {self.widths_us[-1]:g}"
-            )
-        self.threshold_us, self.saturation_us = self.widths_us[0], self.widths_us[-1]
+        if not widths[-1] <= LONGEST_US:
+            raise InputError(f"pulse widths of a recruitment curve end at {LONGEST_US:g} us, got {widths[-1]:g}")
+        vars(self).update(pulse_widths_us=widths, recruitments=values)
         self._freeze()
 
-    def _values(self) -> tuple:
-        return self.widths_us.tobytes(), self.values.tobytes()
+    @property
+    def threshold_us(self) -> float:
+        """The first width, us."""
+        return float(self.pulse_widths_us[0])
 
-    def __eq__(self, other) -> bool:
-        return isinstance(other, MeasuredRecruitment) and self._values() == other._values()
-
-    def __hash__(self) -> int:
-        return hash(self._values())
-
-    def __repr__(self) -> str:
-        return f"MeasuredRecruitment({self.widths_us.tolist()}, {self.values.tolist()})"
+    @property
+    def saturation_us(self) -> float:
+        """The last width, us."""
+        return float(self.pulse_widths_us[-1])
 
     def recruitment(self, pulse_width_us) -> np.ndarray:
         """Recruitment, 0 to 1, at pulse widths in us."""
-        return np.interp(pulse_width_us, self.widths_us, self.values)
+        return np.interp(pulse_width_us, self.pulse_widths_us, self.recruitments)
 
     def pulse_width_us(self, recruitment) -> np.ndarray:
         """Pulse width in us for a recruitment: 0 for 0 and below, saturation for 1 and above."""
-        return np.where(np.asarray(recruitment) > 0.0, np.interp(recruitment, self.values, self.widths_us), 0.0)
+        return np.where(
+            np.asarray(recruitment) > 0.0, np.interp(recruitment, self.recruitments, self.pulse_widths_us), 0.0
+        )
 
 
 class ChannelRecruitment:

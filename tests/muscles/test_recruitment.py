@@ -230,7 +230,7 @@ def test_curves_are_equal_by_value_and_cannot_be_changed():
         with pytest.raises(ValueError, match="read-only"):
             curve.threshold_us[0] = 7.0
     with pytest.raises(ValueError, match="read-only"):
-        MeasuredRecruitment([120, 500], [0, 1]).widths_us[1] = np.inf
+        MeasuredRecruitment([120, 500], [0, 1]).pulse_widths_us[1] = np.inf
     given = np.array([100.0, 120.0])
     curve = LinearRecruitment(given, 500.0)
     given[0] = -7.0
