@@ -14,26 +14,24 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.allocation.allocate import Allocator
-from fes_pin.allocation.horizon import Horizon, invert_lag
-from fes_pin.muscles.recruitment import Hysteresis, LinearRecruitment
+import fes_pin as fp
 
 RATE_HZ, LAG_S, TORQUE_NM, PLAY_US, STEPS = 45.0, 0.05, 0.034 * 60.0, 25.0, 10
-curve = LinearRecruitment(180.0, 1000.0)
+curve = fp.LinearRecruitment(180.0, 1000.0)
 time = np.arange(int(3 * RATE_HZ)) / RATE_HZ
 ahead = np.arange(len(time) + STEPS + 1) / RATE_HZ
 wanted = TORQUE_NM * (0.35 + 0.25 * np.sin(2 * np.pi * 1.2 * ahead) + 0.12 * np.sign(np.sin(2 * np.pi * 0.5 * ahead)))
 keep = np.exp(-1.0 / RATE_HZ / LAG_S)
 
 # %% Four ways to choose recruitment, pulse by pulse; what pulse k makes is seen at pulse k + 1
-program = Allocator([[TORQUE_NM]], recruitment=curve, effort=1e-8)
+program = fp.Allocator([[TORQUE_NM]], recruitment=curve, effort=1e-8)
 static = program.sequence(wanted[1 : len(time) + 1, None]).recruitment[:, 0]
-inverse = invert_lag(static[:, None], 1.0 / RATE_HZ, LAG_S, start=[0.0])[:, 0]
+inverse = fp.invert_lag(static[:, None], 1.0 / RATE_HZ, LAG_S, start=[0.0])[:, 0]
 
 
 def receding(**options):
-    horizon = Horizon(
-        Allocator([[TORQUE_NM]], recruitment=curve, effort=1e-8, **options), 1 / RATE_HZ, LAG_S, steps=STEPS
+    horizon = fp.Horizon(
+        fp.Allocator([[TORQUE_NM]], recruitment=curve, effort=1e-8, **options), 1 / RATE_HZ, LAG_S, steps=STEPS
     )
     plans = [horizon.advance(wanted[k + 1 : k + 1 + STEPS, None]) for k in range(len(time))]
     return np.array([p.recruitment[0, 0] for p in plans]), plans
@@ -52,7 +50,7 @@ ways = {
 
 # %% Simulated with a nerve that has play
 def simulate(recruitment, knows_play):
-    play, act, torque, widths = Hysteresis(curve, PLAY_US), 0.0, [], []
+    play, act, torque, widths = fp.Hysteresis(curve, PLAY_US), 0.0, [], []
     for r in recruitment:
         width = play.pulse_width_us(r) if knows_play else float(curve.pulse_width_us(r))
         act = keep * act + (1 - keep) * play.recruitment(width)

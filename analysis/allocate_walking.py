@@ -19,24 +19,21 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.allocation.allocate import Allocator, allocate
-from fes_pin.allocation.attainable_torques import AttainableTorques
-from fes_pin.allocation.walk import allocate_walk, clipped, direction_error, rescaled
+import fes_pin as fp
+from fes_pin.allocation.walk import clipped, direction_error, rescaled
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.measured_walk import read_walk
 from fes_pin.body.passive import PassiveLegs
-from fes_pin.data.errors import InputError
-from fes_pin.muscles.nerves import HEALTHY, PARALYSED, PARALYSED_BAND, Nerves
-from fes_pin.muscles.recruitment import LinearRecruitment
+from fes_pin.muscles.nerves import HEALTHY, PARALYSED, PARALYSED_BAND
 
 try:
     measured = read_walk()
-except InputError as error:
+except fp.InputError as error:
     print(f"allocate_walking: {error}", file=sys.stderr)
     raise SystemExit(2) from None
 walk = measured.active(PassiveLegs())
 weights = walk.known.astype(float)
-LEG = [n.removeprefix("left_") for n in Nerves().names if n.startswith("left_")]
+LEG = [n.removeprefix("left_") for n in fp.Nerves().names if n.startswith("left_")]
 TRUNK = ("erector_spinae", "abdominals")
 SETS = {
     "peroneal (drop foot)": ["deep_peroneal"],
@@ -73,9 +70,9 @@ results = {}
 for name, nerves in SETS.items():
     row = []
     for strength in STRENGTHS:
-        channels = Nerves(both_sides(nerves), strength=strength)
-        sagittal = allocate_walk(walk.torque, channels, walk.q, walk.rates, weights=sagittal_only)
-        full = allocate_walk(walk.torque, channels, walk.q, walk.rates, weights=weights)
+        channels = fp.Nerves(both_sides(nerves), strength=strength)
+        sagittal = fp.allocate_walk(walk.torque, channels, walk.q, walk.rates, weights=sagittal_only)
+        full = fp.allocate_walk(walk.torque, channels, walk.q, walk.rates, weights=weights)
         assert max(sagittal.residual.max(), full.residual.max()) < 1e-9
         row.append((attained(sagittal, SAGITTAL)[0], attained(full, walk.known_joints)[0]))
         if strength == PARALYSED:
@@ -95,9 +92,9 @@ share = {}
 print(f"{chosen}, all sagittal; columns: {columns}")
 for forces, (over_length, over_speed) in FORCES.items():
     for strength in STRENGTHS:
-        channels = Nerves(both_sides(SETS[chosen]), strength=strength, force_length=over_length)
+        channels = fp.Nerves(both_sides(SETS[chosen]), strength=strength, force_length=over_length)
         rates = walk.rates if over_speed else None
-        found = allocate_walk(walk.torque, channels, walk.q, rates, weights=sagittal_only)
+        found = fp.allocate_walk(walk.torque, channels, walk.q, rates, weights=sagittal_only)
         share[forces, strength] = attained(found, SAGITTAL)[0]
     print(f"{forces:32s}" + "".join(f"{100 * share[forces, strength]:6.0f} %" for strength in STRENGTHS))
 
@@ -107,7 +104,7 @@ for name, nerves in SETS.items():
     cells = []
     for factor in (0.0, 0.5, 1.0, 2.0):
         wanted = measured.active(PassiveLegs(factor)).torque
-        found = allocate_walk(wanted, Nerves(both_sides(nerves)), walk.q, walk.rates, weights=sagittal_only)
+        found = fp.allocate_walk(wanted, fp.Nerves(both_sides(nerves)), walk.q, walk.rates, weights=sagittal_only)
         cells.append(f"{factor:g}: {100 * attained(found, SAGITTAL)[0]:3.0f} %")
         if factor == 0.0:
             alone[name] = attained(found, SAGITTAL)[0]
@@ -143,7 +140,7 @@ for name, (sagittal, _) in results.items():
     print(f"{name:22s} median torque-direction error and rms torque error: {text}")
 
 # %% The ankle rig: the paper's threshold and saturation, one joint, one nerve
-rig = Allocator([[0.034 * 60.0]], recruitment=LinearRecruitment(180.0, 1000.0), effort=1e-9)
+rig = fp.Allocator([[0.034 * 60.0]], recruitment=fp.LinearRecruitment(180.0, 1000.0), effort=1e-9)
 for torque in (0.0, 0.5, 1.5, 2.5):
     print(f"ankle rig, {torque} N m wanted:", str(rig([torque])).replace("\n", "; "))
 
@@ -175,10 +172,10 @@ image = axes[1, 0].pcolormesh(walk.time, np.arange(len(right) + 1), width[:, :-1
 axes[1, 0].set(title="pulse widths (white: off)", xlabel="time (s)", yticks=np.arange(len(right)) + 0.5)
 axes[1, 0].set_yticklabels([names[i].removeprefix("right_").replace("_", "\n") for i in right], fontsize=8)
 figure.colorbar(image, ax=axes[1, 0], label="us")
-outline = AttainableTorques(Nerves(both_sides(SETS[chosen])), walk.q[60]).outline(
+outline = fp.AttainableTorques(fp.Nerves(both_sides(SETS[chosen])), walk.q[60]).outline(
     "right_knee_flexion", "right_ankle_dorsiflexion"
 )
-wide = AttainableTorques(Nerves(both_sides(SETS["every leg nerve"])), walk.q[60]).outline(
+wide = fp.AttainableTorques(fp.Nerves(both_sides(SETS["every leg nerve"])), walk.q[60]).outline(
     "right_knee_flexion", "right_ankle_dorsiflexion"
 )
 axes[1, 1].fill(*wide.T, color="tab:blue", alpha=0.15, label="every leg nerve")
@@ -210,6 +207,6 @@ print(
     f"healthy adult's strength, {weak:.0f} to {strong:.0f} % with what paralysed muscle has, "
     f"{healthy:.0f} % with a healthy adult's; {100 * alone[chosen]:.0f} % if joints give nothing by themselves."
 )
-nerves = Nerves(both_sides(SETS[chosen]))
+nerves = fp.Nerves(both_sides(SETS[chosen]))
 wanted = dict(zip(JOINT_NAMES, walk.torque[60], strict=True))
-print(allocate(wanted, nerves, walk.q[60], v=walk.rates[60], weights=weights))
+print(fp.allocate(wanted, nerves, walk.q[60], v=walk.rates[60], weights=weights))
