@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -77,7 +78,7 @@ class Nerves(ReadOnly):
     (19, 2)
     """
 
-    names: tuple[str, ...] = None  # type: ignore[assignment]  # a tuple of names once it is built
+    names: tuple[str, ...] | Any = None  # a tuple once it is built
     strength: float | None = None
     length: float = 1.0
     force_length: bool = True
@@ -143,7 +144,7 @@ class Nerves(ReadOnly):
         """
         size = between(mass_kg, 0.0, STRONGEST * SUBJECT_MASS, "mass_kg") / SUBJECT_MASS
         length = between(height_m, SHORTEST * SUBJECT_HEIGHT, LONGEST * SUBJECT_HEIGHT, "height_m") / SUBJECT_HEIGHT
-        return cls(names, strength=strength, length=length, size=size, **options)  # type: ignore[arg-type]
+        return cls(names, strength=strength, length=length, size=size, **options)
 
     @classmethod
     def muscles(cls, *nerves: str, **options) -> Nerves:
