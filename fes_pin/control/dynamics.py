@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number, shortened
+from fes_pin.data.numbers import between, number, positive_number, shortened
+from fes_pin.data.tabulated import Tabulated
 from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.ankle import Ankle
@@ -37,8 +38,8 @@ def _frame_of(model: Model) -> dict[str, float]:
     }
 
 
-@dataclass(frozen=True, slots=True)
-class AnkleDynamics:
+@dataclass(frozen=True, eq=False)
+class AnkleDynamics(Tabulated):
     """Eq. (1) as plain numbers: the ankle that a controller believes in, with one load.
 
     Attributes
@@ -63,6 +64,13 @@ class AnkleDynamics:
     frame_coupling: float = 0.0
     frame_hz: float = 0.0
     frame_damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("inertia", "time_constant", "pull_nm"):
+            positive_number(getattr(self, name), name)
+        for name in ("damping", "load_kg", "frame_coupling", "frame_hz", "frame_damping"):
+            between(getattr(self, name), 0.0, math.inf, name)
 
     @classmethod
     def of(cls, model: Model, load_kg: float) -> AnkleDynamics:

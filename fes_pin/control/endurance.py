@@ -17,6 +17,7 @@ import numpy as np
 from fes_pin.control.dynamics import ANGLES_RAD, PULSE_S, AnkleDynamics
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, numbers, whole
+from fes_pin.data.tabulated import Tabulated
 from fes_pin.models.effects.fatigue import FLOOR, Fatigue
 from fes_pin.models.model import Model
 
@@ -31,8 +32,8 @@ LEAD_S = 20.0
 FORECAST_STEP_S = 0.5
 
 
-@dataclass(frozen=True)
-class Budget:
+@dataclass(frozen=True, eq=False)
+class Budget(Tabulated):
     """What a schedule costs.
 
     Attributes
@@ -44,6 +45,13 @@ class Budget:
     time: np.ndarray
     needed: np.ndarray
     capacity: np.ndarray
+
+    along = ("time", "needed", "capacity")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not len(self.time) or not all(np.isfinite(getattr(self, name)).all() for name in self.along):
+            raise InputError("expected one or more finite numbers each", column=", ".join(self.along))
 
     @property
     def short_at_s(self) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S
+from fes_pin.data.tabulated import Tabulated
 
 
 class StimulatedJoint(Protocol):
@@ -24,8 +25,8 @@ class StimulatedJoint(Protocol):
         """Hold a pulse width for a time in s."""
 
 
-@dataclass(frozen=True)
-class Tracking:
+@dataclass(frozen=True, eq=False)
+class Tracking(Tabulated):
     """A closed loop, recorded once per pulse.
 
     Attributes
@@ -43,6 +44,8 @@ class Tracking:
     pulse_width_us: np.ndarray
     share: np.ndarray
     step_s: np.ndarray
+
+    along = ("time", "reference_rad", "angle_rad", "measured_rad", "pulse_width_us", "share", "step_s")
 
     def rms_error_deg(self, start_s: float = 0.0, end_s: float = np.inf) -> float:
         """Root mean square of reference minus true angle, degrees."""

@@ -14,13 +14,14 @@ import numpy as np
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.control.observer import JointObserver
 from fes_pin.control.tuning import Gains, Loop, corners, loop_at
+from fes_pin.data.tabulated import Tabulated
 
 FREQUENCIES = 4000
 """Up to half the pulse rate."""
 
 
-@dataclass(frozen=True)
-class StabilityMargins:
+@dataclass(frozen=True, eq=False)
+class StabilityMargins(Tabulated):
     """How far a stable loop is from instability.
 
     Attributes

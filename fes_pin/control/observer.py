@@ -17,6 +17,7 @@ import scipy.linalg
 
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, PulseToPulse
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import between, positive_number, shortened
 
 GATE = 5.0
 """Standard deviations beyond which a reading says no more than this many: the model may be wrong, or the reading. Which
@@ -64,8 +65,12 @@ class JointObserver:
         share_wander: float = 0.02,
         share_std: float = 0.3,
     ) -> None:
-        if not (angle_std_rad > 0.0 and torque_wander > 0.0 and share_wander >= 0.0 and share_std > 0.0):
-            raise InputError("expected noise of the angle, and of torque and gain, above 0")
+        if not isinstance(dynamics, AnkleDynamics):
+            raise InputError(f"expected AnkleDynamics, found {shortened(dynamics)}", column="dynamics")
+        stds = {"angle_std_rad": angle_std_rad, "torque_wander": torque_wander, "share_std": share_std}
+        for name, value in stds.items():
+            positive_number(value, name)
+        between(share_wander, 0.0, math.inf, "share_wander")
         self.dynamics, self.variance = dynamics, angle_std_rad**2
         self.angle_std_rad = angle_std_rad
         self.pulse = PulseToPulse(dynamics)

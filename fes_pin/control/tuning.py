@@ -14,6 +14,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
@@ -22,6 +23,11 @@ from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.control.given import GivenAnkle, Sampled
 from fes_pin.control.observer import JointObserver
 from fes_pin.data.errors import InputError
+from fes_pin.data.show import frame
+from fes_pin.data.tabulated import Tabulated
+
+if TYPE_CHECKING:
+    import pandas
 
 DEGREE = math.pi / 180.0
 LADDER = (0.5, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05, 0.03)
@@ -36,8 +42,8 @@ ANGLES = 9
 """Angles that gains are computed for."""
 
 
-@dataclass(frozen=True)
-class Gains:
+@dataclass(frozen=True, eq=False)
+class Gains(Tabulated):
     """Feedback of (share times activation, angle, rate) to recruitment, by angle.
 
     Attributes
@@ -60,14 +66,24 @@ class Gains:
     radius: float
     torque_wander: float
 
+    along = ("angles", "table")
+
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_rows", self.table.tolist())
-        object.__setattr__(self, "_ends", (float(self.angles[0]), float(self.angles[-1])))
+        super().__post_init__()
+        if self.table.shape[1:] != (3,) or len(self.angles) < 2 or not (np.diff(self.angles) > 0.0).all():
+            raise InputError("expected two or more rising angles, and three gains for each", column="table")
+        rows, ends = tuple(map(tuple, self.table.tolist())), (float(self.angles[0]), float(self.angles[-1]))
+        vars(self).update(_rows=rows, _ends=ends)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The gains by angle as a frame of pandas, a row an angle."""
+        names = ("of_activation", "of_angle_per_rad", "of_rate_s_per_rad")
+        columns = {n: self.table[:, k] for k, n in enumerate(names)}
+        return frame({"angle_rad": self.angles, **columns}, index="angle_rad")
 
     def at(self, angle: float) -> list[float]:
         """The three gains at an angle, between the table's by straight lines."""
-        rows: list[list[float]] = self._rows  # type: ignore[attr-defined]
-        first, last = self._ends  # type: ignore[attr-defined]
+        rows, (first, last) = vars(self)["_rows"], vars(self)["_ends"]
         place = min(max((angle - first) / (last - first), 0.0), 1.0) * (len(rows) - 1)
         k = min(int(place), len(rows) - 2)
         part = place - k
@@ -138,8 +154,8 @@ def corners(dynamics: AnkleDynamics) -> list[AnkleDynamics]:
     return found
 
 
-@dataclass(frozen=True)
-class Loop:
+@dataclass(frozen=True, eq=False)
+class Loop(Tabulated):
     """The linear loop at one angle: x+ = a x + b r of the truth, of which the sensor sees angle = see x; z+ = own z +
     seen angle and r = law z + direct angle of observer and feedback.
     """

@@ -17,6 +17,7 @@ import scipy.optimize
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, numbers, positive_number
+from fes_pin.data.tabulated import Tabulated
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import GRAVITY
 from fes_pin.paper.ratios import RATIOS, Optimum, RatioProblem, least_error
@@ -28,8 +29,8 @@ START = (np.log(5.0), np.log(2.0))
 """Logarithms of f0 in N and f1 in 1/rad where the search starts; theta_r starts at the smallest angle less 0.3 rad."""
 
 
-@dataclass(frozen=True)
-class Antagonist:
+@dataclass(frozen=True, eq=False)
+class Antagonist(Tabulated):
     """A fitted F_ANT.
 
     Attributes
@@ -45,6 +46,8 @@ class Antagonist:
     values: np.ndarray
     covariance: np.ndarray
     residual: np.ndarray
+
+    along = ("residual",)
 
     def force(self, angle_rad: np.ndarray) -> np.ndarray:
         """F_ANT in N at angles in rad."""

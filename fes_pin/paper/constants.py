@@ -17,7 +17,9 @@ from types import MappingProxyType
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import positive_number
 from fes_pin.data.study import Study
+from fes_pin.data.tabulated import Tabulated
 from fes_pin.data.trial import Trial
 from fes_pin.paper.twin import AnkleTwin, record, staircase
 
@@ -40,8 +42,8 @@ STAIRCASES = (
 """Stimuli of a whole study of one ankle; the first is the paper's trial."""
 
 
-@dataclass(frozen=True)
-class PrintedTrial:
+@dataclass(frozen=True, eq=False)
+class PrintedTrial(Tabulated):
     """What the paper prints of one trial.
 
     Attributes
@@ -92,8 +94,16 @@ ON_FRAME: Mapping[str, Mapping[str, float]] = MappingProxyType(
 
 
 def twin_of_ratios(ratios: Mapping[str, float], load_kg: float) -> AnkleTwin:
-    """An ankle with these k1, k2 and k3: J = l / k2, a = k1 J, xi = k3 J."""
-    inertia = LEVER_M / ratios["k2"]
+    """An ankle with these k1, k2 and k3: J = l / k2, a = k1 J, xi = k3 J.
+
+    Raises
+    ------
+    InputError
+        For ratios that are missing, or none.
+    """
+    if set(ratios) < {"k1", "k2", "k3"}:
+        raise InputError(f"expected k1, k2 and k3, found {', '.join(ratios)}", column="ratios")
+    inertia = LEVER_M / positive_number(ratios["k2"], "k2")
     return AnkleTwin(
         inertia_kgm2=inertia,
         com_distance_m=LEVER_M,

@@ -19,6 +19,9 @@ import numpy as np
 import scipy.stats
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import between, positive_number
+from fes_pin.data.read_only import ReadOnly
+from fes_pin.data.tabulated import Tabulated
 from fes_pin.paper.ratios import RATIOS, REACH, UNITS, Optimum, RatioProblem
 
 LIKELIHOOD_95 = float(scipy.stats.chi2.ppf(0.95, 1))
@@ -30,8 +33,8 @@ CLOSE = 1e-6
 INNER_ITERATIONS = 40
 
 
-@dataclass(frozen=True)
-class Extreme:
+@dataclass(frozen=True, eq=False)
+class Extreme(Tabulated):
     """The end of a path through a domain.
 
     Attributes
@@ -64,6 +67,19 @@ class Extreme:
     def is_optimal(self, tolerance: float = 1e-3) -> bool:
         """True if the optimality conditions hold: on the level, and no free step leads back inside."""
         return self.has_end and self.level_miss <= tolerance and self.gradient_miss <= tolerance
+
+
+def ratio_place(name: str) -> int:
+    """The place of a ratio among k1, k2 and k3.
+
+    Raises
+    ------
+    InputError
+        For another name.
+    """
+    if name not in RATIOS:
+        raise InputError(f"expected one of {', '.join(RATIOS)}, found {name!r}")
+    return RATIOS.index(name)
 
 
 def follow(
@@ -167,8 +183,8 @@ class _Path:
         return x, error if math.isfinite(error) else math.inf
 
 
-@dataclass(frozen=True)
-class ErrorDomain:
+@dataclass(frozen=True, eq=False)
+class ErrorDomain(ReadOnly):
     """All ratios with E at most a level, seen through its extremes.
 
     Attributes
@@ -185,11 +201,11 @@ class ErrorDomain:
 
     def minimum(self, name: str) -> float:
         """Least value of a ratio in the domain; 0 if it has no lower end."""
-        return self.optimum.ratios[name] * math.exp(-self.lowest[name].distance)
+        return self.optimum.ratios[RATIOS[ratio_place(name)]] * math.exp(-self.lowest[name].distance)
 
     def maximum(self, name: str) -> float:
         """Greatest value of a ratio in the domain; infinite if it has no upper end."""
-        return self.optimum.ratios[name] * math.exp(self.highest[name].distance)
+        return self.optimum.ratios[RATIOS[ratio_place(name)]] * math.exp(self.highest[name].distance)
 
     def is_optimal(self) -> bool:
         """True if every extreme that exists meets its optimality conditions."""
@@ -198,7 +214,7 @@ class ErrorDomain:
     def correlation(self, one: str, other: str) -> float:
         """How two ratios go together near the optimum: correlation of their logarithms over the domain."""
         covariance = np.linalg.inv(self.optimum.curvature)
-        i, j = RATIOS.index(one), RATIOS.index(other)
+        i, j = ratio_place(one), ratio_place(other)
         return float(covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j]))
 
     @cached_property
@@ -209,7 +225,9 @@ class ErrorDomain:
 
     def outline(self, one: str, other: str, angles: int = 48, cut: bool = False) -> np.ndarray:
         """The domain's shadow on the plane of two ratios (or its cut through the optimum), shape (angles, 2)."""
-        i, j = RATIOS.index(one), RATIOS.index(other)
+        i, j = ratio_place(one), ratio_place(other)
+        if i == j:
+            raise InputError(f"expected two ratios, found {one} twice")
         (k,) = {0, 1, 2} - {i, j}
         free = np.zeros((3, 0)) if cut else np.eye(3)[:, [k]]
         covariance = np.linalg.inv(self.optimum.curvature)[np.ix_([i, j], [i, j])]
@@ -261,7 +279,7 @@ def error_domain(
 
 def error_holding(problem: RatioProblem, optimum: Optimum, name: str, value: float) -> float:
     """E in percent with one ratio held at a value and the other two made best for it."""
-    k = RATIOS.index(name)
+    k, value = ratio_place(name), positive_number(value, "value")
     ahead = math.log(value) - optimum.x[k]
     path = _Path(problem, optimum, math.copysign(1.0, ahead) * np.eye(3)[k], math.inf, np.delete(np.eye(3), k, axis=1))
     x, error = optimum.x, optimum.error_percent
@@ -276,6 +294,8 @@ def ellipsoid_floor(low: float, best: float, high: float, error_percent: float, 
     An ellipsoidal domain has such a parabola for each ratio's profile, and the profile is at most E at the best point:
     where this is below 0, ends and best point are not those of one ellipsoid.
     """
+    low, high = positive_number(low, "low"), positive_number(high, "high")
+    best = between(best, low, high, "best")
     ends = np.log([low, high])
     place = (math.log(best) - ends.mean()) / (0.5 * np.ptp(ends))
     return float((error_percent - level_percent * place**2) / (1.0 - place**2))
@@ -291,5 +311,6 @@ def profile_intervals(problem: RatioProblem, optimum: Optimum, noise_std: float)
     noise_std
         rad.
     """
+    noise_std = positive_number(noise_std, "noise_std")
     rise = 100.0 * LIKELIHOOD_95 * noise_std**2 / problem.spread
     return error_domain(problem, optimum, optimum.error_percent + rise)

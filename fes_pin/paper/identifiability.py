@@ -10,12 +10,19 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fes_pin.data.errors import InputError
+from fes_pin.data.show import frame
+from fes_pin.data.tabulated import Tabulated
 from fes_pin.data.trial import Trial
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
+
+if TYPE_CHECKING:
+    import pandas
 
 SYMBOLS = {
     "gain": "K",
@@ -33,8 +40,8 @@ UNSEEN = 1e-5
 """Singular value, relative to the largest, below which a direction does not show: far above the differences' error."""
 
 
-@dataclass(frozen=True)
-class Identifiability:
+@dataclass(frozen=True, eq=False)
+class Identifiability(Tabulated):
     """What trials determine.
 
     Attributes
@@ -59,7 +66,7 @@ class Identifiability:
 
         Raises
         ------
-        KeyError
+        InputError
             For a constant that was not moved.
         """
         w = np.zeros(len(self.names))
@@ -67,6 +74,11 @@ class Identifiability:
             w[_index(self.names, name)] = power
         seen = self._seen
         return bool(np.linalg.norm(w - seen.T @ (seen @ w)) <= 1e-4 * np.linalg.norm(w))
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The constants as a frame of pandas, a row a constant: whether the data determine it singly."""
+        single = [self.determines({n: 1.0}) for n in self.names]
+        return frame({"constant": self.names, "determined": single}, index="constant")
 
     def products(self) -> tuple[dict[str, float], ...]:
         """A smallest set of products that the data determine, each by powers."""
@@ -91,6 +103,11 @@ def ankle_identifiability(
     ----------
     names
         Parameters of the model or constants of its rig, all above 0.
+
+    Raises
+    ------
+    InputError
+        For another name.
     """
     base = _readings(model, trials)
     sizes = [float(np.ptp(r)) or 1.0 for r in base]
@@ -109,13 +126,15 @@ def _scaled(model: Model, name: str, factor: float) -> Model:
     if name in model.parameters():
         return model.with_parameters({name: model.parameters()[name] * factor})
     constants = dict(model.rig.constants)
+    if name not in constants:
+        raise InputError(f"no constant {name}; there are {', '.join((*model.parameters(), *constants))}")
     constants[name] *= factor
     return Model(dataclasses.replace(model.rig, constants=constants), model.effects)
 
 
 def _index(names: Sequence[str], name: str) -> int:
     if name not in names:
-        raise KeyError(f"no constant {name}; there are {', '.join(names)}")
+        raise InputError(f"no constant {name}; there are {', '.join(names)}")
     return list(names).index(name)
 
 

@@ -25,6 +25,7 @@ import scipy.stats
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, number, positive_number
+from fes_pin.data.tabulated import Tabulated
 from fes_pin.data.trial import Trial
 
 START_TIME_CONSTANT_S = 0.1
@@ -234,8 +235,8 @@ def _slope(alpha: float, beta: float, dt: float, force_scale: float) -> np.ndarr
     return np.array([[beta / left / (1.0 - alpha), 1.0 / left], [dt / (alpha * math.log(alpha) ** 2), 0.0]])
 
 
-@dataclass(frozen=True)
-class GainHistory:
+@dataclass(frozen=True, eq=False)
+class GainHistory(Tabulated):
     """The estimates over a trial: the paper's figure 3.
 
     Attributes
@@ -256,6 +257,8 @@ class GainHistory:
     time_constant_s: np.ndarray
     time_constant_std_s: np.ndarray
     nis: np.ndarray
+
+    along = ("time", "gain", "gain_std", "time_constant_s", "time_constant_std_s", "nis")
 
     def at(self, time: float) -> tuple[float, float]:
         """K and tau in s, as known at a time in s; after the last sample as known then.

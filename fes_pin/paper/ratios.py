@@ -15,6 +15,8 @@ import numpy as np
 import scipy.optimize
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import shortened, whole
+from fes_pin.data.tabulated import Tabulated
 from fes_pin.data.trial import Trial
 from fes_pin.identify.error_measures import percent_of_spread
 from fes_pin.models.model import Model
@@ -75,6 +77,8 @@ class RatioProblem:
     """
 
     def __init__(self, model: Model, trials: Sequence[Trial], known_gain: float | None = None) -> None:
+        if not isinstance(model, Model):
+            raise InputError(f"expected a model, found {shortened(model)}", column="model")
         if not isinstance(model.rig, Ankle):
             raise InputError(f"k1, k2 and k3 belong to the rig ankle, found {model.rig.name}")
         if not trials or any(t.kind != "motion" for t in trials):
@@ -135,8 +139,8 @@ class RatioProblem:
         return 200.0 / self.spread * (s.T @ s)
 
 
-@dataclass(frozen=True)
-class Optimum:
+@dataclass(frozen=True, eq=False)
+class Optimum(Tabulated):
     """The point of least E.
 
     Attributes
@@ -163,7 +167,14 @@ class Optimum:
 
 
 def least_error(problem: RatioProblem, starts: int = 5, seed: int = 0) -> Optimum:
-    """The ratios of least E, the best of several starts within a factor of two of the problem's own."""
+    """The ratios of least E, the best of one or more starts within a factor of two of the problem's own.
+
+    Raises
+    ------
+    InputError
+        For fewer starts than one.
+    """
+    starts = whole(starts, "starts", least=1)
     rng = np.random.default_rng(seed)
     best = None
     for k in range(starts):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number, positive_number
 from fes_pin.data.trial import Trial
 from fes_pin.paper.equation_1 import antagonist_n, static_torque_nm
 
@@ -46,6 +47,11 @@ class AnkleTwin:
         c' = (1 - c) / recovery - rate act (c - 0.35), force c F_M.
     hysteresis_us
         Half width of the play between pulse width and recruitment.
+
+    Raises
+    ------
+    InputError
+        For what is no finite number; inertia, lever and times that are not above 0; a saturation not above threshold.
     """
 
     inertia_kgm2: float = 1.0e-3
@@ -68,6 +74,14 @@ class AnkleTwin:
     fatigue_per_s: float = 0.0
     recovery_s: float = 60.0
     hysteresis_us: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            number(value, name)
+        for name in ("inertia_kgm2", "com_distance_m", "time_constant_s", "recovery_s"):
+            positive_number(getattr(self, name), name)
+        if not 0.0 <= self.threshold_us < self.saturation_us:
+            raise InputError(f"expected more than the threshold of {self.threshold_us:g} us", column="saturation_us")
 
     def antagonist(self, q: float) -> float:
         """F_ANT in N at an angle in rad."""

@@ -98,11 +98,13 @@ def test_agrees_with_the_batch_fit_of_the_same_trial():
 
 
 def test_missing_samples_are_bridged():
-    trial = isometric(9)
-    force = trial["force_n"].copy()
-    force[np.random.default_rng(0).random(len(force)) < 0.3] = np.nan
-    gain, tau = track_gain(trial.with_columns(force_n=force), CONSTANTS, FORCE_NOISE_N).at(8.0)
+    trial, missing = isometric(9), np.random.default_rng(0).random(1792) < 0.3
+    tracker = GainFilter(trial.dt, StraightRecruitment.of(CONSTANTS), FORCE_NOISE_N)
+    for force, width in zip(np.where(missing, np.nan, trial["force_n"]), trial["pulse_width_us"], strict=True):
+        tracker.step(force, width)
+    gain, tau = tracker.gain_and_time_constant()
     assert gain == pytest.approx(0.65, rel=0.02) and tau == pytest.approx(0.05, rel=0.02)
+    assert tracker.skipped == missing.sum()
 
 
 def test_a_wandering_gain_is_followed():

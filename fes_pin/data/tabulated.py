@@ -1,0 +1,85 @@
+"""Frozen dataclasses of numbers and arrays: read-only, checked, compared by value, shown as tables."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import numbers
+from fes_pin.data.read_only import ReadOnly, as_dicts
+from fes_pin.data.show import frame, table_html
+
+if TYPE_CHECKING:
+    import pandas
+
+
+class Tabulated(ReadOnly):
+    """Base of results that are numbers and arrays; use `dataclass(frozen=True, eq=False)`.
+
+    Attributes
+    ----------
+    along
+        Names of the arrays that share their first axis: the columns of `to_frame`. Those of one axis are copied, and
+        must hold numbers. Without any, the numbers of the result are its one row.
+
+    Raises
+    ------
+    InputError
+        When it is built: arrays along one axis that are of different lengths, or hold no numbers.
+    """
+
+    along: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        for item in dataclasses.fields(self):  # type: ignore[arg-type] # every subclass is a dataclass
+            value = getattr(self, item.name)
+            if item.name in self.along or isinstance(value, np.ndarray):
+                vars(self)[item.name] = numbers(value, item.name)
+        if len({getattr(self, name).shape[:1] for name in self.along} | {()}) > 2 or any(
+            not getattr(self, name).ndim for name in self.along
+        ):
+            raise InputError(f"expected arrays of one length, found others: {', '.join(self.along)}")
+        self._freeze()
+
+    def _values(self) -> dict[str, Any]:
+        return {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}  # type: ignore[arg-type]
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            type(self) is type(other) and self._key() == other._key()
+            if isinstance(other, Tabulated)
+            else NotImplemented
+        )
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> str:
+        shown = {
+            n: (v.shape, v.tolist()) if isinstance(v, np.ndarray) else as_dicts(v) for n, v in self._values().items()
+        }
+        return repr(shown)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The columns that share their first axis, or without any the numbers, as a frame of pandas.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        if self.along:
+            return frame({n: getattr(self, n) for n in self.along})
+        return frame({n: [v] for n, v in self._values().items() if isinstance(v, int | float)})
+
+    def _repr_html_(self) -> str:
+        rows = []
+        for name, value in self._values().items():
+            if isinstance(value, np.ndarray) and value.size:
+                rows.append((name, f"{np.nanmin(value):.4g} to {np.nanmax(value):.4g}, shape {value.shape}"))
+            elif isinstance(value, int | float):
+                rows.append((name, f"{value:.4g}"))
+        return table_html(type(self).__name__, ("quantity", "value"), rows)
