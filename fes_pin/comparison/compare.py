@@ -17,6 +17,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import measured_study, split
+from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.error_measures import percent_of_spread
 from fes_pin.identify.fit import fit_multistart, rough_noise
@@ -85,6 +86,7 @@ def compare(
     if given_s is not None:
         _check_time(given_s, every, "given_s")
     chosen = _chosen(models, extended, nominal, every, library)
+    noted = [*measured.warnings, *check_study(joined, nominal)]
     parts = partings(fitted, held)
     scale, floor = spreads(nominal, every), rough_noise(nominal, every)
     told = []
@@ -101,7 +103,7 @@ def compare(
         by="role" if held else "folds",
         horizon_s=horizon,
         given_s=given_s,
-        warnings=(*measured.warnings, *_warnings(ranked, given_s)),
+        warnings=(*noted, *_warnings(ranked, given_s)),
         wall_s=time.perf_counter() - began,
     )
 

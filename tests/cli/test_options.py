@@ -6,8 +6,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from fes_pin.cli.group import App, needs, python_names, remark
+from fes_pin.cli.group import VOICE, App, needs, python_names, remark
 from fes_pin.cli.main import app
+from fes_pin.cli.progress import progress
 from fes_pin.data.errors import InputError
 
 
@@ -112,6 +113,16 @@ def test_quiet_leaves_the_answer_and_with_out_nothing(talking):
     assert said("-q") == (0, "the answer\n", "")
     assert said("--quiet", "--out", "file") == (0, "", "")
     assert said("-q", "--out", "-") == (0, "the answer\n", "")
+
+
+def test_verbose_says_its_progress_in_lines_where_nobody_watches(capsys):
+    """In a test no person watches standard error."""
+    for voice, lines in ((0, ""), (1, "fes-pin:  50% fitting\n"), (-1, "")):
+        token = VOICE.set(voice)
+        with progress() as tell:
+            tell(0.5, "fitting")
+        VOICE.reset(token)
+        assert capsys.readouterr().err == lines
 
 
 def test_an_error_of_python_names_the_option_that_was_given(talking):

@@ -161,3 +161,16 @@ def test_bad_questions_are_one_line(tmp_path, monkeypatch, capsys, words, said):
 def test_another_rig_is_refused(tmp_path):
     with pytest.raises(InputError, match="muscle or ankle"):
         fp.compare(fp.read_study(studies.joint(tmp_path / "s")))
+
+
+def test_a_comparison_is_held_to_the_guards_of_a_check():
+    study = twins.study("lag", 3)
+    trials = [replace(t, columns={**t.columns, "force_n": -t["force_n"]}) for t in study.trials]
+    found = fp.compare(replace(study, trials=tuple(trials)), ["nominal"])
+    assert any("is its sign turned round" in words for words in found.warnings)
+    still = [
+        t.with_columns(pulse_width_us=0.0 * t.time) if "pulse_width_us" in t else t.with_columns(stim=0.0 * t.time)
+        for t in study.trials
+    ]
+    with pytest.raises(fp.InputError, match="never stimulated"):
+        fp.compare(replace(study, trials=tuple(still)), ["nominal"])
