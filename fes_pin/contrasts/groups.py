@@ -48,7 +48,7 @@ def _labelled(study: Study, by: str) -> Study:
     for trial, label in zip(study.trials, labels, strict=True):
         if label is None:
             message = f"trial {trial.name} has no {by}; expected {expected}"
-            raise InputError(message, file=study.folder / "study.toml", column=by)
+            raise InputError(message, file=study.document, column=by)
     trials = [derived_trial(t, group=label) for t, label in zip(study.trials, labels, strict=True)]
     return replace(study, trials=tuple(trials))
 
@@ -61,14 +61,14 @@ def _joined(before: Study, after: Study) -> Study:
         one, two = before.constants.get(name), after.constants.get(name)
         if one != two:
             message = f"expected the rig of {before.name} with {name} = {one}, found {two}"
-            raise InputError(message, file=after.folder / "study.toml", column=f"rig.{name}")
+            raise InputError(message, file=after.document, column=f"rig.{name}")
     if (before.urdf is None) != (after.urdf is None):
         raise InputError(f"expected the rig of {before.name}: one has a URDF, the other none", file=after.folder)
     if before.urdf is not None and after.urdf is not None and before.urdf.read_bytes() != after.urdf.read_bytes():
         raise InputError(f"expected the URDF of {before.name}, found another", file=after.urdf)
     if set(before.start) != set(after.start):
         odd = sorted(set(before.start) ^ set(after.start))[0]
-        raise InputError(f"expected start.{odd} in both studies, or in none", file=after.folder / "study.toml")
+        raise InputError(f"expected start.{odd} in both studies, or in none", file=after.document)
     names = (before.name, after.name) if before.name != after.name else ("before", "after")
     trials: list[Trial] = []
     for label, study in zip(names, (before, after), strict=True):

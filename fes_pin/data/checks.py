@@ -13,7 +13,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import GROUND_REACTION, REQUIRED, TRANSLATIONS
-from fes_pin.data.schema import NumberKey, RigSchema, is_like, unknown, unread
+from fes_pin.data.schema import ROLES, NumberKey, RigSchema, is_like, one_of, unknown, unread
 from fes_pin.data.table import Fault
 
 KeyFault = Callable[[str, str], InputError]
@@ -53,6 +53,20 @@ def checked_label(value: object, error: KeyFault, key: str = "group", what: str 
     if not (isinstance(value, str) and value.strip() and value.isprintable()):
         raise error(key, f"expected {what}, one line of text")
     return value
+
+
+def checked_role(value: object, error: KeyFault) -> str:
+    """The role of a trial.
+
+    Raises
+    ------
+    InputError
+        Made by `error`, for any other word.
+    """
+    try:
+        return one_of(value, ROLES)
+    except ValueError as problem:
+        raise error("role", str(problem)) from None
 
 
 def checked_remarks(value: object, error: KeyFault) -> tuple[str, ...]:

@@ -19,7 +19,8 @@ class InputError(ValueError):
     def __init__(
         self, message: str, *, file: str | Path | None = None, row: int | None = None, column: str | None = None
     ) -> None:
-        self.message, self.file, self.row, self.column = message, file, row, column
+        self.message, self.row, self.column = message, row, column
+        self.file = None if file == Path() else file  # a study that was made in memory has no folder
         super().__init__(str(self))
 
     def __str__(self) -> str:

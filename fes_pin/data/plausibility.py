@@ -1,9 +1,9 @@
 """What a study's numbers alone say against it, before anything is fitted: refused, or warned of, in one line each.
 
 Refused, as no verdict could follow from it: no stimulus above threshold in any trial, outputs that never change or go
-to and fro between two counts, too few samples, an angle that only degrees explain, a length that only millimetres
-explain, a load that only grams explain, an imposed motion that never moves. Everything else is a warning: the diagnosis
-goes on, and tells it. Trials that are only to be predicted are held to the same list, but for what a fit needs.
+to and fro between two counts, too few samples, a load that only grams explain, an imposed motion that never moves; and
+what `check_trial` refuses of each trial: an angle that only degrees explain. Everything else is a warning, and the
+diagnosis goes on. Trials that are only to be predicted are held to the same list, but for what a fit needs.
 """
 
 from __future__ import annotations
@@ -22,12 +22,11 @@ from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED, RigSchema
 from fes_pin.data.stuck import RUN
 from fes_pin.data.study import Study
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, check_trial
 
 SAMPLES_EACH = 10
 """Samples for each value that is fitted, at least: a standard deviation that is estimated from fewer is itself
 uncertain by more than a quarter (one over the root of twice their number)."""
-TURN = 2.0 * math.pi
 PULSES = ("pulse_width_us", "stim")
 """Inputs without which nothing happens: a muscle contracts where it is stimulated."""
 FEW = 16
@@ -48,8 +47,6 @@ COUNTS = 20
 """Different whole numbers from which on a column of nothing else is a counter's, not a quantity in SI units."""
 SHORTEST, JUMP = 5, 3.0
 """Samples that a dropout stands still for, at least; and by how many of its largest usual steps it then jumps."""
-LONGEST_MUSCLE_M = 1.0
-"""Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
 STILL = 6.0
 """Deviations of its noise that an imposed motion must exceed to count as one."""
 RATE_RATIO = 5.0
@@ -87,6 +84,8 @@ def implausible(study: Study | ToPredict) -> list[str]:
     InputError
         For what no verdict could follow from; see the module.
     """
+    for trial in study.trials if isinstance(study, ToPredict) else ():  # those of a study were checked with it
+        check_trial(trial, study.schema, inputs_only=True, threshold_us=-math.inf)
     _check_rows(study)
     warnings = [*_read(study), *_inputs(study), *_units(study), *_imposed(study)]
     outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
@@ -196,14 +195,7 @@ def _inputs(study: Study | ToPredict) -> Iterable[str]:
 
 
 def _units(study: Study | ToPredict) -> Iterable[str]:
-    """Ranges that another unit would explain; refuses an ankle's angle beyond a turn."""
-    for trial in study.trials:
-        angles = [trial["angle_rad"]] if "angle_rad" in trial else []
-        angles += [np.array([trial.conditions["angle_rad"]])] if "angle_rad" in trial.conditions else []
-        most = max((float(np.abs(a).max()) for a in angles), default=0.0)
-        if most > TURN:
-            message = f"trial {trial.name}: angle_rad reaches {most:.4g}; no ankle turns so far: is it in degrees?"
-            raise InputError(message, file=study.folder, column="angle_rad")
+    """Ranges that another unit would explain."""
     for name, most, unit, small in (("force_n", STRONGEST_N, "N", "mN"), ("torque_nm", STRONGEST_NM, "N m", "mN m")):
         strong = [t.name for t in study.trials if name in t and float(np.abs(t[name]).max()) > most]
         if strong:
@@ -222,23 +214,17 @@ def _units(study: Study | ToPredict) -> Iterable[str]:
 
 
 def _imposed(study: Study | ToPredict) -> Iterable[str]:
-    """What is odd about imposed motions; refuses a length in millimetres, and a motion that never moves."""
+    """What is odd about imposed motions; refuses a motion that never moves."""
     trials = [t for t in study.trials if t.kind == IMPOSED]
     if not trials:
         return
     name = study.schema.imposed[0]
-    longest = max(float(np.abs(t[name]).max()) for t in trials)
-    if name == "length_m" and longest > LONGEST_MUSCLE_M:
-        message = f"length_m reaches {longest:.4g} m; no muscle is so long: is it in mm?"
-        raise InputError(message, file=study.folder, column=name)
-    if name == "length_m" and (short := [t for t in trials if not t[name].min() > 0.0]):
-        message = f"trial {short[0].name}: length_m is {short[0][name].min():.4g} m; expected the whole length, above 0"
-        raise InputError(message, file=study.folder, column=name)
     if isinstance(study, ToPredict):
         return
     motions = [imposed_motion(t, study.schema.imposed) for t in trials]
     ends = [(float(m.values[0].min()), float(m.values[0].max())) for m in motions]
     moved = max(high for _, high in ends) - min(low for low, _ in ends)
+    longest = max(float(np.abs(t[name]).max()) for t in trials)
     if not moved > max(STILL * max(m.doubt[0] for m in motions), 1e-9 * longest):
         message = f"{name} never moves in any imposed trial: nothing but noise of {motions[0].doubt[0]:.2g} is in it"
         raise InputError(message, file=study.folder, column=name)

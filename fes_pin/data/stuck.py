@@ -28,8 +28,6 @@ that sampling follows about 1."""
 FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 SHORTEST = 0.25
 """Share of a trial's longest piece that another must have to be worth a start of its own."""
-OF_THE_START = ("position0", "velocity0")
-"""Conditions that state where a trial begins: of its later pieces they say nothing."""
 FEW = 16
 """Samples below which a piece shows no motion."""
 BY_CHANCE = 1e-3
@@ -140,9 +138,7 @@ def piece(trial: Trial, rows: slice, number: int) -> Trial:
         Of the piece, from 0.
     """
     name = f"{trial.name}_part{number + 1}" if number else trial.name
-    stated = {n: v for n, v in trial.conditions.items() if not rows.start or n not in OF_THE_START}
-    columns = {n: v[rows] for n, v in trial.columns.items()}
-    return derived_trial(trial, name=name, columns=columns, time=trial.time[rows], conditions=stated)
+    return derived_trial(trial.part(rows), name=name)
 
 
 def _said(trial: Trial, name: str, stretches: Sequence[slice]) -> str:

@@ -6,7 +6,7 @@ import hashlib
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
@@ -21,6 +21,7 @@ from fes_pin.data.checks import (
     checked_kind,
     checked_label,
     checked_remarks,
+    checked_role,
     known_constants,
 )
 from fes_pin.data.errors import InputError
@@ -29,14 +30,12 @@ from fes_pin.data.motion import GROUND_REACTION
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.schema import (
-    ROLES,
     NumberKey,
     Rigs,
     RigSchema,
     check_conditions,
     checked_numbers,
     known_rigs,
-    one_of,
     schema_of,
     unknown,
 )
@@ -148,6 +147,45 @@ class Study(ReadOnly):
         if twice := [name for name, count in Counter(t.name for t in trials).items() if count > 1]:
             raise InputError(f"two trials are named {twice[0]!r}; expected a name for each", column="trials")
 
+    @classmethod
+    def from_frames(cls, frames: Mapping[str, Any], about: Any = None, *, rig: str, **fields: Any) -> Study:
+        """A study of frames of pandas, or of mappings of arrays.
+
+        Parameters
+        ----------
+        frames
+            By the trial's name; see `Trial.from_frame`.
+        about
+            By the trial's name a mapping of its `kind` (without it the rig's default), `role`, `group` and conditions,
+            as a `[[trial]]` table gives them; or a frame with a row for each trial, as `to_frame` gives it, of which
+            what is missing, and what is none of these, is passed over.
+        rig, fields
+            As `Study` takes them: name, constants, start, files ...
+
+        Returns
+        -------
+        Study
+
+        Raises
+        ------
+        InputError
+            Something is said about a trial that is not there; or as `Trial` and `Study`.
+        """
+        fields = {"constants": {}, **fields}
+        try:
+            schema = fields.get("described") or schema_of(rig)
+        except ValueError as problem:
+            raise InputError(str(problem), column="rig") from None
+        rows = about or {} if about is None or isinstance(about, Mapping) else _rows(about, schema)
+        if odd := [name for name in rows if name not in frames]:
+            raise InputError(f"expected names of frames, found {odd[0]!r}", column="about")
+        trials = []
+        for name, one in frames.items():
+            row = dict(rows.get(name, {}))
+            labels = {"kind": schema.default_kind, **{n: row.pop(n) for n in ("kind", "role", "group") if n in row}}
+            trials.append(Trial.from_frame(one, name=name, conditions=row, **labels))
+        return cls(rig=rig, trials=tuple(trials), **fields)
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Study) or self is other:
             return self is other
@@ -171,16 +209,13 @@ class Study(ReadOnly):
 
         Empty for a study that was made in memory, but for files that were read for it.
         """
-        out: dict[str, str] = {}
         parts: tuple[Study | Trial, ...] = (self, *self.trials)
+        out = {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in self.files.values()}
         for one in parts:
             if one.as_read is not None:
                 edited = one.as_read.digest != one.digest()
-                out |= {path: EDITED if edited else sha for path, sha in one.as_read.sha256.items()}
-        out |= {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in self.files.values()}
-        names = {path: Path(path) for path in out}
-        near = {p: n.relative_to(self.folder).as_posix() for p, n in names.items() if n.is_relative_to(self.folder)}
-        return {near.get(path, path): sha for path, sha in out.items()}
+                out |= dict.fromkeys(one.as_read.sha256, EDITED) if edited else one.as_read.sha256
+        return {path.removeprefix(f"{self.folder}/"): sha for path, sha in out.items()}
 
     @property
     def schema(self) -> RigSchema:
@@ -191,6 +226,24 @@ class Study(ReadOnly):
     def urdf(self) -> Path | None:
         """The rig's URDF, if the study has one."""
         return self.files.get("urdf")
+
+    @property
+    def document(self) -> Path | None:
+        """Its study.toml, if it was read from one."""
+        return Path(next(iter(self.as_read.sha256))) if self.as_read is not None else None
+
+    def __len__(self) -> int:
+        return len(self.trials)
+
+    def __iter__(self) -> Iterator[Trial]:
+        return iter(self.trials)
+
+    def __getitem__(self, which: str | int) -> Trial:
+        """One trial by its name or its place."""
+        return self.trials[which] if isinstance(which, int) else self.trial(which)
+
+    def __contains__(self, which: object) -> bool:
+        return which in self.trials or any(trial.name == which for trial in self.trials)
 
     def trial(self, name: str) -> Trial:
         """One trial by its name.
@@ -226,11 +279,18 @@ class Study(ReadOnly):
             "trial": [t.name for t in self.trials],
             "kind": [t.kind for t in self.trials],
             "role": [t.role for t in self.trials],
+            "group": [t.group for t in self.trials],
             "samples": [len(t) for t in self.trials],
             "duration_s": [t.duration for t in self.trials],
         }
         given = {n: [t.conditions.get(n, math.nan) for t in self.trials] for n in conditions}
         return frame({**told, **given}, index="trial")
+
+
+def _rows(table: Any, schema: RigSchema) -> dict[str, dict[str, Any]]:
+    """What a frame says about trials, by their name."""
+    known = table[[n for n in table.columns if n in ("kind", "role", "group", *schema.conditions)]]
+    return {str(name): dict(row.dropna()) for name, row in known.iterrows()}
 
 
 def _fault_of(trials: Sequence[Trial]) -> Callable[[int | None, str, str], InputError]:
@@ -342,10 +402,7 @@ class _Reader(StudyTables):
         kind = checked_kind(self.schema, table.get("kind"), error)
         role, group = table.get("role"), table.get("group")
         if role is not None:
-            try:
-                one_of(role, ROLES)
-            except ValueError as problem:
-                raise error("role", str(problem)) from None
+            checked_role(role, error)
         if group is not None:
             checked_label(group, error)
         remarks = checked_remarks(table.get("remarks", ()), error)

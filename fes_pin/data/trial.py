@@ -13,12 +13,12 @@ import numpy as np
 
 from fes_pin.data.as_read import AsRead, digest_of, hashing
 from fes_pin.data.checks import (
-    KeyFault,
     check_columns,
     check_values,
     checked_kind,
     checked_label,
     checked_remarks,
+    checked_role,
 )
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
@@ -27,11 +27,9 @@ from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.hint import NEW_STUDY, read_csv_or_hint
 from fes_pin.data.schema import (
-    ROLES,
     NumberKey,
     RigSchema,
     check_conditions,
-    one_of,
     schema_of,
 )
 from fes_pin.data.show import frame
@@ -39,6 +37,12 @@ from fes_pin.data.table import MIN_ROWS, Table, check_time, check_times, format_
 
 if TYPE_CHECKING:
     import pandas
+
+
+OF_THE_START = ("position0", "velocity0")
+"""Conditions that state where a trial begins: of its later parts they say nothing."""
+BEGAN = "start_s"
+"""The condition that states when a trial began in its session."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -95,7 +99,7 @@ class Trial(ReadOnly):
         checked_label(self.name, error, "name", "a name")
         checked_label(self.kind, error, "kind", "a kind")
         if self.role is not None:
-            _checked("role", self.role, ROLES, error)
+            checked_role(self.role, error)
         if self.group is not None:
             checked_label(self.group, error)
         remarks = checked_remarks(self.remarks, error)
@@ -183,8 +187,34 @@ class Trial(ReadOnly):
             return self
         if count < MIN_ROWS:
             raise InputError(f"expected at least {MIN_ROWS} samples, found {count}", column="count")
-        columns = {n: v[:count] for n, v in self.columns.items()}
-        return derived_trial(self, columns=columns, time=self.time[:count])
+        return self.part(slice(0, count))
+
+    def between(self, start_s: float, end_s: float) -> Trial:
+        """The samples of a stretch of time, both ends among them; the times stay as they are.
+
+        What was stated of its beginning (`position0`, `velocity0`) is lost where that is cut off, and a remark says so:
+        a model of an ankle or a muscle begins at rest.
+
+        Raises
+        ------
+        InputError
+            Fewer than 3 samples lie there.
+        """
+        rows = np.flatnonzero((self.time >= start_s - 1e-6 * self.dt) & (self.time <= end_s + 1e-6 * self.dt))
+        if len(rows) < MIN_ROWS:
+            ends = f"{self.time[0]:g} to {self.time[-1]:g} s"
+            raise self.error(f"expected at least {MIN_ROWS} samples, found {len(rows)} of those from {ends}", "time_s")
+        part = self.part(slice(int(rows[0]), int(rows[-1]) + 1))
+        cut = f"the first {part.time[0] - self.time[0]:.4g} s are cut off"
+        return part if part.time[0] == self.time[0] else derived_trial(part, remarks=(*self.remarks, cut))
+
+    def part(self, rows: slice) -> Trial:
+        """Some rows of the trial; what was stated of its first sample is lost with it."""
+        stated = {n: v for n, v in self.conditions.items() if not rows.start or n not in OF_THE_START}
+        if rows.start and BEGAN in stated:
+            stated[BEGAN] += float(self.time[rows.start] - self.time[0])
+        columns = {n: v[rows] for n, v in self.columns.items()}
+        return derived_trial(self, columns=columns, time=self.time[rows], conditions=stated)
 
     def with_columns(self, **columns: np.ndarray) -> Trial:
         """The same trial with columns added or replaced, each of shape (n,)."""
@@ -226,6 +256,29 @@ class Trial(ReadOnly):
         columns = ", ".join(self.columns)
         role = f", {self.role}" if self.role else ""
         return f"Trial {self.name} ({self.kind}{role}): {len(self)} samples{rate}{conditions}; {columns}"
+
+    @classmethod
+    def from_frame(cls, frame: Any, *, name: str, kind: str, **labels: Any) -> Trial:
+        """A trial of a frame of pandas, or of a mapping of arrays: what `to_frame` gives, back again.
+
+        Parameters
+        ----------
+        frame
+            Columns by their name with its unit; the times as a column `time_s`, or as the index.
+        name, kind, labels
+            As `Trial` takes them: conditions, role, group ...
+
+        Raises
+        ------
+        InputError
+            There are no times; or as `Trial`.
+        """
+        columns = {str(key): values for key, values in frame.items()}
+        index = getattr(frame, "index", None)
+        time = columns.pop("time_s", index if getattr(getattr(index, "dtype", None), "kind", "") == "f" else None)
+        if time is None:
+            raise InputError(f"missing; expected a column of times or an index of them (trial {name})", column="time_s")
+        return cls(name, kind, columns, time, **labels)
 
     def to_frame(self) -> pandas.DataFrame:
         """Every column against `time_s` as a frame of pandas; see `data.show.frame`."""
@@ -347,7 +400,7 @@ def read_trial(
         raise error("rig", str(problem)) from None
     kind = checked_kind(schema, kind, error)
     if role is not None:
-        _checked("role", role, ROLES, error)
+        checked_role(role, error)
     numbers = check_conditions(schema, kind, conditions or {}, error)
     labels: dict[str, Any] = {"name": name or path.stem, "kind": kind, "conditions": numbers}
     labels |= {"role": role, "group": group, "low_pass_hz": low_pass_hz}
@@ -382,13 +435,6 @@ def _checked_columns(
     columns = {name: table.column(name) for name in table.names[1:]}
     check_values(columns, schema, table.error, -math.inf)  # a study with its threshold judges widths
     return columns, table.values[:, 0]
-
-
-def _checked(key: str, value: object, known: tuple[str, ...], error: KeyFault) -> str:
-    try:
-        return one_of(value, known)
-    except ValueError as problem:
-        raise error(key, str(problem)) from None
 
 
 def _body_columns(path: Path, inputs_only: bool) -> tuple[dict[str, np.ndarray], np.ndarray]:

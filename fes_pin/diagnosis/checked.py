@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fes_pin.data.numbers import printed
+from fes_pin.data.show import frame, table_html
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.decide.doubts import few_trials
 from fes_pin.diagnosis.diagnosis import measured_study, split
@@ -15,12 +17,15 @@ from fes_pin.diagnosis.testable import Testable, testable_causes
 from fes_pin.models.catalogue import Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 
+if TYPE_CHECKING:
+    import pandas
+
 FAR = 0.3
 """Share of the variance that a nominal model leaves from which on it is said that it is far off."""
 NOT_JUDGED = "its files can be read; numbers of walking are not judged before a diagnosis"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Checked:
     """What is odd about a study, and what its trials can and cannot show.
 
@@ -51,6 +56,26 @@ class Checked:
         lists = {"absorbed": list(found.absorbed), "silent": list(found.silent), "alike": [*map(list, found.alike)]}
         shown = {name: printed(share, 4) for name, share in found.shown.items()}
         return {**told, "shown": shown, **lists, "unexplained_percent": printed(100.0 * found.unexplained, 4)}
+
+    def to_frame(self) -> pandas.DataFrame:
+        """One row a cause: whether it would show, and the share of its sensitivity that nothing else takes up (0 to 1).
+
+        What is shared by causes that are absorbed or silent is not a number.
+        """
+        found, rows = self.testable, list[tuple[str, str, float]]()
+        if isinstance(found, Testable):
+            rows += [(name, "shown", share) for name, share in found.shown.items()]
+            for word, names in (("absorbed", found.absorbed), ("silent", found.silent)):
+                rows += [(name, word, math.nan) for name in names]
+        names = ("cause", "testable", "share")
+        return frame({name: [row[k] for row in rows] for k, name in enumerate(names)}, index="cause")
+
+    def _repr_html_(self) -> str:
+        first, *notes = str(self).splitlines()
+        return table_html(first, (), (), notes)
+
+    def __repr__(self) -> str:
+        return str(self)
 
     def __str__(self) -> str:
         found, lines = self.testable, [*odd_lines(self.study, self.odd)]
