@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -323,7 +323,14 @@ def _numbers(values: Any, name: str, trial: Trial) -> np.ndarray:
     return array
 
 
-def check_trial(trial: Trial, schema: RigSchema, *, inputs_only: bool = False, threshold_us: float = math.inf) -> None:
+def check_trial(
+    trial: Trial,
+    schema: RigSchema,
+    *,
+    inputs_only: bool = False,
+    threshold_us: float = math.inf,
+    also: Collection[str] = (),
+) -> None:
     """Require of a trial what a rig's schema asks: its kind, conditions, columns, and units that can be.
 
     Parameters
@@ -332,6 +339,8 @@ def check_trial(trial: Trial, schema: RigSchema, *, inputs_only: bool = False, t
         Do not require the measured outputs, to predict them.
     threshold_us
         Of the rig, where it is known: pulse widths above it are in us.
+    also
+        Further columns that it may have.
 
     Raises
     ------
@@ -344,7 +353,7 @@ def check_trial(trial: Trial, schema: RigSchema, *, inputs_only: bool = False, t
 
     kind = checked_kind(schema, trial.kind, error)
     check_conditions(schema, kind, trial.conditions, error)
-    check_columns(tuple(trial.columns), schema, kind, inputs_only, trial.error)
+    check_columns([n for n in trial.columns if n not in also], schema, kind, inputs_only, trial.error)
     if "angle_rad" in trial.conditions:
         check_values({"angle_rad": np.array([trial.conditions["angle_rad"]])}, schema, lambda m, c, _: error(c, m))
     check_values(trial.columns, schema, trial.error, threshold_us)

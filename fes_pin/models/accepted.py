@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
-from fes_pin.data.checks import check_columns, check_values, checked_kind
 from fes_pin.data.errors import InputError
-from fes_pin.data.schema import check_conditions
-from fes_pin.data.trial import Trial
+from fes_pin.data.trial import Trial, check_trial
 from fes_pin.models.model import Model
 
 
 def accepted_trials(model: Model, trials: Trial | Iterable[Trial], inputs_only: bool = True) -> tuple[Trial, ...]:
-    """The trials, if the model's rig can have them; see `fes_pin.data.checks`.
+    """The trials, if the model's rig can have them; see `check_trial`.
 
     Parameters
     ----------
@@ -33,16 +32,10 @@ def accepted_trials(model: Model, trials: Trial | Iterable[Trial], inputs_only: 
     if not given:
         raise InputError("expected at least one trial, found none", column="trials")
     schema, also = model.rig.described(), {n for e in model.effects for n in e.inputs}
+    threshold_us = float(model.rig.constants.get("threshold_us", math.inf))
     for trial in given:
         if not isinstance(trial, Trial):
             raise InputError(f"expected trials, found a {type(trial).__name__}", column="trials")
-
-        def fault(key: str, message: str, trial: Trial = trial) -> InputError:
-            return trial.error(message, key)
-
-        kind = checked_kind(schema, trial.kind, fault)
-        check_columns([n for n in trial.columns if n not in also], schema, kind, inputs_only, trial.error)
-        check_values(trial.columns, schema, trial.error)
-        check_conditions(schema, kind, trial.conditions, fault)
+        check_trial(trial, schema, inputs_only=inputs_only, threshold_us=threshold_us, also=also)
         model.rig.check_prediction(trial)
     return given
