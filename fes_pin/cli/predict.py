@@ -184,8 +184,8 @@ def _along(path: Path, model: Model, trial: Trial, horizon_s: float) -> Trial:
 def _errors(path: Path, measured: Sequence[Trial], found: Sequence[Trial], horizon_s: float | None) -> list[str]:
     """E of each trial whose outputs were measured, and of all of them, in words."""
     from fes_pin.diagnosis.replay import squares_of
-    from fes_pin.identify.error_measures import percent_of_spread
     from fes_pin.identify.stored import load_random
+    from fes_pin.infer.held_out import percent_of_spread
 
     random = load_random(path)
     noise = random if isinstance(random, dict) else {}

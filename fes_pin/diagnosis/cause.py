@@ -10,8 +10,8 @@ from typing import Any
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.results import shown
 from fes_pin.diagnosis.decide.chosen_again import is_chosen
-from fes_pin.diagnosis.decide.held_out import Evidence, Gain, speaks_for
 from fes_pin.identify.fit import Fit
+from fes_pin.infer.held_out import Evidence, Gain, speaks_for
 from fes_pin.infer.levels import CONFIDENCE_95
 
 CELLS = ("value", "std", "unit", "low", "high", "at_bound")

@@ -17,7 +17,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
 from fes_pin.diagnosis.decide.gains_ahead import Fold, gains_of
-from fes_pin.diagnosis.decide.held_out import Evidence, Gain, folds_of
+from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
 from fes_pin.diagnosis.driven_held_out import (
     Again,
@@ -55,6 +55,7 @@ from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_reading
 from fes_pin.identify.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
+from fes_pin.infer.held_out import Evidence, Gain
 from fes_pin.models.stage import Effect
 
 

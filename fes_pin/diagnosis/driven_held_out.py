@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.gains_ahead import Fold
-from fes_pin.diagnosis.decide.held_out import Evidence, folds_of
+from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
 from fes_pin.diagnosis.search.likelihood_models import Found
 from fes_pin.identify.fit import Fit
@@ -17,6 +17,7 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Unknowns, normal_equations
 from fes_pin.identify.scatter import at_rest
 from fes_pin.identify.turns import maximise, together
+from fes_pin.infer.held_out import Evidence
 from fes_pin.workers import in_parallel
 
 WIDE = 10.0

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.diagnosis.decide.claims import FORM_SHARE
-from fes_pin.diagnosis.decide.held_out import Evidence, Gain, speaks_for
 from fes_pin.diagnosis.errors_ahead import RandomPart, are_large, random_parts
 from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.search.likelihood_models import Found
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import WORTH
+from fes_pin.infer.held_out import Evidence, Gain, speaks_for
 from fes_pin.infer.levels import CERTAIN_LEVEL, NOTHING_PERCENT
 
 UNMOVED = "the motion is as likely without the recorded input, so something else moves the rig"

@@ -9,13 +9,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.decide.held_out import Errors
 from fes_pin.identify.ahead import SquaredErrors, forecast_errors, forecasts, one_step, own_noise, reach_of
 from fes_pin.identify.doubts import driving_size
-from fes_pin.identify.error_measures import percent_of_spread
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
+from fes_pin.infer.held_out import Errors, percent_of_spread
 from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import in_parallel

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from fes_pin.data.schema import IMPOSED
-from fes_pin.diagnosis.decide.held_out import held_out_gain
 from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import errors_over_horizon
 from fes_pin.diagnosis.search.cause_sets import Names, names_of
@@ -15,6 +14,7 @@ from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import NominalFitError
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts, step_s
+from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
 

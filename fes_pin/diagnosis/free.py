@@ -11,7 +11,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, share_of
 from fes_pin.diagnosis.decide.doubts import doubts, with_error
-from fes_pin.diagnosis.decide.held_out import HeldOut, cross_validate, errors_of, held_out_gain, separate
+from fes_pin.diagnosis.decide.held_out import HeldOut, cross_validate, errors_of, separate
 from fes_pin.diagnosis.decide.rivals import absorbed, equivalents, estimates, experiment, ranking
 from fes_pin.diagnosis.errors_ahead import free_errors
 from fes_pin.diagnosis.remainder.open_set import Remainder, unexplained_remainder
@@ -22,6 +22,7 @@ from fes_pin.diagnosis.search.simulation_search import Searched, SimulationSearc
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import Fit, rough_noise
 from fes_pin.identify.noise import NoiseModel
+from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import CERTAIN_LEVEL
 from fes_pin.models.model import Model
 

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.trial import Trial, derived_trial
-from fes_pin.diagnosis.decide.held_out import within
 from fes_pin.diagnosis.errors_ahead import AheadErrors
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.ahead import over_horizon
-from fes_pin.identify.error_measures import percent_of_spread
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
+from fes_pin.infer.held_out import percent_of_spread, within
 from fes_pin.infer.levels import RUNAWAY
 
 

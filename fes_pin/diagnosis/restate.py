@@ -17,7 +17,7 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.cause import Cause, ParameterEstimate
-from fes_pin.diagnosis.decide.held_out import Errors, cross_validate, errors_of, held_out_gain, separate
+from fes_pin.diagnosis.decide.held_out import cross_validate, errors_of, separate
 from fes_pin.diagnosis.errors_ahead import Ahead
 from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials, takes_most
 from fes_pin.diagnosis.remainder.driven import driven_remainder
@@ -28,6 +28,7 @@ from fes_pin.identify.ahead import forecast_errors, own_noise
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.levels import PARAMETER_PRICE, SEPARABLE
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Stage

@@ -16,9 +16,6 @@ that a recorded effort drives the three are those of its first output.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 E_WORDS = (
     "E is the squared error of a model, in percent of the measurement's squares about its mean (equation 2 of the "
     "paper): 0 % is a perfect model, 100 % no better than the mean."
@@ -27,14 +24,3 @@ FREE, ONE_STEP = "free, from the inputs", "one sample ahead"
 """What a prediction is called in tables."""
 MEASURES = ("fit", "held_out", "horizon")
 """Errors that every record has of both models, and tables of many studies show."""
-
-
-def percent_of_spread(squares: ArrayLike, around: ArrayLike) -> float:
-    """E, percent.
-
-    Parameters
-    ----------
-    squares, around
-        Squared errors, and squares of the measurement about the mean of each trial, in the same unit; summed here.
-    """
-    return 100.0 * float(np.sum(squares)) / max(float(np.sum(around)), 1e-300)

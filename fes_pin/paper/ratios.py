@@ -18,7 +18,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import shortened, whole
 from fes_pin.data.tabulated import Tabulated
 from fes_pin.data.trial import Trial
-from fes_pin.identify.error_measures import percent_of_spread
+from fes_pin.infer.held_out import percent_of_spread
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle
 from fes_pin.models.simulate import Simulator, max_step

@@ -11,11 +11,11 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
+from fes_pin.infer.held_out import Gain
 from fes_pin.walk.banks import Banks
 from fes_pin.walk.experiment import NextWalk, next_walk
 from fes_pin.walk.fits import Set
 from fes_pin.walk.judge import (
-    WalkGain,
     floor_percent,
     other_leg,
     unseen,
@@ -207,9 +207,7 @@ def _marker_noise(banks: Banks) -> WalkCause | None:
     from scipy.stats import chi2  # noqa: PLC0415
 
     parameters = {"markers_m": Estimate(1e-3 * level, 1e-3 * std, "m")}
-    return WalkCause(
-        "marker_noise", "white", parameters, (), (), float(chi2.sf(saved, 1)), 0.0, WalkGain(0.0, 0.0, 0.0)
-    )
+    return WalkCause("marker_noise", "white", parameters, (), (), float(chi2.sf(saved, 1)), 0.0, Gain(0.0, 0.0, 0.0))
 
 
 def _experiment(search: WalkSearch, best: Set, causes: list[WalkCause]) -> NextWalk | None:

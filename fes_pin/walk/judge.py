@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from fes_pin.infer.held_out import Gain
 from fes_pin.walk.banks import Banks, Chosen
 from fes_pin.walk.fits import Set
 from fes_pin.walk.likelihood import FLOOR_N, by_frequency, fit_walk
@@ -19,15 +18,6 @@ SEEN = 3.0
 WAVES = ("mean", "once a stride", "twice a stride")
 CHANNELS = ("forward force", "leftward force", "vertical force", "moment about forward", "moment about left",
             "moment about vertical")  # fmt: skip
-
-
-@dataclass(frozen=True)
-class WalkGain:
-    """Percent of the squared error above the noise that a cause removes, with a 95 % interval."""
-
-    percent: float
-    low: float
-    high: float
 
 
 def weights(banks: Banks) -> np.ndarray:
@@ -62,7 +52,7 @@ def left_by(banks: Banks, one: Set, held_out: bool) -> np.ndarray:
     return np.array(out)
 
 
-def walk_gain(banks: Banks, without: Set, with_it: Set, held_out: bool, seed: int) -> WalkGain:
+def walk_gain(banks: Banks, without: Set, with_it: Set, held_out: bool, seed: int) -> Gain:
     """What the second set removes of the first one's squared error, above what differs from stride to stride."""
     scale = weights(banks)[:, None]
     before, after = (np.sum((scale * left_by(banks, s, held_out)) ** 2, axis=1) for s in (without, with_it))
@@ -77,10 +67,10 @@ def walk_gain(banks: Banks, without: Set, with_it: Set, held_out: bool, seed: in
     drawn = np.stack([part[:, strides[:, h]].sum(axis=2) for h, part in enumerate(parts)]).sum(axis=0).T
     ratio = lambda s: 100.0 * (s[..., 0] - s[..., 1]) / np.maximum(s[..., 0] - s[..., 2], 0.05 * s[..., 0])  # noqa: E731
     low, high = np.quantile(ratio(drawn), [0.025, 0.975])
-    return WalkGain(float(ratio(parts.sum(axis=(0, 2)))), float(low), float(high))
+    return Gain(float(ratio(parts.sum(axis=(0, 2)))), float(low), float(high))
 
 
-def walk_evidence(banks: Banks, without: Set, with_it: Set, seed: int) -> WalkGain:
+def walk_evidence(banks: Banks, without: Set, with_it: Set, seed: int) -> Gain:
     """By how much held-out strides are likelier with the second set's sizes than with the first's, in the same noise.
 
     Twice the log-likelihood a stride: what the nuisance may take, of landmarks and plates, counts for neither. In
@@ -100,7 +90,7 @@ def walk_evidence(banks: Banks, without: Set, with_it: Set, seed: int) -> WalkGa
     drawn = np.random.default_rng(seed).integers(0, len(before), size=(BOOTSTRAP, len(before)))
     shares = 100.0 * (before - after)[drawn].sum(axis=1) / before[drawn].sum(axis=1)
     low, high = np.quantile(shares, [0.025, 0.975])
-    return WalkGain(float(100.0 * np.sum(before - after) / np.sum(before)), float(low), float(high))
+    return Gain(float(100.0 * np.sum(before - after) / np.sum(before)), float(low), float(high))
 
 
 def walk_error_percent(banks: Banks, one: Set, held_out: bool) -> float:

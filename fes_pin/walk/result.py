@@ -15,11 +15,12 @@ from fes_pin.data.results import Recorded, Saveable
 from fes_pin.data.show import by_columns, explaining, from_to
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
+from fes_pin.infer.held_out import Gain
 from fes_pin.walk.effect import STAGE
 from fes_pin.walk.experiment import NextWalk
 from fes_pin.walk.extended import extended_body
 from fes_pin.walk.fits import Set
-from fes_pin.walk.judge import CHANNELS, WalkGain
+from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.nulls import LEVEL
 from fes_pin.walk.search import WalkSearch
 
@@ -76,8 +77,8 @@ class WalkCause(Recorded):
     elsewhere: tuple[str, ...]
     p_value: float
     gain_fit: float
-    gain_held_out: WalkGain | None
-    evidence: WalkGain | None = None
+    gain_held_out: Gain | None
+    evidence: Gain | None = None
     other_leg_percent: float | None = None
     stage: str = STAGE
 
@@ -238,7 +239,7 @@ class WalkDiagnosis(Saveable):
             (c.name, c.site, n, *one, c.p_value, g.percent, g.low, g.high, ", ".join(c.equivalents))
             for c in self.causes
             for n, one in c.parameters.items()
-            for g in (c.gain_held_out or WalkGain(math.nan, math.nan, math.nan),)
+            for g in (c.gain_held_out or Gain(math.nan, math.nan, math.nan),)
         ]
         return by_columns(head, rows)
 

@@ -8,9 +8,9 @@ import pytest
 
 from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.decide.claims import Claims
-from fes_pin.diagnosis.decide.held_out import Evidence, Gain, added_likelihood, speaks_for
 from fes_pin.diagnosis.free import with_refused
 from fes_pin.diagnosis.remainder.open_set import Remainder
+from fes_pin.infer.held_out import Evidence, Gain, added_likelihood, speaks_for
 from fes_pin.infer.levels import CERTAIN_LEVEL
 
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 from diagnosis.hidden import study_of
 
-from fes_pin.diagnosis.decide.held_out import Errors, cross_validate, errors_of, held_out_gain, separate
+from fes_pin.diagnosis.decide.held_out import cross_validate, errors_of, separate
 from fes_pin.identify.fit import fit
+from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model

@@ -9,11 +9,11 @@ from driven_rigs.laboratory import draw_laboratory
 from scipy.signal import lfilter
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.decide.held_out import Evidence, Gain
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.driven_refused import Refused, unsupported, with_refused_causes
 from fes_pin.diagnosis.errors_ahead import RandomPart
 from fes_pin.diagnosis.remainder.open_set import Remainder
+from fes_pin.infer.held_out import Evidence, Gain
 
 NOTHING = Remainder(False, 0.5, None)
 LITTLE = (RandomPart("effort", 0.1, 0.1, 0.01),)

@@ -8,11 +8,11 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.cause import Cause, ParameterEstimate, Ranked
-from fes_pin.diagnosis.decide.held_out import Gain
 from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.fit import fit
+from fes_pin.infer.held_out import Gain
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
