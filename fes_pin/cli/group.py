@@ -203,7 +203,7 @@ def _word(one: Any) -> str:
 
 def _in_options(error: InputError, own: Mapping[str, str], told: Mapping[str, str]) -> InputError:
     """An error with options of the command line in place of arguments of Python."""
-    column, message = error.column, error.message
+    column, message = error.column, error.message.replace("force=True", "--force")
     if error.file is None and column is not None:
         column = told.get(column, own.get(column, column))
     if told:

@@ -132,7 +132,7 @@ def run_cohort(
     found = find_studies(places)
     library = tuple(library)
     catalogue = load_library(*library)  # what cannot be read is said before any work
-    outputs = Outputs("cohort", force, "--force" if command else "force=True")
+    outputs = Outputs("cohort", force)
     store = Store(out, outputs)
     every = [Work(n, str(f), seed, limit, library, command) for n, f in found.items()]
     todo: list[Task] = [(work, key) for work in every if not store.has(work, key := work.key())]
@@ -143,20 +143,18 @@ def run_cohort(
     done, failed = len(every) - len(todo), 0
     waiting: list[Answer] = []  # failures, until there is a study that did not fail: else nothing is written
     undone = {work.name for work, _ in todo}
-    old = [one for name in found if name not in undone and (one := store.get(name)) is not None]
-    any_good = any(not one.error for one in old)
+    errors = {name: one.error for name in found if name not in undone and (one := store.get(name)) is not None}
     for answer in _answers(todo, workers, scheduler, run):
         waiting.append(answer)
-        any_good = any_good or not answer.error
-        while any_good and waiting:
+        errors[answer.name] = answer.error
+        while waiting and not all(errors.values()):
             store.put(waiting.pop(0))
         done, failed = done + 1, failed + bool(answer.error)
         fresh = done - (len(every) - len(todo))
         left = (time.monotonic() - began) / fresh * (len(every) - done)
         tell(CohortProgress(done, len(every), failed, left, answer.name))
-    if not any_good:
-        _, first = min([*((one.name, one.error) for one in waiting), *((one.name, one.error) for one in old)])
-        raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {first}")
+    if all(errors.values()):
+        raise InputError(f"none of {len(found)} studies could be diagnosed; the first: {min(errors.items())[1]}")
 
     def kept() -> Iterator[Kept]:  # read again for each table: no more than one record is held
         return (one for name in found if (one := store.get(name)) is not None)

@@ -158,7 +158,7 @@ def download(name: str, folder: str | Path | None = None, unverified: bool = Fal
     dataset = _known(name)
     if dataset.by_hand or name not in CONVERTERS:
         raise InputError(f"{dataset.by_hand}; it is at {dataset.origin} ({dataset.licence})", column=name)
-    target, outputs = Path(folder or folders()[0]) / name, Outputs("datasets", force, "--force (force=True)")
+    target, outputs = Path(folder or folders()[0]) / name, Outputs("datasets", force)
     outputs.check(target, ("study.toml", *dataset.converted))
     with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
         _retrieve(dataset, Path(scratch))

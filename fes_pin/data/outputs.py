@@ -7,17 +7,16 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import check_folder, write_bytes, write_files
 from fes_pin.data.read_files import refuse_inputs, was_read
 
 RECORD = ".fes_pin.json"
-"""In each folder that a command writes into: which files it wrote, and the SHA-256 of each."""
+"""In each folder that a command writes into: by name of a file which command wrote it, and its SHA-256."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +32,10 @@ class Outputs:
         Its name.
     force
         Whether files of others are written over.
-    words
-        How a person says so.
     """
 
     command: str
     force: bool = False
-    words: str = "--force"
 
     def check(self, folder: str | Path, names: Iterable[str]) -> None:
         """Raise where `write` would, before the work that makes the files of these names (or contents by name).
@@ -53,8 +49,7 @@ class Outputs:
 
     def check_file(self, path: str | Path) -> None:
         """Raise where `write_file` would, as `check`."""
-        place = _place(path)
-        if place is not None:
+        if (place := _place(path)) is not None:
             self.check(place.parent, (place.name,))
 
     def write(self, folder: str | Path, contents: Mapping[str, str | bytes], without: Iterable[str] = ()) -> None:
@@ -73,89 +68,74 @@ class Outputs:
         folder = Path(folder)
         with _alone(folder):
             record = self._check(folder, contents)
-            gone = [n for n in without if self._wrote(folder / n, record.get(n)) and not was_read(folder / n)]
-            kept = {n: entry for n, entry in record.items() if n not in gone and os.path.lexists(folder / n)}
-            kept |= {n: {"by": self.command, "sha256": _sha256(content)} for n, content in contents.items()}
+            gone = [n for n in without if self._wrote(folder, n, record) and not was_read(folder / n)]
+            kept = {n: note for n, note in record.items() if n not in gone and os.path.lexists(folder / n)}
+            kept |= {name: self._note(content) for name, content in contents.items()}
             write_files(folder, {RECORD: json.dumps(kept, indent=1) + "\n", **contents}, without=gone)
 
     def write_file(self, path: str | Path, content: str | bytes) -> None:
         """Write one file into a folder that is there, as `write`; to a special file, such as a pipe, without a note."""
-        place = _place(path)
-        if place is not None:
+        if (place := _place(path)) is not None:
             self.write(place.parent, {place.name: content})
         else:
             write_bytes(path, content.encode() if isinstance(content, str) else content)
 
-    def _check(self, folder: Path, contents: Mapping[str, str | bytes | None]) -> dict[str, Any]:
+    def _check(self, folder: Path, contents: Mapping[str, str | bytes | None]) -> dict[str, str]:
         """The record of the folder, where all files may be written."""
         check_folder(folder)
         record = _record(folder)
-        if RECORD in contents:
-            raise InputError("is where fes-pin notes what it wrote; expected another name", file=folder / RECORD)
         refuse_inputs(folder / name for name in contents)
         for name, content in contents.items():
-            place, entry = folder / name, record.get(name)
-            if place.is_dir():
-                raise InputError("expected a file to write, found a folder", file=place)
-            if not os.path.lexists(place) or self.force or self._wrote(place, entry):
+            place = folder / name
+            if name == RECORD or place.is_dir():
+                found = "a folder" if place.is_dir() else "where fes-pin notes what it wrote"
+                raise InputError(f"cannot be written: expected a file, found {found}", file=place)
+            is_same = content is not None and place.is_file() and self._note(content) == self._note(place.read_bytes())
+            if not os.path.lexists(place) or self.force or is_same or self._wrote(folder, name, record):
                 continue
-            if content is not None and place.is_file() and _sha256(content) == _sha256(place.read_bytes()):
-                continue
-            by = entry["by"] if entry else ""
-            why = f"fes-pin {by} wrote it" if by != self.command else f"it was changed since fes-pin {by} wrote it"
-            found = f"is there already, and {why if by else f'fes-pin {self.command} did not write it'}"
-            raise InputError(f"{found}; expected another place, or {self.words} to write over it", file=place)
+            by = record.get(name, "").rpartition(" ")[0]
+            why = f"fes-pin {by} wrote it" if by else f"fes-pin {self.command} did not write it"
+            why = f"it was changed since {why}" if by == self.command else why
+            expected = "expected another place, or force=True to write over it"
+            raise InputError(f"is there already, and {why}; {expected}", file=place)
         return record
 
-    def _wrote(self, place: Path, entry: Mapping[str, str] | None) -> bool:
+    def _wrote(self, folder: Path, name: str, record: Mapping[str, str]) -> bool:
         """True of a file that is as this command wrote it."""
-        try:
-            return bool(entry) and entry == {"by": self.command, "sha256": _sha256(place.read_bytes())}
-        except OSError:
-            return False
+        return (folder / name).is_file() and record.get(name) == self._note((folder / name).read_bytes())
+
+    def _note(self, content: str | bytes) -> str:
+        """What the record says of a file with this content."""
+        return f"{self.command} {hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()}"
 
 
 def _place(path: str | Path) -> Path | None:
     """Where a file is written, at the end of symbolic links; None for a special file."""
     path = Path(path)
     refuse_inputs([path])
-    try:
+    with suppress(OSError, RuntimeError):
         place = path.resolve() if path.is_symlink() else path
-        if place.exists() and not (place.is_file() or place.is_dir()):
-            return None
-        if not place.parent.is_dir():
-            raise InputError("cannot be written: the folder does not exist", file=path)
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"cannot be written: {error}", file=path) from None
-    return place
+        if not place.exists() or place.is_file() or place.is_dir():
+            if not place.parent.is_dir():
+                raise InputError("cannot be written: the folder does not exist", file=path)
+            return place
+    return None
 
 
-def _record(folder: Path) -> dict[str, Any]:
+def _record(folder: Path) -> dict[str, str]:
     """What the folder's record says of files; what cannot be read says nothing."""
-    try:
+    with suppress(OSError, ValueError):
         found = json.loads((folder / RECORD).read_bytes())
-    except (OSError, ValueError):
-        return {}
-    entries = found.items() if isinstance(found, dict) else ()
-    return {n: e for n, e in entries if isinstance(e, dict) and set(e) == {"by", "sha256"}}
-
-
-def _sha256(content: str | bytes) -> str:
-    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
+        return {n: note for n, note in found.items() if isinstance(note, str)} if isinstance(found, dict) else {}
+    return {}
 
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """Let no other command write into the folder meanwhile, on a disk that knows locks: its record is one file."""
-    handle = None
-    try:
-        nearest = next(p for p in (folder, *folder.absolute().parents) if p.exists())
-        handle = os.open(nearest, os.O_RDONLY)
-        fcntl.flock(handle, fcntl.LOCK_EX)
-    except OSError:
-        pass
-    try:
+    with ExitStack() as held:
+        with suppress(OSError):
+            handle = os.open(next(p for p in (folder, *folder.absolute().parents) if p.exists()), os.O_RDONLY)
+            held.callback(os.close, handle)
+            fcntl.flock(handle, fcntl.LOCK_EX)
         yield
-    finally:
-        if handle is not None:
-            os.close(handle)

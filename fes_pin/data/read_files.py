@@ -10,35 +10,37 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from fes_pin.data.errors import InputError
 
-Identity = tuple[int, int]
-_read: dict[Identity, str] = {}
-_written: dict[Identity, tuple[int, int]] = {}
+_read: dict[tuple[int, int], str] = {}
+"""The name under which each was read, by identity."""
+_written: dict[tuple[int, int], tuple[int, int]] = {}
 """Size and time of change of what this process wrote: to read that again does not make it an input."""
 
 
 def note_read(path: str | Path) -> None:
     """Remember a file as an input, unless this process wrote it as it is."""
-    known = _stat(path)
-    if known is not None and _written.get(_identity(known)) != (known.st_size, known.st_mtime_ns):
-        _read[_identity(known)] = os.path.abspath(path)
+    known = os.stat(path)
+    if _written.get((known.st_dev, known.st_ino)) != (known.st_size, known.st_mtime_ns):
+        _read[known.st_dev, known.st_ino] = os.path.abspath(path)
 
 
 def note_written(path: str | Path) -> None:
     """Remember a file as one that this process wrote."""
-    known = _stat(path)
-    if known is not None:
-        _written[_identity(known)] = known.st_size, known.st_mtime_ns
+    known = os.stat(path)
+    _written[known.st_dev, known.st_ino] = known.st_size, known.st_mtime_ns
 
 
 def was_read(path: str | Path) -> str:
     """The name under which a file was read; "" for one that was not."""
-    known = _stat(path)
-    place = "" if known is None else _read.get(_identity(known), "")
-    still = _stat(place) if place else None  # the number of a file that is gone goes to another one
-    return place if known and still and _identity(still) == _identity(known) else ""
+    try:
+        known = os.stat(path)
+        place = _read.get((known.st_dev, known.st_ino), "")
+        return place if place and os.path.samestat(os.stat(place), known) else ""  # numbers go to new files
+    except (OSError, ValueError):
+        return ""
 
 
 def refuse_inputs(paths: Iterable[Path]) -> None:
@@ -58,24 +60,12 @@ def refuse_inputs(paths: Iterable[Path]) -> None:
 @contextmanager
 def one_command() -> Iterator[None]:
     """What is read and written inside is of one command: what was read before is not its input."""
-    before = dict(_read), dict(_written)
-    _read.clear()
-    _written.clear()
+    before: list[tuple[dict[Any, Any], dict[Any, Any]]] = [(known, dict(known)) for known in (_read, _written)]
+    for known, _ in before:
+        known.clear()
     try:
         yield
     finally:
-        _read.clear()
-        _written.clear()
-        _read.update(before[0])
-        _written.update(before[1])
-
-
-def _stat(path: str | Path) -> os.stat_result | None:
-    try:
-        return os.stat(path)
-    except (OSError, ValueError):
-        return None
-
-
-def _identity(known: os.stat_result) -> Identity:
-    return known.st_dev, known.st_ino
+        for known, then in before:
+            known.clear()
+            known.update(then)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import in_full
 
 _URDF = """<?xml version="1.0"?>
 <!-- {what} Position 0: {zero}. {axis}
@@ -70,39 +69,20 @@ def slide(mass_kg: float) -> str:
         A mass that is not above 0.
     """
     _check(mass=mass_kg)
-    return _URDF.format(
-        name="slide",
-        what=f"A carriage of {mass_kg:g} kg on a level rail.",
-        zero="where you say",
-        axis="Positive moves along +x.",
-        link="carriage",
-        joint="rail",
-        kind="prismatic",
-        direction="1 0 0",
-        height=in_full(0.0),
-        mass=in_full(mass_kg),
-        across=in_full(0.0),
-        along=in_full(0.0),
-        limit=LIMIT,
-    )
+    words = {"zero": "where you say", "axis": "Positive moves along +x.", "link": "carriage", "joint": "rail"}
+    words |= {"kind": "prismatic", "direction": "1 0 0", "limit": LIMIT}
+    return _filled("slide", f"A carriage of {mass_kg:g} kg on a level rail.", mass_kg, 0.0, 0.0, **words)
 
 
 def _turning(name: str, what: str, mass: float, centre: float, about_centre: float, upright: bool) -> str:
-    return _URDF.format(
-        name=name,
-        what=what,
-        zero="upright" if upright else "hanging straight down",
-        axis=_SWING,
-        link="arm",
-        joint="pivot",
-        kind="continuous",
-        direction="0 1 0",
-        limit="",
-        height=in_full(centre if upright else -centre),
-        mass=in_full(mass),
-        across=in_full(about_centre),
-        along=in_full(0.0),
-    )
+    words = {"zero": "upright" if upright else "hanging straight down", "axis": _SWING, "link": "arm", "joint": "pivot"}
+    words |= {"kind": "continuous", "direction": "0 1 0", "limit": ""}
+    return _filled(name, what, mass, centre if upright else -centre, about_centre, **words)
+
+
+def _filled(name: str, what: str, mass: float, height: float, across: float, **words: str) -> str:
+    numbers = {"mass": float(mass), "height": float(height), "across": float(across), "along": 0.0}
+    return _URDF.format(name=name, what=what, **numbers, **words)
 
 
 def _check(**numbers: float) -> None:

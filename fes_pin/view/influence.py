@@ -55,8 +55,8 @@ def check_image(path: str | Path) -> str:
     """
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    kinds, kind = sorted(Figure().canvas.get_supported_filetypes()), Path(path).suffix.lower().removeprefix(".")
-    if kind not in kinds:
+    kind = Path(path).suffix.lower().removeprefix(".")
+    if kind not in (kinds := sorted(Figure().canvas.get_supported_filetypes())):
         raise InputError(f"expected a name that ends in one of {', '.join(kinds)}", file=path)
     return kind
 

@@ -54,7 +54,7 @@ def test_a_file_in_the_way_of_a_folder_is_named(sandbox, monkeypatch, capsys, wo
     assert hashes(sandbox) == before
 
 
-@pytest.mark.parametrize("value", ["abc", "-1", "1.5", "²", "253402300800", "9" * 30])
+@pytest.mark.parametrize("value", ["abc", "-1", "1.5", "²", "1" * 12, "9" * 30])
 def test_a_date_that_is_none_is_said_first(sandbox, monkeypatch, capsys, value):  # noqa: F811
     monkeypatch.setenv("SOURCE_DATE_EPOCH", value)
     monkeypatch.setattr("fes_pin.diagnosis.diagnosis.diagnose_joint", None)
