@@ -22,11 +22,11 @@ def datasets(
     force: Force = False,
 ) -> None:
     """List the public data sets that the documentation uses; with names, fetch them and make them studies."""
-    from fes_pin.data.datasets import DATASETS, download
+    from fes_pin.data.datasets import DATASETS, download_all
 
-    for name in names or []:
-        typer.echo(f"{name}: {download(name, out, unverified, force)}")
     if names:
+        for name, place in download_all(names, out, unverified, force).items():
+            typer.echo(f"{name}: {place}")
         return
     for one in DATASETS.values():
         typer.echo(f"{one.name}: {one.what}\n  {one.origin} ({one.licence})")

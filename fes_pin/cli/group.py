@@ -224,22 +224,32 @@ class Commands(TyperGroup):
         raise SystemExit(code)
 
     def _run(self, held: Held, args: Any, given: dict[str, Any]) -> int:
+        is_done = False
         try:
             code = super().main(args, standalone_mode=False, **given)
+            is_done = True
             held.release()
             return code if isinstance(code, int) else 0
         except InputError as error:
-            return _refuse(f"fes-pin: {error}")
+            if not is_done:
+                return _refuse(f"fes-pin: {error}")
+            _refuse(f"fes-pin: {error}")
+            return _give_up(held.stream)
         except USAGE_ERROR as error:
             return _refuse(_in_one_line(error))
         except typer.Abort:
             return 1
-        except BrokenPipeError:  # what reads has gone; no second error when the interpreter closes the stream
-            os.dup2(os.open(os.devnull, os.O_WRONLY), held.stream.fileno())
-            return 1
+        except BrokenPipeError:  # what reads has gone
+            return _give_up(held.stream)
         except BaseException:
             held.release()
             raise
+
+
+def _give_up(stream: TextIO) -> int:
+    """Print no more, and no second error when the interpreter closes the stream; files may be written already."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    return 1
 
 
 def _make_streams_whole() -> None:

@@ -15,6 +15,7 @@ from fes_pin.cli.group import python_names, remark
 from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, pairs, study_of
 from fes_pin.cli.progress import catalogue_with, say_whose_code
 from fes_pin.data.errors import InputError
+from fes_pin.data.read_files import note_read
 
 if TYPE_CHECKING:
     import numpy as np
@@ -164,6 +165,7 @@ def _readable(path: Path) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="fes-pin-") as folder:
         copy = Path(folder) / "stdin.csv"
         copy.write_bytes(sys.stdin.buffer.read())
+        note_read("/dev/stdin")  # a file that the shell gave
         yield copy
 
 

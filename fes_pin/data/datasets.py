@@ -11,12 +11,12 @@ import json
 import logging
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import quote
 
-from fes_pin.data.conversions import CONVERTERS
+from fes_pin.data.conversions import CONVERTERS, Files
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.schema import unknown
@@ -155,10 +155,26 @@ def download(name: str, folder: str | Path | None = None, unverified: bool = Fal
     InputError
         Unknown name, a set that cannot be fetched, no pooch, no answer, a wrong checksum, files that were changed.
     """
+    return download_all([name], folder, unverified, force)[name]
+
+
+def download_all(
+    names: Iterable[str], folder: str | Path | None = None, unverified: bool = False, force: bool = False
+) -> dict[str, Path]:
+    """Fetch several data sets, as `download`: nothing is written where one of them fails."""
+    outputs = Outputs("datasets", force)
+    places = {name: Path(folder or folders()[0]) / name for name in names}
+    made = {name: _fetched(name, place, unverified, outputs) for name, place in places.items()}
+    for name, files in made.items():
+        outputs.write(places[name], files)
+    return places
+
+
+def _fetched(name: str, target: Path, unverified: bool, outputs: Outputs) -> Files:
+    """The files of a data set's study."""
     dataset = _known(name)
     if dataset.by_hand or name not in CONVERTERS:
         raise InputError(f"{dataset.by_hand}; it is at {dataset.origin} ({dataset.licence})", column=name)
-    target, outputs = Path(folder or folders()[0]) / name, Outputs("datasets", force)
     outputs.check(target, ("study.toml", *dataset.converted))
     with tempfile.TemporaryDirectory(prefix="fes-pin-") as scratch:
         _retrieve(dataset, Path(scratch))
@@ -173,8 +189,7 @@ def download(name: str, folder: str | Path | None = None, unverified: bool = Fal
         )
     about = f"# From {dataset.origin}\n# {dataset.licence}; converted by fes-pin datasets. {dataset.reference}".rstrip()
     made["study.toml"] = f"{about}\n{made['study.toml']}"
-    outputs.write(target, {**made})
-    return target
+    return made
 
 
 def _retrieve(dataset: Dataset, scratch: Path) -> None:

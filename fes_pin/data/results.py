@@ -160,7 +160,7 @@ def save_result(result: Saveable, path: str | Path) -> None:
     Raises
     ------
     InputError
-        It is no such result, or the file cannot be written.
+        It is no such result, or the file cannot be written, or was read.
     """
     if not isinstance(result, Saveable):
         kind = type(result).__name__

@@ -440,7 +440,8 @@ def write_study(study: Study, folder: str | Path) -> None:
     Raises
     ------
     InputError
-        If the folder cannot be written, or what would be written could not be read: samples that were not measured, an
+        If the folder cannot be written, a file in it was read and would be replaced (see `read_files`), or what would
+        be written could not be read: samples that were not measured, an
         input that some trials lack.
     """
     schema = study.schema

@@ -57,7 +57,7 @@ def save_model(model: Model, path: str | Path) -> None:
     ------
     InputError
         It is no `Model`: the body of a diagnosis of walking is saved as URDF, by its `write`. Or the file cannot be
-        written.
+        written, or was read and not written by this process.
     """
     if not isinstance(model, Model):
         how = ": its write() saves it as URDF, which Body.from_urdf reads" if hasattr(model, "urdf") else ""

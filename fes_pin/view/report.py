@@ -45,7 +45,7 @@ def report(diagnosis: Diagnosis | WalkDiagnosis, path: str | Path) -> None:
     Raises
     ------
     InputError
-        If the file cannot be written.
+        If the file cannot be written, or was read.
     """
     if isinstance(diagnosis, Diagnosis):
         write_text(path, report_html(diagnosis))

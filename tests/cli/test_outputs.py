@@ -4,6 +4,8 @@ import hashlib
 import json
 import os
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -262,6 +264,41 @@ def test_a_prediction_replaces_an_earlier_one_and_no_recording(sandbox, monkeypa
     assert run(monkeypatch, *words, "/dev/null") == 0 and not Path("/dev", RECORD).exists()
     capsys.readouterr()
     assert "notes what it wrote" in fails(monkeypatch, capsys, *words, RECORD)
+
+
+def shell(words):
+    known = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    words = f"{sys.executable} -m fes_pin {words}"
+    return subprocess.run(["sh", "-c", words], check=False, env=known, capture_output=True, text=True)
+
+
+def test_a_recording_that_the_shell_gives_is_an_input(sandbox):
+    before = hashes(sandbox)
+    made = shell("predict model.toml - --out study/a.csv --force < study/a.csv")
+    assert made.returncode == 2 and "was read" in made.stderr and hashes(sandbox) == before
+
+
+def test_data_sets_are_all_fetched_or_none(sandbox, monkeypatch, capsys):
+    made = {"study.toml": "x", "a.csv": "x"}
+    monkeypatch.setattr("fes_pin.data.datasets._retrieve", lambda *_: None)
+    monkeypatch.setattr("fes_pin.data.datasets.CONVERTERS", {"servo_pendulum": (lambda _: dict(made), ())})
+    words = ("datasets", "servo_pendulum", "--unverified", "--out", "sets")
+    fails(monkeypatch, capsys, *words, "biceps_fes")
+    assert not Path("sets").exists()
+    assert run(monkeypatch, *words) == 0 == run(monkeypatch, *words)
+    Path("sets/servo_pendulum/study.toml").write_text("edited")
+    before = hashes(sandbox)
+    capsys.readouterr()
+    assert "was changed since" in fails(monkeypatch, capsys, *words)
+    assert hashes(sandbox) == before and run(monkeypatch, *words, "--force") == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full is Linux's")
+def test_an_answer_that_cannot_be_printed_was_written(sandbox):
+    """Exit code 2 says that nothing is written."""
+    made = shell("new-study --rod 1 1 --out rods > /dev/full")
+    assert (made.returncode, made.stderr.count("\n")) == (1, 1) and Path("rods/rod.urdf").exists()
+    assert "standard output cannot be written" in made.stderr
 
 
 def test_two_commands_at_once_both_note_what_they_wrote(sandbox):
