@@ -490,7 +490,7 @@ def write_trial(trial: Trial, path: str | Path) -> None:
     Raises
     ------
     InputError
-        If the file cannot be written, was read, or could not be read again: a trial with samples that were not measured.
+        If the file cannot be written, was read, or could not be read again: a trial with samples that nobody measured.
     """
     write_text(path, trial_csv(replace(trial, as_read=None)))  # which checks it by itself
 
