@@ -400,8 +400,7 @@ def fit(
     """
     measured = accepted_trials(model, trials, inputs_only=False)
     model = model.with_parameters(fixed) if isinstance(fixed, Mapping) else model
-    free = _less(model.fitted_parameters(), [fixed] if isinstance(fixed, str) else fixed)
-    narrower = _checked_bounds(model, free, bounds or {})
+    free, narrower = _chosen(model, [fixed] if isinstance(fixed, str) else list(fixed), bounds or {})
 
     def problem(noise: NoiseModel) -> Problem:
         made = Problem(model, measured, noise, free)
@@ -419,30 +418,24 @@ def fit(
     return replace(found, bounds=narrower)
 
 
-def _less(fitted: tuple[str, ...], fixed: Iterable[str]) -> tuple[str, ...]:
-    """The parameters that are fitted where some of them are fixed."""
-    for name in (listed := tuple(fixed)):
-        if name not in fitted:
-            raise InputError(unknown(str(name), fitted), column="fixed")
-    return tuple(n for n in fitted if n not in listed)
-
-
-def _checked_bounds(
-    model: Model, free: tuple[str, ...], bounds: Mapping[str, tuple[float, float]]
-) -> dict[str, tuple[float, float]]:
-    """Bounds that somebody asks for, within those of the parameters."""
-    out, info = {}, model.parameter_info()
+def _chosen(
+    model: Model, fixed: Sequence[str], bounds: Mapping[str, tuple[float, float]]
+) -> tuple[tuple[str, ...], dict[str, tuple[float, float]]]:
+    """What is fitted where some is fixed, and the bounds that were asked for, within those of the parameters."""
+    fitted, info, narrower = model.fitted_parameters(), model.parameter_info(), dict[str, tuple[float, float]]()
+    free = tuple(n for n in fitted if n not in fixed)
+    for column, names, known in (("fixed", fixed, fitted), ("bounds", bounds, free)):
+        for name in names:
+            if name not in known:
+                raise InputError(unknown(str(name), known), column=column)
     for name, ends in bounds.items():
-        if name not in free:
-            raise InputError(unknown(name, free), column="bounds")
-        if not isinstance(ends, tuple | list) or len(ends) != 2 or not ends[0] < ends[1]:
-            raise InputError(f"expected (lower, upper) of {name}, found {ends!r}", column="bounds")
-        low, high = max(float(ends[0]), info[name].lower), min(float(ends[1]), info[name].upper)
-        if not low < high:
-            told = f"expected part of {info[name].lower:g} to {info[name].upper:g} for {name}, found {ends!r}"
+        least, most = info[name].lower, info[name].upper
+        low, high = ends if isinstance(ends, tuple | list) and len(ends) == 2 else (1.0, 0.0)
+        narrower[name] = (max(float(low), least), min(float(high), most))
+        if not narrower[name][0] < narrower[name][1]:
+            told = f"expected (lower, upper) of {name} within {least:g} to {most:g}, found {ends!r}"
             raise InputError(told, column="bounds")
-        out[name] = (low, high)
-    return out
+    return free, narrower
 
 
 def rough_noise(model: Model, trials: Sequence[Trial]) -> dict[str, Noise]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
+from importlib import import_module
+from pkgutil import iter_modules
 from types import SimpleNamespace
 from typing import Any, ClassVar, TypeVar
 
@@ -246,6 +248,17 @@ class Effect:
 
 
 Named = TypeVar("Named", Effect, type[Effect])
+
+
+Kind = TypeVar("Kind")
+
+
+def classes_in(folder: Iterable[str], package: str, kind: type[Kind]) -> Iterator[type[Kind]]:
+    """The classes of a kind that the files of a package define; `folder` is its `__path__`."""
+    for file in iter_modules(folder, f"{package}."):
+        for one in vars(import_module(file.name)).values():
+            if isinstance(one, type) and issubclass(one, kind) and one.__module__ == file.name:
+                yield one
 
 
 def by_name(effects: Iterable[type[Effect]], name: str) -> type[Effect]:

@@ -124,9 +124,15 @@ def test_bounds_that_are_asked_for_hold_and_are_said():
         ({"fixed": {"gian": 1.0}}, "gian: unknown; did you mean gain?"),
         ({"fixed": {"gain": -1.0}}, "gain: expected a number above 0, found -1.0"),
         ({"bounds": {"gian": (0.0, 1.0)}}, "bounds: unknown; did you mean gain?"),
-        ({"bounds": {"gain": (1.0, 0.0)}}, "bounds: expected (lower, upper) of gain, found (1.0, 0.0)"),
-        ({"bounds": {"gain": 1.0}}, "bounds: expected (lower, upper) of gain, found 1.0"),
-        ({"bounds": {"gain": (-2.0, -1.0)}}, "bounds: expected part of 1e-06 to 100000 for gain, found (-2.0, -1.0)"),
+        (
+            {"bounds": {"gain": (1.0, 0.0)}},
+            "bounds: expected (lower, upper) of gain within 1e-06 to 100000, found (1.0, 0.0)",
+        ),
+        ({"bounds": {"gain": 1.0}}, "bounds: expected (lower, upper) of gain within 1e-06 to 100000, found 1.0"),
+        (
+            {"bounds": {"gain": (-2.0, -1.0)}},
+            "bounds: expected (lower, upper) of gain within 1e-06 to 100000, found (-2.0, -1.0)",
+        ),
         ({"bounds": {"gain": (0.0, 1.0)}, "fixed": ("gain",)}, "bounds: unknown; expected time_constant_s"),
     ],
 )

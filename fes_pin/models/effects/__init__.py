@@ -5,24 +5,14 @@ An effect is in the tests, the report, the documentation and the diagnosis by it
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any
 
-from fes_pin.models.stage import Effect, by_name, in_order
+from fes_pin.models.stage import Effect, by_name, classes_in, in_order
 
 
 def find_effects() -> tuple[type[Effect], ...]:
     """The effects of this folder's files, in the order of the signal path, by name at each stage."""
-    return in_order(_written_here())
-
-
-def _written_here() -> Iterator[type[Effect]]:
-    for file in iter_modules(__path__, f"{__name__}."):
-        for one in vars(import_module(file.name)).values():
-            if isinstance(one, type) and issubclass(one, Effect) and one.__module__ == file.name:
-                yield one
+    return in_order(classes_in(__path__, __name__, Effect))
 
 
 EFFECTS = find_effects()

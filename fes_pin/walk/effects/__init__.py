@@ -2,21 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from importlib import import_module
-from pkgutil import iter_modules
-
+from fes_pin.models.stage import classes_in
 from fes_pin.walk.effect import Form, WalkEffect
 
-
-def _written_here() -> Iterator[type[WalkEffect]]:
-    for file in iter_modules(__path__, f"{__name__}."):
-        for one in vars(import_module(file.name)).values():
-            if isinstance(one, type) and issubclass(one, WalkEffect) and one.__module__ == file.name:
-                yield one
-
-
-EFFECTS = tuple(sorted(_written_here(), key=lambda e: e.name))
+EFFECTS = tuple(sorted(classes_in(__path__, __name__, WalkEffect), key=lambda e: e.name))
 """Every cause, by name."""
 
 
