@@ -19,38 +19,19 @@ UNITS = (
 )
 
 
-MEANT: Mapping[str, set[str]] = {
-    "effort": {
-        "torque",
-        "force",
-        "moment",
-        "tau",
-        "motor",
-        "command",
-        "commanded",
-        "drive",
-        "actuation",
-        "current",
-        "u",
-    },
-    "position": {"angle", "theta", "q", "phi", "displacement", "encoder", "x", "pos"},
-    "velocity": {"speed", "rate", "omega", "qd", "dq", "v", "vel"},
-    "pulse_width_us": {
-        "pulse",
-        "width",
-        "pw",
-        "pulsewidth",
-        "stimulus",
-        "stimulation",
-        "duration",
-        "charge",
-        "current",
-    },
-    "stim": {"pulse", "pulses", "trigger", "stimulus", "stimulation", "sync"},
-    "angle_rad": {"theta", "q", "position", "goniometer", "ankle"},
-    "force_n": {"force", "load", "tension", "cell", "f"},
-    "length_m": {"length", "l", "lmtu", "lmtc", "mtu", "stretch", "displacement"},
-    "torque_nm": {"torque", "moment", "tau"},
+MEANT: Mapping[str, frozenset[str]] = {
+    column: frozenset(words.split())
+    for column, words in {
+        "effort": "torque force moment tau motor command commanded drive actuation current u",
+        "position": "angle theta q phi displacement encoder x pos",
+        "velocity": "speed rate omega qd dq v vel",
+        "pulse_width_us": "pulse width pw pulsewidth stimulus stimulation duration charge current",
+        "stim": "pulse pulses trigger stimulus stimulation sync",
+        "angle_rad": "theta q position goniometer ankle",
+        "force_n": "force load tension cell f",
+        "length_m": "length l lmtu lmtc mtu stretch displacement",
+        "torque_nm": "torque moment tau",
+    }.items()
 }
 """Other words for what a column holds, as measuring systems name it."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline, make_lsq_spline, make_smoothing_spline
+from scipy.interpolate import BSpline, make_interp_spline, make_lsq_spline
 from scipy.signal import butter, sosfiltfilt
 
 from fes_pin.data.errors import InputError
@@ -30,10 +30,6 @@ MOTION, PLACES = 5.0, 5.0
 """Times what many knots leave, beyond which few leave motion, as of noise that lasts many follow a part only; and
 places between knots, as many as hold all squares evenly, of which noise has more, or a quarter. A quick release leaves
 20 to 100 times as much, or all of it in two or three places."""
-_WINDOW = 300
-"""Samples that cross-validation looks at together: its cost grows with the cube."""
-_GRID = 10.0 ** np.linspace(-4.0, 8.0, 121)
-"""Lambdas that are tried, in samples to the fourth."""
 _TWICE = (2.0**0.5 - 1.0) ** (1.0 / (2 * ORDER))
 """Run twice, the filter halves the power lower than run once; the design is higher by this (Winter, ch. 3)."""
 
@@ -80,38 +76,6 @@ def rates(values: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     """First and second derivative by quintic splines through the samples: two arrays (n, ...)."""
     spline = make_interp_spline(time, values, k=5)
     return spline(time, 1), spline(time, 2)
-
-
-def smoothing_spline(values: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Cubic smoothing splines by generalized cross-validation, with the bandwidth that it found.
-
-    Cross-validation takes the noise for white; on signals that were filtered before it finds too much bandwidth.
-
-    Parameters
-    ----------
-    values
-        (n, m).
-    time
-        (n,) s, in equal steps.
-
-    Returns
-    -------
-    smooth, rate, acceleration
-        (n, m) each; the acceleration of a natural spline is 0 at both ends.
-    bandwidth_hz
-        (m,) where half of the amplitude passes: 1 / (2 pi (lambda dt)^(1/4)).
-    """
-    dt = float(time[-1] - time[0]) / (len(time) - 1)
-    out = np.empty((3, *values.shape))
-    bandwidth = np.empty(values.shape[1])
-    count = np.arange(len(time), dtype=float)  # in samples: the solver's scale
-    for k, column in enumerate(values.T):
-        lam = _cross_validated(column)
-        spline = make_smoothing_spline(count, column, lam=lam)
-        for order in range(3):
-            out[order, :, k] = spline(count, order) / dt**order
-        bandwidth[k] = 1.0 / (2.0 * np.pi * dt * lam**0.25) if lam > 0.0 else 0.5 / dt
-    return out[0], out[1], out[2], np.minimum(bandwidth, 0.5 / dt)
 
 
 def smoothed_rates(values: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
@@ -207,31 +171,3 @@ def _knot_places(time: np.ndarray, inner: int) -> np.ndarray:
         np.linspace(time[0], time[-1], inner + 2)[1:-1],
         np.full(DEGREE + 1, time[-1]),
     ]
-
-
-def _cross_validated(values: np.ndarray) -> float:
-    """Lambda of least generalized cross-validation, by Whittaker's smoother, the spline's counterpart for equal steps.
-
-    Its penalty is on second differences (Eilers 2003, Anal. Chem. 75:3631); a long record is judged window by window.
-    """
-    penalty, power, _ = _spectrum(values)
-    kept = 1.0 / (1.0 + _GRID[:, None] * penalty)
-    score = ((1.0 - kept) ** 2 @ power) / np.maximum(1.0 - kept.mean(axis=1), 1e-9) ** 2
-    return float(_GRID[int(np.argmin(score))])
-
-
-def _spectrum(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Penalties of the smoother's components, their squares summed over windows, and how many windows there are."""
-    size = min(len(values), _WINDOW)
-    count = len(values) // size
-    windows = values[: size * count].reshape(count, size)
-    penalty, vectors = _second_differences(size)
-    return penalty, ((windows @ vectors) ** 2).sum(axis=0), count
-
-
-@lru_cache(maxsize=4)
-def _second_differences(size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues and eigenvectors of the penalty on second differences of `size` samples."""
-    difference = np.diff(np.eye(size), 2, axis=0)
-    values, vectors = np.linalg.eigh(difference.T @ difference)
-    return np.maximum(values, 0.0), vectors

@@ -13,7 +13,7 @@ from fes_pin.body.gait import pelvis_turns, postures_of_walk
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import OPTIONAL, REQUIRED
-from fes_pin.data.smooth import CUTOFF_HZ, low_pass, rates, smoothing_spline
+from fes_pin.data.smooth import CUTOFF_HZ, low_pass, rates
 
 TO_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """OpenSim's axes (x forward, y up, z right) to ours (x forward, y left, z up)."""
@@ -99,14 +99,13 @@ def motion_of(
     columns: Mapping[str, np.ndarray],
     hip: np.ndarray,
     *,
-    cutoff_hz: float | None = CUTOFF_HZ,
+    cutoff_hz: float = CUTOFF_HZ,
     belt_speed_mps: float = 0.0,
 ) -> Motion:
     """The body's motion from OpenSim's coordinates.
 
     Rates and accelerations are the file's where it has both for every coordinate (`qd_`, `qdd_`), and then nothing is
-    filtered; else coordinates are low-passed at `cutoff_hz`, or smoothed by splines of estimated bandwidth if it is
-    None, and differentiated.
+    filtered; else coordinates are low-passed at `cutoff_hz`, and differentiated.
 
     Parameters
     ----------
@@ -117,7 +116,7 @@ def motion_of(
     hip
         Right hip centre in OpenSim's pelvis, (3,) m; see `pelvis_to_hip`.
     cutoff_hz
-        Of the low pass, Hz, or None for splines.
+        Of the low pass, Hz.
     belt_speed_mps
         Speed of a treadmill's belt, taken as walking over ground: its way is added to the pelvis's.
 
@@ -173,7 +172,7 @@ def rooted_motion(free: Motion, columns: Mapping[str, np.ndarray], hip: np.ndarr
     rows
         The samples of the single support.
     """
-    cutoff = free.bandwidth_hz[0] if free.bandwidth_hz else None
+    cutoff = free.bandwidth_hz[0] if free.bandwidth_hz else CUTOFF_HZ
     at, _ = _followed(free.body, free.time, columns, hip, cutoff, flat_foot=True)
     q, v, a = _joints(free.model, [angles[rows] for angles, _, _ in at])
     data = free.model.createData()
@@ -194,7 +193,7 @@ def _followed(
     time: np.ndarray,
     columns: Mapping[str, np.ndarray],
     hip: np.ndarray,
-    cutoff_hz: float | None,
+    cutoff_hz: float,
     flat_foot: bool = False,
 ) -> tuple[list[tuple[np.ndarray, np.ndarray, np.ndarray]], tuple[float, float] | None]:
     """Poses now, a small step later and a small step before, in every sample; the coordinates' bandwidth."""
@@ -217,7 +216,7 @@ def _joints(model: pin.Model, angles: list[np.ndarray]) -> tuple[np.ndarray, np.
 
 
 def _paths(
-    names: list[str], time: np.ndarray, columns: Mapping[str, np.ndarray], cutoff_hz: float | None
+    names: list[str], time: np.ndarray, columns: Mapping[str, np.ndarray], cutoff_hz: float
 ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], tuple[float, float] | None]:
     """Coordinates, rates and accelerations (n, coordinates), and the bandwidth that was left to them."""
     for name in REQUIRED:
@@ -228,9 +227,6 @@ def _paths(
         first, second = (np.stack([columns[f"{kind}_{n}"] for n in names], axis=1) for kind in ("qd", "qdd"))
         return (raw, first, second), None
     dt = float(time[-1] - time[0]) / (len(time) - 1)
-    if cutoff_hz is None:
-        smooth, first, second, bandwidth = smoothing_spline(raw, time)
-        return (smooth, first, second), (float(bandwidth.min()), float(bandwidth.max()))
     smooth = low_pass(raw, dt, cutoff_hz)
     return (smooth, *rates(smooth, time)), (cutoff_hz, cutoff_hz)
 

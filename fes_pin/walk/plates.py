@@ -72,7 +72,7 @@ def plates_of(
     columns: Mapping[str, np.ndarray],
     at: np.ndarray,
     *,
-    cutoff_hz: float | None = CUTOFF_HZ,
+    cutoff_hz: float = CUTOFF_HZ,
     belt_speed_mps: float = 0.0,
     start_s: float | None = None,
 ) -> Plates:
@@ -85,7 +85,7 @@ def plates_of(
     at
         (n,) s; times of the motion.
     cutoff_hz
-        Of the zero-phase low pass that forces and moments about the origin go through, Hz; None for none.
+        Of the zero-phase low pass that forces and moments about the origin go through, Hz.
     belt_speed_mps
         Of a treadmill: its way since `start_s` is added to the centres of pressure, as to the pelvis.
     start_s
@@ -109,7 +109,7 @@ def plates_of(
         )
         point = point + way
         wrench = np.hstack([force, np.cross(point, force) + free])
-        smooth = wrench if cutoff_hz is None else low_pass(wrench, dt, cutoff_hz)
+        smooth = low_pass(wrench, dt, cutoff_hz)
         feet[side] = _at(at, time, smooth)
         loaded[side] = _at(at, time, force[:, 2:]).ravel() > LOADED_N
         pressure[side] = _held(_at(at, time, point), loaded[side])

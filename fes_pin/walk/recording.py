@@ -51,7 +51,7 @@ class WalkRecording:
     coordinates_time: np.ndarray = field(repr=False)
     coordinates: Mapping[str, np.ndarray] = field(repr=False)
     hip: np.ndarray = field(repr=False)
-    cutoff_hz: float | None = CUTOFF_HZ
+    cutoff_hz: float = CUTOFF_HZ
     belt_speed_mps: float = 0.0
     start_s: float = 0.0
     role: str | None = None
@@ -99,7 +99,7 @@ def _as_heavy(body: Body, study: Study) -> Body:
 
 
 def recordings_of(
-    study: Study, *, cutoff_hz: float | None = CUTOFF_HZ, stance: str = "right", body: Body | None = None
+    study: Study, *, cutoff_hz: float = CUTOFF_HZ, stance: str = "right", body: Body | None = None
 ) -> tuple[Body, list[WalkRecording]]:
     """Every trial of a walking study, each file at its own sample rate; by the body that is given, else the study's.
 
@@ -113,7 +113,7 @@ def recordings_of(
     return body, [_recording(trial, body, hip, cutoff_hz) for trial in study.trials]
 
 
-def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float | None) -> WalkRecording:
+def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> WalkRecording:
     paths = list(map(Path, trial.as_read.sha256)) if trial.as_read is not None else []
     source, reaction = paths[0] if paths else None, paths[-1] if paths else None
     if trial.as_read is not None and trial.as_read.recordings and not trial.is_edited:
@@ -123,8 +123,8 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float | Non
         columns = {n: v for n, v in trial.columns.items() if n.startswith(("q_", "qd_", "qdd_"))}
         raw = {n: v for n, v in trial.columns.items() if n not in columns}
     belt = trial.conditions.get("belt_speed_mps", 0.0)
-    filtered = cutoff_hz and not all(f"qdd_{n[2:]}" in columns for n in columns if n.startswith("q_"))
-    edge = 0.5 / cutoff_hz if cutoff_hz and filtered else 0.0
+    filtered = not all(f"qdd_{n[2:]}" in columns for n in columns if n.startswith("q_"))
+    edge = 0.5 / cutoff_hz if filtered else 0.0
     inside = (time >= max(raw_time[0], time[0] + edge)) & (time <= min(raw_time[-1], time[-1] - edge))
     if inside.sum() < 10:
         raise InputError(f"trial {trial.name} has {inside.sum()} samples of motion and reaction together", file=source)

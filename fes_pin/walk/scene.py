@@ -100,7 +100,7 @@ class Scene:
         return np.hstack([along, np.cross(point - self.centre, along)])
 
 
-def scene_of(recording: WalkRecording, cutoff_hz: float | None, later_s: float = 0.0) -> Scene:
+def scene_of(recording: WalkRecording, cutoff_hz: float, later_s: float = 0.0) -> Scene:
     """A trial as a scene; `later_s` reads the plates that much later than their clock says."""
     plates = recording.plates
     if later_s:

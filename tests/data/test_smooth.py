@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.smooth import low_pass, rates, smoothed_rates, smoothing_spline
+from fes_pin.data.smooth import low_pass, rates, smoothed_rates
 
 TIME = np.arange(400) / 100.0
 
@@ -40,19 +40,6 @@ def test_splines_differentiate():
     first, second = rates(np.sin(3 * TIME)[:, None], TIME)
     assert np.abs(first[5:-5, 0] - 3 * np.cos(3 * TIME[5:-5])).max() < 1e-5
     assert np.abs(second[5:-5, 0] + 9 * np.sin(3 * TIME[5:-5])).max() < 1e-3
-
-
-def test_a_smoothing_splines_bandwidth_falls_with_the_noise_and_its_rate_is_near():
-    random = np.random.default_rng(3)
-    truth = np.sin(2 * np.pi * TIME)
-    bands = []
-    for noise in (0.001, 0.1):
-        smooth, rate, _, band = smoothing_spline((truth + noise * random.normal(size=400))[:, None], TIME)
-        bands.append(band[0])
-        assert np.sqrt(np.mean((smooth[:, 0] - truth) ** 2)) < 0.7 * noise
-        error = rate[20:-20, 0] - 2 * np.pi * np.cos(2 * np.pi * TIME[20:-20])
-        assert np.sqrt(np.mean(error**2)) < 2 * np.pi * band[0] * noise
-    assert 1.0 < bands[1] < bands[0] < 20.0
 
 
 @pytest.mark.parametrize("noise", [1e-4, 1e-2])
