@@ -25,23 +25,6 @@ USAGE_ERROR: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__na
 
 VOICE: ContextVar[int] = ContextVar("VOICE", default=0)
 """How much is said besides the answer: -1 with --quiet, 1 with --verbose."""
-QUIET, LOUD = "No progress, no remarks; with --out only errors.", "Progress as lines where no bar is watched."
-SHARED = (
-    Parameter("ctx", Parameter.KEYWORD_ONLY, annotation=typer.Context),
-    Parameter(
-        "quiet",
-        Parameter.KEYWORD_ONLY,
-        default=False,
-        annotation=Annotated[bool, typer.Option("--quiet", "-q", help=QUIET)],
-    ),
-    Parameter(
-        "verbose",
-        Parameter.KEYWORD_ONLY,
-        default=False,
-        annotation=Annotated[bool, typer.Option("--verbose", "-v", help=LOUD)],
-    ),
-)
-"""Parameters of every command."""
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -54,21 +37,21 @@ def needs(**rules: str) -> Callable[[F], F]:
         By parameter the parameters of which one must be given as well ("rate width"), or none after "not".
     """
 
-    def with_rules(command: F) -> F:
-        command.__dict__.setdefault("rules", {}).update(rules)
-        return command
-
-    return with_rules
+    return _noting("rules", rules)
 
 
 def python_names(**words: str) -> Callable[[F], F]:
     """Say which words of a command line give what errors name as an argument of Python: `horizon_s="--horizon"`."""
 
-    def with_words(command: F) -> F:
-        command.__dict__.setdefault("words", {}).update(words)
+    return _noting("words", words)
+
+
+def _noting(what: str, told: dict[str, str]) -> Callable[[F], F]:
+    def noted(command: F) -> F:
+        command.__dict__.setdefault(what, {}).update(told)
         return command
 
-    return with_words
+    return noted
 
 
 def remark(text: str) -> None:
@@ -150,6 +133,18 @@ class App(typer.Typer):
         return add
 
 
+def _shared(
+    ctx: typer.Context,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="No progress, no remarks; with --out only errors.")
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Progress as lines where no bar is watched.")
+    ] = False,
+) -> None:
+    """The parameters of every command."""
+
+
 def _run_by_group(command: Callable[..., Any]) -> Callable[..., Any]:
     """The command with what all commands share before and after it."""
 
@@ -173,8 +168,8 @@ def _run_by_group(command: Callable[..., Any]) -> Callable[..., Any]:
         finally:
             VOICE.reset(before)
 
-    own = signature(command, eval_str=True).parameters.values()
-    parameters = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in (*own, *SHARED)]
+    each = [p for one in (command, _shared) for p in signature(one, eval_str=True).parameters.values()]
+    parameters = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in each]
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
