@@ -57,6 +57,8 @@ class Allocator:
         self.precise = max(PRECISE, SAME * self.certify.flattest)
         self.squares, self.pull = p.squares, p.pull
         self.H = self.squares + np.diag(p.prices + p.change)
+        for array in (self.squares, self.pull, self.H):
+            array.setflags(write=False)
         self.program = BoundedProgram(self.H)
         self._previous = self.at_rest = np.zeros(p.n)
         self.at_rest.setflags(write=False)

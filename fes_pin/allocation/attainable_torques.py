@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import linprog
+from scipy.optimize import linprog, lsq_linear
 
-from fes_pin.allocation.bounded import BoundedProgram
 from fes_pin.allocation.inputs import fractions, torque_matrix
 from fes_pin.allocation.walk import allocate_walk
 from fes_pin.body.joints import JOINT_NAMES
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
 
 INSIDE_NM = 1e-6
 """A torque nearer to the set than this counts as inside, N m."""
-STEPS, SETTLED = 60, 1e-12
-"""Proximal steps at most, and the move of a recruitment at which they have settled."""
 MET_NM = 1.0
 """Default tolerance for a gait's torque to count as attained, N m per joint."""
 
@@ -102,14 +99,7 @@ class AttainableTorques:
     def nearest(self, torque: Any) -> Nearest:
         """The attainable torque nearest to one wanted (by joint name, absent 0, or array over those that count)."""
         wanted = by_name(torque, self.joints, "torque", 0.0)
-        scale = float((self.columns**2).sum(0).max(initial=0.0)) or 1.0
-        squares, n = self.columns.T @ self.columns / scale, self.columns.shape[1]
-        near, r, off, full = 1e-7, np.zeros(n), np.zeros(n), np.ones(n)
-        program = BoundedProgram(squares + near * np.eye(n))
-        for _ in range(STEPS):  # proximal steps: they settle on a point of the set nearest to the torque
-            before, r = r, program.solve(-wanted @ self.columns / scale - near * r, off, full)
-            if np.abs(r - before).max(initial=0.0) <= SETTLED:
-                break
+        r = lsq_linear(self.columns, wanted, (0.0, 1.0), method="bvls", tol=1e-15).x
         return Nearest(self.columns @ r, r * self.upper, float(np.linalg.norm(self.columns @ r - wanted)))
 
     def contains(self, torque: Any) -> bool:

@@ -15,7 +15,7 @@ from typing import Any
 import daqp
 import numpy as np
 import qpsolvers
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csc_matrix, issparse, vstack
 
 from fes_pin.allocation.problem import EPSILON, within_rate
@@ -94,7 +94,10 @@ def exact(
         x = np.where(at > 0, high, np.where(at < 0, low, 0.0))
         free = np.flatnonzero(at == 0)
         if len(free):
-            factors = cho_factor(S[np.ix_(free, free)], check_finite=False)
+            try:
+                factors = cho_factor(S[np.ix_(free, free)], check_finite=False)
+            except LinAlgError:
+                break
             for _ in range(2):  # the second time refines
                 x[free] -= cho_solve(factors, (S @ x + c)[free], check_finite=False)
         slope = S @ x + c

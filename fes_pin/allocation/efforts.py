@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from scipy.optimize import nnls
 
-from fes_pin.allocation.bounded import lone_steps, solve_once
+from fes_pin.allocation.bounded import BoundedProgram, lone_steps, solve_once
 from fes_pin.allocation.problem import EPSILON
 
 STEPS = 100
@@ -13,6 +15,8 @@ FLATTEST = 1e-9
 """Least curvature, of a channel's own at full recruitment, on the way to cubes, which are flat where it is off."""
 SHARES = (1e-6, 1e-8, 1e-10, 1e-4)
 """Weights of effort, of the torque error's, with which the limits of the lexicographic answer are guessed."""
+LEAST_SHARE = 1e-10
+"""Weight of a channel's effort, of the strongest's torque error, below which equal channels are one to rounding."""
 PRESSED = 1e-10
 """A limit that the torque error presses on by less than this holds for the sake of effort."""
 
@@ -73,9 +77,9 @@ def error_then_effort(
     total = prices + change
     target = change * previous / total
     best, least = np.clip(target, lower, upper), np.inf
-    for share in SHARES:
-        weight = share / total.max()
-        guess = solve_once(squares + weight * np.diag(total), f - weight * total * target, lower, upper)
+    for floor, share in product((0.0, LEAST_SHARE), SHARES):
+        weight = np.maximum(share * total / total.max(), floor)
+        guess = BoundedProgram(squares + np.diag(weight)).solve(f - weight * target, lower, upper)
         for _ in range(len(f)):
             r = least_norm(squares, f, total, target, guess, (guess > lower) & (guess < upper))
             outside = (r < lower) | (r > upper)

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from fes_pin.allocation.allocate import Allocator, allocate
+from fes_pin.allocation.bounded import solve_once
+from fes_pin.allocation.certificate import Certifier
+from fes_pin.allocation.horizon import Horizon
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.nerves import Nerves
 from tests.allocation.exact_fractions import optimum
@@ -94,6 +97,26 @@ def test_random_problems_warm_and_cold_have_the_exact_answer():
 @pytest.mark.long
 def test_a_hundred_thousand_random_problems_warm_and_cold_have_the_exact_answer():
     check(510, 100_000)
+
+
+def test_a_horizon_with_prices_far_apart_is_the_exact_optimum():
+    """Without a rate its program has limits alone, as that of a torque has: the same exchange from a cold start."""
+    rng = np.random.default_rng(52)
+    for _ in range(150):
+        matrix, options, _ = asked(rng)
+        horizon = Horizon(Allocator(matrix, **options), steps=3)
+        p, n = horizon.program.problem, horizon.program.n
+        horizon.act = rng.uniform(0, 1, n)
+        torques = rng.normal(size=(3, len(matrix))) * 10.0 ** rng.uniform(-2, 2.3)
+        found = horizon.plan(torques).recruitment
+        free = horizon.keep ** np.arange(1, 4)[:, None] * horizon.act
+        H = np.kron(horizon.response.T @ horizon.response, p.matrix.T @ p.matrix) / p.scale + np.diag(
+            np.tile(p.prices, 3)
+        )
+        f = horizon.response.T @ ((free @ p.matrix.T - torques) @ p.matrix) / p.scale
+        best = solve_once(H, f.ravel(), np.tile(p.lower, 3), np.tile(p.upper, 3))
+        tolerance = min(EXACT * 3 * n / Certifier(p).flattest, 1e-3)
+        np.testing.assert_allclose(found.ravel(), best, atol=tolerance)
 
 
 @pytest.mark.parametrize("start", [[368.0], {"left_femoral": 1.5}, [-0.1], [np.nan], "off", {"left_tibial": 0.1}])
