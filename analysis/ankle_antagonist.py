@@ -10,7 +10,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.paper.antagonist import carried_covariance, fit_antagonist, with_antagonist
+import fes_pin as fp
+from fes_pin.paper.antagonist import carried_covariance, with_antagonist
 from fes_pin.paper.constants import ANGLE_NOISE_RAD, paper_trial, paper_twin
 from fes_pin.paper.equation_1 import GRAVITY
 from fes_pin.paper.error_region import profile_intervals
@@ -22,7 +23,7 @@ twin = paper_twin("3-23")
 loads = np.repeat([0.2, 0.5, 0.8, 1.0, 1.2, 1.5, 2.0, 2.5], 3)
 true = np.array([replace(twin, load_kg=m).rest_angle() for m in loads])
 angles = true + ANGLE_NOISE_RAD * np.random.default_rng(3).standard_normal(len(loads))
-curve = fit_antagonist(loads, angles, ANGLE_NOISE_RAD, twin.foot_mass_kg)
+curve = fp.fit_antagonist(loads, angles, ANGLE_NOISE_RAD, twin.foot_mass_kg)
 print(curve)
 
 # %% Carry it on to the ratios

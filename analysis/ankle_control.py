@@ -12,16 +12,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.control.control import PositionController
-from fes_pin.control.dynamics import AnkleDynamics
-from fes_pin.control.endurance import least_rest, muscle_budget
-from fes_pin.control.loop import sine, steps, track
-from fes_pin.control.margins import delay_margin, margins
-from fes_pin.control.observer import JointObserver
+import fes_pin as fp
+from fes_pin.control.loop import sine, steps
+from fes_pin.control.margins import margins
 from fes_pin.control.tuning import loop_at
-from fes_pin.models.effects.fatigue import Fatigue
-from fes_pin.models.effects.frame_vibration import FrameVibration
-from fes_pin.models.effects.recruitment_hysteresis import RecruitmentHysteresis
 from fes_pin.paper.constants import STEPWISE, paper_twin
 from fes_pin.paper.ratios import RatioProblem, ankle_of, least_error
 from fes_pin.paper.twin import RunningTwin, record, staircase
@@ -42,66 +36,66 @@ def changed(gain, tau, stiffness):
 
 # %% Steps and sines
 wave, stair = sine(low, 15.0, 0.5, 20.0), steps(low, (0.0, 5.0, 15.0, 8.0, 0.0), 2.0)
-controller = PositionController(model, LOAD)
+controller = fp.PositionController(model, LOAD)
 gains = controller.gains
 print(f"tuned: one degree is worth {gains.boldness:g} of the muscle; worst corner {gains.radius:.3f} a pulse")
 middle = float(gains.angles[len(gains.angles) // 2])
 left = margins(loop_at(controller.dynamics, controller.observer, gains, middle))
 print(f"margins in the middle: gain {left.gain:.2f}, phase {left.phase_deg:.0f} degrees, {1e3 * left.delay_s:.0f} ms")
-believed, worst_delay = delay_margin(controller.dynamics, controller.observer, gains)
+believed, worst_delay = fp.delay_margin(controller.dynamics, controller.observer, gains)
 print(
     f"dead time that every angle bears: {1e3 * believed:.0f} ms if the model is right, {1e3 * worst_delay:.0f} ms if "
     "gain, time constant and stiffness are 30 % off"
 )
 stepped, waved = (
-    track(controller, RunningTwin(twin), stair),
-    track(PositionController(model, LOAD), RunningTwin(twin), wave),
+    fp.track(controller, RunningTwin(twin), stair),
+    fp.track(fp.PositionController(model, LOAD), RunningTwin(twin), wave),
 )
 print(f"sine of 15 degrees peak to peak, 0.5 Hz, {LOAD} kg: RMS {waved.rms_error_deg():.3f} degrees")
-one, joint, late = PositionController(model, LOAD), RunningTwin(twin), []
+one, joint, late = fp.PositionController(model, LOAD), RunningTwin(twin), []
 for wanted, error in zip(wave.tolist(), np.random.default_rng(0).normal(0.0, 2e-3, len(wave)).tolist(), strict=True):
     late.append(math.degrees(wanted - joint.angle_rad))
-    joint.step(one.step(joint.angle_rad + error, wanted), 1.0 / 45.0)
+    joint.step(one.step(joint.angle_rad + error, wanted, len(late) / 45.0), 1.0 / 45.0)
 print(f"the same as a number at a time, which nobody knew before: RMS {np.sqrt(np.mean(np.square(late))):.2f} degrees")
 for height in (0.25, 0.5, 1.0):
     held = np.full(900, twin.rest_angle() + math.radians(height))
-    near = track(PositionController(model, LOAD), RunningTwin(twin), held)
+    near = fp.track(fp.PositionController(model, LOAD), RunningTwin(twin), held)
     switched = np.sum(np.diff(near.pulse_width_us > 0.0)) / near.time[-1]
     print(f"held {height:g} degrees above rest: RMS {near.rms_error_deg(2.0):.2f}, {switched:.1f} switches a second")
 for load, height in ((1.0, 15.0), (0.2, 30.0)):
     other = replace(twin, load_kg=load)
-    run = track(
-        PositionController(ankle_of(other), load),
+    run = fp.track(
+        fp.PositionController(ankle_of(other), load),
         RunningTwin(other),
         sine(other.rest_angle() + math.radians(1.0), height, 0.5, 20.0),
     )
     print(f"sine of {height:g} degrees peak to peak, 0.5 Hz, {load} kg: RMS {run.rms_error_deg():.3f} degrees")
 corners = {
-    factors: track(PositionController(model, LOAD), RunningTwin(changed(*factors)), wave)
+    factors: fp.track(fp.PositionController(model, LOAD), RunningTwin(changed(*factors)), wave)
     for factors in itertools.product((0.7, 1.3), repeat=3)
 }
 worst = max(corners, key=lambda f: corners[f].rms_error_deg())
 print(f"gain, tau and stiffness 30 % off, 8 corners: RMS {corners[worst].rms_error_deg():.3f} degrees at worst {worst}")
 played = replace(twin, hysteresis_us=60.0)
-without = track(PositionController(model, LOAD), RunningTwin(played), wave).rms_error_deg(2.0)
-aware = PositionController(model + RecruitmentHysteresis(half_width_us=60.0), LOAD)
-undone = track(aware, RunningTwin(played), wave).rms_error_deg(2.0)
+without = fp.track(fp.PositionController(model, LOAD), RunningTwin(played), wave).rms_error_deg(2.0)
+aware = fp.PositionController(model + fp.effects.RecruitmentHysteresis(half_width_us=60.0), LOAD)
+undone = fp.track(aware, RunningTwin(played), wave).rms_error_deg(2.0)
 print(f"hysteresis of +-60 us: RMS {without:.3f} degrees, compensated {undone:.3f}")
 
 # %% Five minutes, fatigue to 60 %, within the budget; and 20 degrees, which is beyond it
-fatigue = Fatigue(rate_per_s=0.068, recovery_s=60.0)
+fatigue = fp.effects.Fatigue(rate_per_s=0.068, recovery_s=60.0)
 tiring = replace(twin, fatigue_per_s=0.068, recovery_s=60.0)
 long = sine(low, 15.0, 0.5, 300.0)
-plan = muscle_budget(model + fatigue, LOAD, long)
+plan = fp.muscle_budget(model + fatigue, LOAD, long)
 tired = RunningTwin(tiring)
-endured = track(PositionController(model + fatigue, LOAD), tired, long)
+endured = fp.track(fp.PositionController(model + fatigue, LOAD), tired, long)
 print(
     f"5 minutes with fatigue: force left {100 * tired.capacity:.1f} %, estimated {100 * endured.share[-1]:.1f} %, "
     f"budget {100 * plan.capacity[-1]:.1f} %; RMS {endured.rms_error_deg():.3f} degrees"
 )
 greedy = sine(low, 20.0, 0.5, 90.0)
-short_at = muscle_budget(model + fatigue, LOAD, greedy).short_at_s
-watcher, joint, warned, over = PositionController(model + fatigue, LOAD), RunningTwin(tiring), [], []
+short_at = fp.muscle_budget(model + fatigue, LOAD, greedy).short_at_s
+watcher, joint, warned, over = fp.PositionController(model + fatigue, LOAD), RunningTwin(tiring), [], []
 
 
 def noted(k, angle):
@@ -112,8 +106,8 @@ def noted(k, angle):
     return angle
 
 
-beyond = track(watcher, joint, greedy, sensor=noted)
-rest = least_rest(model + fatigue, LOAD, sine(low, 19.0, 0.5, 20.0), 4)
+beyond = fp.track(watcher, joint, greedy, sensor=noted)
+rest = fp.least_rest(model + fatigue, LOAD, sine(low, 19.0, 0.5, 20.0), 4)
 print(
     f"20 degrees: the budget ends at {short_at:.0f} s, the warning comes at {warned[0]:.0f} s, "
     f"the joint first falls 1 degree short at {over[0]:.0f} s"
@@ -127,13 +121,15 @@ shaken = paper_twin("3-23", frame=True)
 
 
 def on_frame(label, rig, known, seconds=60.0, wander=None):
-    observer = None if wander is None else JointObserver(AnkleDynamics.of(known, rig.load_kg), torque_wander=wander)
-    controller = PositionController(known, rig.load_kg, observer)
-    truth = AnkleDynamics.of(framed(rig), rig.load_kg)
+    observer = (
+        None if wander is None else fp.JointObserver(fp.AnkleDynamics.of(known, rig.load_kg), torque_wander=wander)
+    )
+    controller = fp.PositionController(known, rig.load_kg, observer)
+    truth = fp.AnkleDynamics.of(framed(rig), rig.load_kg)
     angles = controller.gains.angles[:7:2]
     radius = max(loop_at(truth, controller.observer, controller.gains, q).radius() for q in angles)
     reference = sine(rig.rest_angle() + math.radians(1.0), 12.0, 0.5, seconds)
-    run = track(controller, RunningTwin(rig), reference)
+    run = fp.track(controller, RunningTwin(rig), reference)
     print(
         f"frame at {rig.frame_hz:g} Hz, J / J_frame {rig.frame_coupling:.2f}; {label}: a swing changes by "
         f"{100 * (radius - 1):+.2f} % a pulse; RMS {run.rms_error_deg(0.0, seconds / 2):.2f} degrees in the first "
@@ -143,7 +139,9 @@ def on_frame(label, rig, known, seconds=60.0, wander=None):
 
 
 def framed(rig):
-    frame = FrameVibration(coupling=rig.frame_coupling, frequency_hz=rig.frame_hz, damping_ratio=rig.frame_damping)
+    frame = fp.effects.FrameVibration(
+        coupling=rig.frame_coupling, frequency_hz=rig.frame_hz, damping_ratio=rig.frame_damping
+    )
     return ankle_of(replace(rig, frame_coupling=0.0)) + frame
 
 

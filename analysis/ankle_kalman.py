@@ -9,12 +9,13 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
+import fes_pin as fp
 from fes_pin.identify.fit import fit
 from fes_pin.identify.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_twin
-from fes_pin.paper.kalman import GainFilter, StraightRecruitment, chi2_band, nees, track_gain
+from fes_pin.paper.kalman import StraightRecruitment, chi2_band, nees
 from fes_pin.paper.twin import record, staircase
 
 OUT = Path(__file__).parents[1] / "out"
@@ -27,15 +28,15 @@ def isometric(stimulus, seed, noise=FORCE_NOISE_N):
 
 
 trial = isometric(isometric_stimulus(8.0), 1)
-history = track_gain(trial, twin.constants(), FORCE_NOISE_N)
-plain = track_gain(isometric(isometric_stimulus(8.0), 1, 1.0), twin.constants(), 1.0, plain=True)
-ours = track_gain(isometric(isometric_stimulus(8.0), 1, 1.0), twin.constants(), 1.0)
+history = fp.track_gain(trial, twin.constants(), FORCE_NOISE_N)
+plain = fp.track_gain(isometric(isometric_stimulus(8.0), 1, 1.0), twin.constants(), 1.0, plain=True)
+ours = fp.track_gain(isometric(isometric_stimulus(8.0), 1, 1.0), twin.constants(), 1.0)
 
 # %% Is its band honest? NEES over 60 trials, NIS within each
 runs, squares, innovations = 60, [], []
 for seed in range(2000, 2000 + runs):
     one = isometric(isometric_stimulus(5.25), seed)
-    tracker = GainFilter(one.dt, StraightRecruitment.of(twin.constants()), FORCE_NOISE_N)
+    tracker = fp.GainFilter(one.dt, StraightRecruitment.of(twin.constants()), FORCE_NOISE_N)
     for k, (force, width) in enumerate(zip(one["force_n"], one["pulse_width_us"], strict=True)):
         tracker.step(force, width)
         if k >= 225:

@@ -22,6 +22,14 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.comparison.result import Comparison as Comparison
     from fes_pin.contrasts.contrast import contrast as contrast
     from fes_pin.contrasts.result import Contrast as Contrast
+    from fes_pin.control.control import PositionController as PositionController
+    from fes_pin.control.dynamics import AnkleDynamics as AnkleDynamics
+    from fes_pin.control.endurance import least_rest as least_rest
+    from fes_pin.control.endurance import muscle_budget as muscle_budget
+    from fes_pin.control.limits import StimulationLimits as StimulationLimits
+    from fes_pin.control.loop import track as track
+    from fes_pin.control.margins import delay_margin as delay_margin
+    from fes_pin.control.observer import JointObserver as JointObserver
     from fes_pin.data.errors import InputError as InputError
     from fes_pin.data.results import load_result as load_result
     from fes_pin.data.results import save_result as save_result
@@ -54,6 +62,9 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.muscles.recruitment import MeasuredRecruitment as MeasuredRecruitment
     from fes_pin.muscles.recruitment import SaturatingRecruitment as SaturatingRecruitment
     from fes_pin.muscles.recruitment import SigmoidRecruitment as SigmoidRecruitment
+    from fes_pin.paper.antagonist import fit_antagonist as fit_antagonist
+    from fes_pin.paper.kalman import GainFilter as GainFilter
+    from fes_pin.paper.kalman import track_gain as track_gain
     from fes_pin.verdict.ask import diagnose as diagnose
     from fes_pin.view.report import report as report
     from fes_pin.walk.diagnosis import diagnose_walk as diagnose_walk
@@ -108,6 +119,17 @@ _WHERE = {
     "HillRecruitment": "fes_pin.muscles.recruitment",
     "MeasuredRecruitment": "fes_pin.muscles.recruitment",
     "Hysteresis": "fes_pin.muscles.recruitment",
+    "AnkleDynamics": "fes_pin.control.dynamics",
+    "JointObserver": "fes_pin.control.observer",
+    "PositionController": "fes_pin.control.control",
+    "StimulationLimits": "fes_pin.control.limits",
+    "delay_margin": "fes_pin.control.margins",
+    "least_rest": "fes_pin.control.endurance",
+    "muscle_budget": "fes_pin.control.endurance",
+    "track": "fes_pin.control.loop",
+    "GainFilter": "fes_pin.paper.kalman",
+    "track_gain": "fes_pin.paper.kalman",
+    "fit_antagonist": "fes_pin.paper.antagonist",
 }
 _CHAPTERS = {"effects": "fes_pin.models.effects", "rigs": "fes_pin.models.rigs"}
 

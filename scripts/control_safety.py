@@ -2,6 +2,7 @@
 
 .venv/bin/python scripts/control_safety.py                    # 1000 faults, 10 hours; 15 minutes on two cores
 .venv/bin/python scripts/control_safety.py --faults 80 --hours 0.5
+.venv/bin/python scripts/control_safety.py --faults 0 --hours 0 --steps 100000    # whatever callers do
 
 The ankles are twins (`fes_pin.paper.twin`), whose integrator shares no line with the controller's model. Each is off by
 up to 30 % in gain, time constant and stiffness from what the controller believes, half of them tire, a third stand on
@@ -23,8 +24,11 @@ from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from fes_pin.control.control import PositionController
-from fes_pin.control.dynamics import PULSE_S
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.control.faults import Status
+from fes_pin.control.limits import StimulationLimits
+from fes_pin.control.observer import JointObserver
+from fes_pin.data.errors import InputError
 from fes_pin.models.effects.fatigue import Fatigue
 from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.paper.constants import paper_twin
@@ -233,7 +237,7 @@ def fault(kind: str, seed: int) -> Outcome:
             else:
                 broken = change
         reading = working(k, joint.angle_rad)
-        width = controller.step(broken(k, reading) if broken else reading)
+        width = controller.step(broken(k, reading) if broken else reading, time_s=k * PULSE_S)
         joint.step(width, PULSE_S)
         if k < start:
             continue
@@ -280,12 +284,113 @@ def normal(seed: int, seconds: float = BOUT_S) -> Bout:
     controller.follow(schedule(rng, seconds))
     surprise, stopped = 0.0, math.inf
     for k in range(round(seconds / PULSE_S)):
-        joint.step(controller.step(working(k, joint.angle_rad)), PULSE_S)
+        joint.step(controller.step(working(k, joint.angle_rad), time_s=k * PULSE_S), PULSE_S)
         surprise = max(surprise, controller.monitor.surprise)
         if controller.status.is_fault:
             stopped = k * PULSE_S
             break
     return Bout(controller.status.name, surprise, controller.calm, subject, stopped)
+
+
+@dataclass(frozen=True)
+class Abuse:
+    """What two controllers did whose callers do anything: steps, pauses, limits that were refused, what went wrong."""
+
+    steps: int
+    pauses: int
+    refused: int
+    wrong: tuple[str, ...]
+
+
+LIMIT_UNITS = {"pulse_width_us": 1e3, "rate_us_per_s": 1e3, "charge_uc_per_s": 1e3, "current_ma": 1e3}
+"""Factors by which a unit slips: ms for us, mC for uC, A for mA."""
+
+
+def limits_of(rng: np.random.Generator) -> StimulationLimits:
+    """Limits of a clinic, in one of three draws with a slip of units; such are refused, and drawn again."""
+    given = {
+        "pulse_width_us": rng.uniform(200.0, 1000.0),
+        "rate_us_per_s": rng.uniform(1000.0, 20_000.0),
+        "charge_uc_per_s": rng.uniform(500.0, 3000.0),
+        "current_ma": rng.uniform(15.0, 40.0),
+    }
+    if rng.random() < 1.0 / 3.0:
+        name = str(rng.choice(list(given)))
+        given[name] *= LIMIT_UNITS[name] ** rng.choice([-1.0, 1.0])
+    return StimulationLimits(**given)
+
+
+def must_not_be(controller: PositionController, widths: list[float], stopped: int, gap: float) -> list[str]:
+    """What is wrong with the last of some widths, `gap` seconds after the one before it."""
+    limits, width = controller.limits, widths[-1]
+    wrong = {
+        "outside of the limits": width != 0.0
+        and not BELIEVED.threshold_us <= width <= min(limits.pulse_width_us, BELIEVED.saturation_us),
+        "while waiting": width > 0.0 and controller.status is Status.WAITING,
+        "while stopped": width > 0.0 and stopped > limits.ramp_s / PULSE_S + 1,
+        "at once after a pause": width > 0.0 and gap >= 0.2,
+        "charge above its limit": 1e-3 * (limits.current_ma or 0.0) * sum(widths[-45:])
+        > limits.charge_uc_per_s * (1.0 + 1e-9),
+    }
+    return [what for what, found in wrong.items() if found]
+
+
+def abused(seed: int, steps: int = 2000) -> Abuse:
+    """Two legs of one clinic, given one observer: one is moved, one is to rest; readings, references, times, pauses and
+    resets are anything."""
+    rng, refused, wrong, legs = np.random.default_rng([seed, 78]), 0, [], []
+    model = ankle_of(BELIEVED)
+    shared = JointObserver(AnkleDynamics.of(model, BELIEVED.load_kg))
+    while len(legs) < 2:
+        try:
+            legs.append(PositionController(model, BELIEVED.load_kg, shared, limits_of(rng)))
+        except InputError:
+            refused += 1
+    joints, rest, pauses = [RunningTwin(BELIEVED, max_step_s=STEP_S) for _ in legs], BELIEVED.rest_angle(), 0
+    now, given, stopped = 0.0, [[0.0], [0.0]], [0, 0]
+    for k in range(steps):
+        gap = rng.uniform(0.8, 1.2) * PULSE_S
+        if rng.random() < 0.003:
+            gap, pauses = float(rng.choice([0.2, 1.0, 60.0])), pauses + 1
+        now += gap
+        for leg, (controller, joint) in enumerate(zip(legs, joints, strict=True)):
+            joint.step(given[leg][-1], min(gap, PULSE_S))
+            for _ in range(min(round(gap / PULSE_S) - 1, 200)):
+                joint.step(0.0, PULSE_S)
+            reading: object = joint.angle_rad + NOISE_RAD * rng.standard_normal()
+            if rng.random() < 0.01:
+                reading = rng.choice([math.nan, math.inf, -math.inf, 0.0, 1e300, 3.0, 105.0])
+            wanted: object = (
+                rest if leg else rest + math.radians(rng.uniform(-5.0, 40.0) if rng.random() < 0.1 else 9.0)
+            )
+            if rng.random() < 5e-4:
+                wanted = rng.choice([math.nan, 95.0, -1.0])
+            try:
+                width = controller.step(reading, wanted, now if rng.random() > 2e-4 else -1.0)
+            except InputError:
+                width = 0.0
+            stopped[leg] = stopped[leg] + 1 if controller.status is not Status.RUNNING else 0
+            given[leg].append(width)
+            place = f"seed {seed}, leg {leg}, step {k}, {controller.status.name}: {width:.0f} us, "
+            wrong += [place + what for what in must_not_be(controller, given[leg], stopped[leg], gap)]
+            if leg and width > 400.0 and not pauses and abs(joint.angle_rad - rest) < math.radians(1.0):
+                wrong.append(f"{place}for a leg that is to rest")
+            if controller.status.is_fault and stopped[leg] > 60:
+                controller.reset()
+    return Abuse(2 * steps, pauses, refused, tuple(wrong))
+
+
+def show_abuse(outcomes: Iterable[Abuse]) -> None:
+    """What came of it."""
+    every = list(outcomes)
+    steps, pauses, refused = (sum(getattr(o, n) for o in every) for n in ("steps", "pauses", "refused"))
+    wrong = [line for o in every for line in o.wrong]
+    print(
+        f"{steps} steps of controllers that were given one observer, {pauses} pauses, {refused} limits with a slip of "
+        f"units or without room refused: {len(wrong)} widths that must not be"
+    )
+    for line in wrong[:20]:
+        print(f"  {line}")
 
 
 def show_faults(outcomes: Iterable[Outcome]) -> None:
@@ -357,10 +462,11 @@ def _fault(job: tuple[str, int]) -> Outcome:
 
 
 def main() -> None:
-    """Both tables."""
+    """The tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--faults", type=int, default=1000, help="of all kinds together")
     parser.add_argument("--hours", type=float, default=10.0, help="of normal use")
+    parser.add_argument("--steps", type=int, default=100_000, help="of controllers whose callers do anything")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     given = parser.parse_args()
@@ -371,6 +477,8 @@ def main() -> None:
         bouts = range(given.seed, given.seed + round(given.hours * 3600.0 / BOUT_S))
         if bouts:
             show_normal(pool.imap_unordered(normal, bouts), given.hours)
+        if given.steps:
+            show_abuse(pool.imap_unordered(abused, range(given.seed, given.seed + -(-given.steps // 4000))))
 
 
 if __name__ == "__main__":

@@ -268,24 +268,22 @@ class PositionController:
         ------
         InputError
             For what is no reading, no reference or no time: text, lists, booleans, degrees, angles outside the range of
-            motion, a time that is not at least half a pulse after the last. It is a fault, too. A number that no joint
+            motion, times that go on faster than pulses by more than jitter. It is a fault, too. A number that no joint
             can have is refused only before the first pulse; later it is the sensor that is at fault, not the caller.
         """
-        if self.status.is_fault:
-            return self._ramp()
         try:
+            self._notice(time_s)
+            if self.status.is_fault:
+                return self._ramp()
             reading = read(angle_rad)
             if self.status is Status.WAITING and abs(reading) > LARGEST_RAD:
                 raise InputError(f"angle_rad: expected an angle in rad, found {reading:g}{hint(reading)}")
             wanted, preview = self._coming(reference_rad)
-            pause_s = self.clock.pause_s(time_s)
         except InputError:
+            if self.status.is_fault:
+                return self._ramp()
             self.status = Status.REFUSED
             raise
-        if pause_s:
-            self.paused_s = max(self.paused_s, pause_s)
-            self._begin()
-            self.risen = 0
         self._next(wanted, preview)
         if self.status is Status.WAITING:
             self._await(reading)
@@ -306,6 +304,16 @@ class PositionController:
         self.observer.predict(self.recruitment)
         return width
 
+    def _notice(self, time_s: float | None) -> None:
+        """Begin again after a pause; a fault stays one, and its ramp is over."""
+        pause_s = self.clock.pause_s(time_s)
+        if pause_s and self.status.is_fault:
+            self.falling = []
+        elif pause_s:
+            self.paused_s = max(self.paused_s, pause_s)
+            self._begin()
+            self.risen = 0
+
     def _coming(self, reference_rad: object) -> tuple[list[float], bool]:
         """What is wanted in this pulse and the next ones, and whether those are known."""
         if reference_rad is not None:
@@ -323,8 +331,8 @@ class PositionController:
         self.count += 1
         if self.status is Status.RUNNING:
             self.risen = min(self.risen + 1, RISE_PULSES)
-        let_in = self.lowest + self.risen / RISE_PULSES * (self.highest - self.lowest)
-        self.window.take(wanted, preview, self.lowest, let_in)
+        held_back = (1.0 - self.risen / RISE_PULSES) * (self.highest - self.lowest)
+        self.window.take(wanted, preview, self.lowest, self.highest - held_back)
 
     def _lacking(self, wanted: float) -> float:
         """Recruitment that a reference takes beyond what the muscle can hold; notes how far it lies beyond reach."""

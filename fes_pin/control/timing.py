@@ -14,8 +14,9 @@ PAUSE_S = BAD_READINGS * PULSE_S
 """Time between two readings from which on it is a pause, 0.13 s: so many missing readings in a row are a fault, too."""
 CLOCK_PAUSE_S = 1.0
 """The same by the computer's clock, which other programs hold up: a muscle lets go within 0.2 s."""
-SOONEST_S = 0.5 * PULSE_S
-"""Readings that are nearer to each other are not those of pulses: the charge of a second would be another."""
+AHEAD_S, FORGOTTEN = 0.5 * PULSE_S, 0.1
+"""How far calls may run ahead of the pulses, and the share of it that is forgotten with each: jitter of half a pulse,
+and a timer of 22 ms in place of 22.2. Limits count pulses: calls twice as fast would give twice the charge."""
 
 
 class PulseClock:
@@ -23,6 +24,7 @@ class PulseClock:
 
     def __init__(self) -> None:
         self.last: tuple[bool, float] | None = None
+        self.ahead_s = 0.0
 
     def pause_s(self, time_s: float | None) -> float:
         """Note a call; the time in s since the last one if that was a pause, else 0.
@@ -30,15 +32,17 @@ class PulseClock:
         Raises
         ------
         InputError
-            For a stated time that is none, or that is less than half a pulse after the last.
+            For a stated time that is none, or calls that come faster than pulses; the call does not count.
         """
         stated = time_s is not None
         now = number(time_s, "time_s") if stated else time.monotonic()
         gap = now - self.last[1] if self.last and self.last[0] == stated else PULSE_S
-        if stated and gap < SOONEST_S:
+        ahead = max((1.0 - FORGOTTEN) * self.ahead_s + PULSE_S - gap, 0.0) if stated else 0.0
+        if ahead > AHEAD_S:
             raise InputError(
                 f"expected one call per pulse, every {PULSE_S:.4f} s, found {gap:.3g} s after the last", column="time_s"
             )
+        self.ahead_s = ahead
         self.last = stated, now
         if gap < 0.0:  # the clock of another machine or process: it says nothing of how long it was
             return math.inf

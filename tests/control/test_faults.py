@@ -52,6 +52,13 @@ def test_a_slice_of_normal_use_is_not_stopped(seed):
     assert bout.status == "RUNNING" and bout.surprise < 1.0
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_slice_of_whatever_callers_do_gives_no_width_that_must_not_be(seed):
+    """Shared observers, pauses, slips of units, readings, references and times that are none."""
+    outcome = control_safety.abused(seed, 800)
+    assert outcome.wrong == () and outcome.steps == 1600
+
+
 @pytest.mark.parametrize("reading", [math.nan, None, 0.2, 3.0, REST + 0.3])
 def test_no_pulse_before_a_valid_reading(reading):
     controller = fresh()

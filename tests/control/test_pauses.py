@@ -128,6 +128,19 @@ def test_a_time_that_does_not_go_on_is_refused(when):
     assert controller.status is Status.REFUSED
 
 
+@pytest.mark.parametrize(("gap", "refused"), [(0.022, False), (PULSE_S, False), (0.02, True), (0.6 * PULSE_S, True)])
+def test_calls_that_come_faster_than_pulses_are_refused_and_a_timer_of_22_ms_is_not(gap, refused):
+    """Limits of charge count pulses: 50 calls a second would give 11 % more than they allow."""
+    controller, joint = fresh(), RunningTwin(TWIN)
+    try:
+        for k in range(300):
+            joint.step(controller.step(joint.angle_rad, UP, k * gap + 0.2 * gap * (k % 2)), gap)
+    except InputError as error:
+        assert refused and str(error).startswith("time_s: expected one call per pulse")
+    else:
+        assert not refused and controller.status is Status.RUNNING
+
+
 def test_a_fault_stays_a_fault_over_a_pause():
     controller, joint = fresh(), RunningTwin(TWIN)
     _, now = running(controller, joint)
@@ -135,6 +148,21 @@ def test_a_fault_stays_a_fault_over_a_pause():
         controller.step(joint.angle_rad, "up", now)
     assert [controller.step(REST, UP, now + 100.0 + k * PULSE_S) for k in range(60)][-1] == 0.0
     assert controller.status is Status.REFUSED
+
+
+@pytest.mark.parametrize("broken", ["reference", "reading"])
+def test_a_pause_in_the_ramp_after_a_fault_ends_the_ramp(broken):
+    """The rest of the ramp was given after it: 294 us out of nothing."""
+    controller, joint = fresh(), RunningTwin(TWIN)
+    _, now = running(controller, joint)
+    if broken == "reference":
+        with pytest.raises(InputError):
+            controller.step(joint.angle_rad, "up", now)
+    else:
+        for k in range(6):
+            controller.step(math.nan, UP, now + k * PULSE_S)
+    assert controller.status.is_fault
+    assert not any(controller.step(REST, UP, now + 60.0 + k * PULSE_S) for k in range(20))
 
 
 def test_after_a_pause_the_reference_is_let_in_within_half_a_second():
