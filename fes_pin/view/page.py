@@ -87,11 +87,9 @@ def section(title: str, *contents: Markup) -> Markup:
     return element("section", element("h2", title), joined(kept)) if kept else Markup("")
 
 
-def figure(drawing: Drawing | str, caption: Content = "", class_: str = "", file: str = "figure") -> Markup:
+def figure(drawing: Drawing, caption: Content = "", class_: str = "", file: str = "figure") -> Markup:
     """An inline drawing (SVG, trusted) with a caption, and its data as CSV behind it."""
     known = {"class_": class_} if class_ else {}
-    if isinstance(drawing, str):
-        return element("figure", Markup(drawing), element("figcaption", caption), **known)
     words = f"data (CSV, {drawing.note})" if drawing.note else "data (CSV)"
     link = element("a", words, class_="data", download=f"{file}.csv", href=f"data:text/csv,{quote(drawing.csv)}")
     return element("figure", Markup(drawing.svg), element("figcaption", caption, " ", link), **known)

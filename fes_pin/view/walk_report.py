@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from fes_pin.diagnosis.text import percent, probability
 from fes_pin.models.describe import sentence
+from fes_pin.view.chart import Panel, svg
+from fes_pin.view.drawing import Drawing, csv_of, every
 from fes_pin.view.page import Content, Markup, element, figure, html_table, joined, key, page, section
-from fes_pin.view.style import EXTENDED, FAINT, MEASURED, NOMINAL
-from fes_pin.view.svg import WIDTH, inline_svg, styled
+from fes_pin.view.style import thin_curve
 from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.record import BODY_FILE
 from fes_pin.walk.result import WalkDiagnosis, walk_cause_row
 
 PLAYBACK_FILE = "playback.html"
+SHOWN_S = 4.0
+"""Of each trial, s."""
+WIDE, ROW, AXIS = 420.0, 160.0, 66.0
+"""Width of a figure's half and height of a channel, room for the axis on the left."""
 
 
 def walk_report_html(diagnosis: WalkDiagnosis) -> str:
     """The report as one HTML page that needs nothing else: no network, no script."""
-    with styled():
-        return _html(diagnosis)
-
-
-def _html(diagnosis: WalkDiagnosis) -> str:
     words = diagnosis.headline()
     strides = diagnosis.search.banks.strides.count
     partly = " partly" if diagnosis.causes and diagnosis.remainder.unexplained else ""
@@ -105,27 +105,48 @@ def _trials(diagnosis: WalkDiagnosis) -> list[Markup]:
             with_it = banks.bank(best.forms).scenes[number]
             columns = np.concatenate([banks.forms[i].columns(with_it) for i in best.forms], axis=2)
             made = scene.measured - (with_it.residual - columns @ best.fitted.values)
-        drawn = _figure(scene.motion.time, scene.measured, scene.needed, made, scene.plates.loaded)
-        out.append(figure(inline_svg(drawn, f"Ground reaction of trial {scene.name}"), scene.name))
+        curves = {"measured": scene.measured, "nominal": scene.needed} | ({} if made is None else {"extended": made})
+        single = scene.plates.loaded["left"] ^ scene.plates.loaded["right"]
+        drawn = _drawing(scene.name, scene.motion.time, curves, single)
+        out.append(
+            figure(
+                drawn, f"Trial {scene.name}, at most {SHOWN_S:g} s of it; single supports are shaded.", file=scene.name
+            )
+        )
     return out
 
 
-def _figure(
-    time: np.ndarray, measured: np.ndarray, needed: np.ndarray, made: np.ndarray | None, loaded: dict[str, np.ndarray]
-) -> Figure:
-    """Six channels about the centre of mass over the first strides; single supports are shaded."""
-    shown = time <= time[0] + 4.0
-    figure_ = Figure(figsize=(2.0 * WIDTH, 5.4), layout="constrained")
-    axes = figure_.subplots(3, 2, sharex=True)
-    for channel, panel in enumerate(axes.T.ravel()):
-        single = loaded["left"] ^ loaded["right"]
-        panel.fill_between(time[shown], 0, 1, where=single[shown], transform=panel.get_xaxis_transform(), color=FAINT,
-                           alpha=0.35, lw=0)  # fmt: skip
-        panel.plot(time[shown], measured[shown, channel], color=MEASURED, lw=1.4)
-        panel.plot(time[shown], needed[shown, channel], color=NOMINAL, lw=1.2)
-        if made is not None:
-            panel.plot(time[shown], made[shown, channel], color=EXTENDED, lw=1.2)
-        panel.set_ylabel(f"{CHANNELS[channel]}\n({'N' if channel < 3 else 'N m'})", fontsize=8.5)
-    for panel in axes[2]:
-        panel.set_xlabel("time (s)")
-    return figure_
+def _drawing(trial: str, time: np.ndarray, curves: Mapping[str, np.ndarray], single: np.ndarray) -> Drawing:
+    """Six channels about the centre of mass, forces on the left and moments on the right.
+
+    Parameters
+    ----------
+    curves
+        Each of shape (n, 6), by the name of its colour.
+    single
+        Shape (n,): whether one foot alone is on the ground.
+    """
+    shown = time <= time[0] + SHOWN_S
+    time, edges = time[shown], np.flatnonzero(np.diff(single[shown], prepend=False, append=False))
+    panels, columns = [], {"time_s": time}
+    for channel, name in enumerate(CHANNELS):
+        unit = "N" if channel < 3 else "N m"
+        own = {of: values[shown, channel] for of, values in curves.items()}
+        columns |= {f"{name.replace(' ', '_')}_{of}": values for of, values in own.items()}
+        low, high = min(v.min() for v in own.values()), max(v.max() for v in own.values())
+        room = 0.05 * (high - low) or 1.0
+        left = AXIS + (channel // 3) * WIDE
+        panel = Panel(left, 8.0 + (channel % 3) * ROW, WIDE - AXIS - 8.0, ROW - 16.0, (time[0], time[-1]),
+                      (low - room, high + room))  # fmt: skip
+        for begin, end in edges.reshape(-1, 2).tolist():
+            panel.box((time[begin], time[end - 1]), panel.y, "band")
+        for of, values in own.items():
+            panel.line(*thin_curve(time, values), of, 1.3)
+        panel.y_axis(f"{name} ({unit})".replace(" about", "\nabout"), title_at=left - AXIS + 26.0)
+        if channel % 3 == 2:
+            panel.x_axis("time (s)")
+        panels.append(panel)
+    words = f"Ground reaction of trial {trial} in six channels: {', '.join(CHANNELS)}."
+    step = every(len(time))
+    note = f"every {step}. sample" if step > 1 else ""
+    return Drawing(svg(panels, 2.0 * WIDE, 3.0 * ROW + 30.0, words), csv_of(columns, step), note)

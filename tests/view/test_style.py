@@ -1,11 +1,9 @@
 """Curves drawn with few points: every extreme stays, in order, and both ends."""
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 
 from fes_pin.view.style import thin_curve
-from fes_pin.view.svg import styled
 
 
 @pytest.mark.parametrize("n", [1, 5, 699, 700, 701, 1000, 12345])
@@ -16,13 +14,3 @@ def test_extremes_and_ends_stay(n):
     assert len(t) == len(y) <= 702 and (np.diff(t) > 0).all()
     assert (y.min(), y.max(), y[0], y[-1]) == (values.min(), values.max(), values[0], values[-1])
     assert (values[np.round(t / 1e-3).astype(int)] == y).all()
-
-
-def test_settings_inside_settings_end_with_the_outer():
-    before = dict(mpl.rcParams)
-    with styled():
-        inside = mpl.rcParams["svg.fonttype"]
-        with styled():
-            pass
-        assert mpl.rcParams["svg.fonttype"] == inside == "none"
-    assert dict(mpl.rcParams) == before

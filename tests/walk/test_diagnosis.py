@@ -3,6 +3,7 @@
 import json
 import re
 import tomllib
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -88,6 +89,18 @@ def test_the_report_has_a_style_for_all_that_it_shows(heavy):
     for name in set(re.findall(r'class="(\w+)', page)) - {"eyebrow"}:
         assert f".{name}" in style, name
     assert 'class="facts"' in page
+
+
+def test_the_data_of_the_ground_reaction_stand_behind_its_figure(heavy):
+    page = walk_report_html(heavy)
+    assert page.count("<svg") == len(heavy.study.trials)
+    csv = unquote(re.search(r'href="data:text/csv,([^"]*)"', page)[1]).splitlines()
+    scene = heavy.search.banks.as_read.scenes[0]
+    head = csv[0].split(",")
+    assert head[0] == "time_s" and len(head) == 1 + 3 * 6
+    rows = np.array([[float(v) for v in line.split(",")] for line in csv[1:]])
+    near = np.searchsorted(scene.motion.time, rows[:, 0] - 1e-6)
+    assert rows[:, head.index("vertical_force_measured")] == pytest.approx(scene.measured[near, 2], rel=1e-4, abs=1e-3)
 
 
 def test_one_question_for_every_study_and_its_limit_of_time_holds(heavy, tmp_path):
