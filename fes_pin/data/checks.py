@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.motion import GROUND_REACTION, REQUIRED, TRANSLATIONS
+from fes_pin.data.motion import GROUND_REACTION, OPTIONAL, REQUIRED, TRANSLATIONS, knees_bend_positively
 from fes_pin.data.schema import ROLES, NumberKey, RigSchema, is_like, one_of, unknown, unread
 from fes_pin.data.table import Fault
 
@@ -121,9 +121,12 @@ def _check_body_columns(names: Sequence[str], inputs_only: bool, error: Fault) -
     for name in (*(f"q_{one}" for one in REQUIRED), *(() if inputs_only else GROUND_REACTION)):
         if name not in names:
             raise error("missing", name, None)
+    known = [f"q_{one}" for one in (*REQUIRED, *OPTIONAL)]
     for name in names:
         if name not in GROUND_REACTION and not name.startswith(("q_", "qd_", "qdd_")):
             raise error("unknown; expected q_<coordinate>, its rates qd_ and qdd_, and the ground reaction", name, None)
+        if name.startswith("q_") and name not in known and is_like(name, known, cutoff=0.92):
+            raise error(unknown(name, known), name, None)
 
 
 def _not_read(name: str, schema: RigSchema, kind: str) -> str:
@@ -159,6 +162,8 @@ def check_values(
     if "stim" in columns and (other := ~np.isin(columns["stim"], (0.0, 1.0))).any():
         sample = int(np.argmax(other))
         raise error(f"expected 0 or 1, found {columns['stim'][sample]:g}", "stim", sample)
+    if len(schema.recordings) > 1 and knees_bend_positively(columns):
+        raise error("its knees bend positively; expected flexion below 0, as gait2354 has it", "q_knee_angle_r", None)
     turning = [f"q_{one}" for one in REQUIRED if one not in TRANSLATIONS] if len(schema.recordings) > 1 else []
     for name in ("angle_rad", *turning):
         if name in columns and (most := float(np.abs(columns[name]).max())) > TURN:

@@ -128,10 +128,15 @@ def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarra
     return _knees_as_gait2354(columns)
 
 
+def knees_bend_positively(columns: Mapping[str, np.ndarray]) -> bool:
+    """True of coordinates that count the flexion of knees positive: none extends so far beyond straight."""
+    knees = [columns[f"q_knee_angle_{side}"] for side in "rl"]
+    return all(bool(knee.max() > BENT_RAD and knee.min() > BACK_RAD) for knee in knees)
+
+
 def _knees_as_gait2354(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Flexion negative, as gait2354 has it; Rajagopal's model counts it positive (IEEE Trans. Biomed. Eng. 63:2068)."""
-    knees = [columns[f"q_knee_angle_{side}"] for side in "rl"]
-    if not all(knee.max() > BENT_RAD and knee.min() > BACK_RAD for knee in knees):
+    if not knees_bend_positively(columns):
         return columns
     turned = {f"{kind}_knee_angle_{side}" for kind in ("q", "qd", "qdd") for side in "rl"}
     return {name: -values if name in turned else values for name, values in columns.items()}

@@ -111,3 +111,9 @@ def test_what_a_check_says_is_a_frame_and_a_page():
     assert set(table["testable"]) <= {"shown", "absorbed", "silent"} and table.index.name == "cause"
     assert list(table.index[table["testable"] == "shown"]) == list(found.testable.shown)
     assert repr(found) == str(found) and "<p>" in found._repr_html_()
+
+
+def test_the_example_of_the_documentation_runs(capsys):
+    page = (DEMO.parents[2] / "docs" / "study_format.md").read_text()
+    exec(page.split("```python\n")[1].split("```")[0], {})
+    assert "Trial rested (isometric, fit): 101 samples" in capsys.readouterr().out

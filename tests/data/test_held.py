@@ -166,3 +166,24 @@ def test_a_walk_is_written_at_its_own_rates_and_needs_its_files_no_more(walk_fol
     assert fp.read_study(tmp_path / "edited") == edited != study
     with pytest.raises(fp.InputError, match="trial coords has 0 samples of motion and reaction together"):
         recordings_of(replace(edited, trials=(edited.trials[0].first(4),)))
+
+
+WALKS = {
+    "a coordinate is missing": (lambda t: t.without("q_hip_flexion_r"), "q_hip_flexion_r: missing"),
+    "a force is missing": (lambda t: t.without("r_Fx"), "r_Fx: missing"),
+    "a misspelt coordinate": (lambda t: t.with_columns(q_lumbar_extnsion=t.time), "did you mean q_lumbar_extension"),
+    "another column": (lambda t: t.with_columns(emg=t.time), "emg: unknown; expected q_<coordinate>"),
+    "degrees": (lambda t: t.with_columns(q_hip_flexion_r=np.degrees(t["q_hip_flexion_r"]) + 9.0), "is it in degrees?"),
+    "knees the other way": (
+        lambda t: t.with_columns(**{f"q_knee_angle_{s}": np.abs(t[f"q_knee_angle_{s}"]) + 0.8 for s in "rl"}),
+        "flexion below 0",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WALKS)
+def test_a_walk_that_cannot_be_is_refused_when_it_is_built(measured, case):
+    change, words = WALKS[case]
+    with pytest.raises(fp.InputError) as caught:
+        replace(measured, trials=(change(measured.trials[0]),))
+    assert words in str(caught.value)
