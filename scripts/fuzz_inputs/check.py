@@ -21,6 +21,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from fes_pin.data.outputs import RECORD
+
 SECONDS = 30
 """Of processor time that one call may take that fits models."""
 READING_SECONDS = 10
@@ -156,7 +158,7 @@ def _watch(allowed: Sequence[Path], told: int) -> None:
             return
         if event in REMOVALS and arguments[1] != NO_FOLDER:
             path = os.path.join(os.readlink(f"/proc/self/fd/{arguments[1]}"), os.fsdecode(path))
-        if isinstance(path, int):
+        if isinstance(path, int) or (event == "os.mkdir" and os.path.isdir(path)):  # a folder that is there stays
             return
         where = Path(os.path.realpath(os.fsdecode(path)))
         if str(where) != os.devnull and not any(_is_for(where, a) for a in allowed):
@@ -166,6 +168,6 @@ def _watch(allowed: Sequence[Path], told: int) -> None:
 
 
 def _is_for(path: Path, allowed: Path) -> bool:
-    """True for what may be written: the path itself, what is in it, and what is moved there once it is whole."""
+    """True for what may be written: the path itself, what is in it, what is moved there once it is whole, its note."""
     partial = any(p.parent == allowed.parent and p.name.startswith(PARTIAL) for p in (path, *path.parents))
-    return path == allowed or allowed in path.parents or partial
+    return path in (allowed, allowed.parent / RECORD) or allowed in path.parents or partial

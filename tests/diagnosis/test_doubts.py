@@ -17,10 +17,10 @@ from fes_pin.models.nominal import nominal_model
 from fes_pin.view.report import report_html
 
 
-def test_a_model_that_cannot_be_simulated_is_unexplained_with_the_reason():
+def test_a_model_that_cannot_be_simulated_stops_with_the_reason():
     study = study_of("ankle", n_motion=1, n_isometric=0, duration_s=1.0)
     diagnosis = diagnose_joint(replace(study, start={**study.start, "inertia_kgm2": 1e-9, "damping_nms": 1e2}))
-    assert diagnosis.verdict == "unexplained" and diagnosis.remainder.unexplained
+    assert diagnosis.verdict == "stopped" and not diagnosis.causes
     assert "leaves the floating-point numbers" in diagnosis.reason
     assert diagnosis.reason in str(diagnosis).splitlines()[0]
     assert diagnosis_record(diagnosis)["reason"] == diagnosis.reason
