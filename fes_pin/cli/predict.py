@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -91,7 +91,8 @@ def predict(
     if out is not None and out != STANDARD:
         outputs.check_file(out)
     schema = loaded.rig.described()
-    odd = check_study(ToPredict(measured, schema, loaded.rig.constants, trial), loaded)
+    with _by_option(pairs("--set", setting)):
+        odd = check_study(ToPredict(measured, schema, loaded.rig.constants, trial), loaded)
     given = [load_log(model).applied(one) for one in measured]
     found = [run(loaded, one) if horizon is None else _along(model, loaded, one, horizon) for one in given]
     errors = _errors(model, given, found, horizon)
@@ -145,15 +146,24 @@ def _trial(
             raise InputError(str(problem), column=f"--set {name}") from None
     schema = model.rig.described()
     own = None if columns_of is None else read_columns(columns_of, rigs=catalogue.schemas())
-    with _readable(path) as file:
+    with _by_option({"kind", *conditions, *schema.conditions}), _readable(path) as file:
         try:
             return read_trial(file, rig=schema, kind=kind, conditions=conditions, inputs_only=inputs_only, own=own)
         except InputError as error:
-            if error.row is None and error.column in {"kind", *conditions, *schema.conditions}:
-                raise InputError(error.message, column=f"--set {error.column}") from None
             if file == path or error.file != file:
                 raise
             raise InputError(error.message, file="standard input", row=error.row, column=error.column) from None
+
+
+@contextmanager
+def _by_option(settings: Collection[str]) -> Iterator[None]:
+    """Name what was set by its option."""
+    try:
+        yield
+    except InputError as error:
+        if error.row is None and error.column in settings:
+            raise InputError(error.message, column=f"--set {error.column}") from None
+        raise
 
 
 @contextmanager

@@ -141,6 +141,8 @@ SETTINGS = {  # settings, the option that is named
     "no number": (("load_kg=x",), "--set load_kg"),
     "of another kind": (("load_kg=1", "angle_rad=1"), "--set angle_rad"),
     "unknown": (("load_kg=1", "weight=1"), "--set weight"),
+    "an angle in degrees": (("kind=isometric", "angle_rad=190"), "--set angle_rad"),
+    "a load in g": (("load_kg=1000",), "--set load_kg"),
     "a kind that is none": (("kind=running",), "--set kind"),
 }
 
