@@ -18,6 +18,8 @@ from fes_pin.models.simulate import simulated_trial
 COARSE = 5.0
 """Time constants that a sample step may be long: a first-order lag has then settled to less than a hundredth, and
 nothing of it is seen, were the start value wrong by half. Milliseconds under `time_s` make hundreds."""
+SLOW_S = 0.1
+"""Time step in s of a trial to predict that is asked about: 10 kHz in ms."""
 SLOWEST_S = 1.0
 """Time step in s that is refused anyway: pulses come 20 to 50 times a second, and a limb swings about once."""
 TURNS = 4.0
@@ -62,7 +64,10 @@ def _steps(study: Study | ToPredict, model: Model) -> Iterable[str]:
         raise InputError(f"{message}: is time_s in ms?", file=study.folder, column="time_s")
     for name, constant in model.rig.time_constants({t.kind for t in study.trials}).items():
         told = f"the time step of trial {slowest.name} is {slowest.dt:.4g} s, and {name} {constant:.4g} s"
-        if slowest.dt > COARSE * constant:
+        is_fitted = isinstance(
+            study, ToPredict
+        )  # a constant that a fit found may be short, and that is no slip of units
+        if slowest.dt > COARSE * constant and not (is_fitted and slowest.dt < SLOW_S):
             raise InputError(
                 f"{told}: is time_s in ms, or the value in [start] wrong?", file=study.folder, column="time_s"
             )

@@ -200,6 +200,15 @@ def test_trials_to_predict_need_no_outputs():
     assert "nothing is stimulated" in words
 
 
+def test_a_fitted_time_constant_that_is_short_is_no_slip_of_units():
+    study = study_of("muscle")
+    model = nominal_model(study).with_parameters({"time_constant_s": 1e-4})
+    with pytest.raises(InputError, match="is time_s in ms"):
+        check_study(study, model)
+    (words,) = check_study(ToPredict(study.trials, study.schema, study.constants), model)
+    assert "what happens between samples is lost" in words
+
+
 def test_a_check_and_a_diagnosis_warn_of_the_same():
     """Also of what a fit gives away; of how few trials there are a diagnosis warns where it names causes."""
     study = replace(study_of("muscle"), trials=study_of("muscle").trials[:4])
