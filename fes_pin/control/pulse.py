@@ -3,35 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
+from collections.abc import Mapping
+from typing import Any
 
 from fes_pin.control.limits import Limiter, StimulationLimits
 from fes_pin.data.errors import InputError
-from fes_pin.muscles.recruitment import LinearRecruitment
+from fes_pin.data.numbers import shortened
+from fes_pin.muscles.recruitment import LinearRecruitment, MeasuredRecruitment
 
 SWITCH = 0.1
 """Pulses begin where this recruitment is wanted, and end where as much less than none is. Near rest the feedback wants
 0.03 to either side, which is the sensor's noise seen through the observer: answered pulse by pulse it is felt, 10 to 20
 times a second, and moves nothing. With 0.1 pulses begin or end about once a second there, and the joint is held to 0.5
 degrees within half a degree of rest, as before everywhere else (`analysis/ankle_control.py`)."""
-
-
-class Curve(Protocol):
-    """A recruitment curve; `fes_pin.muscles.recruitment` has several."""
-
-    @property
-    def threshold_us(self) -> Any:
-        """Pulse width that recruits the first fibre."""
-
-    @property
-    def saturation_us(self) -> Any:
-        """Pulse width that recruits the last."""
-
-    def recruitment(self, pulse_width_us: Any) -> Any:
-        """Recruitment at a pulse width."""
-
-    def pulse_width_us(self, recruitment: Any) -> Any:
-        """Pulse width for a recruitment."""
 
 
 class PulseWidth:
@@ -59,7 +43,14 @@ class PulseWidth:
         pulses.
     """
 
-    def __init__(self, curve: Curve, half_width_us: float = 0.0, limits: StimulationLimits | None = None) -> None:
+    def __init__(
+        self,
+        curve: LinearRecruitment | MeasuredRecruitment,
+        half_width_us: float = 0.0,
+        limits: StimulationLimits | Mapping[str, Any] | None = None,
+    ) -> None:
+        if not isinstance(curve, LinearRecruitment | MeasuredRecruitment):
+            raise InputError(f"expected a recruitment curve, found {shortened(curve)}", column="curve")
         self.curve, self.half = curve, float(half_width_us)
         self.threshold, self.saturation = float(curve.threshold_us), float(curve.saturation_us)
         if not (self.half == 0.0 or 0.0 < self.half < self.threshold):

@@ -199,6 +199,18 @@ def test_sane_limits_hold_in_every_second(width, rate, charge, current, threshol
     assert (np.diff(np.maximum(widths, threshold)) <= rate * PULSE_S + 1e-6).all()
 
 
+@pytest.mark.parametrize("saturation", [6.7e8, 8000.0])
+def test_a_muscle_whose_saturation_no_stimulator_gives_is_refused(saturation):
+    model = ankle_of(replace(TWIN, saturation_us=saturation))
+    with pytest.raises(InputError, match="saturation_us"):
+        PositionController(model, 0.5)
+
+
+def test_what_is_no_curve_is_refused():
+    with pytest.raises(InputError, match="curve: expected a recruitment curve"):
+        PulseWidth(180.0)
+
+
 @pytest.mark.parametrize("load", [1000.0, -0.1, "0.5", math.nan])
 def test_a_load_that_no_ankle_holds_is_refused(load):
     with pytest.raises(InputError, match="load"):

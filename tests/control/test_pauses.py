@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+import fes_pin as fp
 from fes_pin.control.control import RISE_PULSES, START_RAD, START_READINGS, PositionController
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.control.faults import Status
@@ -17,9 +18,9 @@ from fes_pin.control.loop import track
 from fes_pin.control.observer import JointObserver
 from fes_pin.control.timing import CLOCK_PAUSE_S, PAUSE_S
 from fes_pin.data.errors import InputError
-from fes_pin.paper.constants import paper_twin
+from fes_pin.paper.constants import STEPWISE, paper_twin
 from fes_pin.paper.ratios import ankle_of
-from fes_pin.paper.twin import RunningTwin
+from fes_pin.paper.twin import RunningTwin, record, staircase
 
 TWIN = replace(paper_twin("3-23"), load_kg=0.5)
 REST = TWIN.rest_angle()
@@ -217,10 +218,11 @@ def test_a_copy_of_a_controller_goes_on_as_the_controller_does(copied):
 
 
 def test_a_controller_takes_a_fit_by_its_model_and_refuses_what_has_none():
-    class Fitted:
-        model = ankle_of(TWIN)
-
-    run = track(PositionController(Fitted(), 0.5), RunningTwin(TWIN), np.full(90, UP))
+    motion = record(TWIN, staircase(list(STEPWISE)), "motion", noise_std=2e-3)
+    fitted = fp.fit(ankle_of(TWIN), [motion])
+    controller = fp.PositionController(fitted, 0.5)
+    assert controller.dynamics == AnkleDynamics.of(fitted.model, 0.5)
+    run = track(controller, RunningTwin(TWIN), np.full(90, UP))
     assert run.angle_rad[-1] == pytest.approx(UP, abs=0.01)
     for nothing in (None, 0.5, {"gain": 1.0}, TWIN):
         with pytest.raises(InputError, match=r"^model: expected a model"):
