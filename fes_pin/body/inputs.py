@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from fes_pin.body.joints import JOINT_NAMES, known_joint
+from fes_pin.body.joints import JOINT_NAMES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number, positive_number
+from fes_pin.data.numbers import number, positive_number, shortened
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Inputs:
         InputError
             Unknown joint, or a negative limit.
         """
-        names = tuple(known_joint(name) for name in joints)
+        names = tuple(known_joint(name) for name in names_of(joints))
         if number(limit_nm, "limit_nm", infinite=True) < 0.0:
             raise InputError(f"the torque limit must be 0 or more, got {limit_nm}", column="limit_nm")
         matrix = np.array([[float(joint == name) for name in names] for joint in JOINT_NAMES]).reshape(19, len(names))
@@ -88,16 +88,16 @@ class Inputs:
         InputError
             None of these.
         """
+        if not isinstance(linear, LinearBody):
+            raise InputError(f"must be a LinearBody, as linearize gives it, got {shortened(linear)}", column="linear")
         if isinstance(thing, Inputs):
             return thing
         if hasattr(thing, "torque_matrix") and hasattr(thing, "names"):
             posture = {**dict.fromkeys(JOINT_NAMES, 0.0), **linear.whole_posture}
             return cls.pulling(thing.names, thing.torque_matrix(posture))
-        if isinstance(thing, str):
-            thing = [thing]
-        if isinstance(thing, Mapping) or not isinstance(thing, Iterable):
+        if hasattr(thing, "keys") or not isinstance(thing, Iterable):
             raise InputError("inputs must be Inputs, Nerves, or names of joints")
-        return cls.torques([known_joint(name) for name in thing])
+        return cls.torques(names_of(thing))
 
     @property
     def n(self) -> int:
@@ -126,7 +126,7 @@ class Inputs:
         InputError
             A name that is not among them.
         """
-        wanted = tuple(names)
+        wanted = tuple(names_of(names))
         for name in wanted:
             if name not in self.names:
                 raise InputError(f"unknown input {name!r}; there are {', '.join(self.names)}")

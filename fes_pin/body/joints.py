@@ -8,7 +8,7 @@ internal, bending right, lumbar rotation left).
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
+from fes_pin.data.numbers import shortened
 
 SIDES = ("left", "right")
 _LEG = (
@@ -146,6 +147,21 @@ def known_joint(name: str) -> str:
         near = difflib.get_close_matches(str(name), JOINT_NAMES, n=1, cutoff=0.0)[0]
         raise InputError(f"unknown joint {name!r}; did you mean {near!r}?")
     return name
+
+
+def names_of(given: str | Iterable[str]) -> list[str]:
+    """Names as a list: one name alone, a list, a generator, or a set, which is taken in alphabetical order.
+
+    Raises
+    ------
+    InputError
+        Something that holds no names.
+    """
+    if isinstance(given, str):
+        return [given]
+    if not isinstance(given, Iterable):
+        raise InputError(f"names are expected, got {shortened(given)}")
+    return sorted(given, key=str) if isinstance(given, set | frozenset) else list(given)
 
 
 def angles_array(angles: Mapping[str, float] | Sequence[float] | np.ndarray, order: Sequence[str]) -> NamedArray:

@@ -7,7 +7,7 @@ are the identity and A^-1.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from fes_pin.body.build import GRAVITY, Body
+from fes_pin.body.joints import names_of
 from fes_pin.body.modes import ModeSet, modes
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
@@ -131,14 +132,15 @@ class LinearBody:
         """The eigenpairs of A^-1 B, n of them on one foot (see `fes_pin.body.modes.modes`)."""
         return modes(self)
 
-    def brace(self, joints: Sequence[str]) -> LinearBody:
-        """The same body with these joints locked at the posture.
+    def brace(self, joints: str | Iterable[str]) -> LinearBody:
+        """The same body with these joints locked at the posture: names, or one name.
 
         Raises
         ------
         InputError
             A joint that is not free here, or all of them.
         """
+        joints = names_of(joints)
         for name in joints:
             if name not in self.joint_names:
                 raise InputError(f"cannot brace {name!r}: it is not among the joints that move")

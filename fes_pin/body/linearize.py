@@ -24,7 +24,10 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.passive import Passive
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
-from fes_pin.data.numbers import number
+from fes_pin.data.numbers import between, shortened
+
+MOST_GRAVITY = 100.0
+"""m/s2; no planet with a surface has more (ours)."""
 
 
 def ground_normal(slope: Sequence[float]) -> np.ndarray:
@@ -87,7 +90,7 @@ def linearize(
     passive
         Passive joints (`ElasticJoints`, `PassiveLegs`).
     gravity
-        m/s2.
+        How strongly it pulls down, m/s2; 0 to 100.
     check
         Whether the posture must lie within the joints' limits.
     both_feet
@@ -97,10 +100,16 @@ def linearize(
     Raises
     ------
     InputError
-        Unknown posture or joint, posture outside limits, no such slope; a second foot that is not flat on the ground,
-        or moves.
+        Unknown posture or joint, posture outside limits, no such slope, a gravity that pulls up; a second foot that is
+        not flat on the ground, or moves.
     """
-    q, gravity = body.angles(posture, check), number(gravity, "gravity")
+    if not isinstance(body, Body):
+        raise InputError(f"must be a Body, got {shortened(body)}", column="body")
+    q, gravity = body.angles(posture, check), between(gravity, 0.0, MOST_GRAVITY, "gravity")
+    if passive is not None and not hasattr(passive, "stiffness"):
+        raise InputError(f"must be ElasticJoints or PassiveLegs, got {shortened(passive)}", column="passive")
+    if both_feet is not None and not isinstance(both_feet, bool | np.bool_):
+        raise InputError(f"must be True, False or None, got {shortened(both_feet)}", column="both_feet")
     name = posture if isinstance(posture, str) else ""
     model = model_on_slope(body, slope, gravity)
     data = model.createData()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from fes_pin.body.catchable import catchable, plans_of
 from fes_pin.body.controllability import modal_controllability
 from fes_pin.body.covering import Demand, smallest
 from fes_pin.body.inputs import Inputs
-from fes_pin.body.joints import SIDES, known_joint
+from fes_pin.body.joints import SIDES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.programs import LinearProgram
 from fes_pin.data.errors import InputError
@@ -37,6 +37,9 @@ ORTHOSES: dict[str, tuple[str, ...]] = {
 """What an orthosis locks. A hip guide leaves flexion free, as a hip guidance orthosis does; a corset joins trunk and
 pelvis."""
 
+MOST_SETS = 64
+"""Sets of the smallest size that are compared by price; where there are more, the answer says so (ours: a search of
+minutes)."""
 STIMULATIONS = ("over_time", "constant")
 """How a set may be stimulated: in any course within the bounds, or constantly."""
 
@@ -64,6 +67,9 @@ class MinimalSet:
         The same if all strengths are less or more by the factor they are known to.
     error_deg
         By how much rounding may have moved the three.
+    equals
+        How many sets of this size do for these braces: they were all priced, so that the first one is the cheapest.
+        `MOST_SETS` where there may be more: the first one is then the cheapest of these.
     """
 
     inputs: tuple[str, ...]
@@ -77,6 +83,7 @@ class MinimalSet:
     lean_deg: float
     lean_band_deg: tuple[float, float]
     error_deg: float = 0.0
+    equals: int = 1
 
     def __str__(self) -> str:
         low, high = self.lean_band_deg
@@ -85,6 +92,8 @@ class MinimalSet:
         able = f"{what} a lean of {lean_text(self.lean_deg)} [{lean_text(low)}, {lean_text(high)}] deg"
         able = able if self.falls else "nothing falls, and the posture is held"
         price = f"; energy {self.energy:.2g} s, condition {self.condition:.1e}" if self.falls else ""
+        if self.equals > 1:
+            price += f"; {'at least ' * (self.equals == MOST_SETS)}{self.equals} sets of this size do"
         return (
             f"{len(self.inputs):2d} nerves ({self.locked_joints} joints locked, {self.falls} falls): "
             f"{', '.join(self.inputs) or '-'}; {further}; {able}{price}"
@@ -129,7 +138,7 @@ def minimal_sets(
     settle_deg
         How far modes may be from the posture (see `fes_pin.body.attainable` and `catchable`). Only with `together`.
     alternatives
-        How many sets of the smallest size to find for each choice of braces; the cheapest first.
+        How many sets of the smallest size to return for each choice of braces; the cheapest first.
     strength_factor
         Strengths are known to this factor: the band of `lean_band_deg`.
     stimulation
@@ -143,7 +152,8 @@ def minimal_sets(
     list of MinimalSet
         One or more per choice of braces for which a set exists; fewest nerves first, then fewest braces, then least
         energy. Exact: no smaller set meets the demands (integer programs by HiGHS, each proved optimal); over time,
-        of plans as `fes_pin.body.plans` divides them.
+        of plans as `fes_pin.body.plans` divides them. Of all sets of the smallest size the cheapest are returned, of
+        the first `MOST_SETS` where there are more (`equals` says how many were compared).
 
     Raises
     ------
@@ -165,9 +175,12 @@ def minimal_sets(
             if len(set(locked)) == linear.n:
                 continue
             braced = linear.brace(list(dict.fromkeys(locked))) if locked else linear
-            for names in _smallest(braced, inputs, asked, alternatives):
-                found.append(_priced(braced, inputs.select(names), chosen, asked))
-    return sorted(found, key=lambda s: (len(s.inputs), len(s.braces), s.energy, s.inputs, s.braces))
+            sets = [inputs.select(names) for names in _smallest(braced, inputs, asked, max(MOST_SETS, alternatives))]
+            prices = [modal_controllability(braced, each).fall_energy[0].max(initial=0.0) for each in sets]
+            order = sorted(range(len(sets)), key=lambda i: (float(f"{prices[i]:.9g}"), sets[i].names))
+            for i in order[:alternatives]:
+                found.append(replace(_priced(braced, sets[i], chosen, asked), equals=len(sets)))
+    return sorted(found, key=lambda s: (len(s.inputs), len(s.braces), float(f"{s.energy:.9g}"), s.inputs, s.braces))
 
 
 def pareto(sets: Iterable[MinimalSet]) -> list[MinimalSet]:
@@ -185,7 +198,7 @@ def pareto(sets: Iterable[MinimalSet]) -> list[MinimalSet]:
 def _orthoses(braces: Iterable[str] | Mapping[str, Sequence[str]]) -> dict[str, tuple[str, ...]]:
     if isinstance(braces, Mapping):
         return {str(name): tuple(known_joint(joint) for joint in joints) for name, joints in braces.items()}
-    names = [braces] if isinstance(braces, str) else list(braces)
+    names = names_of(braces)
     for name in names:
         if name not in ORTHOSES:
             raise InputError(f"unknown brace {name!r}; known are {', '.join(ORTHOSES)}")

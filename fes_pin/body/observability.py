@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fes_pin.body.controllability import RELATIVE_TOLERANCE, _independent
-from fes_pin.body.joints import known_joint
+from fes_pin.body.joints import known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, ModeSet, modes
 from fes_pin.data.errors import InputError
@@ -76,7 +76,7 @@ def observability(linear: LinearBody, sensors: Iterable[str]) -> ModalObservabil
         Unknown or braced joint, or none.
     """
     found = modes(linear)
-    names = tuple(known_joint(name) for name in ([sensors] if isinstance(sensors, str) else sensors))
+    names = tuple(known_joint(name) for name in names_of(sensors))
     if not names:
         raise InputError("at least one goniometer is needed")
     for name in names:

@@ -11,8 +11,9 @@ from typing import Protocol
 
 import numpy as np
 
-from fes_pin.body.joints import SIDES, angles_array
+from fes_pin.body.joints import JOINT_NAMES, SIDES, angles_array
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import between
 
 
 class Passive(Protocol):
@@ -54,6 +55,11 @@ class ElasticJoints:
     damping_nms: Mapping[str, float] = field(default_factory=dict)
     rest_rad: Mapping[str, float] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        _positive(self.stiffness_nm, JOINT_NAMES, "stiffness")
+        _positive(self.damping_nms, JOINT_NAMES, "damping")
+        angles_array(self.rest_rad, JOINT_NAMES)
+
     def torque(self, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
         """Torque at rest: (19,) N m."""
         return -_positive(self.stiffness_nm, names, "stiffness") * (q - angles_array(self.rest_rad, names))
@@ -80,6 +86,8 @@ _TERMS = (
 )
 _OFFSETS = {"hip_flexion": 8.072, "knee_flexion": -4.820, "ankle_dorsiflexion": 1.792}
 _DEGREE = 180.0 / np.pi
+MOST_PASSIVE = 100.0
+"""No leg is so much stiffer than a healthy one (ours): contractures are some times as stiff."""
 
 
 @dataclass(frozen=True)
@@ -97,10 +105,19 @@ class PassiveLegs:
         On all moments.
     damping_nms
         Damping by joint name, N m s/rad; none by default.
+
+    Raises
+    ------
+    InputError
+        A factor that is not between 0 and 100, unknown joint, negative damping.
     """
 
     factor: float = 1.0
     damping_nms: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "factor", between(self.factor, 0.0, MOST_PASSIVE, "factor"))
+        _positive(self.damping_nms, JOINT_NAMES, "damping")
 
     def _each(self, q: np.ndarray, names: Sequence[str]):
         places = {name: i for i, name in enumerate(names)}

@@ -117,7 +117,10 @@ def nerves(
     ] = False,
     settle: Annotated[float, typer.Option(help="how far modes may be from the posture, degrees")] = 10.0,
     strength: Annotated[
-        float | None, typer.Option(help="1: a healthy adult's; without it that of paralysed, stimulated muscle, 0.5")
+        float | None,
+        typer.Option(
+            help="1: a healthy young adult's of this sex; without it that of paralysed, stimulated muscle, 0.5"
+        ),
     ] = None,
 ) -> None:
     """Which nerves control which modes, what they can catch and hold, and the fewest that do."""
@@ -127,7 +130,7 @@ def nerves(
     from fes_pin.body.controllability import modal_controllability
     from fes_pin.body.inputs import Inputs
     from fes_pin.data.outputs import Outputs
-    from fes_pin.muscles.nerve_inputs import subject_nerves
+    from fes_pin.muscles.nerve_inputs import subject_nerves, whose_strength
     from fes_pin.view.influence import check_image, influence_image, influence_table
 
     if strength is not None:
@@ -146,7 +149,8 @@ def nerves(
     weak, strong = (attainable(linear, inputs.scaled(f), settle_deg=settle) for f in chosen.strength_band)
     held = attainable(linear, inputs, settle_deg=settle)
     low, high = (chosen.assumed_strength * f for f in chosen.strength_band)
-    whose = "of a healthy adult's strength" + (" (paralysed, stimulated muscle)" if strength is None else "")
+    whose = f"of the strength of {whose_strength(linear.body)}"
+    whose += " (paralysed, stimulated muscle)" if strength is None else ""
     lines.append(f"At {chosen.assumed_strength:g} {whose} {held}")
     if held.falling:
         lines.append(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from xml.etree.ElementTree import tostring
 
 import numpy as np
@@ -66,4 +67,4 @@ def with_segments(body: Body, parameters: dict[str, np.ndarray]) -> Body:
                                     "izz": (2, 2)}.items():  # fmt: skip
                     child.set(key, in_full(inertia[i, k]))
     text = '<?xml version="1.0"?>\n' + tostring(tree, encoding="unicode") + "\n"
-    return Body(text, body.stance, body.height_m, f"{body.label}, extended")
+    return replace(body, urdf=text, label=f"{body.label}, extended")

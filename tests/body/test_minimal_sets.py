@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from fes_pin.body.attainable import attainable, demands
+from fes_pin.body.build import Body
 from fes_pin.body.catchable import catchable
 from fes_pin.body.controllability import modal_controllability
 from fes_pin.body.inputs import Inputs
+from fes_pin.body.joints import mirrored
 from fes_pin.body.linearize import linearize
 from fes_pin.body.minimal_sets import ORTHOSES, minimal_sets, pareto
 from fes_pin.data.errors import InputError
@@ -65,6 +67,27 @@ def test_no_smaller_set_pulls_both_ways_in_turn(braced):
     assert not any(pulls(n) for n in itertools.combinations(RIGHT, size - 1))
     assert {s.inputs for s in found} == {n for n in itertools.combinations(RIGHT, size) if pulls(n)}
     assert all(modal_controllability(braced, nerves.select(s.inputs)).controls_falls for s in found)
+
+
+MIRRORED = tuple(name.replace("right_", "left_") for name in RIGHT)
+
+
+@pytest.mark.parametrize("options", [{"lean_deg": 0.5}, {"stimulation": "constant", "gravity": False}])
+def test_the_cheapest_set_is_the_same_in_a_mirror_and_in_any_order(options):
+    """Of all smallest sets the cheapest, not the first that a search meets."""
+    found = {}
+    for stance, names in (("right", (*RIGHT, *MIRRORED)), ("left", (*MIRRORED, *RIGHT)), ("left", (*RIGHT, *MIRRORED))):
+        linear = linearize(Body.from_subject(72.6, 1.80, stance=stance), "neutral")
+        linear = linear.brace({*PEELED, "right_knee_flexion", "right_hip_rotation"})
+        nerves = Nerves(names, strength=1.0)
+        found[stance, names[0]] = minimal_sets(linear, nerves, alternatives=2, balance=False, **options)
+    one, *others = found.values()
+    assert (
+        one[0].equals > 1 and one[0].energy < one[1].energy and f"{one[0].equals} sets of this size do" in str(one[0])
+    )
+    for other in others:
+        assert [s.energy for s in other] == pytest.approx([s.energy for s in one], rel=1e-9)
+        assert {mirrored(n) for n in other[0].inputs} == set(one[0].inputs)
 
 
 def test_pulling_inputs_need_one_more_than_falls(braced):
