@@ -6,7 +6,9 @@ A constant input holds a lean where it balances gravity in every falling mode. I
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +17,9 @@ from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, modes
 from fes_pin.body.programs import LinearProgram, ProgramAnswer
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.numbers import positive_number
+from fes_pin.data.show import Tabled
 
 SETTLE_DEG = 10.0
 """How far a swinging mode may hang from the posture and still count as the posture: ours; linear models reach no
@@ -82,8 +86,7 @@ def demands(
     """
     settle_deg = positive_number(settle_deg, "settle_deg", infinite=True)
     found = modes(linear)
-    kinds = np.array([mode.kind for mode in found])
-    degree = np.radians(1.0) / np.abs(found.shapes).max(axis=0)
+    kinds, degree = found.kinds, found.degree
     gains = found.shapes.T @ inputs.on(linear)
     constant = found.shapes.T @ linear.C * gravity
     size = np.abs(gains).max(axis=1, initial=0.0)
@@ -110,8 +113,8 @@ def demands(
     )
 
 
-@dataclass(frozen=True)
-class HeldLeans:
+@dataclass(frozen=True, eq=False)
+class HeldLeans(ByValue, Tabled):
     """What inputs within their bounds can hold.
 
     Parameters
@@ -134,9 +137,17 @@ class HeldLeans:
 
     falling: tuple[Mode, ...] = field(repr=False)
     holds: bool
-    effort: dict[str, float]
+    effort: Mapping[str, float]
     lean_deg: np.ndarray
     error_deg: np.ndarray = field(repr=False)
+
+    def _table(self) -> dict[str, Any]:
+        names = [mode.name for mode in self.falling]
+        return {
+            "mode": names,
+            "positive_deg": self.lean_deg[:, 0].tolist(),
+            "negative_deg": self.lean_deg[:, 1].tolist(),
+        }
 
     @property
     def least_lean_deg(self) -> float:

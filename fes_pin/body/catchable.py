@@ -11,6 +11,7 @@ plan catches beyond the modal bound is lost to any stimulation; between the two 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -19,12 +20,14 @@ from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, modes
 from fes_pin.body.plans import Plans
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number, positive_number
+from fes_pin.data.show import Tabled
 
 
-@dataclass(frozen=True)
-class CaughtLeans:
+@dataclass(frozen=True, eq=False)
+class CaughtLeans(ByValue, Tabled):
     """From which leans at rest inputs within their bounds can bring the body to rest again.
 
     Parameters
@@ -47,6 +50,14 @@ class CaughtLeans:
     lean_deg: np.ndarray
     error_deg: np.ndarray = field(repr=False)
     bound_deg: np.ndarray
+
+    def _table(self) -> dict[str, Any]:
+        names = [mode.name for mode in self.falling]
+        return {
+            "mode": names,
+            "positive_deg": self.lean_deg[:, 0].tolist(),
+            "negative_deg": self.lean_deg[:, 1].tolist(),
+        }
 
     @property
     def least_lean_deg(self) -> float:
@@ -92,7 +103,7 @@ def modal_bound(linear: LinearBody, inputs, lag_s: float = 0.0, gravity: bool = 
     if number(lag_s, "lag_s") < 0.0:
         raise InputError(f"must not be negative, got {lag_s}", column="lag_s")
     found = modes(linear)
-    fall = [i for i, mode in enumerate(found) if mode.kind == "fall"]
+    fall = found.kinds == "fall"
     shapes, values = found.shapes[:, fall], found.values[fall]
     gains, constant = shapes.T @ inputs.on(linear), shapes.T @ linear.C * gravity
     with np.errstate(invalid="ignore"):  # a gain of 0 times no bound
@@ -101,8 +112,7 @@ def modal_bound(linear: LinearBody, inputs, lag_s: float = 0.0, gravity: bool = 
         )
     least, most = constant + ends.min(axis=0).sum(axis=1), constant + ends.max(axis=0).sum(axis=1)
     share = np.maximum(np.column_stack([-least, most]), 0.0) / values[:, None]
-    degree = np.radians(1.0) / np.abs(shapes).max(axis=0)
-    return share / degree[:, None] / (1.0 + np.sqrt(values) * lag_s)[:, None]
+    return share / found.degree[fall, None] / (1.0 + np.sqrt(values) * lag_s)[:, None]
 
 
 def catchable(

@@ -24,6 +24,7 @@ from fes_pin.body.joints import JOINT_NAMES, angles_array
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.linearize import model_on_slope
 from fes_pin.body.plans import PULSE_S, Plans
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number
 
@@ -33,8 +34,8 @@ LOST_DEG = 45.0
 """A joint this far from the posture is lost: no linear model reaches there (`fes_pin.body.attainable.lean_text`)."""
 
 
-@dataclass(frozen=True)
-class Caught:
+@dataclass(frozen=True, eq=False)
+class Caught(ByValue):
     """A run of the closed loop.
 
     Parameters

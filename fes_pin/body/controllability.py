@@ -9,6 +9,7 @@ autonomous systems with positive controllers", SIAM J. Control 10:339-353, 1972)
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -16,8 +17,11 @@ from scipy import linalg
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import ModeSet, modes
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
+from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import positive_number
+from fes_pin.data.show import Tabled
 
 RELATIVE_TOLERANCE = 1e-9
 """Below this part of the largest gain, an input does not act on a mode: rounding, not muscle."""
@@ -25,8 +29,8 @@ SAME_POLE = 1e-6
 """Eigenvalues of A^-1 B closer than this part of their size (or of 1/s2) are taken as one."""
 
 
-@dataclass(frozen=True)
-class ModalControllability:
+@dataclass(frozen=True, eq=False)
+class ModalControllability(ByValue, Tabled):
     """What a set of inputs can do with the modes of a body.
 
     Parameters
@@ -63,7 +67,31 @@ class ModalControllability:
     @property
     def falling(self) -> np.ndarray:
         """Which modes fall: (modes,) bool."""
-        return np.array([mode.kind == "fall" for mode in self.modes])
+        return self.modes.kinds == "fall"
+
+    @property
+    def _strongest(self) -> list[str]:
+        return [self.inputs.names[int(i)] if self.inputs.n else "-" for i in np.abs(self.mode_influence).argmax(axis=1)]
+
+    def _table(self) -> dict[str, Any]:
+        return {
+            "mode": [mode.name for mode in self.modes],
+            "controllable": self.controllable.tolist(),
+            "both_ways": self.both_ways.tolist(),
+            f"energy_{self.inputs.price_unit}": self.energy.tolist(),
+            "strongest_input": self._strongest,
+        }
+
+    def influence(self, name: str) -> NamedArray:
+        """Acceleration of each joint per unit of one input, (joints,) rad/s2 by joint name.
+
+        Raises
+        ------
+        InputError
+            A name that is not among the inputs.
+        """
+        column = self.inputs.select([name]).names[0]
+        return NamedArray(self.joint_influence[:, self.inputs.names.index(column)], self.linear.joint_names)
 
     @property
     def controls_falls(self) -> bool:
@@ -74,8 +102,7 @@ class ModalControllability:
     def fall_energy(self) -> tuple[np.ndarray, float]:
         """Price of all falls together, without a horizon (see `stabilizing_price`)."""
         rows = self.falling
-        scale = np.array([np.radians(1.0) / np.abs(mode.shape).max() for mode in self.modes])
-        return stabilizing_price(self.modes.values[rows], self.gains[rows], scale[rows])
+        return stabilizing_price(self.modes.values[rows], self.gains[rows], self.modes.degree[rows])
 
     def __str__(self) -> str:
         out = [f"{self.inputs.n} inputs, horizon {self.horizon:g} s: " + ", ".join(self.inputs.names)]
@@ -83,10 +110,9 @@ class ModalControllability:
             out.append("(of the modes without damping and rates: see pbh)")
         out.append(f"{'mode':70s} PBH  both ways  {f'1 deg, {self.inputs.price_unit}':>15s}  strongest input")
         for i, mode in enumerate(self.modes):
-            strongest = self.inputs.names[int(np.abs(self.mode_influence[i]).argmax())] if self.inputs.n else "-"
             out.append(
                 f"{i + 1:3d} {mode.name:66s} {'yes' if self.controllable[i] else 'no':4s} "
-                f"{'yes' if self.both_ways[i] else 'no':10s} {self.energy[i]:15.3g}  {strongest}"
+                f"{'yes' if self.both_ways[i] else 'no':10s} {self.energy[i]:15.3g}  {self._strongest[i]}"
             )
         return "\n".join(out)
 

@@ -19,6 +19,7 @@ from scipy.spatial import ConvexHull
 from fes_pin.body.anthropometry import ANKLE_ALONG_FOOT, FOOT_BREADTH, MTP_ALONG_FOOT
 from fes_pin.body.build import Body
 from fes_pin.body.joints import SIDES
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 
 FOOT_LENGTH = 0.2581 / 1.741
@@ -27,8 +28,8 @@ FLAT_DEG, LEVEL_M = 1.0, 0.005
 """A sole turned by less, and no further off the ground, rests on it: soles give way by some millimetres (ours)."""
 
 
-@dataclass(frozen=True)
-class SupportPolygon:
+@dataclass(frozen=True, eq=False)
+class SupportPolygon(ByValue):
     """The area on the ground that carries a body.
 
     Parameters
@@ -62,8 +63,8 @@ class SupportPolygon:
         return -distance if inside else distance
 
 
-@dataclass(frozen=True)
-class Wrench:
+@dataclass(frozen=True, eq=False)
+class Wrench(ByValue):
     """The ground's wrench (f, n) about the origin, N and N m, linear in small deviations and accelerations.
 
     Parameters

@@ -9,12 +9,13 @@ import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number, positive_number, shortened
 
 
-@dataclass(frozen=True)
-class Inputs:
+@dataclass(frozen=True, eq=False)
+class Inputs(ByValue):
     """A set of inputs u: joint torques D = matrix @ u.
 
     Parameters
@@ -41,6 +42,8 @@ class Inputs:
     upper: np.ndarray = field(repr=False)
 
     def __post_init__(self) -> None:
+        for name in ("matrix", "lower", "upper"):
+            object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
         shape = (len(self.joint_names), len(self.names))
         if self.matrix.shape != shape or not np.all(np.isfinite(self.matrix)):
             raise InputError(f"the input matrix must be finite and of shape {shape}, got {self.matrix.shape}")
@@ -52,6 +55,7 @@ class Inputs:
             raise InputError(f"bounds must have {shape[1]} values each")
         if not (np.all(self.lower <= 0.0) and np.all(self.upper >= 0.0)):
             raise InputError("the bounds of an input must hold 0")
+        self._freeze()
 
     @classmethod
     def torques(cls, joints: Iterable[str] = JOINT_NAMES, limit_nm: float = np.inf) -> Inputs:

@@ -7,9 +7,10 @@ are the identity and A^-1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import null_space
@@ -17,15 +18,27 @@ from scipy.linalg import null_space
 from fes_pin.body.build import GRAVITY, Body
 from fes_pin.body.joints import names_of
 from fes_pin.body.modes import ModeSet, modes
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
+from fes_pin.data.numbers import known_word
+from fes_pin.data.show import Tabled, frame
+
+if TYPE_CHECKING:
+    import pandas
 
 _RANK = 1e-9
 """Singular values below this part of the largest are rounding: the second foot's rows are of order 1."""
 
 
-@dataclass(frozen=True)
-class LinearBody:
+def _fixed(array: np.ndarray) -> np.ndarray:
+    """An array that cannot be changed."""
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class LinearBody(ByValue, Tabled):
     """A body linearized at a posture; arrays over joints in the order of `joint_names`.
 
     Vectors answer by name, as in `linear.C["right_hip_flexion"]`, matrices as tables: `linear.to_frame("A")`.
@@ -59,7 +72,7 @@ class LinearBody:
     body: Body = field(repr=False)
     slope: tuple[float, float] = (0.0, 0.0)
     braced: tuple[str, ...] = ()
-    held: dict[str, float] = field(default_factory=dict, repr=False)
+    held: Mapping[str, float] = field(default_factory=dict, repr=False)
     closure: np.ndarray | None = field(default=None, repr=False)
     posture_name: str = ""
     gravity: float = GRAVITY
@@ -67,6 +80,7 @@ class LinearBody:
     def __post_init__(self) -> None:
         for name in ("q", "C"):
             object.__setattr__(self, name, NamedArray(getattr(self, name), self.joint_names))
+        self._freeze()
 
     @property
     def n(self) -> int:
@@ -86,12 +100,12 @@ class LinearBody:
     @cached_property
     def basis(self) -> np.ndarray:
         """Columns that span the deviations that the ground allows: (n, r), orthonormal."""
-        return np.eye(self.n) if self.closure is None else null_space(self.closure, rcond=_RANK)
+        return _fixed(np.eye(self.n) if self.closure is None else null_space(self.closure, rcond=_RANK))
 
     @cached_property
     def mobility(self) -> np.ndarray:
         """Acceleration of each joint per torque at each: (n, n), 1/(kg m2); A^-1 on one foot."""
-        return self.basis @ np.linalg.solve(self.basis.T @ self.A @ self.basis, self.basis.T)
+        return _fixed(self.basis @ np.linalg.solve(self.basis.T @ self.A @ self.basis, self.basis.T))
 
     @property
     def conservative(self) -> bool:
@@ -106,12 +120,12 @@ class LinearBody:
         F[:n, n:] = np.eye(n)
         F[n:, :n] = self.mobility @ self.B
         F[n:, n:] = -self.mobility @ self.E
-        return F
+        return _fixed(F)
 
     @cached_property
     def R(self) -> np.ndarray:
         """Input matrix of equation (11) for u = C + D: (2n, n)."""
-        return np.vstack([np.zeros((self.n, self.n)), self.mobility])
+        return _fixed(np.vstack([np.zeros((self.n, self.n)), self.mobility]))
 
     @property
     def holding_torque(self) -> dict[str, float]:
@@ -127,6 +141,30 @@ class LinearBody:
     def whole_posture(self) -> dict[str, float]:
         """Angles of all joints, braced ones too, rad by name."""
         return {**self.held, **self.posture}
+
+    def _table(self) -> dict[str, Any]:
+        return {"joint": list(self.joint_names), "angle_rad": self.q.tolist(), "holding_nm": (-self.C).tolist()}
+
+    def to_frame(self, matrix: str | None = None) -> pandas.DataFrame:
+        """Angles and holding torques by joint as a frame of pandas, or one of the matrices with its names.
+
+        Parameters
+        ----------
+        matrix
+            `A`, `B` or `E`, by joint; `F`, by state; `R`, states by joint.
+
+        Raises
+        ------
+        InputError
+            Another matrix; pandas is not installed.
+        """
+        if matrix is None:
+            return super().to_frame()
+        known_word(matrix, ("A", "B", "E", "F", "R"), "matrix")
+        rows = self.state_names if matrix in "FR" else self.joint_names
+        columns = self.state_names if matrix == "F" else self.joint_names
+        values = dict(zip(columns, getattr(self, matrix).T, strict=True))
+        return frame({"name": list(rows), **values}, index="name")
 
     def modes(self) -> ModeSet:
         """The eigenpairs of A^-1 B, n of them on one foot (see `fes_pin.body.modes.modes`)."""

@@ -24,7 +24,7 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.passive import Passive
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
-from fes_pin.data.numbers import between, shortened
+from fes_pin.data.numbers import between, shortened, truth
 
 MOST_GRAVITY = 100.0
 """m/s2; no planet with a surface has more (ours)."""
@@ -108,8 +108,8 @@ def linearize(
     q, gravity = body.angles(posture, check), between(gravity, 0.0, MOST_GRAVITY, "gravity")
     if passive is not None and not hasattr(passive, "stiffness"):
         raise InputError(f"must be ElasticJoints or PassiveLegs, got {shortened(passive)}", column="passive")
-    if both_feet is not None and not isinstance(both_feet, bool | np.bool_):
-        raise InputError(f"must be True, False or None, got {shortened(both_feet)}", column="both_feet")
+    if both_feet is not None:
+        truth(both_feet, "both_feet")
     name = posture if isinstance(posture, str) else ""
     model = model_on_slope(body, slope, gravity)
     data = model.createData()

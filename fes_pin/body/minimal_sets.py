@@ -22,7 +22,7 @@ from fes_pin.body.joints import SIDES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.programs import LinearProgram
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number, positive_number, whole
+from fes_pin.data.numbers import number, positive_number, truth, whole
 
 ORTHOSES: dict[str, tuple[str, ...]] = {
     **{f"{side}_{name}": tuple(f"{side}_{joint}" for joint in joints) for side in SIDES for name, joints in {
@@ -224,6 +224,8 @@ class _Question:
             )
         if number(self.strength_factor, "strength_factor") < 1.0:
             raise InputError(f"must be 1 or more, got {self.strength_factor}", column="strength_factor")
+        for name in ("together", "gravity", "balance"):
+            truth(getattr(self, name), name)
         positive_number(self.settle_deg, "settle_deg", infinite=self.stimulation == "constant")
 
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -17,7 +18,9 @@ from scipy import linalg
 
 from fes_pin.body.build import Body
 from fes_pin.body.joints import side_of
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.named import NamedArray
+from fes_pin.data.show import Tabled
 
 NEUTRAL_RATE = 1e-3
 """Below this rate, 1/s, a mode neither falls nor swings within a quarter of an hour."""
@@ -75,8 +78,8 @@ class Linear(Protocol):
         """Whether there is neither damping nor motion."""
 
 
-@dataclass(frozen=True)
-class Mode:
+@dataclass(frozen=True, eq=False)
+class Mode(ByValue, Tabled):
     """One way in which the body falls or swings.
 
     Parameters
@@ -102,6 +105,14 @@ class Mode:
     def __post_init__(self) -> None:
         for name in ("shape", "participation"):
             object.__setattr__(self, name, NamedArray(getattr(self, name), self.joint_names))
+        self._freeze()
+
+    def _table(self) -> dict[str, Any]:
+        shape, share = self.one_degree.tolist(), self.participation.tolist()
+        return {"joint": list(self.joint_names), "one_degree_rad": shape, "participation": share}
+
+    def __str__(self) -> str:
+        return self.name
 
     @property
     def kind(self) -> str:
@@ -140,8 +151,8 @@ class Mode:
         return self.shape * np.radians(1.0) / np.abs(self.shape).max()
 
 
-@dataclass(frozen=True)
-class ModeSet:
+@dataclass(frozen=True, eq=False)
+class ModeSet(ByValue, Tabled):
     """All modes of a body, fastest fall first, fastest swing last.
 
     Parameters
@@ -160,6 +171,26 @@ class ModeSet:
     values: np.ndarray = field(repr=False)
     shapes: np.ndarray = field(repr=False)
     conservative: bool = True
+
+    @cached_property
+    def kinds(self) -> np.ndarray:
+        """`fall`, `swing` or `neutral` by mode: (n,) text."""
+        return np.array([mode.kind for mode in self.modes])
+
+    @cached_property
+    def degree(self) -> np.ndarray:
+        """Modal coordinate of one degree of each mode's greatest joint: (n,)."""
+        return np.radians(1.0) / np.abs(self.shapes).max(axis=0)
+
+    def _table(self) -> dict[str, Any]:
+        return {
+            "mode": [mode.name for mode in self.modes],
+            "kind": self.kinds.tolist(),
+            "value_per_s2": self.values.tolist(),
+            "doubling_s": [mode.doubling_time for mode in self.modes],
+            "frequency_hz": [mode.frequency for mode in self.modes],
+            "greatest_joint": [next(iter(mode.joints)) for mode in self.modes],
+        }
 
     def __iter__(self):
         return iter(self.modes)

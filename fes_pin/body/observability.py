@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -19,8 +20,10 @@ from fes_pin.body.controllability import RELATIVE_TOLERANCE, _independent
 from fes_pin.body.joints import known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, ModeSet, modes
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number
+from fes_pin.data.show import Tabled
 
 NOISE_DEG, RATE_HZ, LOOK_S = 0.5, 200.0, 0.3
 """Noise of a good flexible goniometer, degrees; its sampling, Hz; the time that a fall leaves for a look, s (ours)."""
@@ -30,8 +33,8 @@ PRIOR_DEG = 10.0
 _SETS_AT_ONCE = 20000
 
 
-@dataclass(frozen=True)
-class ModalObservability:
+@dataclass(frozen=True, eq=False)
+class ModalObservability(ByValue, Tabled):
     """What goniometers at some joints see.
 
     Parameters
@@ -55,8 +58,11 @@ class ModalObservability:
     @property
     def worst_deg(self) -> float:
         """The largest posterior deviation of a falling mode, degrees; 0 where nothing falls."""
-        rows = [i for i, mode in enumerate(self.modes) if mode.kind == "fall"]
-        return float(self.posterior_deg[rows].max(initial=0.0))
+        return float(self.posterior_deg[self.modes.kinds == "fall"].max(initial=0.0))
+
+    def _table(self) -> dict[str, Any]:
+        names = [mode.name for mode in self.modes]
+        return {"mode": names, "observable": self.observable.tolist(), "left_deg": self.posterior_deg.tolist()}
 
     def __str__(self) -> str:
         lines = ["goniometers: " + ", ".join(self.sensors)]

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES, SIDES, angles_array
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between
 
@@ -36,8 +37,8 @@ def _positive(values: Mapping[str, float], names: Sequence[str], what: str) -> n
     return array
 
 
-@dataclass(frozen=True)
-class ElasticJoints:
+@dataclass(frozen=True, eq=False)
+class ElasticJoints(ByValue):
     """A spring and a damper in each joint: tau = -stiffness (q - rest) - damping v.
 
     Parameters
@@ -59,6 +60,7 @@ class ElasticJoints:
         _positive(self.stiffness_nm, JOINT_NAMES, "stiffness")
         _positive(self.damping_nms, JOINT_NAMES, "damping")
         angles_array(self.rest_rad, JOINT_NAMES)
+        self._freeze()
 
     def torque(self, q: np.ndarray, names: Sequence[str]) -> np.ndarray:
         """Torque at rest: (19,) N m."""
@@ -90,8 +92,8 @@ MOST_PASSIVE = 100.0
 """No leg is so much stiffer than a healthy one (ours): contractures are some times as stiff."""
 
 
-@dataclass(frozen=True)
-class PassiveLegs:
+@dataclass(frozen=True, eq=False)
+class PassiveLegs(ByValue):
     """Passive elastic moments of hip, knee and ankle in the sagittal plane, with the coupling of two-joint muscles.
 
     Sums of exponentials fitted to ten healthy adults: R. Riener, T. Edrich, "Identification of passive elastic joint
@@ -118,6 +120,7 @@ class PassiveLegs:
     def __post_init__(self) -> None:
         object.__setattr__(self, "factor", between(self.factor, 0.0, MOST_PASSIVE, "factor"))
         _positive(self.damping_nms, JOINT_NAMES, "damping")
+        self._freeze()
 
     def _each(self, q: np.ndarray, names: Sequence[str]):
         places = {name: i for i, name in enumerate(names)}

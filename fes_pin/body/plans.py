@@ -71,7 +71,7 @@ class Plans:
     @cached_property
     def degree(self) -> np.ndarray:
         """Modal coordinate of one degree of the mode's greatest joint: (r,)."""
-        return np.radians(1.0) / np.abs(self.modes.shapes).max(axis=0)
+        return self.modes.degree
 
     @cached_property
     def gains(self) -> np.ndarray:
@@ -86,7 +86,7 @@ class Plans:
     @cached_property
     def kinds(self) -> np.ndarray:
         """`fall`, `swing` or `neutral` by mode."""
-        return np.array([mode.kind for mode in self.modes])
+        return self.modes.kinds
 
     @cached_property
     def _edges(self) -> tuple[np.ndarray, np.ndarray]:

@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from fes_pin.body.joints import JOINTS, SEGMENT_NAMES, SIDES
+from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
 
 
-@dataclass(frozen=True)
-class Segment:
+@dataclass(frozen=True, eq=False)
+class Segment(ByValue):
     """A rigid segment, given in the neutral posture in world axes (x forward, y left, z up).
 
     Parameters
@@ -55,8 +56,8 @@ class Segment:
         return self
 
 
-@dataclass(frozen=True)
-class Skeleton:
+@dataclass(frozen=True, eq=False)
+class Skeleton(ByValue):
     """Ten segments and nine joint centres in the neutral posture, ground at z = 0.
 
     Parameters
@@ -84,6 +85,7 @@ class Skeleton:
         for joint in JOINTS:
             if joint.name not in self.centres:
                 raise InputError(f"the centre of joint {joint.name!r} is missing")
+        self._freeze()
 
     @property
     def mass(self) -> float:

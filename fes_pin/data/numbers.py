@@ -148,6 +148,19 @@ def known_word(value: object, allowed: Collection[str], name: str) -> str:
     return value
 
 
+def truth(value: object, name: str) -> bool:
+    """True or False.
+
+    Raises
+    ------
+    InputError
+        Anything else: a text is no answer.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"must be True or False, got {shortened(value)}", column=name)
+    return bool(value)
+
+
 def by_name(values: Any, names: Sequence[str], what: str, default: float) -> np.ndarray:
     """Numbers per name: a mapping or a `NamedArray` (absent names get the default), one number for all, or an array.
 

@@ -10,6 +10,7 @@ import numpy as np
 from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, angles_array, known_joint
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.muscles.fibres import isometric_force, velocity_factor
 from fes_pin.muscles.paths import COORDINATES, LegPaths, leg_paths, read_table
 
@@ -66,7 +67,7 @@ def angles_of(q) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class MuscleTable:
+class MuscleTable(ReadOnly):
     """Muscles of both sides, in the order of `SIDES`; on each side those of the leg, then those of the trunk.
 
     Attributes

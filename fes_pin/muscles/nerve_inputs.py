@@ -109,5 +109,6 @@ def inputs_by_name(linear: LinearBody, inputs) -> Inputs:
         return Inputs.of(inputs, linear)
     if not isinstance(inputs, Iterable) or hasattr(inputs, "keys"):
         raise InputError("inputs must be Inputs, Nerves, or names of nerves or joints")
+    Inputs.of((), linear)  # a body, not something else
     names = names_of(inputs)
     return Inputs.of(names if set(names) <= set(JOINT_NAMES) else subject_nerves(linear.body, names), linear)

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from fes_pin.body.joints import axis_of
+from fes_pin.data.read_only import ReadOnly
 
 BODIES = ("pelvis", "femur", "tibia", "calcaneus", "toes")
 
@@ -168,7 +169,7 @@ class Edge:
 
 
 @dataclass(frozen=True, eq=False)
-class LegPaths:
+class LegPaths(ReadOnly):
     """Points of the muscles of a right leg.
 
     Attributes
