@@ -71,7 +71,10 @@ def test_without_a_strength_muscle_is_paralysed_and_that_is_said():
     """The default of allocation: 0.5 of a healthy adult's, 0.3 to 0.7."""
     common = ("nerves", "femoral", "tibial", "--posture", "standing")
     output = run(*common).output
-    assert "At 0.5 of a healthy adult's strength (paralysed, stimulated muscle)" in output
+    assert (
+        "At 0.5 of the strength of a healthy man of 18 to 25 years, 73 kg and 1.80 m (paralysed, stimulated muscle)"
+        in output
+    )
     assert "It may be 0.3 to 0.7" in output
     assert "At 1 of a healthy adult's strength " in run(*common, "--strength", "1").output
 
