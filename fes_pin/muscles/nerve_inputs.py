@@ -9,7 +9,7 @@ from fes_pin.body.build import Body
 from fes_pin.body.controllability import ModalControllability
 from fes_pin.body.controllability import modal_controllability as _controllability
 from fes_pin.body.inputs import Inputs
-from fes_pin.body.joints import JOINT_NAMES, SIDES, names_of
+from fes_pin.body.joints import JOINT_NAMES, SIDES
 from fes_pin.body.linearize import LinearBody
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import known_word
@@ -110,5 +110,5 @@ def inputs_by_name(linear: LinearBody, inputs) -> Inputs:
     if not isinstance(inputs, Iterable) or hasattr(inputs, "keys"):
         raise InputError("inputs must be Inputs, Nerves, or names of nerves or joints")
     Inputs.of((), linear)  # a body, not something else
-    names = names_of(inputs)
+    names = nerve_names(inputs)
     return Inputs.of(names if set(names) <= set(JOINT_NAMES) else subject_nerves(linear.body, names), linear)

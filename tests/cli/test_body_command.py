@@ -76,7 +76,10 @@ def test_without_a_strength_muscle_is_paralysed_and_that_is_said():
         in output
     )
     assert "It may be 0.3 to 0.7" in output
-    assert "At 1 of a healthy adult's strength " in run(*common, "--strength", "1").output
+    assert (
+        "At 1 of the strength of a healthy man of 18 to 25 years, 73 kg and 1.80 m"
+        in run(*common, "--strength", "1").output
+    )
 
 
 def test_standing_on_both_feet():
