@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import linprog, lsq_linear
 
-from fes_pin.allocation.inputs import fractions, torque_matrix
+from fes_pin.allocation.inputs import fractions, torque_matrix, wanted_torque
 from fes_pin.allocation.walk import allocate_walk
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
@@ -66,9 +66,10 @@ class AttainableTorques:
         range.
     """
 
-    def __init__(self, nerves: Any, q: Any = None, joints: Sequence[str] | None = None, upper: Any = 1.0) -> None:
+    def __init__(self, nerves: Any, q: Any = None, joints: Iterable[str] | None = None, upper: Any = 1.0) -> None:
         whole, names, known = torque_matrix(nerves, q)
-        self.joints = known if joints is None else (joints,) if isinstance(joints, str) else tuple(joints)
+        one = isinstance(joints, str) or not isinstance(joints, Iterable)
+        self.joints = known if joints is None else (joints,) if one else tuple(joints)
         unknown = [name for name in self.joints if name not in known]
         if unknown:
             raise InputError(f"unknown joint {unknown[0]!r}; the joints are {', '.join(known)}")
@@ -98,7 +99,7 @@ class AttainableTorques:
 
     def nearest(self, torque: Any) -> Nearest:
         """The attainable torque nearest to one wanted (by joint name, absent 0, or array over those that count)."""
-        wanted = by_name(torque, self.joints, "torque", 0.0)
+        wanted = wanted_torque(torque, self.joints)
         r = lsq_linear(self.columns, wanted, (0.0, 1.0), method="bvls", tol=1e-15).x
         return Nearest(self.columns @ r, r * self.upper, float(np.linalg.norm(self.columns @ r - wanted)))
 
@@ -108,7 +109,7 @@ class AttainableTorques:
 
     def share(self, torque: Any) -> float:
         """Greatest multiple of the torque that is attainable, infinite for no torque (a linear program)."""
-        wanted = by_name(torque, self.joints, "torque", 0.0)
+        wanted = wanted_torque(torque, self.joints)
         if not wanted.any():
             return np.inf
         n, size = self.columns.shape[1], float(np.abs(wanted).max())
@@ -135,7 +136,7 @@ class AttainableTorques:
         return np.vstack([path, path[-1] + lowest - path[1:-1]])
 
 
-def gait_share(torques: Any, nerves: Any, q: Any, joints: Sequence[str], tolerance_nm: float = MET_NM) -> float:
+def gait_share(torques: Any, nerves: Any, q: Any, joints: Iterable[str], tolerance_nm: float = MET_NM) -> float:
     """Fraction of a gait's samples whose torque is attained on all the given joints within a tolerance.
 
     Each sample is allocated with the error of these joints only; attained means that none misses by more.

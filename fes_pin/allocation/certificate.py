@@ -54,7 +54,7 @@ class Certificate:
     def residual(self) -> float:
         """Greatest of primal, dual and complementarity; not a number where one of them is none."""
         parts = (self.primal, self.dual, self.complementarity)
-        return math.nan if any(math.isnan(part) for part in parts) else max(parts)
+        return math.nan if math.isnan(sum(parts)) else max(parts)
 
     def is_optimal(self, tolerance: float = 1e-9) -> bool:
         """Whether no residual exceeds this part of `flattest`, or else rounding, and the cost is a finite number."""
@@ -102,6 +102,7 @@ class Certifier:
         arms = np.abs(problem.matrix) * self.weighed[:, None]
         unit = (joints + n + 4) * EPSILON  # n products in a torque, as many sums over joints, prices and change
         self.unit, self.arms = unit * (arms.T @ np.abs(problem.matrix).sum(1) + prices), unit * arms.sum(0)
+        self.hidden = [float((part / self.curvature).max()) for part in (self.unit, self.arms)]
         self.paid = problem.prices + problem.change
         far = float(((self.unit + self.arms * LARGEST_NM) / self.paid).max())
         self.farthest = np.inf if problem.cubes else max(far, NOTHING)
@@ -116,7 +117,7 @@ class Certifier:
 
     def unseen(self, wanted: np.ndarray) -> float:
         """Residual up to which rounding of the gradient, or a recruitment that is nothing, hides the optimum."""
-        return max(float((self.rounding(wanted) / self.curvature).max()), NOTHING)
+        return max(self.hidden[0] + self.hidden[1] * float(np.abs(wanted).max(initial=0.0)), NOTHING)
 
     def gradient(self, achieved: np.ndarray, wanted: np.ndarray, r: np.ndarray, previous: np.ndarray) -> np.ndarray:
         """Slope of the cost over recruitment, (..., n), at `achieved` (..., joints) N m."""

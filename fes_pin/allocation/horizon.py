@@ -50,8 +50,9 @@ class StrengthFatigue:
     def after(self, left: np.ndarray, act: np.ndarray, step_s: float) -> np.ndarray:
         """Strength left (n,) after a step with activation act (n,), exact for constant activation."""
         down, up = act / self.fatigue_s, (1.0 - act) / self.recovery_s
-        settled = (self.least * down + up) / (down + up)
-        return settled + (left - settled) * np.exp(-(down + up) * step_s)
+        rate = down + up
+        settled = np.where(rate > 0.0, (self.least * down + up) / np.where(rate > 0.0, rate, 1.0), left)
+        return settled + (left - settled) * np.exp(-rate * step_s)
 
 
 def invert_lag(

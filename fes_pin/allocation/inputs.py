@@ -40,6 +40,8 @@ def torque_matrix(nerves: Any, q: Any, v: Any = None) -> tuple[np.ndarray, tuple
             joints = tuple(f"joint_{j + 1}" for j in range(len(matrix)))
     if matrix.ndim != 2 or 0 in matrix.shape:
         raise InputError(f"the torque matrix must be joints x channels, got shape {matrix.shape}")
+    if len(set(names)) < len(names) or len(set(joints)) < len(joints):
+        raise InputError("the torque matrix names a channel or a joint twice")
     in_range(matrix, "the torque matrix")
     return matrix, names, joints
 
@@ -69,7 +71,7 @@ def wanted_torque(torque: Any, joints: tuple[str, ...]) -> np.ndarray:
     InputError
         Not such numbers, one number for several joints, or beyond any body's range.
     """
-    if len(joints) > 1 and not hasattr(torque, "keys") and np.ndim(torque) == 0:
+    if len(joints) > 1 and np.ndim(torque) == 0 and not hasattr(torque, "keys"):
         raise InputError(f"one torque for {len(joints)} joints: name its joint, as in {{{joints[0]!r}: -40}}")
     wanted = by_name(torque, joints, "wanted torque", 0.0)
     worst = int(np.abs(wanted).argmax())

@@ -219,10 +219,12 @@ class Hysteresis:
     Raises
     ------
     InputError
-        No such widths.
+        No curve, or no such widths.
     """
 
     def __init__(self, curve: LinearRecruitment, half_width_us: float, acting_us: float = 0.0) -> None:
+        if not isinstance(curve, _Curve) or np.ndim(curve.threshold_us):
+            raise InputError(f"expected the recruitment curve of one channel, got {curve!r:.40}")
         self.curve, self.half_width_us = curve, between(half_width_us, 0.0, LONGEST_US, "half_width_us")
         self.acting_us = between(acting_us, 0.0, LONGEST_US, "acting_us")
 

@@ -100,6 +100,16 @@ def test_a_matrix_without_names_has_numbered_joints_and_one_with_names_keeps_the
         )
 
 
+def test_a_matrix_that_names_a_channel_or_a_joint_twice_is_refused():
+    pandas = pytest.importorskip("pandas")
+    for table in (
+        pandas.DataFrame([[1.0, 2.0]], columns=["a", "a"], index=["j"]),
+        pandas.DataFrame([[1.0], [2.0]], columns=["a"], index=["j", "j"]),
+    ):
+        with pytest.raises(InputError, match="twice"):
+            fp.Allocator(table)
+
+
 def test_answers_answer_by_name():
     a = fp.allocate(WANTED, NERVES)
     assert a["left_tibial"] == a.pulse_widths_us["left_tibial"] > 180.0

@@ -80,6 +80,9 @@ def test_other_solvers_only_propose_and_the_answer_is_exact():
         (lambda p: fp.AttainableTorques(MATRIX, upper=2.0), "upper limits"),
         (lambda p: fp.AttainableTorques(MATRIX, upper=[1.0, -1.0, 0.0]), "upper limits"),
         (lambda p: fp.AttainableTorques(MATRIX, joints=[]), "joints"),
+        (lambda p: fp.AttainableTorques(MATRIX, joints=5), "joint"),
+        (lambda p: fp.AttainableTorques(MATRIX).nearest(-40), "one torque for 2 joints"),
+        (lambda p: fp.AttainableTorques(MATRIX).share(-40), "one torque for 2 joints"),
         (lambda p: fp.AttainableTorques(MATRIX, joints=["joint_1", "joint_1"]), "joints"),
     ],
 )
@@ -96,6 +99,16 @@ def test_a_fatigue_that_was_spoilt_later_fails_before_the_state_changes():
     with pytest.raises(AttributeError):
         horizon.advance(np.full((3, 2), 20.0))
     assert horizon.act is act and horizon.before is before and horizon.queue is queue
+
+
+def test_strength_that_neither_falls_nor_comes_back_stays():
+    left = np.array([1.0, 0.6, 0.3])
+    for fatigue, act in (
+        (fp.StrengthFatigue(recovery_s=np.inf), np.zeros(3)),
+        (fp.StrengthFatigue(fatigue_s=np.inf), np.ones(3)),
+        (fp.StrengthFatigue(np.inf, np.inf), np.array([0.0, 0.5, 1.0])),
+    ):
+        np.testing.assert_array_equal(fatigue.after(left, act, 1.0), left)
 
 
 @pytest.mark.parametrize("name", ["act", "left", "before"])

@@ -141,6 +141,8 @@ def test_hysteresis_is_undone_wherever_it_can_be(curve):
         lambda: MeasuredRecruitment("a", "b"),
         lambda: MeasuredRecruitment([100.0, 200.0], [0.0, "x"]),
         lambda: Hysteresis(LinearRecruitment(), "wide"),
+        lambda: Hysteresis("steep", 10.0),
+        lambda: Hysteresis(LinearRecruitment(np.array([100.0, 120.0])), 10.0),
         lambda: Hysteresis(LinearRecruitment(), 20.0, acting_us=float("nan")),
     ],
 )
