@@ -68,8 +68,9 @@ class AttainableTorques:
 
     def __init__(self, nerves: Any, q: Any = None, joints: Iterable[str] | None = None, upper: Any = 1.0) -> None:
         whole, names, known = torque_matrix(nerves, q)
-        one = isinstance(joints, str) or not isinstance(joints, Iterable)
-        self.joints = known if joints is None else (joints,) if one else tuple(joints)
+        several: Any = known if joints is None else joints
+        one = isinstance(joints, str) or not isinstance(several, Iterable)
+        self.joints: tuple[str, ...] = (several,) if one else tuple(several)
         unknown = [name for name in self.joints if name not in known]
         if unknown:
             raise InputError(f"unknown joint {unknown[0]!r}; the joints are {', '.join(known)}")
