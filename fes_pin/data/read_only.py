@@ -32,7 +32,7 @@ def _held(value: Any) -> Any:
     """A mapping or list, and what it holds, so that nobody can write to it; an array is marked so."""
     if isinstance(value, Mapping):
         return MappingProxyType({n: _held(v) for n, v in value.items()})
-    if isinstance(value, list):
+    if type(value) in (list, tuple):
         return tuple(map(_held, value))
     if isinstance(value, np.ndarray):
         value.setflags(write=False)

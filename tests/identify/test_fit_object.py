@@ -170,6 +170,10 @@ def test_nothing_that_a_fit_holds_can_be_written_to(plain, copied):
     with pytest.raises(TypeError):
         fitted.noise["force_n"] = noise
     with pytest.raises(TypeError):
+        fitted.unknowns[0]["initial_position"] = 0.0
+    with pytest.raises(TypeError):
+        fitted.bounds["gain"] = (0.0, 1.0)
+    with pytest.raises(TypeError):
         fitted.model.rig.constants["threshold_us"] = 0.0
 
 

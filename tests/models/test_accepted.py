@@ -11,7 +11,7 @@ from models.cases import RIGS, trial
 import fes_pin as fp
 from fes_pin.models.effects import SensorOffset
 from fes_pin.models.model import Model
-from fes_pin.models.rigs import Joint
+from fes_pin.models.rigs import Joint, Muscle
 
 MODELS = {rig: Model(one) for rig, one in RIGS.items()}
 KINDS = {"ankle": "motion", "joint": "motion", "muscle": "isometric"}
@@ -105,6 +105,14 @@ def test_no_trials_are_refused(trials, told):
     with pytest.raises(fp.InputError) as raised:
         fp.fit(MODELS["muscle"], trials)
     assert str(raised.value) == told
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_pulse_widths_need_a_recruitment_curve(verb):
+    with pytest.raises(
+        fp.InputError, match=r"constants\.threshold_us: missing; trials with pulse_width_us need thresh"
+    ):
+        VERBS[verb](Model(Muscle()), recorded("muscle"))
 
 
 @pytest.mark.parametrize("verb", VERBS)
