@@ -44,14 +44,17 @@ class AsRead:
 class HeldFile(PosixPath):
     """A path with the bytes that were there when it was read: whoever reads it reads those."""
 
-    content: bytes | None = None
-
     @classmethod
     def holding(cls, path: str | Path, content: bytes) -> HeldFile:
         """The path, absolute, with its bytes."""
         held = cls(os.path.abspath(path))
-        held.content = content
+        vars(held)["content"] = content
         return held
+
+    @property
+    def content(self) -> bytes | None:
+        """The bytes; None of a path that was made of this one."""
+        return vars(self).get("content")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (type(self), self.parts) if self.content is None else (HeldFile.holding, (str(self), self.content))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,19 @@ LONGEST_MUSCLE_M = 1.0
 """Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
 SHORTEST_PULSE_US = 2.0
 """Pulse width in us that recruits nothing: surface stimulators give 50 to 1000 us, and 2 is a long one in ms."""
+
+
+def checked_mapping(value: Any, error: KeyFault, key: str) -> dict[Any, Any]:
+    """Names with their values.
+
+    Raises
+    ------
+    InputError
+        Made by `error`, for anything else.
+    """
+    if not callable(getattr(value, "items", None)):
+        raise error(key, f"expected a mapping of names to values, found a {type(value).__name__}")
+    return dict(value.items())
 
 
 def checked_kind(schema: RigSchema, kind: object, error: KeyFault) -> str:

@@ -9,6 +9,8 @@ from difflib import get_close_matches
 from numbers import Real
 from typing import Any
 
+from fes_pin.data.read_only import ReadOnly
+
 ROLES = ("fit", "held_out")
 IMPOSED = "imposed"
 """The kind of a trial in which the motion is an input."""
@@ -86,7 +88,7 @@ def any_number(unit: str, required: bool = True) -> NumberKey:
 
 
 @dataclass(frozen=True)
-class RigSchema:
+class RigSchema(ReadOnly):
     """The keys of one rig's tables and the columns of its trials.
 
     Parameters
@@ -145,6 +147,9 @@ class RigSchema:
     check_files: Callable[[Mapping[str, Any]], object] | None = None
     name: str = ""
     owner: Any = None
+
+    def __post_init__(self) -> None:
+        self._freeze()
 
     def stimuli(self, kind: str) -> tuple[str, ...]:
         """The input columns of a kind of trial, of which it holds one, beside a motion that it may impose."""

@@ -6,7 +6,7 @@ import hashlib
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
@@ -20,6 +20,7 @@ from fes_pin.data.checks import (
     check_same_inputs,
     checked_kind,
     checked_label,
+    checked_mapping,
     checked_remarks,
     checked_role,
     known_constants,
@@ -105,22 +106,22 @@ class Study(ReadOnly):
     def __post_init__(self) -> None:
         checked_label(self.name, lambda _, message: InputError(message, column="name"), what="a name")
         schema = self._schema()
-        numbers = {}
-        known = {"constants": {**known_constants(schema), **schema.passive}, "start": dict(schema.start)}
-        for key in set(schema.start) & set(self.constants):
-            if key in self.start:
-                raise InputError("is also among the constants; expected it in one of them", column=f"start.{key}")
-            del known["start"][key]
-        for where, keys in known.items():
-            fault = partial(_fault, where)
-            numbers[where] = checked_numbers(getattr(self, where), keys, fault)
-        check_constants(schema, numbers["constants"], self.files, partial(_fault, "constants or files"))
-        if odd := [key for key in self.files if key not in schema.files]:
+        given = {
+            n: checked_mapping(getattr(self, n), partial(_fault, "Study"), n) for n in ("constants", "start", "files")
+        }
+        twice = set(schema.start) & set(given["constants"])
+        if odd := sorted(twice & set(given["start"])):
+            raise _fault("start", odd[0], "is also among the constants; expected it in one of them")
+        known = {"constants": {**known_constants(schema), **schema.passive}}
+        known["start"] = {key: number for key, number in schema.start.items() if key not in twice}
+        numbers = {n: checked_numbers(given[n], keys, partial(_fault, n)) for n, keys in known.items()}
+        check_constants(schema, numbers["constants"], given["files"], partial(_fault, "constants or files"))
+        if odd := [key for key in given["files"] if key not in schema.files]:
             raise _fault("files", odd[0], unknown(odd[0], schema.files))
-        files = {key: hold(path) for key, path in self.files.items()}
-        if any(files[key] is not path for key, path in self.files.items()):
+        files = {key: hold(path) for key, path in given["files"].items()}
+        if any(files[key] is not path for key, path in given["files"].items()):
             check_files(schema, files)
-        trials = tuple(self.trials)
+        trials = tuple(self.trials) if isinstance(self.trials, Iterable) else (self.trials,)
         self._check_trials(trials, schema)
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
@@ -331,7 +332,8 @@ def read_study(path: str | Path, *, rigs: Rigs | None = None) -> Study:
     with hashing() as sha256:
         document = read_toml(path / "study.toml" if folder else path)
     study = _Reader(document, known_rigs(rigs)).study()
-    return replace(study, as_read=AsRead(sha256, study.digest()))
+    vars(study)["as_read"] = AsRead(sha256, study.digest())
+    return study
 
 
 def read_columns(path: str | Path, *, rigs: Rigs | None = None) -> Columns | None:

@@ -17,6 +17,7 @@ from fes_pin.data.checks import (
     check_values,
     checked_kind,
     checked_label,
+    checked_mapping,
     checked_remarks,
     checked_role,
 )
@@ -103,13 +104,14 @@ class Trial(ReadOnly):
         if self.group is not None:
             checked_label(self.group, error)
         remarks = checked_remarks(self.remarks, error)
+        given = {key: checked_mapping(getattr(self, key), error, key) for key in ("columns", "conditions")}
         try:
-            conditions = {key: NumberKey("").check(value) for key, value in dict(self.conditions).items()}
+            conditions = {key: NumberKey("").check(value) for key, value in given["conditions"].items()}
             low_pass = None if self.low_pass_hz is None else NumberKey("Hz", 0.0).check(self.low_pass_hz)
         except ValueError as problem:
             raise error("conditions, low_pass_hz", str(problem)) from None
         time = _numbers(self.time, "time_s", self)
-        columns = {name: _numbers(values, name, self) for name, values in self.columns.items()}
+        columns = {name: _numbers(values, name, self) for name, values in given["columns"].items()}
         if len(time) < MIN_ROWS:
             raise self.error(f"expected at least {MIN_ROWS} samples, found {len(time)}", "time_s")
         if odd := [name for name, values in columns.items() if values.shape != time.shape]:
@@ -243,11 +245,11 @@ class Trial(ReadOnly):
         ------
         KeyError
             If either has no such column.
-        ValueError
+        InputError
             If they were not sampled at the same times.
         """
         if len(self) != len(simulated) or not np.allclose(self.time, simulated.time, rtol=0.0, atol=1e-3 * self.dt):
-            raise ValueError(f"trials {self.name} and {simulated.name} were not sampled at the same times")
+            raise InputError(f"trials {self.name} and {simulated.name} were not sampled at the same times")
         return self[column] - simulated[column]
 
     def __repr__(self) -> str:

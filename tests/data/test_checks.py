@@ -63,6 +63,9 @@ BAD_TRIALS = {
     "one text as remarks": (lambda: trial(remarks="filled in"), "expected texts"),
     "a text as condition": (lambda: trial(conditions={"load_kg": "1"}), "expected a number, found the text '1'"),
     "a condition that is NaN": (lambda: trial(conditions={"load_kg": float("nan")}), "expected a finite number"),
+    "an array as columns": (lambda: trial(np.ones((100, 2))), "columns: expected a mapping of names to values, found a ndarray"),
+    "no conditions": (lambda: Trial("a", "motion", ANKLE, TIME, None), "conditions: expected a mapping"),
+    "no columns": (lambda: Trial("a", "motion", None, TIME), "columns: expected a mapping"),
     "a low pass at 0 Hz": (lambda: trial(low_pass_hz=0.0), "above 0 in Hz"),
 }  # fmt: skip
 
@@ -127,6 +130,10 @@ BAD_STUDIES = {
     "an unknown rig": (lambda s: replace(s, rig="knee"), "rig: expected one of"),
     "another rig": (lambda s: replace(s, rig="joint"), "unknown"),
     "no name": (lambda s: replace(s, name=" "), "name: expected a name"),
+    "trials by name": (lambda s: replace(s, trials={"a": s.trials[0]}), "expected trials, found a str"),
+    "a number of trials": (lambda s: replace(s, trials=3), "expected trials, found a int"),
+    "no constants": (lambda s: replace(s, constants=None), "Study.constants: expected a mapping"),
+    "files as a list": (lambda s: replace(s, files=["rig.urdf"]), "Study.files: expected a mapping"),
     "no horizon": (lambda s: replace(s, horizon_s=0.0), "above 0 in s"),
     "degrees": (lambda s: replace(s, trials=(s.trials[0].with_columns(angle_rad=np.full(5, 105.0)),)), "is it in degrees?"),
 }  # fmt: skip
@@ -136,7 +143,7 @@ BAD_STUDIES = {
 def test_a_study_that_cannot_be_is_refused_when_it_is_built(tmp_path, case):
     spoil, words = BAD_STUDIES[case]
     study = read_study(studies.ankle(tmp_path))
-    assert replace(study) == replace(study)
+    assert replace(study) == study and replace(study, trials=study.trials[0]).trials == study.trials[:1]
     with pytest.raises(InputError) as caught:
         spoil(study)
     assert words in str(caught.value)

@@ -80,7 +80,8 @@ def test_copies_of_a_study_are_equal_to_it_and_as_read_only(tmp_path, rig):
     study = fp.read_study(READ[rig](tmp_path))
     for other in (pickle.loads(pickle.dumps(study)), copy.copy(study), copy.deepcopy(study), replace(study)):
         assert other == study and hash(other) == hash(study) and other.inputs() == study.inputs()
-        for mapping in (other.constants, other.start, other.files, other.trials[0].columns, other.trials[0].conditions):
+        held = (other.constants, other.start, other.files, other.schema.constants, other.schema.outputs)
+        for mapping in (*held, other.trials[0].columns, other.trials[0].conditions):
             with pytest.raises(TypeError):
                 mapping["x"] = 1.0
         with pytest.raises(ValueError, match="read-only"):
@@ -96,6 +97,8 @@ def test_a_held_file_is_a_path_and_what_is_made_of_it_is_none(tmp_path):
     held = HeldFile.holding(path, path.read_bytes())
     path.write_text("after")
     assert held == path and held.read_text() == "before" and copy.deepcopy(held).read_bytes() == b"before"
+    with pytest.raises(AttributeError):
+        held.content = b"other"
     assert (held.parent / "rig.urdf").read_text() == "after" and held.parent.exists()
 
 
