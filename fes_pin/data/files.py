@@ -218,14 +218,18 @@ def _write_into(folder: Path, contents: Mapping[str, str | bytes], without: Iter
 
 
 def _exchange(staged: Mapping[Path, Path], leaving: Iterable[Path], scratch: Path) -> None:
-    """Rename new files to their places after the old ones have left; where that fails, everything is as before."""
+    """Rename new files to their places after the old ones have left; where that fails, everything is as before.
+
+    The first file is always there, old or new: it may say what the others are.
+    """
+    first = next(iter(staged), None)
     aside: list[tuple[Path, Path]] = []
     placed: list[Path] = []
     try:
         for index, target in enumerate(leaving):
             if os.path.lexists(target):
                 aside.append((target, scratch / f"old-{index}"))
-                os.replace(*aside[-1])
+                (shutil.copyfile if target == first and target.is_file() else os.replace)(*aside[-1])
         for target, new in staged.items():
             target.parent.mkdir(parents=True, exist_ok=True)
             placed.append(target)

@@ -12,6 +12,7 @@ import pytest
 from fes_pin.data import files
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import check_folder, write_files, write_text
+from fes_pin.data.outputs import Outputs
 
 
 def test_write_replaces_whole(tmp_path):
@@ -131,7 +132,20 @@ def test_a_run_killed_before_any_rename_leaves_whole_files_of_one_run_or_none(tm
     for k in range(1, 10):
         (tmp_path / str(k)).mkdir()
         left.append(run_until_killed(tmp_path / str(k), rename=k))
-    assert left == list(map(frozenset, ("", "a", "ab", "abc", "bc", "c", "", "a", "ab")))
+    assert left == list(map(frozenset, ("", "a", "ab", "abc", "ac", "a", "a", "ab", "a")))
+
+
+def test_a_command_that_was_killed_writes_over_what_it_left(tmp_path):
+    """Before any rename: what stands is of the command, and the file of another one stays noted."""
+    code = WRITER.replace("files import write_files", "outputs import Outputs")
+    code = code.replace("    write_files(", "    Outputs('one').write(")
+    for rename in range(2, 12):
+        folder = tmp_path / str(rename)
+        Outputs("other").write(folder, {"other": "x"})
+        run = subprocess.run([sys.executable, "-c", code, str(folder), str(rename)], check=False, capture_output=True)
+        assert run.returncode == -9
+        Outputs("other").check(folder, ["other"])
+        Outputs("one").write(folder, {"a": "a", "b": "b", "sub/c": "c"})
 
 
 def test_a_run_killed_at_any_moment_leaves_whole_files_of_one_run_or_none(tmp_path):
