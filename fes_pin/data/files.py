@@ -231,7 +231,8 @@ def _exchange(staged: Mapping[Path, Path], leaving: Iterable[Path], scratch: Pat
                 aside.append((target, scratch / f"old-{index}"))
                 (shutil.copyfile if target == first and target.is_file() else os.replace)(*aside[-1])
         for target, new in staged.items():
-            target.parent.mkdir(parents=True, exist_ok=True)
+            if not target.parent.exists():
+                target.parent.mkdir(parents=True, exist_ok=True)
             placed.append(target)
             os.replace(new, target)
     except BaseException:
@@ -313,7 +314,8 @@ def _make_folder(folder: Path) -> Path | None:
         if parent.exists():
             break
         made = parent
-    folder.mkdir(parents=True, exist_ok=True)
+    if made is not None:
+        folder.mkdir(parents=True, exist_ok=True)
     return made
 
 

@@ -69,20 +69,21 @@ def slide(mass_kg: float) -> str:
         A mass that is not above 0.
     """
     _check(mass=mass_kg)
-    words = {"zero": "where you say", "axis": "Positive moves along +x.", "link": "carriage", "joint": "rail"}
-    words |= {"kind": "prismatic", "direction": "1 0 0", "limit": LIMIT}
-    return _filled("slide", f"A carriage of {mass_kg:g} kg on a level rail.", mass_kg, 0.0, 0.0, **words)
+    moves = ("Positive moves along +x.", "carriage", "rail", "prismatic", "1 0 0", LIMIT)
+    return _filled("slide", f"A carriage of {mass_kg:g} kg on a level rail.", "where you say", mass_kg, 0.0, 0.0, moves)
 
 
 def _turning(name: str, what: str, mass: float, centre: float, about_centre: float, upright: bool) -> str:
-    words = {"zero": "upright" if upright else "hanging straight down", "axis": _SWING, "link": "arm", "joint": "pivot"}
-    words |= {"kind": "continuous", "direction": "0 1 0", "limit": ""}
-    return _filled(name, what, mass, centre if upright else -centre, about_centre, **words)
+    zero, height = ("upright", centre) if upright else ("hanging straight down", -centre)
+    turns = (_SWING, "arm", "pivot", "continuous", "0 1 0", "")
+    return _filled(name, what, zero, mass, height, about_centre, turns)
 
 
-def _filled(name: str, what: str, mass: float, height: float, across: float, **words: str) -> str:
+def _filled(name: str, what: str, zero: str, mass: float, height: float, across: float, moves: tuple[str, ...]) -> str:
+    """The template with numbers, and with words on how its joint moves: axis, link, joint, kind, direction, limit."""
+    words = dict(zip(("axis", "link", "joint", "kind", "direction", "limit"), moves, strict=True))
     numbers = {"mass": float(mass), "height": float(height), "across": float(across), "along": 0.0}
-    return _URDF.format(name=name, what=what, **numbers, **words)
+    return _URDF.format(name=name, what=what, zero=zero, **numbers, **words)
 
 
 def _check(**numbers: float) -> None:
