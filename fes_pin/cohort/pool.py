@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import chi2, false_discovery_control, t
+from scipy.stats import binomtest, chi2, false_discovery_control, t
 
 from fes_pin.diagnosis.recorded import LEAST_P
 
@@ -133,7 +133,5 @@ def share_interval(named: int, studies: int) -> tuple[float, float]:
     """95 % interval of a share, percent, by Wilson (J. Am. Stat. Assoc. 22, 1927)."""
     if studies == 0:
         return 0.0, 100.0
-    z, share = 1.959963984540054, named / studies
-    middle = (share + z * z / (2 * studies)) / (1 + z * z / studies)
-    half = z / (1 + z * z / studies) * math.sqrt(share * (1 - share) / studies + z * z / (4 * studies**2))
-    return 100.0 * max(middle - half, 0.0), 100.0 * min(middle + half, 1.0)
+    ends = binomtest(named, studies).proportion_ci(method="wilson")
+    return 100.0 * float(ends.low), 100.0 * float(ends.high)

@@ -218,12 +218,8 @@ class Diagnosis(Saveable):
         }
 
     def _model(self, which: str) -> dict[str, Any]:
-        free: tuple[float | None, float | None] = getattr(self, f"{which}_error")
-        fitted: Fit = getattr(self, which)
-        return {
-            "parameters": recorded.parameters_record(fitted),
-            "error_percent": recorded.errors_record(free, self.ahead, which),
-        }
+        errors = recorded.errors_record(getattr(self, f"{which}_error"), self.ahead, which)
+        return {"parameters": recorded.parameters_record(getattr(self, which)), "error_percent": errors}
 
     def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         rows = [cause_row(c) for c in self.causes]

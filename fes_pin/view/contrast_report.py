@@ -8,13 +8,11 @@ from collections.abc import Mapping
 from fes_pin.contrasts.result import Change, Contrast, contrast_headline, contrast_notes
 from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.text import probability
-from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.page import Content, Markup, element, figure, html_table, joined, page, section, unit_text
+from fes_pin.view.ranking import named_rows, rows_drawing
 from fes_pin.view.report_causes import value_and_interval
 
-NAMES, WIDE, ROW = 176.0, 420.0, 24.0
-"""Room for names, width of a figure, height of a row."""
 SAID = ("in all groups", "repeats scatter", "something is left", "nothing left")
 """Beginnings of the notes that stand beside how it was judged; the others have sections of their own."""
 
@@ -94,16 +92,15 @@ def _drawing(change: Change, groups: tuple[str, ...]) -> Drawing:
         rows.append((group, one.value, low, high))
     low, high = min(r[2] for r in rows), max(r[3] for r in rows)
     room = 0.08 * max(high - low, 1e-12)
-    panel = Panel(NAMES, 8, WIDE - NAMES - 14, ROW * len(rows), (low - room, high + room), (0.5 - len(rows), 0.5))
-    for k, (group, value, below, above) in enumerate(rows):
-        panel.text(NAMES - 8, 8 + ROW * (k + 0.5) + 4, group[:27], "end", "ink", "name")
+    panel = named_rows([r[0] for r in rows], ["ink"] * len(rows), (low - room, high + room))
+    for k, (_, value, below, above) in enumerate(rows):
         panel.line([below, above], [-k, -k], "ink", 2.6)
         panel.dot(value, -k, "ink")
     panel.x_axis(f"{name} ({unit_text(next(iter(by_group.values())).unit)})")
     words = "; ".join(f"{g} {v:.4g}, interval {a:.4g} to {b:.4g}" for g, v, a, b in rows)
     head = ("group", name, "low", "high")
     csv = rows_csv(head, [(g.replace(",", " "), *numbers) for g, *numbers in rows])
-    return Drawing(svg([panel], WIDE, 8 + ROW * len(rows) + 40, f"{name} in each group: {words}."), csv)
+    return rows_drawing(panel, len(rows), f"{name} in each group: {words}.", csv)
 
 
 def _unchanged(found: Contrast) -> list[Markup]:

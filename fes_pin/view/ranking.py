@@ -27,7 +27,7 @@ def gain_drawing(diagnosis: Diagnosis) -> Drawing:
     causes, on = diagnosis.causes, "held-out" if diagnosis.was_held_out else "fitted"
     low = min([0.0, *(c.gain_held_out.low for c in causes)])
     high = max([100.0, *(c.gain_held_out.high for c in causes)])
-    panel = _rows([c.name for c in causes], [c.stage for c in causes], (1.03 * low, 1.03 * high))
+    panel = named_rows([c.name for c in causes], [c.stage for c in causes], (1.03 * low, 1.03 * high))
     rows: list[tuple[str | float, ...]] = []
     for k, cause in enumerate(causes):
         held, colour = cause.gain_held_out, _stage(cause.stage)
@@ -37,7 +37,7 @@ def gain_drawing(diagnosis: Diagnosis) -> Drawing:
         rows.append((cause.name, held.percent, held.low, held.high))
     panel.x_axis(f"gain on {on} trials (%)")
     words = "; ".join(f"{n} {p:.0f} %, interval {a:.0f} to {b:.0f}" for n, p, a, b in rows)
-    return _drawing(panel, len(causes), f"Gain of each cause on {on} trials: {words}.",
+    return rows_drawing(panel, len(causes), f"Gain of each cause on {on} trials: {words}.",
                     rows_csv(("cause", "gain_percent", "low", "high"), rows))  # fmt: skip
 
 
@@ -51,7 +51,7 @@ def rivals_drawing(diagnosis: Diagnosis, cause: Cause) -> Drawing:
     values = np.maximum([v for _, v in rivals], LEAST)
     stages = [_stage_of(diagnosis.catalogue, n) for n, _ in rivals]
     high = max(30.0, 2.5 * float(values.max()))
-    panel = _rows([n for n, _ in rivals], stages, (LEAST, high), True)
+    panel = named_rows([n for n, _ in rivals], stages, (LEAST, high), True)
     panel.box((LEAST, SEPARABLE), panel.y, "band")
     for k, ((name, _), value, stage) in enumerate(zip(rivals, values, stages, strict=True)):
         panel.line([LEAST, value], [-k, -k], _stage(stage), 1.2, 0.6)
@@ -61,7 +61,7 @@ def rivals_drawing(diagnosis: Diagnosis, cause: Cause) -> Drawing:
     panel.x_axis("loss of twice the log-likelihood", [(p, f"{p:g}" if p < 1e4 else f"{p:.0e}".replace("e+0", "e"))
                                                        for p in shown])  # fmt: skip
     words = "; ".join(f"{n} {v:.3g}{', not told apart' if n in cause.equivalents else ''}" for n, v in rivals)
-    return _drawing(
+    return rows_drawing(
         panel,
         len(rivals),
         f"Rivals of {cause.name}, by how much twice the log-likelihood falls with each in its place: {words}. "
@@ -81,7 +81,7 @@ def shown_rivals(diagnosis: Diagnosis, cause: Cause) -> list[tuple[str, float]]:
     return sorted(found.items(), key=lambda pair: pair[1])[:RIVALS]
 
 
-def _rows(names: Sequence[str], stages: Sequence[str], x: tuple[float, float], logarithmic: bool = False) -> Panel:
+def named_rows(names: Sequence[str], stages: Sequence[str], x: tuple[float, float], logarithmic: bool = False) -> Panel:
     """A panel with a row for each name, in the colour of its stage."""
     panel = Panel(NAMES, 8, WIDE - NAMES - 14, ROW * len(names), x, (0.5 - len(names), 0.5), logarithmic)
     for k, (name, stage) in enumerate(zip(names, stages, strict=True)):
@@ -89,7 +89,8 @@ def _rows(names: Sequence[str], stages: Sequence[str], x: tuple[float, float], l
     return panel
 
 
-def _drawing(panel: Panel, rows: int, words: str, csv: str) -> Drawing:
+def rows_drawing(panel: Panel, rows: int, words: str, csv: str) -> Drawing:
+    """The figure of a panel of so many rows, described in words, with its data."""
     return Drawing(svg([panel], WIDE, 8 + ROW * rows + 40, words), csv)
 
 

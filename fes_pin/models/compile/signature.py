@@ -7,11 +7,10 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
+from fes_pin.data.sources import code_hash
+
 
 @cache
 def source_signature() -> str:
     """Changes whenever an equation, the compiler or CasADi changes."""
-    digest = hashlib.sha256(version("casadi").encode())
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+    return hashlib.sha256(f"{version('casadi')} {code_hash(Path(__file__).parents[1])}".encode()).hexdigest()
