@@ -38,6 +38,9 @@ from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.workers import OutOfTime, Progress, noting_stops, one_thread_each, time_limit
 
+LOOKED = 0.1
+"""Share of a limit of time that a fit of the nominal model is looked at for what it gives away, besides."""
+
 
 def diagnose_joint(
     study: Study,
@@ -79,9 +82,10 @@ def diagnose_joint(
     catalogue, made = catalogue_of(library), provenance_now(study, seed)
     measured = measured_study(study)
     warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
-    warnings += given_away(measured.study)
+    with time_limit(math.inf if limit is None else LOOKED * limit):
+        warnings += given_away(measured.study)
     with one_thread_each(), noting_stops() as stops:
-        work = _Work(catalogue, seed, tell, math.inf if limit is None else began + limit, stops)
+        work = _Work(catalogue, seed, tell, math.inf if limit is None else time.perf_counter() + limit, stops)
         diagnosis = work.diagnosis_of_log(measured.study)
     tell(1.0, "done")
     warnings += diagnosis.warnings

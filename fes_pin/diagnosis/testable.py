@@ -25,7 +25,7 @@ from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulated_trial
-from fes_pin.workers import one_thread_each
+from fes_pin.workers import OutOfTime, one_thread_each
 
 ALIKE = 0.99
 """Cosine of two causes' sensitivities from which they look alike: to tell them apart at 95 % either must then stand out
@@ -105,13 +105,13 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
 
 
 def given_away(study: Study) -> list[str]:
-    """What a fit of the nominal model gives away of a study; the warnings of `Testable`."""
+    """What a fit of the nominal model gives away of a study, the warnings of `Testable`; nothing where time is over."""
     nominal, trials = _to_fit(study)
     with one_thread_each():
         try:
             fitted = _fitted(nominal, trials)
             return _given_away(nominal, trials, fitted) if math.isfinite(fitted.sse) else []
-        except (ArithmeticError, np.linalg.LinAlgError):
+        except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
             return []
 
 

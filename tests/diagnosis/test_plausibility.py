@@ -16,8 +16,10 @@ from fes_pin.diagnosis.checked import check
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.record import diagnosis_record
+from fes_pin.diagnosis.testable import given_away
 from fes_pin.models.nominal import nominal_model
 from fes_pin.view.report import report_html
+from fes_pin.workers import time_limit
 
 OUTPUTS = ("angle_rad", "force_n", "position", "velocity")
 INPUTS = ("pulse_width_us", "stim", "effort")
@@ -233,3 +235,11 @@ def test_a_check_is_written_as_text_and_for_json():
         f"these trials can show {len(told['shown'])} causes",
     ):
         assert line in str(found)
+
+
+def test_a_limit_of_time_ends_what_a_fit_gives_away():
+    study = shifted(replace(study_of("muscle"), trials=study_of("muscle").trials[:4]))
+    assert len(given_away(study)) == 1
+    with time_limit(-1.0):
+        assert given_away(study) == []
+    assert not any("answers" in words for words in diagnose_joint(study, limit=0.0).warnings)
