@@ -79,7 +79,7 @@ axes[0].legend(fontsize=8, ncols=2, loc="upper left")
 axes[1].axhspan(0, 180, color="0.9", lw=0)
 axes[1].text(0.02, 90, "below threshold: never used, except 0", fontsize=8, va="center")
 axes[1].set(ylabel="pulse width (us)", xlabel="time (s)", ylim=(0, 1030), xlim=(0, time[-1]))
-out = Path(__file__).parents[1] / "out"
+out = Path("out")
 out.mkdir(exist_ok=True)
 figure.savefig(out / "allocate_ankle.png", dpi=110)
 

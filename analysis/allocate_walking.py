@@ -196,7 +196,7 @@ axes[1, 2].set_xticklabels(
     fontsize=8,
 )
 axes[1, 2].legend(fontsize=8)
-out = Path(__file__).parents[1] / "out"
+out = Path("out")
 out.mkdir(exist_ok=True)
 figure.savefig(out / "allocate_walking.png", dpi=110)
 

@@ -17,7 +17,7 @@ from fes_pin.paper.equation_1 import GRAVITY
 from fes_pin.paper.error_region import profile_intervals
 from fes_pin.paper.ratios import RATIOS, RatioProblem, ankle_of, least_error
 
-OUT = Path(__file__).parents[1] / "out"
+OUT = Path("out")
 OUT.mkdir(exist_ok=True)
 twin = paper_twin("3-23")
 loads = np.repeat([0.2, 0.5, 0.8, 1.0, 1.2, 1.5, 2.0, 2.5], 3)

@@ -17,7 +17,7 @@ from fes_pin.paper.constants import PRINTED, STEPWISE, paper_study, paper_twin
 from fes_pin.paper.ratios import RatioProblem, ankle_of, error_percent, least_error
 from fes_pin.paper.twin import RunningTwin, staircase
 
-OUT = Path(__file__).parents[1] / "out"
+OUT = Path("out")
 OUT.mkdir(exist_ok=True)
 answers = {}
 for name in PRINTED:

@@ -20,7 +20,7 @@ from fes_pin.paper.constants import STEPWISE, paper_twin
 from fes_pin.paper.ratios import RatioProblem, ankle_of, least_error
 from fes_pin.paper.twin import RunningTwin, record, staircase
 
-OUT = Path(__file__).parents[1] / "out"
+OUT = Path("out")
 OUT.mkdir(exist_ok=True)
 LOAD = 0.5
 twin = replace(paper_twin("3-23"), load_kg=LOAD)

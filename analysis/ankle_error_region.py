@@ -17,7 +17,7 @@ from fes_pin.paper.identifiability import ankle_identifiability
 from fes_pin.paper.ratios import RATIOS, UNITS, RatioProblem, ankle_of, least_error
 from fes_pin.paper.twin import record, staircase
 
-OUT = Path(__file__).parents[1] / "out"
+OUT = Path("out")
 OUT.mkdir(exist_ok=True)
 found = {}
 for name in PRINTED:

@@ -18,7 +18,7 @@ from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimul
 from fes_pin.paper.kalman import StraightRecruitment, chi2_band, nees
 from fes_pin.paper.twin import record, staircase
 
-OUT = Path(__file__).parents[1] / "out"
+OUT = Path("out")
 OUT.mkdir(exist_ok=True)
 twin = paper_twin("3-23")
 

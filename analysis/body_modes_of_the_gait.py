@@ -61,11 +61,15 @@ for name in ("mid_stance", "pre_swing"):
     print(f"the stance toe joint carries {torque:+.0f} N m if that foot carries all")
 
 # %% Picture
-figure, (top, bottom) = plt.subplots(2, 1, figsize=(7.5, 7), sharex=True)
-for k, m in enumerate(modes):
-    top.plot([along[k]] * len(m.falling), [1e3 * mode.doubling_time for mode in m.falling], ".", color="tab:red", ms=3)
-top.set(
-    yscale="log", ylim=(10, 3000), ylabel="time to double, ms", title="How fast the unmoved body falls, one dot a mode"
+figure, (top, bottom) = plt.subplots(2, 1, figsize=(9.5, 7), sharex=True)
+for rank in range(falls.max()):
+    times = [1e3 * m.falling[rank].doubling_time if rank < len(m.falling) else np.nan for m in modes]
+    middle = next((m.falling[rank] for m in modes[50::-1] if rank < len(m.falling)), None)
+    joint = next(iter(middle.joints)).replace("_", " ") if middle is not None else ""
+    top.plot(along, times, lw=1.3, color=plt.cm.tab20(rank), label=f"{rank + 1}. fall; most at {joint}")
+top.set(yscale="log", ylim=(10, 3000), ylabel="time to double, ms", title="Falls of the unmoved body by rank of speed")
+top.legend(
+    fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5), title="joint: first half of the step", title_fontsize=7
 )
 bottom.plot(along, change, label="change of the holding torque since mid-stance")
 bottom.plot(along, error, label="what the linear model of mid-stance misses of it")

@@ -128,6 +128,7 @@ for axes, posture in zip(rows, POSTURES, strict=True):
         bars = axes.bar(places, [c or 0 for c in counts], 0.38, label=f"stimulated {stimulation.replace('_', ' ')}")
         axes.bar_label(bars, ["no set" if c is None else str(c) for c in counts], fontsize=8)
     axes.set(ylabel="fewest nerves", title=posture.replace("_", " "))
+    axes.margins(y=0.2)  # room for the numbers over the bars
 rows[0].legend()
 rows[1].set_xticks(range(len(STEPS)), [s.replace(", ", "\n") for s in STEPS], fontsize=8)
 figure.tight_layout()

@@ -23,7 +23,7 @@ from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 from fes_pin.paper.equation_1 import static_torque_nm
 
-OUT = Path(__file__).parents[1] / "out"
+OUT = Path("out")
 OUT.mkdir(exist_ok=True)
 STUDIES, MOST_TRIALS, STEP_S, SECONDS = 10, 3, 0.005, 5.0
 DELAY, LAG, LOAD, OFFSET = "electromechanical_delay", "second_order_activation", "load_error", "sensor_offset"

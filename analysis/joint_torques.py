@@ -84,8 +84,8 @@ for axis, (action, curve) in zip(axes.T.flat, ANDERSON_2007.items(), strict=True
     axis.set(title=action, xlabel=f"{curve.joint.replace('_', ' ')} (degrees)", ylabel="torque (N m)")
     axis.set_ylim(0, None)
     axis.margins(x=0)
-axes[0, 1].legend(fontsize=7.5)
-out = Path(__file__).parents[1] / "out"
+figure.legend(*axes[0, 1].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=9)
+out = Path("out")
 out.mkdir(exist_ok=True)
 figure.savefig(out / "joint_torques.png", dpi=110)
 

@@ -92,7 +92,6 @@ def as_gallery(text: str, other: Shown | None = None) -> str:
     words = "\n\n".join(part for part in (after, literal(rest.strip())) if part)
     head = f'r"""\n{first}\n{"=" * len(first)}\n\n{words}\n\n{note}"""\n'
     body = re.sub(r"^# %% +(.+)$", _cell, text[match.end() :], flags=re.MULTILINE)
-    body = body.replace('Path(__file__).parents[1] / "out"', 'Path("out")')  # there is no file while it is built
     thumbnail = ""
     if other is not None and (FIGURES / other.picture).exists():
         thumbnail = f"# sphinx_gallery_thumbnail_path = '_generated/figures/{other.picture}'\n"

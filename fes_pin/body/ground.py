@@ -159,10 +159,18 @@ def soles(body: Body, q: np.ndarray, side: str, heel: bool) -> np.ndarray:
 
     Length and breadth by published proportions from the distance of the ankle and the MTP joint.
     """
-    foot = _foot(body, q, side)
+    return _corners(_foot(body, q, side), heel)[:, :2]
+
+
+def sole_height(body: Body, q: np.ndarray, side: str) -> float:
+    """Height of the lowest corner of a forefoot's sole over the plane of the stance foot, m; negative below."""
+    return float(_corners(_foot(body, q, side), False)[:, 2].min())
+
+
+def _corners(foot: _Foot, heel: bool) -> np.ndarray:
     half = 0.5 * FOOT_BREADTH / FOOT_LENGTH * foot.length
     ends = (-MTP_ALONG_FOOT * foot.length if heel else 0.0, (1.0 - MTP_ALONG_FOOT) * foot.length)
-    return (np.array([[x, y, 0.0] for x in ends for y in (-half, half)]) @ foot.turn.T + foot.place)[:, :2]
+    return np.array([[x, y, 0.0] for x in ends for y in (-half, half)]) @ foot.turn.T + foot.place
 
 
 def support(body: Body, q: np.ndarray, heels: dict[str, bool], sides: Sequence[str]) -> SupportPolygon:

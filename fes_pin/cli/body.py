@@ -200,7 +200,7 @@ def view(
     """A page with the body, or a live one: a posture, a mode in motion, a nerve's influence, or measured walking."""
     from fes_pin.data.outputs import Outputs
     from fes_pin.muscles.nerve_inputs import subject_nerves
-    from fes_pin.view.viewer import BodyScene, show_influence, show_mode
+    from fes_pin.view.viewer import show_influence, show_mode, show_posture
 
     if page:
         raise InputError(
@@ -221,7 +221,7 @@ def view(
     elif walk is not None:
         scene = _walking(linear.body, walk)
     else:
-        scene = BodyScene(linear.body, caption=str(linear.body)).pose(linear.whole_posture)
+        scene = show_posture(linear)
     if out is not None:
         Outputs("body view", force).write_file(out, scene.html())
         typer.echo(f"wrote {out}")

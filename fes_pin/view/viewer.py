@@ -17,9 +17,11 @@ import numpy as np
 import pinocchio as pin
 
 from fes_pin.body.build import Body
+from fes_pin.body.ground import LEVEL_M, sole_height
 from fes_pin.body.inputs import Inputs
-from fes_pin.body.joints import JOINTS
+from fes_pin.body.joints import JOINTS, SIDES
 from fes_pin.body.linear_body import LinearBody
+from fes_pin.body.linearize import ground_normal
 from fes_pin.body.modes import Mode
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
@@ -47,12 +49,15 @@ class BodyScene:
         Frames a second of motions.
     opacity
         Of the body, 0 to 1: what lies within it is seen through it.
+    slope
+        Of the ground under the stance foot, as `linearize` takes it: ground and body are tilted.
     """
 
     body: Body
     caption: str = ""
     fps: int = FRAMES_A_SECOND
     opacity: float = 1.0
+    slope: Sequence[float] = (0.0, 0.0)
     frames: list[np.ndarray] = field(default_factory=list)
     roots: list[pin.SE3] = field(default_factory=list)
     balls: list[tuple[np.ndarray, float, int]] = field(default_factory=list)
@@ -112,7 +117,8 @@ class BodyScene:
         ]
         floor = MeshLambertMaterial(color=0x9DAA9D)
         out.append(SetObject(Box([3.0, 1.6, 0.02]), floor, Place(("meshcat", "floor"))))
-        out.append(SetTransform(_moved([0.0, 0.0, -0.011]), Place(("meshcat", "floor"))))
+        tilt = pin.SE3(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), ground_normal(self.slope)), np.zeros(3))
+        out.append(SetTransform(tilt.homogeneous @ _moved([0.0, 0.0, -0.011]), Place(("meshcat", "floor"))))
         for k, shape in enumerate(shapes.geometryObjects):
             geometry, _ = _meshcat_geometry(shape.geometry)
             red, green, blue = (int(255 * c) for c in shape.meshColor[:3])
@@ -129,14 +135,15 @@ class BodyScene:
             for k, shape in enumerate(shapes.geometryObjects):
                 _, turn = _meshcat_geometry(shape.geometry)
                 place = geometry_data.oMg[k]
-                matrix = (self.roots[t] * place if self.roots else place).homogeneous.copy()
+                matrix = (tilt * self.roots[t] * place if self.roots else tilt * place).homogeneous.copy()
                 matrix[:3, :3] = matrix[:3, :3] @ turn
                 path = Place(("meshcat", "body", str(k)))
                 if t == 0:
                     out.append(SetTransform(matrix, path))
                 if len(self.frames) > 1:
                     _key(animation, path, t, matrix)
-        out += [SetTransform(_moved(c), Place(("meshcat", "ball", str(k)))) for k, (c, _, _) in enumerate(self.balls)]
+        for k, (centre, _, _) in enumerate(self.balls):
+            out.append(SetTransform(_moved(tilt.act(centre)), Place(("meshcat", "ball", str(k)))))
         for number, arrow in enumerate(self.arrows):
             out += arrow_commands(arrow, str(number), animation)
         if len(self.frames) > 1:
@@ -168,7 +175,34 @@ def show_mode(linear: LinearBody, mode: Mode) -> BodyScene:
         shape[body.joint_names.index(name)] = MODE_SWING_DEG * value
     count = int(MODE_PERIOD_S * FRAMES_A_SECOND)
     phases = np.sin(2.0 * np.pi * np.arange(count + 1) / count)
-    return BodyScene(body, caption=mode.name).play(q + phases[:, None] * shape)
+    caption = f"{mode.name}; to and fro, not to scale; {said_of(linear)}"
+    return BodyScene(body, caption=caption, slope=linear.slope).play(np.asarray(q) + phases[:, None] * shape)
+
+
+def show_posture(linear: LinearBody) -> BodyScene:
+    """A linearized body in its posture, on its slope."""
+    scene = BodyScene(linear.body, caption=f"{linear.body}; {said_of(linear)}", slope=linear.slope)
+    return scene.pose(linear.whole_posture)
+
+
+def said_of(linear: LinearBody) -> str:
+    """Posture, feet, slope and braces of a linearized body, for a caption; and a foot that lies under the ground."""
+    name = linear.posture_name.replace("_", " ") or "a posture of its own"
+    parts = [f"{name}, {'both feet' if linear.both_feet else f'{linear.body.stance} foot'} on the ground"]
+    if any(linear.slope):
+        tilt = np.degrees(np.arccos(ground_normal(linear.slope)[2]))
+        forward, left = linear.slope
+        parts.append(f"slope {tilt:.1f} degrees (alpha {forward:g}, beta {left:g})")
+    if linear.braced:
+        parts.append(f"{len(linear.braced)} joints braced")
+    other = SIDES[1 - SIDES.index(linear.body.stance)]
+    below = -sole_height(linear.body, linear.body.angles(linear.whole_posture, check=False), other)
+    if below > LEVEL_M:
+        parts.append(
+            f"with the {linear.body.stance} forefoot flat, as the model has it, the {other} one lies "
+            f"{100 * below:.1f} cm under the ground"
+        )
+    return "; ".join(parts)
 
 
 def show_walk(
@@ -236,20 +270,22 @@ def show_influence(linear: LinearBody, inputs, names: str | Sequence[str]) -> Bo
     InputError
         Inputs that are none, or a name that is not among them.
     """
+    strength = getattr(inputs, "assumed_strength", None)
     inputs = Inputs.of(inputs, linear).select([names] if isinstance(names, str) else names)
     torque = dict(zip(inputs.joint_names, inputs.matrix.sum(axis=1).tolist(), strict=True))
-    strength = {j.name: float(np.linalg.norm([torque.get(r, 0.0) for r in j.revolutes])) for j in JOINTS}
-    greatest = max(strength.values())
+    size = {j.name: float(np.linalg.norm([torque.get(r, 0.0) for r in j.revolutes])) for j in JOINTS}
+    greatest = max(size.values())
     posture = linear.whole_posture
-    scene = BodyScene(linear.body).pose(posture)
+    scene = BodyScene(linear.body, slope=linear.slope).pose(posture)
     said = []
     for joint in JOINTS:
-        share = strength[joint.name] / greatest if greatest > 0.0 else 0.0
+        share = size[joint.name] / greatest if greatest > 0.0 else 0.0
         if share < 0.01:
             continue
         scene.balls.append((_centre(linear.body, joint.name, posture), 0.05 + 0.06 * share, _red(share)))
         said += [f"{r} {torque[r]:+.0f} N m" for r in joint.revolutes if abs(torque.get(r, 0.0)) >= 0.01 * greatest]
-    scene.caption = f"{' and '.join(inputs.names)}, full recruitment: " + (", ".join(said) or "no torque")
+    how = "full recruitment" if strength is None else f"full recruitment at {strength:g} of a healthy person's strength"
+    scene.caption = f"{' and '.join(inputs.names)}, {how}: {', '.join(said) or 'no torque'}; {said_of(linear)}"
     return scene
 
 

@@ -32,3 +32,10 @@ def test_story(story, says, tmp_path):
     assert result.returncode == 0, result.stderr
     assert says in result.stdout
     assert (tmp_path / f"out/{story}.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("path", sorted((REPOSITORY / "analysis").glob("*.py")), ids=lambda path: path.stem)
+def test_every_story_draws_into_out_where_it_is_run(path):
+    text = path.read_text()
+    assert "__file__" not in text
+    assert text.count("savefig(") == 0 or '"out' in text

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from fes_pin.body.controllability import modal_controllability
-from fes_pin.body.linearize import linearize
+from fes_pin.body.linearize import linearize, model_on_slope
 from fes_pin.data.errors import InputError
+from fes_pin.muscles.nerve_inputs import subject_nerves
 from fes_pin.muscles.nerves import Nerves
 from fes_pin.view.influence import influence_table, plot_influence
 from fes_pin.view.live import LiveViewer
-from fes_pin.view.viewer import BodyScene, show_influence, show_mode, show_walk
+from fes_pin.view.viewer import BodyScene, show_influence, show_mode, show_posture, show_walk
 
 
 @pytest.fixture(scope="session")
@@ -175,7 +176,7 @@ def test_a_nerve_paints_the_joints_that_it_turns(body, screenshot, tmp_path):
     painted = screenshot(scene.write(tmp_path / "nerve.html"))
     assert red(painted) > 100 > red(plain)
     assert "right_knee_flexion -" in scene.caption
-    assert "left" not in scene.caption
+    assert "left_" not in scene.caption
 
 
 def test_a_page_needs_no_network(body, tmp_path):
@@ -224,3 +225,43 @@ def test_heat_map_and_table(body, tmp_path):
     assert float(row.split()[1]) == pytest.approx(np.degrees(result.joint_influence[i, 0]), abs=0.5)
     with pytest.raises(InputError, match="influence"):
         influence_table(result, "muscles")
+
+
+def placements(scene):
+    """Where each drawn thing is at first, by path."""
+    lowered = [c.lower() for c in scene.commands()]
+    return {c["path"]: np.array(c["matrix"]).reshape(4, 4, order="F") for c in lowered if c["type"] == "set_transform"}
+
+
+def test_a_slope_tilts_the_floor_and_the_body_and_gravity_is_down(body):
+    slope = (0.2, 0.1)
+    level, tilted = (placements(show_posture(linearize(body, "mid_stance", s))) for s in ((0.0, 0.0), slope))
+    normal = np.array([0.2, 0.1, np.sqrt(1.0 - 0.05)])
+    floor = tilted["/meshcat/floor"]
+    assert np.allclose(floor[:3, 2], normal)
+    gravity = model_on_slope(body, slope).gravity.linear
+    assert np.allclose(floor[:3, :3] @ gravity / np.linalg.norm(gravity), [0.0, 0.0, -1.0])
+    for path, matrix in level.items():
+        if "/body/" in path:
+            assert np.allclose(tilted[path][:3, :3], floor[:3, :3] @ matrix[:3, :3])
+            assert np.allclose(tilted[path][:3, 3], floor[:3, :3] @ matrix[:3, 3])
+
+
+@pytest.mark.parametrize(
+    ("posture", "slope", "says"),
+    [
+        ("mid_stance", (0.0, 0.0), "mid stance, right foot on the ground"),
+        ("standing", (0.0, 0.0), "standing, both feet on the ground"),
+        ("mid_stance", (0.2, 0.0), "slope 11.5 degrees (alpha 0.2, beta 0)"),
+        ("initial_contact", (0.0, 0.0), "the left one lies 5.5 cm under the ground"),
+    ],
+)
+def test_captions_say_posture_feet_slope_and_what_cannot_be(body, posture, slope, says):
+    linear = linearize(body, posture, slope)
+    nerves = subject_nerves(body, ["right_femoral"], strength=0.8)
+    scenes = [show_posture(linear), show_mode(linear, linear.modes()[0]), show_influence(linear, nerves, nerves.names)]
+    for scene in scenes:
+        assert says in scene.caption
+        assert ("under the ground" in scene.caption) == (posture == "initial_contact")
+    assert "at 0.8 of a healthy person's strength" in scenes[2].caption
+    assert "1 joints braced" in show_posture(linear.brace("lumbar_bending")).caption or posture == "standing"

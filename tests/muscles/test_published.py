@@ -77,12 +77,10 @@ def test_supinators_weaken_from_the_everted_to_the_inverted_foot():
 
 def test_the_story_prints_the_table_and_draws_it(tmp_path):
     root = Path(__file__).parents[2]
-    (tmp_path / "analysis").mkdir()
-    copy = tmp_path / "analysis" / "joint_torques.py"
-    copy.write_text((root / "analysis/joint_torques.py").read_text())  # it draws beside itself
     environment = {**os.environ, "PYTHONPATH": str(root)}
+    command = [sys.executable, str(root / "analysis/joint_torques.py")]
     result = subprocess.run(
-        [sys.executable, str(copy)], env=environment, capture_output=True, text=True, check=False, timeout=120
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=120
     )
     assert result.returncode == 0, result.stderr
     assert result.stdout.count("\n") == 2 + 6 * 6 + len(SARABON_2021) + 3
