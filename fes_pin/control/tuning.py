@@ -188,7 +188,8 @@ class Loop(Tabulated):
         """Largest modulus of its eigenvalues, per pulse."""
         top = np.hstack([self.a + np.outer(self.b, self.direct * self.see), np.outer(self.b, self.law)])
         bottom = np.hstack([np.outer(self.seen, self.see), self.own])
-        return float(np.abs(np.linalg.eigvals(np.vstack([top, bottom]))).max())
+        loop = np.vstack([top, bottom])
+        return float(np.abs(np.linalg.eigvals(loop)).max()) if np.isfinite(loop).all() else math.inf
 
     def opened(self, frequencies_hz: np.ndarray) -> np.ndarray:
         """What comes back of a recruitment at the nerve, the loop cut there, shape (n,), complex; at -1 it is unstable.

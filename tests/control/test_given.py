@@ -125,6 +125,20 @@ def test_a_loop_that_fails_on_the_model_as_given_is_refused(effect, why):
     assert effect.name in str(refused.value) and "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    "effect",
+    [
+        fp.effects.ForceVelocity(slope_s_per_rad=1000.0, bend=20.0),
+        fp.effects.ForceLength(slope_per_rad=1000.0, curvature_per_rad2=-1000.0),
+        fp.effects.PassiveRelaxation(stiffness_nm_per_rad=828.0, relaxation_s=0.02),
+    ],
+    ids=lambda e: e.name,
+)
+def test_a_model_whose_numbers_overflow_is_refused_in_one_line(effect):
+    with pytest.raises(InputError, match=effect.name):
+        PositionController(ankle_of(TWIN) + effect, TWIN.load_kg)
+
+
 ANKLES = [e for e in shipped().effects if "ankle" in e.rigs]
 
 
