@@ -115,7 +115,7 @@ class Allocator:
             for what only DAQP solves.
         """
         p = self.problem
-        wanted = wanted_torque(torque, p.joints)
+        wanted = wanted_torque(torque, p.joints, p.other)
         if solver != "daqp":
             known_solver(solver, "daqp", "an allocation")
             if not p.plain:
@@ -204,7 +204,7 @@ class Allocator:
             torque at a time.
         """
         p = self.problem
-        wanted = wanted_torques(torques, p.joints)
+        wanted = wanted_torques(torques, p.joints, other=p.other)
         if not p.plain:
             raise InputError("least recruitments, cubes and lexicographic are allocated one torque at a time")
         start = np.zeros(p.n) if previous is None else fractions(previous, p.names, PREVIOUS)

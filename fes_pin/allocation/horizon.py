@@ -201,7 +201,7 @@ class Horizon:
         for name in ("act", "left", "before"):
             fractions(getattr(self, name), p.names, name)
         known_solver(solver, "piqp", "a horizon")
-        wanted = wanted_torques(torques, p.joints, f"{self.steps} steps")
+        wanted = wanted_torques(torques, p.joints, f"{self.steps} steps", p.other)
         if len(wanted) != self.steps:
             raise InputError(f"torques must be {self.steps} steps x {len(p.joints)}, got shape {wanted.shape}")
         free = self.keep ** np.arange(1, self.steps + 1)[:, None] * self.act_when_pulses_act()

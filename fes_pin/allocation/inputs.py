@@ -63,15 +63,31 @@ def in_range(matrix: np.ndarray, what: str) -> None:
         raise InputError(f"the strongest channel of {what} makes {most:g} N m, less than {SMALLEST_NM:g}: wrong units?")
 
 
-def wanted_torque(torque: Any, joints: tuple[str, ...]) -> np.ndarray:
+def has_names(torque: Any, joints: tuple[str, ...], other: tuple[str, ...] | None) -> bool:
+    """Whether torques come by name; `other` is the order of a labelled posture, which arrays must then not be taken in.
+
+    Raises
+    ------
+    InputError
+        An array without names beside a posture in another order.
+    """
+    if hasattr(torque, "keys"):
+        return True
+    if other is not None and np.ndim(torque) and len(joints) > 1:
+        order = f"begins at {other[0]}, that of arrays without names at {joints[0]}"
+        raise InputError(f"the order of the posture {order}: give torques by name, or as NamedArray(torques, names)")
+    return False
+
+
+def wanted_torque(torque: Any, joints: tuple[str, ...], other: tuple[str, ...] | None = None) -> np.ndarray:
     """A wanted torque, by name (absent joints: 0) or (joints,) in the order of `joints`, as an array, N m.
 
     Raises
     ------
     InputError
-        Not such numbers, one number for several joints, or beyond any body's range.
+        Not such numbers, one number for several joints, beyond any body's range, or see `has_names`.
     """
-    if len(joints) > 1 and np.ndim(torque) == 0 and not hasattr(torque, "keys"):
+    if not has_names(torque, joints, other) and len(joints) > 1 and np.ndim(torque) == 0:
         raise InputError(f"one torque for {len(joints)} joints: name its joint, as in {{{joints[0]!r}: -40}}")
     wanted = by_name(torque, joints, "wanted torque", 0.0)
     worst = int(np.abs(wanted).argmax())
@@ -98,16 +114,18 @@ def fractions(values: Any, names: tuple[str, ...], what: str, default: float = 0
     return inside
 
 
-def wanted_torques(torques: Any, joints: tuple[str, ...], what: str = "samples") -> np.ndarray:
+def wanted_torques(
+    torques: Any, joints: tuple[str, ...], what: str = "samples", other: tuple[str, ...] | None = None
+) -> np.ndarray:
     """Wanted torques over time, (samples, joints) N m: columns by name (mapping, DataFrame, `NamedArray`; absent joints
     get 0), or an array whose columns are in the order of `joints`.
 
     Raises
     ------
     InputError
-        Not such numbers, or beyond any body's range.
+        Not such numbers, beyond any body's range, or see `has_names`.
     """
-    if hasattr(torques, "keys"):
+    if has_names(torques, joints, other):
         columns = dict(torques.items())
         by_name(dict.fromkeys(columns, 0.0), joints, "wanted torques", 0.0)
         given = numbers(list(columns.values()), "wanted torques")

@@ -11,6 +11,7 @@ import numpy as np
 from fes_pin.allocation.fixed import Fixed
 from fes_pin.allocation.inputs import fractions, torque_matrix
 from fes_pin.data.errors import InputError
+from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import between, by_name, positive_number, shortened
 from fes_pin.muscles.recruitment import ChannelRecruitment, LinearRecruitment
 
@@ -135,6 +136,8 @@ class AllocationProblem(Fixed):
     held, band
         Joints whose moment arms were taken at another angle than asked, in words, and the factors between which the
         strength is likely to lie (`Nerves`); without nerves nothing, and 1.
+    other
+        Order of the posture's joints, if it came by name in another one than `joints`: torques then need names.
     """
 
     names: tuple[str, ...]
@@ -156,6 +159,7 @@ class AllocationProblem(Fixed):
     scale: float
     held: tuple[str, ...]
     band: tuple[float, float]
+    other: tuple[str, ...] | None
 
     @property
     def n(self) -> int:
@@ -225,6 +229,7 @@ def problem_of(nerves: Any, q: Any, v: Any, options: Options) -> AllocationProbl
         scale=scale,
         held=tuple(nerves.held(q)) if named else (),
         band=nerves.strength_band if named else (1.0, 1.0),
+        other=q.names if isinstance(q, NamedArray) and named and q.names != joints else None,
     )
 
 

@@ -70,7 +70,7 @@ def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: A
         raise InputError("a velocity goes with nerves: matrices hold what muscles make at theirs")
     q0, v0 = (None if a is None or not named or np.ndim(a) < 2 else a[0] for a in (q, v))
     p = problem_of(nerves if named else matrices[0], q0, v0, Options.of(options))
-    wanted = wanted_torques(torques, p.joints)
+    wanted = wanted_torques(torques, p.joints, other=p.other)
     if len(wanted) != len(matrices):
         raise InputError(f"torques of shape {wanted.shape} do not fit moment arms of shape {matrices.shape}")
     if not p.plain or p.rate < np.inf:
