@@ -212,7 +212,7 @@ def check_constants(schema: RigSchema, constants: Mapping[str, float], files: Co
         raise error(absent[0], f"missing; expected {expected}")
     for key, required in schema.files.items():
         if required and key not in files:
-            raise error(key, "missing; expected the path of a file inside the study")
+            raise error(key, "missing; expected the path of a file")
 
 
 def known_constants(schema: RigSchema) -> dict[str, NumberKey]:

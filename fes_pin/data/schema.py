@@ -12,6 +12,8 @@ from typing import Any
 from fes_pin.data.read_only import ReadOnly
 
 ROLES = ("fit", "held_out")
+ALSO_OF_A_TRIAL = ("file", "kind", "role", "group", "name", "remarks", "low_pass_hz")
+"""What a `[[trial]]` states beside its conditions."""
 IMPOSED = "imposed"
 """The kind of a trial in which the motion is an input."""
 UNITS = (
@@ -243,7 +245,7 @@ def check_conditions(
     Exception
         What `error` makes, for an unknown key, a key that is missing, or a value that is not the number it must be.
     """
-    numbers = checked_numbers(conditions, schema.conditions, error, ("file", "kind", "role", "group"))
+    numbers = checked_numbers(conditions, schema.conditions, error, ALSO_OF_A_TRIAL)
     for key, words in schema.needed.get(kind, {}).items():
         if key not in numbers:
             raise error(key, f"missing; expected {words}")

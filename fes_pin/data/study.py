@@ -44,15 +44,13 @@ from fes_pin.data.show import frame, table_html
 from fes_pin.data.study_tables import HORIZON, StudyTables, check_files
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, read_toml
-from fes_pin.data.trial import Trial, check_trial, read_body_trial, read_trial, trial_csv
+from fes_pin.data.trial import LOW_PASS, POSITIVE_HZ, Trial, check_trial, read_body_trial, read_trial, trial_csv
 
 if TYPE_CHECKING:
     import pandas
 
 EDITED = "edited after it was read"
 """What stands in the place of a hash of a file that is no longer what its study holds."""
-LOW_PASS = "low_pass_hz"
-POSITIVE_HZ = NumberKey("Hz", 0.0, required=False)
 _PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 """Names of trials that are names of files as they are."""
 
@@ -115,7 +113,11 @@ class Study(ReadOnly):
         known = {"constants": {**known_constants(schema), **schema.passive}}
         known["start"] = {key: number for key, number in schema.start.items() if key not in twice}
         numbers = {n: checked_numbers(given[n], keys, partial(_fault, n)) for n, keys in known.items()}
-        check_constants(schema, numbers["constants"], given["files"], partial(_fault, "constants or files"))
+
+        def of_rig(key: str, message: str) -> InputError:
+            return _fault("files" if key in schema.files else "constants", key, message)
+
+        check_constants(schema, numbers["constants"], given["files"], of_rig)
         if odd := [key for key in given["files"] if key not in schema.files]:
             raise _fault("files", odd[0], unknown(odd[0], schema.files))
         files = {key: hold(path) for key, path in given["files"].items()}

@@ -31,6 +31,7 @@ from fes_pin.data.schema import (
     NumberKey,
     RigSchema,
     check_conditions,
+    checked_numbers,
     schema_of,
 )
 from fes_pin.data.show import frame
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
     import pandas
 
 
+LOW_PASS = "low_pass_hz"
+POSITIVE_HZ = NumberKey("Hz", 0.0, required=False)
 OF_THE_START = ("position0", "velocity0")
 """Conditions that state where a trial begins: of its later parts they say nothing."""
 BEGAN = "start_s"
@@ -105,11 +108,9 @@ class Trial(ReadOnly):
             checked_label(self.group, error)
         remarks = checked_remarks(self.remarks, error)
         given = {key: checked_mapping(getattr(self, key), error, key) for key in ("columns", "conditions")}
-        try:
-            conditions = {key: NumberKey("").check(value) for key, value in given["conditions"].items()}
-            low_pass = None if self.low_pass_hz is None else NumberKey("Hz", 0.0).check(self.low_pass_hz)
-        except ValueError as problem:
-            raise error("conditions, low_pass_hz", str(problem)) from None
+        conditions = checked_numbers(given["conditions"], dict.fromkeys(given["conditions"], NumberKey("")), error)
+        low_pass = {} if self.low_pass_hz is None else {LOW_PASS: self.low_pass_hz}
+        passed = checked_numbers(low_pass, {LOW_PASS: POSITIVE_HZ}, error).get(LOW_PASS)
         time = _numbers(self.time, "time_s", self)
         columns = {name: _numbers(values, name, self) for name, values in given["columns"].items()}
         if len(time) < MIN_ROWS:
@@ -117,7 +118,7 @@ class Trial(ReadOnly):
         if odd := [name for name, values in columns.items() if values.shape != time.shape]:
             raise self.error(f"expected shape {time.shape} as of the time, found {columns[odd[0]].shape}", odd[0])
         check_times(time, self.error, half_digit=self.as_read.half_digit if self.as_read else None)
-        vars(self).update(time=time, columns=columns, conditions=conditions, low_pass_hz=low_pass, remarks=remarks)
+        vars(self).update(time=time, columns=columns, conditions=conditions, low_pass_hz=passed, remarks=remarks)
         self._freeze()
 
     def _freeze(self) -> None:

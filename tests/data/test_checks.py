@@ -61,12 +61,12 @@ BAD_TRIALS = {
     "a number as kind": (lambda: trial(kind=1), "kind: expected a kind"),
     "a number as group": (lambda: trial(group=1), "group: expected a label"),
     "one text as remarks": (lambda: trial(remarks="filled in"), "expected texts"),
-    "a text as condition": (lambda: trial(conditions={"load_kg": "1"}), "expected a number, found the text '1'"),
+    "a text as condition": (lambda: trial(conditions={"load_kg": "1"}), "load_kg: expected a number, found the text '1'"),
     "a condition that is NaN": (lambda: trial(conditions={"load_kg": float("nan")}), "expected a finite number"),
     "an array as columns": (lambda: trial(np.ones((100, 2))), "columns: expected a mapping of names to values, found a ndarray"),
     "no conditions": (lambda: Trial("a", "motion", ANKLE, TIME, None), "conditions: expected a mapping"),
     "no columns": (lambda: Trial("a", "motion", None, TIME), "columns: expected a mapping"),
-    "a low pass at 0 Hz": (lambda: trial(low_pass_hz=0.0), "above 0 in Hz"),
+    "a low pass at 0 Hz": (lambda: trial(low_pass_hz=0.0), "low_pass_hz: expected a number above 0 in Hz"),
 }  # fmt: skip
 
 
@@ -151,7 +151,7 @@ def test_a_study_that_cannot_be_is_refused_when_it_is_built(tmp_path, case):
 
 def test_a_joint_needs_its_urdf_and_one_input_in_all_trials(tmp_path):
     start = {"inertia_scale": 1.0, "damping": 1e-3}
-    with pytest.raises(InputError, match="urdf: missing"):
+    with pytest.raises(InputError, match=r"files\.urdf: missing; expected the path of a file$"):
         Study("s", "joint", {}, start, (Trial("a", "motion", JOINT, TIME),))
     study = read_study(studies.joint(tmp_path))
     mixed = replace(study, trials=(Trial("c", "motion", JOINT, TIME), *study.trials))  # nothing drives the others
