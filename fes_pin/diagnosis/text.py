@@ -42,7 +42,7 @@ def quantity(value: float, std: float, unit: str) -> str:
 
 
 def estimate_text(one: ParameterEstimate) -> str:
-    """A value with its standard deviation; at a bound with the other end of its interval, at 97.5 % one-sided."""
+    """A value with its standard deviation; at a bound with the other end of its one-sided 95 % interval."""
     if not one.at_bound:
         return quantity(one.value, one.std, one.unit)
     return f"{one.value:.4g} {one.unit} (at its bound, {one_sided(one)})".replace("  ", " ")
@@ -51,7 +51,8 @@ def estimate_text(one: ParameterEstimate) -> str:
 def one_sided(one: ParameterEstimate) -> str:
     """The end of the interval of a value at its bound that is not the bound."""
     low, high = one.interval
-    return f"at most {high:.3g}" if high - one.value >= one.value - low else f"at least {low:.3g}"
+    word, end = ("most", high) if high - one.value >= one.value - low else ("least", low)
+    return f"at {word} {end:.3g}" if math.isfinite(end) else "not identified"
 
 
 def cause_columns(gain: str) -> tuple[str, str, str, str, str]:
