@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from fes_pin.data.trial import Trial
 
 
+@python_names(library="--library")
 def urdf(
     model: Annotated[Path, typer.Argument(help="model.toml of a diagnosis of a joint.")],
     believed: Annotated[Path, typer.Argument(help="The URDF of its study.")],
