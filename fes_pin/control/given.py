@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,6 +21,7 @@ from fes_pin.control.dynamics import ANGLES_RAD, PULSE_S, AnkleDynamics
 from fes_pin.data.errors import InputError
 from fes_pin.models.compile.equations import Tangents
 from fes_pin.models.compile.layout import make_layout
+from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import max_step, total_delay
@@ -54,7 +56,9 @@ class GivenAnkle:
         self.names = tuple(e.name for e in model.effects if e.name not in HANDLED)
         self.dynamics, self.delay_s = dynamics, total_delay(model, model.parameters())
         kept = (e for e in model.effects if e.signal != "delay" and e.name not in ("recruitment_hysteresis", "fatigue"))
-        self.model = Model(model.rig, tuple(kept))
+        # what gives before it slips is taken as friction that does not: its memory follows the angle within a pulse
+        plain = (replace(e, presliding=0.0) if isinstance(e, CoulombFriction) else e for e in kept)
+        self.model = Model(model.rig, tuple(plain))
         self.layout = make_layout(self.model, "motion", ("pulse_width_us",), ())
         d = Tangents(self.model, self.layout)
         into = ca.mtimes(ca.jacobian(d.rates, d.m), ca.jacobian(d.after, d.u))

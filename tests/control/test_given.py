@@ -155,6 +155,11 @@ def test_with_every_effect_an_ankle_is_held_or_refused_by_its_name(effect):
     assert np.isfinite(run.pulse_width_us).all() and run.pulse_width_us.max() <= 1000.0
 
 
+def test_friction_that_gives_before_it_slips_is_taken_as_friction():
+    model = ankle_of(TWIN) + fp.effects.CoulombFriction(torque_nm=0.02, presliding=0.05)
+    assert PositionController(model, TWIN.load_kg).gains.radius < 1.0
+
+
 def test_the_rehearsal_leaves_no_trace():
     controller = PositionController(ankle_of(TWIN) + fp.effects.SensorOffset(offset=0.01), TWIN.load_kg)
     assert (
