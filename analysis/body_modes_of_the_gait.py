@@ -12,18 +12,16 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.body.build import Body
-from fes_pin.body.gait import posture_angles
-from fes_pin.body.linearize import linearize
+import fes_pin as fp
 
 STEP = ("initial_contact", "loading", "mid_stance", "mid_swing", "terminal_stance", "pre_swing")
-body = Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
-corners = np.array([[posture_angles(name, "right")[joint] for joint in body.joint_names] for name in STEP])
+body = fp.Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
+corners = np.array([[fp.posture_angles(name, "right")[joint] for joint in body.joint_names] for name in STEP])
 along = np.linspace(0.0, len(STEP) - 1.0, 101)
 postures = np.stack([np.interp(along, range(len(STEP)), column) for column in corners.T], axis=1)
 
 # %% Modes at every posture
-modes = [linearize(body, q).modes() for q in postures]
+modes = [fp.linearize(body, q).modes() for q in postures]
 falls = np.array([len(m.falling) for m in modes])
 doubling = [[mode.doubling_time for mode in m.falling if np.isfinite(mode.doubling_time)] for m in modes]
 fastest = np.array([min(d) for d in doubling])
@@ -34,10 +32,10 @@ for name, k in zip(STEP, np.searchsorted(along, range(len(STEP))), strict=True):
     print(f"{name:16s} {falls[k]:5d} {1e3 * fastest[k]:12.0f} ms        {slow.name}")
 
 # %% One linear model for all of single support? Its holding torques against the true ones.
-centre = linearize(body, "mid_stance")
+centre = fp.linearize(body, "mid_stance")
 error, change = [], []
 for q in postures:
-    here = linearize(body, q)
+    here = fp.linearize(body, q)
     error.append(np.linalg.norm(centre.C + centre.B @ (q - centre.q) - here.C))
     change.append(np.linalg.norm(here.C - centre.C))
 error, change = np.array(error), np.array(change)
@@ -54,9 +52,9 @@ print(f"The paper's claim of one linear model {'holds' if worst < 0.1 else 'does
 # %% Does the foot's division matter, as the paper says? Lock the toe joints.
 TOES = ("left_mtp_extension", "right_mtp_extension")
 for name in ("mid_stance", "pre_swing"):
-    whole_foot = linearize(body, name).brace(TOES).modes()
-    split = linearize(body, name).modes()
-    torque = linearize(body, name).holding_torque[TOES[1]]
+    whole_foot = fp.linearize(body, name).brace(TOES).modes()
+    split = fp.linearize(body, name).modes()
+    torque = fp.linearize(body, name).holding_torque[TOES[1]]
     print(f"{name}: {len(split.falling)} falls with toe joints, {len(whole_foot.falling)} without them;", end=" ")
     print(f"the stance toe joint carries {torque:+.0f} N m if that foot carries all")
 

@@ -13,12 +13,10 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.body.build import Body
-from fes_pin.body.gait import posture_angles
-from fes_pin.body.linearize import linearize
+import fes_pin as fp
 
-body = Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
-level = posture_angles("mid_stance", "right")
+body = fp.Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
+level = fp.posture_angles("mid_stance", "right")
 ANKLE, HIP, KNEE = "right_ankle_dorsiflexion", "right_hip_flexion", "right_knee_flexion"
 grades = np.linspace(-0.2, 0.2, 41)
 rows = {"square to the ground": [], "kept upright by the ankle": []}
@@ -27,7 +25,7 @@ for grade in grades:  # grade: rise over run, uphill positive
     slope = (-np.sin(angle), 0.0)
     upright = level | {ANKLE: level[ANKLE] + angle}
     for label, posture in zip(rows, (level, upright), strict=True):
-        linear = linearize(body, posture, slope)
+        linear = fp.linearize(body, posture, slope)
         torque = linear.holding_torque
         slow = [mode.rate for mode in linear.modes().falling]
         rows[label].append([torque[ANKLE], torque[KNEE], torque[HIP], slow[0], slow[-1], linear.modes()[0].rate])

@@ -17,20 +17,14 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fes_pin.body.attainable import attainable
-from fes_pin.body.build import Body
-from fes_pin.body.closed_loop import close_the_loop
-from fes_pin.body.inputs import Inputs
+import fes_pin as fp
 from fes_pin.body.joints import JOINT_NAMES
-from fes_pin.body.linearize import linearize
-from fes_pin.body.minimal_sets import ORTHOSES, STIMULATIONS, minimal_sets
-from fes_pin.body.passive import PassiveLegs
-from fes_pin.muscles.nerve_inputs import subject_nerves
-from fes_pin.muscles.nerves import HEALTHY, PARALYSED, Nerves
+from fes_pin.body.minimal_sets import ORTHOSES, STIMULATIONS
+from fes_pin.muscles.nerves import HEALTHY, PARALYSED
 
-body = Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
-LEGS = tuple(n for n in Nerves().names if not n.endswith(("erector_spinae", "abdominals")))
-legs = subject_nerves(body, LEGS, strength=HEALTHY)
+body = fp.Body.from_subject(mass_kg=72.6, height_m=1.80, sex="male", stance="right")
+LEGS = tuple(n for n in fp.Nerves().names if not n.endswith(("erector_spinae", "abdominals")))
+legs = fp.subject_nerves(body, LEGS, strength=HEALTHY)
 POSTURES = ("one_leg", "standing")
 both = lambda name: (*ORTHOSES[f"left_{name}"], *ORTHOSES[f"right_{name}"])  # noqa: E731
 STEPS = {
@@ -56,7 +50,7 @@ for name, column in zip(legs.names, neutral.T, strict=True):
 # %% Braces one after the other; strengths are known to a factor of 1.8
 def shortest(linear):
     """The joint that nerves fall shortest of holding by themselves: name, torque needed, torque there is, N m."""
-    torque = Inputs.of(legs, linear).on(linear)
+    torque = fp.Inputs.of(legs, linear).on(linear)
     need = -linear.C
     have = np.where(need > 0.0, np.maximum(torque, 0.0).sum(axis=1), np.minimum(torque, 0.0).sum(axis=1))
     worst = int(np.argmax(np.abs(need) - np.abs(have)))
@@ -71,11 +65,11 @@ def brace(linear, joints):
 
 table = {}
 for posture in POSTURES:
-    linear = linearize(body, posture)
+    linear = fp.linearize(body, posture)
     print(f"\n{posture}: the fewest of 22 leg nerves that keep the posture and 1 degree of lean each way")
     for step, joints in STEPS.items():
         linear = brace(linear, joints)
-        everything = attainable(linear, legs)
+        everything = fp.attainable(linear, legs)
         line = f"  {step:30s} {len(linear.braced):2d} joints locked, {len(everything.falling)} falls"
         if not everything.holds:
             joint, need, have = shortest(linear)
@@ -83,7 +77,7 @@ for posture in POSTURES:
             line += f"; all nerves together hold nothing{short}"
         print(line, flush=True)
         for stimulation in STIMULATIONS:
-            found = minimal_sets(linear, legs, stimulation=stimulation)
+            found = fp.minimal_sets(linear, legs, stimulation=stimulation)
             table[posture, step, stimulation] = len(found[0].inputs) if found else None
             print(f"    {stimulation:10s} {found[0] if found else 'no set'}", flush=True)
 
@@ -92,24 +86,24 @@ LOCKED = [joint for step in list(STEPS)[:4] for joint in STEPS[step]]
 QUESTIONS = [
     *((f"modes within {deg:g} deg", {"settle_deg": deg}, 1.0, None) for deg in (5.0, 20.0)),
     *((f"strength {s:g}", {}, s, None) for s in (0.7, PARALYSED)),
-    ("passive legs", {}, 1.0, PassiveLegs(1.0)),
-    (f"passive legs, strength {PARALYSED:g}", {}, PARALYSED, PassiveLegs(1.0)),
+    ("passive legs", {}, 1.0, fp.PassiveLegs(1.0)),
+    (f"passive legs, strength {PARALYSED:g}", {}, PARALYSED, fp.PassiveLegs(1.0)),
 ]
 print("\nOn one leg, both ankles in orthoses: fewest nerves, over time / constantly")
 for question, options, strength, passive in [("as above", {}, 1.0, None), *QUESTIONS]:
-    linear = linearize(body, "one_leg", passive=passive).brace(LOCKED)
-    nerves = subject_nerves(body, LEGS, strength=strength)
-    found = [minimal_sets(linear, nerves, stimulation=s, **options) for s in STIMULATIONS]
+    linear = fp.linearize(body, "one_leg", passive=passive).brace(LOCKED)
+    nerves = fp.subject_nerves(body, LEGS, strength=strength)
+    found = [fp.minimal_sets(linear, nerves, stimulation=s, **options) for s in STIMULATIONS]
     print(f"  {question:32s} {' / '.join(str(len(f[0].inputs)) if f else 'none' for f in found)}", flush=True)
 
 # %% Do the fewest catch a fall on the full equations? A degree off in every fall, both ways, for two seconds
-linear = linearize(body, "one_leg").brace(LOCKED)
+linear = fp.linearize(body, "one_leg").brace(LOCKED)
 for stimulation in STIMULATIONS:
-    for best in minimal_sets(linear, legs, stimulation=stimulation, alternatives=3):
-        names = subject_nerves(body, best.inputs, strength=HEALTHY)
+    for best in fp.minimal_sets(linear, legs, stimulation=stimulation, alternatives=3):
+        names = fp.subject_nerves(body, best.inputs, strength=HEALTHY)
         starts = [sign * mode.one_degree for mode in linear.modes().falling for sign in (1.0, -1.0)]
         for moving in (False, True):
-            runs = [close_the_loop(linear, names, start, moving_arms=moving) for start in starts]
+            runs = [fp.close_the_loop(linear, names, start, moving_arms=moving) for start in starts]
             held = sum(not run.lost for run in runs)
             arms = "moment arms that follow the joints" if moving else "moment arms of the posture"
             print(f"  {len(best.inputs)} nerves, {stimulation}, {arms}: held {held} of {len(starts)}", flush=True)

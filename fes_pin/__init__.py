@@ -15,9 +15,17 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.allocation.horizon import StrengthFatigue as StrengthFatigue
     from fes_pin.allocation.horizon import invert_lag as invert_lag
     from fes_pin.allocation.walk import allocate_walk as allocate_walk
+    from fes_pin.body.attainable import attainable as attainable
     from fes_pin.body.build import Body as Body
+    from fes_pin.body.catchable import catchable as catchable
+    from fes_pin.body.closed_loop import close_the_loop as close_the_loop
+    from fes_pin.body.gait import posture_angles as posture_angles
+    from fes_pin.body.inputs import Inputs as Inputs
     from fes_pin.body.linearize import linearize as linearize
     from fes_pin.body.minimal_sets import minimal_sets as minimal_sets
+    from fes_pin.body.observability import fewest_goniometers as fewest_goniometers
+    from fes_pin.body.passive import ElasticJoints as ElasticJoints
+    from fes_pin.body.passive import PassiveLegs as PassiveLegs
     from fes_pin.comparison.compare import compare as compare
     from fes_pin.comparison.result import Comparison as Comparison
     from fes_pin.contrasts.contrast import contrast as contrast
@@ -31,6 +39,7 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.control.margins import delay_margin as delay_margin
     from fes_pin.control.observer import JointObserver as JointObserver
     from fes_pin.data.errors import InputError as InputError
+    from fes_pin.data.named import NamedArray as NamedArray
     from fes_pin.data.results import load_result as load_result
     from fes_pin.data.results import save_result as save_result
     from fes_pin.data.study import Study as Study
@@ -54,6 +63,7 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.models.store import load_model as load_model
     from fes_pin.models.store import save_model as save_model
     from fes_pin.muscles.nerve_inputs import controllability as controllability
+    from fes_pin.muscles.nerve_inputs import subject_nerves as subject_nerves
     from fes_pin.muscles.nerves import Nerves as Nerves
     from fes_pin.muscles.recruitment import GompertzRecruitment as GompertzRecruitment
     from fes_pin.muscles.recruitment import HillRecruitment as HillRecruitment
@@ -67,6 +77,9 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.paper.kalman import track_gain as track_gain
     from fes_pin.verdict.ask import diagnose as diagnose
     from fes_pin.view.report import report as report
+    from fes_pin.view.viewer import show_influence as show_influence
+    from fes_pin.view.viewer import show_mode as show_mode
+    from fes_pin.view.viewer import show_posture as show_posture
     from fes_pin.walk.diagnosis import diagnose_walk as diagnose_walk
 
 __version__ = "0.1.0"
@@ -103,6 +116,19 @@ _WHERE = {
     "Body": "fes_pin.body.build",
     "linearize": "fes_pin.body.linearize",
     "minimal_sets": "fes_pin.body.minimal_sets",
+    "NamedArray": "fes_pin.data.named",
+    "posture_angles": "fes_pin.body.gait",
+    "Inputs": "fes_pin.body.inputs",
+    "PassiveLegs": "fes_pin.body.passive",
+    "ElasticJoints": "fes_pin.body.passive",
+    "attainable": "fes_pin.body.attainable",
+    "catchable": "fes_pin.body.catchable",
+    "close_the_loop": "fes_pin.body.closed_loop",
+    "fewest_goniometers": "fes_pin.body.observability",
+    "subject_nerves": "fes_pin.muscles.nerve_inputs",
+    "show_mode": "fes_pin.view.viewer",
+    "show_posture": "fes_pin.view.viewer",
+    "show_influence": "fes_pin.view.viewer",
     "controllability": "fes_pin.muscles.nerve_inputs",
     "allocate": "fes_pin.allocation.allocate",
     "Nerves": "fes_pin.muscles.nerves",
