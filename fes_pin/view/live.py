@@ -1,25 +1,32 @@
-"""Scenes in a browser while they change: meshcat's server in this process, for this machine alone."""
+"""Scenes in a browser while they change: a server in this process, for this machine alone."""
 
 from __future__ import annotations
 
-import asyncio
-import socket
-import threading
+import os
 import time
-from uuid import uuid4
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
 
 from fes_pin.data.errors import InputError
-from fes_pin.view.viewer import BodyScene, import_meshcat
+from fes_pin.view.viewer import BodyScene
 
 LOOPBACK = "127.0.0.1"
 FIRST_PORT, PORTS = 7000, 100
-"""The port that meshcat's own server begins with, and how many are tried."""
+"""The first port, and how many are tried."""
+_FOLLOW = """<script>
+setInterval(async () => {{
+  const now = await fetch("/count").then(answer => answer.text(), () => "{count}");
+  if (now !== "{count}") location.reload();
+}}, 300);
+</script>
+"""
+"""A page asks which scene is shown, and is loaded anew when it is another one."""
 
 
 class LiveViewer:
-    """meshcat's server in a thread of this process, until `close` or the end of a `with` block.
+    """A server in a thread of this process, until `close` or the end of a `with` block.
 
-    It listens on the loopback address alone, for pages are open to whoever reaches the port; what draws reaches it
+    It listens on the loopback address alone, for pages are open to whoever reaches the port; what is shown reaches it
     inside the process, without a port. However the process ends, the server ends with it.
 
     Attributes
@@ -40,50 +47,14 @@ class LiveViewer:
     """
 
     def __init__(self) -> None:
-        import_meshcat()
-        import zmq  # noqa: PLC0415
-
-        listener = _listening_socket()
-        self.url = f"http://{LOOPBACK}:{listener.getsockname()[1]}/static/"
-        self._inside = f"inproc://fes-pin-{uuid4()}"
-        self._started = threading.Event()
-        self._thread = threading.Thread(target=self._serve, args=(listener,), daemon=True)
+        self._server = _server()
+        self.url = f"http://{LOOPBACK}:{self._server.server_port}/"
+        self._thread = Thread(target=self._server.serve_forever, args=(0.05,), daemon=True)
         self._thread.start()
-        self._started.wait()
-        from meshcat.servers.zmqserver import ZMQWebSocketBridge  # noqa: PLC0415
-
-        self._drawing = ZMQWebSocketBridge.context.socket(zmq.REQ)
-        self._drawing.connect(self._inside)
-
-    def _serve(self, listener: socket.socket) -> None:
-        """The thread: an event loop of its own with the server in it."""
-        self._loop = asyncio.new_event_loop()
-        asyncio.set_event_loop(self._loop)
-        server = _bridge()(self._inside, listener)
-        self._loop.call_soon(self._started.set)
-        self._loop.run_forever()
-        server.zmq_stream.close(linger=0)
-        server.http.stop()
-        for page in list(server.websocket_pool):
-            page.close()
-        self._loop.run_until_complete(server.http.close_all_connections())
-        self._loop.close()
 
     def show(self, scene: BodyScene) -> None:
         """Show a scene instead of what was there before."""
-        from meshcat.commands import Delete  # noqa: PLC0415
-        from meshcat.path import Path  # noqa: PLC0415
-
-        self._send(Delete(Path(("meshcat",))))
-        for command in scene.commands():
-            self._send(command)
-
-    def _send(self, command) -> None:
-        import umsgpack  # noqa: PLC0415
-
-        words = command.lower()
-        self._drawing.send_multipart([words["type"].encode(), words["path"].encode(), umsgpack.packb(words)])
-        self._drawing.recv()
+        self._server.show(scene.html())
 
     def wait(self) -> None:
         """Until the server ends or the caller is interrupted."""
@@ -92,10 +63,8 @@ class LiveViewer:
 
     def close(self) -> None:
         """End the server."""
-        self._drawing.close(linger=0)
-        if self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._loop.stop)
-            self._thread.join()
+        self._server.shutdown()
+        self._server.server_close()
 
     def __enter__(self) -> LiveViewer:
         return self
@@ -104,50 +73,38 @@ class LiveViewer:
         self.close()
 
 
-def _listening_socket() -> socket.socket:
-    """A socket that listens on the first free port of the loopback address."""
+class _Answer(BaseHTTPRequestHandler):
+    """The page, or the number of the scene that it shows."""
+
+    server: _Server
+
+    def do_GET(self) -> None:
+        count, page = self.server.shown
+        content = str(count) if self.path == "/count" else page
+        self.send_response(200)
+        self.send_header("Content-Type", "text/html; charset=utf-8")
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        self.wfile.write(content.encode())
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Nothing is printed."""
+
+
+class _Server(ThreadingHTTPServer):
+    allow_reuse_address = os.name == "posix"  # elsewhere it gives one port to two servers
+    shown = (0, _FOLLOW.format(count=0))
+
+    def show(self, page: str) -> None:
+        count = self.shown[0] + 1
+        self.shown = (count, page + _FOLLOW.format(count=count))
+
+
+def _server() -> _Server:
+    """A server on the first free port of the loopback address."""
     for port in range(FIRST_PORT, FIRST_PORT + PORTS):
         try:
-            found = socket.create_server((LOOPBACK, port))
+            return _Server((LOOPBACK, port), _Answer)
         except OSError:
             continue
-        found.setblocking(False)
-        return found
     raise InputError(f"no port is free between {FIRST_PORT} and {FIRST_PORT + PORTS - 1}")
-
-
-def _bridge() -> type:
-    """meshcat's server between the drawing socket and the pages, on a socket that is given to it, and silent."""
-    from meshcat.servers import zmqserver  # noqa: PLC0415
-    from tornado.httpserver import HTTPServer  # noqa: PLC0415
-    from tornado.web import Application  # noqa: PLC0415
-
-    class Page(zmqserver.WebSocketHandler):
-        def open(self) -> None:
-            self.bridge.websocket_pool.add(self)
-            self.bridge.send_scene(self)
-
-        def on_close(self) -> None:
-            self.bridge.websocket_pool.discard(self)
-
-    class Bridge(zmqserver.ZMQWebSocketBridge):
-        def __init__(self, inside: str, listener: socket.socket) -> None:
-            self.listener = listener
-            super().__init__(zmq_url=inside, host=LOOPBACK, port=listener.getsockname()[1])
-
-        def make_app(self) -> Application:
-            bridge = self
-
-            class Loopback(Application):
-                def listen(self, port: int, address: str | None = None, **options) -> HTTPServer:
-                    bridge.http = HTTPServer(self, **options)
-                    bridge.http.add_socket(bridge.listener)
-                    return bridge.http
-
-            files = {"path": zmqserver.VIEWER_ROOT, "default_filename": zmqserver.VIEWER_HTML}
-            return Loopback(
-                [(r"/static/(.*)", zmqserver.StaticFileHandlerNoCache, files), (r"/", Page, {"bridge": self})],
-                log_function=lambda _handler: None,
-            )
-
-    return Bridge

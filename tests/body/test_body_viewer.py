@@ -16,6 +16,7 @@ from fes_pin.body.linearize import linearize, model_on_slope
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.nerve_inputs import subject_nerves
 from fes_pin.muscles.nerves import Nerves
+from fes_pin.view import live
 from fes_pin.view.influence import influence_table, plot_influence
 from fes_pin.view.live import LiveViewer
 from fes_pin.view.viewer import BodyScene, show_influence, show_mode, show_posture, show_walk
@@ -99,6 +100,27 @@ def test_a_live_viewer_shows_one_scene_after_the_other_and_moves(body, screensho
         assert max(changed(moving[0], p) for p in moving[1:]) > 0.005
     with pytest.raises(OSError):
         urlopen(viewer.url, timeout=2)
+
+
+def test_an_open_page_follows_the_next_scene(body, screenshot, monkeypatch):
+    """The second scene is shown once the page with the first is open."""
+    answer, opened = live._Answer.do_GET, []
+
+    def then_show_the_next(handler):
+        answer(handler)
+        if handler.path == "/":
+            opened.append(handler)
+            if len(opened) == 1:
+                viewer.show(BodyScene(body).pose({"right_ankle_dorsiflexion": -0.3}))
+
+    with LiveViewer() as viewer:
+        viewer.show(BodyScene(body).pose({"right_ankle_dorsiflexion": 0.3}))
+        forward = screenshot(viewer.url)
+        monkeypatch.setattr(live._Answer, "do_GET", then_show_the_next)
+        back = screenshot(viewer.url, milliseconds=4000)
+    assert len(opened) == 2  # loaded anew, once
+    left, right = (np.flatnonzero(skin(p).any(axis=0)).mean() for p in (forward, back))
+    assert abs(left - right) > 20.0
 
 
 @pytest.mark.parametrize("opened", [True, False], ids=["page open", "at once"])
