@@ -113,8 +113,33 @@ def demands(
     )
 
 
+class Leans(ByValue, Tabled):
+    """Base of what inputs can do with leans, one row a falling mode."""
+
+    falling: tuple[Mode, ...]
+    lean_deg: np.ndarray
+
+    @property
+    def _able(self) -> bool:
+        """Whether the posture itself is kept."""
+        raise NotImplementedError
+
+    def _table(self) -> dict[str, Any]:
+        names = [mode.name for mode in self.falling]
+        return {
+            "mode": names,
+            "positive_deg": self.lean_deg[:, 0].tolist(),
+            "negative_deg": self.lean_deg[:, 1].tolist(),
+        }
+
+    @property
+    def least_lean_deg(self) -> float:
+        """The smallest of the leans, 0 where the posture cannot be held, infinite where nothing falls."""
+        return float(np.nan_to_num(self.lean_deg, nan=0.0, posinf=np.inf).min(initial=np.inf)) if self._able else 0.0
+
+
 @dataclass(frozen=True, eq=False)
-class HeldLeans(ByValue, Tabled):
+class HeldLeans(Leans):
     """What inputs within their bounds can hold.
 
     Parameters
@@ -141,18 +166,9 @@ class HeldLeans(ByValue, Tabled):
     lean_deg: np.ndarray
     error_deg: np.ndarray = field(repr=False)
 
-    def _table(self) -> dict[str, Any]:
-        names = [mode.name for mode in self.falling]
-        return {
-            "mode": names,
-            "positive_deg": self.lean_deg[:, 0].tolist(),
-            "negative_deg": self.lean_deg[:, 1].tolist(),
-        }
-
     @property
-    def least_lean_deg(self) -> float:
-        """The smallest of the leans, 0 where the posture cannot be held, infinite where nothing falls."""
-        return float(np.nan_to_num(self.lean_deg, nan=0.0, posinf=np.inf).min(initial=np.inf)) if self.holds else 0.0
+    def _able(self) -> bool:
+        return self.holds
 
     def __str__(self) -> str:
         if not self.holds:

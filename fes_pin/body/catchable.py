@@ -11,23 +11,20 @@ plan catches beyond the modal bound is lost to any stimulation; between the two 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from fes_pin.body.attainable import SETTLE_DEG, lean_text
+from fes_pin.body.attainable import SETTLE_DEG, Leans, lean_text
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, modes
 from fes_pin.body.plans import Plans
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number, positive_number
-from fes_pin.data.show import Tabled
 
 
 @dataclass(frozen=True, eq=False)
-class CaughtLeans(ByValue, Tabled):
+class CaughtLeans(Leans):
     """From which leans at rest inputs within their bounds can bring the body to rest again.
 
     Parameters
@@ -51,18 +48,9 @@ class CaughtLeans(ByValue, Tabled):
     error_deg: np.ndarray = field(repr=False)
     bound_deg: np.ndarray
 
-    def _table(self) -> dict[str, Any]:
-        names = [mode.name for mode in self.falling]
-        return {
-            "mode": names,
-            "positive_deg": self.lean_deg[:, 0].tolist(),
-            "negative_deg": self.lean_deg[:, 1].tolist(),
-        }
-
     @property
-    def least_lean_deg(self) -> float:
-        """The smallest of the leans, 0 where the posture cannot be kept, infinite where nothing falls."""
-        return float(np.nan_to_num(self.lean_deg, nan=0.0, posinf=np.inf).min(initial=np.inf)) if self.rests else 0.0
+    def _able(self) -> bool:
+        return self.rests
 
     def __str__(self) -> str:
         if not self.rests:
