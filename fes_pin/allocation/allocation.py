@@ -204,7 +204,7 @@ class Allocation(Fixed, ByName):
         """Torque wanted, achieved, and achieved by the weakest and strongest muscles likely, N m, a row each joint."""
         least, most = np.sort(self.achieved_band, axis=0)
         columns = {"wanted": self.wanted, "achieved": self.achieved, "least": least, "greatest": most}
-        return frame(dict(joint=self.joints, **columns), "joint")
+        return frame({"joint": self.joints, **columns}, "joint")
 
     def _repr_html_(self) -> str:
         held = self.active

@@ -92,7 +92,7 @@ class AttainableTorques:
     def to_frame(self) -> pandas.DataFrame:
         """Least and greatest torque, N m, a row each joint, as a frame of pandas; see `data.show.frame`."""
         least, greatest = zip(*map(self.range, self.joints), strict=True)
-        return frame(dict(joint=self.joints, least=least, greatest=greatest), "joint")
+        return frame({"joint": self.joints, "least": least, "greatest": greatest}, "joint")
 
     def _repr_html_(self) -> str:
         rows = [(joint, "{:.1f} to {:.1f} N m".format(*self.range(joint))) for joint in self.joints]
