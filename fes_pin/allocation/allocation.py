@@ -203,8 +203,8 @@ class Allocation(Fixed, ByName):
     def torques(self) -> pandas.DataFrame:
         """Torque wanted, achieved, and achieved by the weakest and strongest muscles likely, N m, a row each joint."""
         least, most = np.sort(self.achieved_band, axis=0)
-        columns = {"wanted": self.wanted, "achieved": self.achieved, "least": least, "greatest": most}
-        return frame({"joint": self.joints, **columns}, "joint")
+        columns = {"joint": self.joints, "wanted": self.wanted, "achieved": self.achieved}
+        return frame({**columns, "least": least, "greatest": most}, "joint")
 
     def _repr_html_(self) -> str:
         held = self.active

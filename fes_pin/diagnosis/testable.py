@@ -18,6 +18,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.long_records import searched_part
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.score import Projection, Scores
+from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import ABSORBED_BELOW
@@ -107,6 +108,8 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
 def given_away(study: Study) -> list[str]:
     """What a fit of the nominal model gives away of a study, the warnings of `Testable`; nothing where time is over."""
     nominal, trials = _to_fit(study)
+    if is_fed_back(nominal.rig, trials):
+        return []
     with one_thread_each():
         try:
             fitted = _fitted(nominal, trials)
@@ -116,6 +119,9 @@ def given_away(study: Study) -> list[str]:
 
 
 def _given_away(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
+    """Nothing of a rig whose effort answers its reading: its free simulation leaves the measurement anyway."""
+    if is_fed_back(model.rig, trials):
+        return []
     return [*_reversed(model, trials, fitted), *_shifted(model, trials, fitted)]
 
 
