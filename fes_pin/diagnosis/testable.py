@@ -106,7 +106,10 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
 
 
 def given_away(study: Study) -> list[str]:
-    """What a fit of the nominal model gives away of a study, the warnings of `Testable`; nothing where time is over."""
+    """What a fit of the nominal model gives away of a study, the warnings of `Testable`; nothing where time is over.
+
+    Of a rig whose effort answers its reading nothing either: its diagnosis asks for late efforts by the likelihood.
+    """
     nominal, trials = _to_fit(study)
     if is_fed_back(nominal.rig, trials):
         return []
@@ -119,9 +122,6 @@ def given_away(study: Study) -> list[str]:
 
 
 def _given_away(model: Model, trials: Sequence[Trial], fitted: Fit) -> list[str]:
-    """Nothing of a rig whose effort answers its reading: its free simulation leaves the measurement anyway."""
-    if is_fed_back(model.rig, trials):
-        return []
     return [*_reversed(model, trials, fitted), *_shifted(model, trials, fitted)]
 
 
