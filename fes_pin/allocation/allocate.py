@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
-
 from fes_pin.allocation.allocation import Allocation
 from fes_pin.allocation.allocator import Allocator
+from fes_pin.data.read_only import key_of
 
 __all__ = ["Allocator", "allocate"]
 
@@ -61,7 +60,7 @@ class Asked:
 
 def allocator_for(nerves: Any, q: Any, options: Mapping[str, Any]) -> Allocator:
     """The program for these moment arms and options, made anew only if it is not among the recent ones."""
-    asked = Asked((frozen(nerves), frozen(q), frozen(options)), nerves, q, options)
+    asked = Asked(key_of((nerves, q, options)), nerves, q, options)
     try:
         hash(asked)
     except TypeError:
@@ -73,16 +72,3 @@ def allocator_for(nerves: Any, q: Any, options: Mapping[str, Any]) -> Allocator:
 def recent(asked: Asked) -> Allocator:
     """The last programs, so that the next torque of the same kind need not set them up."""
     return Allocator(asked.nerves, asked.q, **asked.options)
-
-
-def frozen(value: Any) -> Any:
-    """What tells two arguments apart, hashable: equal values, equal keys."""
-    if isinstance(value, np.ndarray):
-        return value.shape, value.dtype.str, value.tobytes(), getattr(value, "names", None)
-    if isinstance(value, Mapping):
-        return tuple((key, frozen(value[key])) for key in sorted(value, key=str))
-    if isinstance(value, (list, tuple)):
-        return tuple(frozen(item) for item in value)
-    if isinstance(value, Set):
-        return frozenset(value)
-    return value

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fes_pin.allocation.certificate import Certificate
-from fes_pin.allocation.fixed import Fixed
 from fes_pin.allocation.problem import AllocationProblem
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.show import frame, table_html
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ WORTH_NAMING = 0.1
 class ByName:
     """What results say by name; they hold a `problem`, pulse widths (..., n) us and torques (..., joints) N m."""
 
-    __slots__ = ()
     problem: AllocationProblem
     pulse_width_us: np.ndarray
     achieved: np.ndarray
@@ -61,8 +60,8 @@ class ByName:
         return table_html(f"{len(self.pulse_width_us)} allocations", ("channel", "pulse widths"), rows)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Allocation(Fixed, ByName):
+@dataclass(frozen=True, eq=False)
+class Allocation(ByName, ReadOnly):
     """Pulse widths for a wanted torque; `allocation["left_femoral"]` is one, `allocation.torque("left_knee_flexion")`
     what a joint gets. Arrays without names are in the order of `names` and `joints`.
 
@@ -98,12 +97,6 @@ class Allocation(Fixed, ByName):
     gap: float
     problem: AllocationProblem
     note: str = ""
-
-    def __post_init__(self) -> None:
-        for array in (self.recruitment, self.pulse_width_us, self.wanted, self.achieved, self.gradient):
-            array.setflags(write=False)
-        for array in (self.lower, self.upper, self.previous):
-            array.setflags(write=False)
 
     @property
     def shortfall(self) -> np.ndarray:
@@ -265,8 +258,8 @@ class Allocation(Fixed, ByName):
         return "\n".join([*lines, f"{proof}{'; ' + self.note if self.note else ''}"])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AllocationSequence(Fixed, ByName):
+@dataclass(frozen=True, eq=False)
+class AllocationSequence(ByName, ReadOnly):
     """Allocations of a torque over time, as arrays.
 
     Attributes

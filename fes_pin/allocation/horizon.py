@@ -11,12 +11,12 @@ from fes_pin.allocation.allocation import ByName
 from fes_pin.allocation.allocator import Allocator
 from fes_pin.allocation.bounded import known_solver
 from fes_pin.allocation.certificate import NOTHING
-from fes_pin.allocation.fixed import Fixed
 from fes_pin.allocation.horizon_program import NO_ROOM, HorizonProgram
 from fes_pin.allocation.inputs import fractions, wanted_torques
 from fes_pin.allocation.problem import AllocationProblem, within_rate
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, numbers, positive_number, shortened, whole
+from fes_pin.data.read_only import ReadOnly
 
 ROUNDED = 1e-13
 """A plan may exceed the rate by so much: its steps are sums, and solvers round; a pulse width by 1e-10 us."""
@@ -88,8 +88,8 @@ def invert_lag(
     return commands
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Plan(Fixed, ByName):
+@dataclass(frozen=True, eq=False)
+class Plan(ByName, ReadOnly):
     """Stimulation over the horizon; only its first step is meant to be applied. `plan["left_femoral"]` are the steps of
     a channel, us, `plan.torque("left_knee_flexion")` those of a joint, N m.
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.allocation.fixed import Fixed
 from fes_pin.allocation.inputs import fractions, torque_matrix
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import between, by_name, positive_number, shortened
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.muscles.recruitment import ChannelRecruitment, LinearRecruitment
 
 EFFORT = 1e-4
@@ -107,8 +107,8 @@ class Options:
         between(self.change, 0.0, LARGEST_PRICE, "change")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AllocationProblem(Fixed):
+@dataclass(frozen=True, eq=False)
+class AllocationProblem(ReadOnly):
     """The program of an allocation with its numbers checked; nothing in it changes.
 
         min over r of sum w (R r - torque)^2 / 2 + effort + change / 2 |r - previous|^2,  lower <= r <= upper

@@ -16,7 +16,7 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import numbers
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class WalkAllocation(AllocationSequence):
     """Allocations along a motion; `problem` has the options and the moment arms of the first sample.
 

@@ -17,9 +17,8 @@ from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, modes
 from fes_pin.body.programs import LinearProgram, ProgramAnswer
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.numbers import positive_number
-from fes_pin.data.show import Tabled
+from fes_pin.data.tabulated import Tabulated
 
 SETTLE_DEG = 10.0
 """How far a swinging mode may hang from the posture and still count as the posture: ours; linear models reach no
@@ -113,7 +112,7 @@ def demands(
     )
 
 
-class Leans(ByValue, Tabled):
+class Leans(Tabulated):
     """Base of what inputs can do with leans, one row a falling mode."""
 
     falling: tuple[Mode, ...]
@@ -123,6 +122,8 @@ class Leans(ByValue, Tabled):
     def _able(self) -> bool:
         """Whether the posture itself is kept."""
         raise NotImplementedError
+
+    _index = "mode"
 
     def _table(self) -> dict[str, Any]:
         names = [mode.name for mode in self.falling]

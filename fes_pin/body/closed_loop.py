@@ -24,9 +24,9 @@ from fes_pin.body.joints import JOINT_NAMES, angles_array
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.linearize import model_on_slope
 from fes_pin.body.plans import PULSE_S, Plans
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number
+from fes_pin.data.read_only import ReadOnly
 
 STEP_S = 0.002
 """Step of the Runge-Kutta integration, s; the fastest falls here double in ten of them."""
@@ -35,7 +35,7 @@ LOST_DEG = 45.0
 
 
 @dataclass(frozen=True, eq=False)
-class Caught(ByValue):
+class Caught(ReadOnly):
     """A run of the closed loop.
 
     Parameters

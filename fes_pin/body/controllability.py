@@ -17,11 +17,10 @@ from scipy import linalg
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import ModeSet, modes
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import positive_number
-from fes_pin.data.show import Tabled
+from fes_pin.data.tabulated import Tabulated
 
 RELATIVE_TOLERANCE = 1e-9
 """Below this part of the largest gain, an input does not act on a mode: rounding, not muscle."""
@@ -30,7 +29,7 @@ SAME_POLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class ModalControllability(ByValue, Tabled):
+class ModalControllability(Tabulated):
     """What a set of inputs can do with the modes of a body.
 
     Parameters
@@ -72,6 +71,8 @@ class ModalControllability(ByValue, Tabled):
     @property
     def _strongest(self) -> list[str]:
         return [self.inputs.names[int(i)] if self.inputs.n else "-" for i in np.abs(self.mode_influence).argmax(axis=1)]
+
+    _index = "mode"
 
     def _table(self) -> dict[str, Any]:
         return {

@@ -19,8 +19,8 @@ from scipy.spatial import ConvexHull
 from fes_pin.body.anthropometry import ANKLE_ALONG_FOOT, FOOT_BREADTH, MTP_ALONG_FOOT
 from fes_pin.body.build import Body
 from fes_pin.body.joints import SIDES
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
+from fes_pin.data.read_only import ReadOnly
 
 FOOT_LENGTH = 0.2581 / 1.741
 """Length of the foot by height: de Leva's man."""
@@ -29,7 +29,7 @@ FLAT_DEG, LEVEL_M = 1.0, 0.005
 
 
 @dataclass(frozen=True, eq=False)
-class SupportPolygon(ByValue):
+class SupportPolygon(ReadOnly):
     """The area on the ground that carries a body.
 
     Parameters
@@ -64,7 +64,7 @@ class SupportPolygon(ByValue):
 
 
 @dataclass(frozen=True, eq=False)
-class Wrench(ByValue):
+class Wrench(ReadOnly):
     """The ground's wrench (f, n) about the origin, N and N m, linear in small deviations and accelerations.
 
     Parameters

@@ -9,13 +9,13 @@ import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number, positive_number, shortened
+from fes_pin.data.read_only import ReadOnly
 
 
 @dataclass(frozen=True, eq=False)
-class Inputs(ByValue):
+class Inputs(ReadOnly):
     """A set of inputs u: joint torques D = matrix @ u.
 
     Parameters

@@ -18,11 +18,11 @@ from scipy.linalg import null_space
 from fes_pin.body.build import GRAVITY, Body
 from fes_pin.body.joints import names_of
 from fes_pin.body.modes import ModeSet, modes
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word
-from fes_pin.data.show import Tabled, frame
+from fes_pin.data.show import frame
+from fes_pin.data.tabulated import Tabulated
 
 if TYPE_CHECKING:
     import pandas
@@ -38,7 +38,7 @@ def _fixed(array: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearBody(ByValue, Tabled):
+class LinearBody(Tabulated):
     """A body linearized at a posture; arrays over joints in the order of `joint_names`.
 
     Vectors answer by name, as in `linear.C["right_hip_flexion"]`, matrices as tables: `linear.to_frame("A")`.
@@ -141,6 +141,8 @@ class LinearBody(ByValue, Tabled):
     def whole_posture(self) -> dict[str, float]:
         """Angles of all joints, braced ones too, rad by name."""
         return {**self.held, **self.posture}
+
+    _index = "joint"
 
     def _table(self) -> dict[str, Any]:
         return {"joint": list(self.joint_names), "angle_rad": self.q.tolist(), "holding_nm": (-self.C).tolist()}

@@ -18,9 +18,8 @@ from scipy import linalg
 
 from fes_pin.body.build import Body
 from fes_pin.body.joints import side_of
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.named import NamedArray
-from fes_pin.data.show import Tabled
+from fes_pin.data.tabulated import Tabulated
 
 NEUTRAL_RATE = 1e-3
 """Below this rate, 1/s, a mode neither falls nor swings within a quarter of an hour."""
@@ -79,7 +78,7 @@ class Linear(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Mode(ByValue, Tabled):
+class Mode(Tabulated):
     """One way in which the body falls or swings.
 
     Parameters
@@ -106,6 +105,8 @@ class Mode(ByValue, Tabled):
         for name in ("shape", "participation"):
             object.__setattr__(self, name, NamedArray(getattr(self, name), self.joint_names))
         self._freeze()
+
+    _index = "joint"
 
     def _table(self) -> dict[str, Any]:
         shape, share = self.one_degree.tolist(), self.participation.tolist()
@@ -152,7 +153,7 @@ class Mode(ByValue, Tabled):
 
 
 @dataclass(frozen=True, eq=False)
-class ModeSet(ByValue, Tabled):
+class ModeSet(Tabulated):
     """All modes of a body, fastest fall first, fastest swing last.
 
     Parameters
@@ -181,6 +182,8 @@ class ModeSet(ByValue, Tabled):
     def degree(self) -> np.ndarray:
         """Modal coordinate of one degree of each mode's greatest joint: (n,)."""
         return np.radians(1.0) / np.abs(self.shapes).max(axis=0)
+
+    _index = "mode"
 
     def _table(self) -> dict[str, Any]:
         return {

@@ -20,10 +20,9 @@ from fes_pin.body.controllability import RELATIVE_TOLERANCE, _independent
 from fes_pin.body.joints import known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, ModeSet, modes
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number
-from fes_pin.data.show import Tabled
+from fes_pin.data.tabulated import Tabulated
 
 NOISE_DEG, RATE_HZ, LOOK_S = 0.5, 200.0, 0.3
 """Noise of a good flexible goniometer, degrees; its sampling, Hz; the time that a fall leaves for a look, s (ours)."""
@@ -34,7 +33,7 @@ _SETS_AT_ONCE = 20000
 
 
 @dataclass(frozen=True, eq=False)
-class ModalObservability(ByValue, Tabled):
+class ModalObservability(Tabulated):
     """What goniometers at some joints see.
 
     Parameters
@@ -59,6 +58,8 @@ class ModalObservability(ByValue, Tabled):
     def worst_deg(self) -> float:
         """The largest posterior deviation of a falling mode, degrees; 0 where nothing falls."""
         return float(self.posterior_deg[self.modes.kinds == "fall"].max(initial=0.0))
+
+    _index = "mode"
 
     def _table(self) -> dict[str, Any]:
         names = [mode.name for mode in self.modes]

@@ -12,9 +12,9 @@ from typing import Protocol
 import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES, SIDES, angles_array
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between
+from fes_pin.data.read_only import ReadOnly
 
 
 class Passive(Protocol):
@@ -38,7 +38,7 @@ def _positive(values: Mapping[str, float], names: Sequence[str], what: str) -> n
 
 
 @dataclass(frozen=True, eq=False)
-class ElasticJoints(ByValue):
+class ElasticJoints(ReadOnly):
     """A spring and a damper in each joint: tau = -stiffness (q - rest) - damping v.
 
     Parameters
@@ -93,7 +93,7 @@ MOST_PASSIVE = 100.0
 
 
 @dataclass(frozen=True, eq=False)
-class PassiveLegs(ByValue):
+class PassiveLegs(ReadOnly):
     """Passive elastic moments of hip, knee and ankle in the sagittal plane, with the coupling of two-joint muscles.
 
     Sums of exponentials fitted to ten healthy adults: R. Riener, T. Edrich, "Identification of passive elastic joint

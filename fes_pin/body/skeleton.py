@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from fes_pin.body.joints import JOINTS, SEGMENT_NAMES, SIDES
-from fes_pin.data.by_value import ByValue
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
+from fes_pin.data.read_only import ReadOnly
 
 
 @dataclass(frozen=True, eq=False)
-class Segment(ByValue):
+class Segment(ReadOnly):
     """A rigid segment, given in the neutral posture in world axes (x forward, y left, z up).
 
     Parameters
@@ -57,7 +57,7 @@ class Segment(ByValue):
 
 
 @dataclass(frozen=True, eq=False)
-class Skeleton(ByValue):
+class Skeleton(ReadOnly):
     """Ten segments and nine joint centres in the neutral posture, ground at z = 0.
 
     Parameters

@@ -64,20 +64,3 @@ def from_to(before: Sequence[float | None], after: Sequence[float | None], where
     """Errors before and after, in percent, of those places that have both."""
     pairs = zip(before, after, where, strict=True)
     return ", ".join(f"{b:.2f} -> {a:.2f} % {w}" for b, a, w in pairs if a is not None and b is not None)
-
-
-class Tabled:
-    """Base of a result that is a table: `_table` gives its columns, the first of them its index."""
-
-    def _table(self) -> Mapping[str, Sequence[Any]]:
-        raise NotImplementedError
-
-    def to_frame(self) -> pandas.DataFrame:
-        """The result as a frame of pandas; see `data.show.frame`."""
-        columns = self._table()
-        return frame(columns, index=next(iter(columns)))
-
-    def _repr_html_(self) -> str:
-        columns = self._table()
-        rows = [[x if isinstance(x, str) else f"{x:.4g}" for x in row] for row in zip(*columns.values(), strict=True)]
-        return table_html(str(self).splitlines()[0], list(columns), rows)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import numbers
-from fes_pin.data.read_only import ReadOnly, as_dicts
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.show import frame, table_html
 
 if TYPE_CHECKING:
@@ -32,11 +33,12 @@ class Tabulated(ReadOnly):
     """
 
     along: ClassVar[tuple[str, ...]] = ()
+    _index: ClassVar[str | None] = None
 
     def __post_init__(self) -> None:
         for item in dataclasses.fields(self):  # type: ignore[arg-type] # every subclass is a dataclass
             value = getattr(self, item.name)
-            if item.name in self.along or isinstance(value, np.ndarray):
+            if item.name in self.along or (type(value) is np.ndarray and value.dtype != bool):
                 vars(self)[item.name] = numbers(value, item.name)
         if len({getattr(self, name).shape[:1] for name in self.along} | {()}) > 2 or any(
             not getattr(self, name).ndim for name in self.along
@@ -47,21 +49,11 @@ class Tabulated(ReadOnly):
     def _values(self) -> dict[str, Any]:
         return {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}  # type: ignore[arg-type]
 
-    def __eq__(self, other: object) -> bool:
-        return (
-            type(self) is type(other) and self._key() == other._key()
-            if isinstance(other, Tabulated)
-            else NotImplemented
-        )
-
-    def __hash__(self) -> int:
-        return hash(self._key())
-
-    def _key(self) -> str:
-        shown = {
-            n: (v.shape, v.tolist()) if isinstance(v, np.ndarray) else as_dicts(v) for n, v in self._values().items()
-        }
-        return repr(shown)
+    def _table(self) -> Mapping[str, Sequence[Any]]:
+        """The columns of `to_frame`; those with an `_index` are shown whole, others by their ranges."""
+        if self.along:
+            return {n: getattr(self, n) for n in self.along}
+        return {n: [v] for n, v in self._values().items() if isinstance(v, int | float)}
 
     def to_frame(self) -> pandas.DataFrame:
         """The columns that share their first axis, or without any the numbers, as a frame of pandas.
@@ -71,11 +63,14 @@ class Tabulated(ReadOnly):
         InputError
             pandas is not installed.
         """
-        if self.along:
-            return frame({n: getattr(self, n) for n in self.along})
-        return frame({n: [v] for n, v in self._values().items() if isinstance(v, int | float)})
+        return frame(self._table(), self._index)
 
     def _repr_html_(self) -> str:
+        if self._index is not None:
+            columns = self._table()
+            cells = zip(*columns.values(), strict=True)
+            texts = [[x if isinstance(x, str) else f"{x:.4g}" for x in row] for row in cells]
+            return table_html(str(self).splitlines()[0], list(columns), texts)
         rows = []
         for name, value in self._values().items():
             if isinstance(value, np.ndarray) and value.size:

@@ -39,21 +39,8 @@ STRAIGHT_BELOW = 1e-6
 """Fraction of the way below which a Hill curve is straight, as in the model of the same name."""
 
 
-class _Curve(ReadOnly):
-    """Base of frozen dataclasses whose fields are arrays: equal by value."""
-
-    def _values(self) -> tuple:
-        return type(self), *(getattr(self, f.name).tobytes() for f in fields(self))  # type: ignore[arg-type]
-
-    def __eq__(self, other) -> bool:
-        return isinstance(other, _Curve) and self._values() == other._values()
-
-    def __hash__(self) -> int:
-        return hash(self._values())
-
-
 @dataclass(frozen=True, eq=False)
-class LinearRecruitment(_Curve):
+class LinearRecruitment(ReadOnly):
     """Straight from threshold to saturation; the defaults are the paper's (section II: 180 us, 1 ms).
 
     Parameters
@@ -223,7 +210,7 @@ class Hysteresis:
     """
 
     def __init__(self, curve: LinearRecruitment, half_width_us: float, acting_us: float = 0.0) -> None:
-        if not isinstance(curve, _Curve) or np.ndim(curve.threshold_us):
+        if not isinstance(curve, LinearRecruitment | MeasuredRecruitment) or np.ndim(curve.threshold_us):
             raise InputError(f"expected the recruitment curve of one channel, got {curve!r:.40}")
         self.curve, self.half_width_us = curve, between(half_width_us, 0.0, LONGEST_US, "half_width_us")
         self.acting_us = between(acting_us, 0.0, LONGEST_US, "acting_us")
@@ -256,7 +243,7 @@ class Hysteresis:
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredRecruitment(_Curve):
+class MeasuredRecruitment(ReadOnly):
     """Straight lines between measured points (pulse width, recruitment).
 
     Parameters
