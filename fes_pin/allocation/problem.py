@@ -11,7 +11,7 @@ import numpy as np
 from fes_pin.allocation.inputs import fractions, torque_matrix
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
-from fes_pin.data.numbers import between, by_name, positive_number, shortened
+from fes_pin.data.numbers import between, by_name, known_word, positive_number, truth
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.muscles.recruitment import ChannelRecruitment, LinearRecruitment
 
@@ -92,11 +92,8 @@ class Options:
 
     def __post_init__(self) -> None:
         for name in ("lexicographic", "rounding"):
-            if not isinstance(getattr(self, name), bool | np.bool_):
-                raise InputError(f"must be True or False, got {shortened(getattr(self, name))}", column=name)
-        kinds = ("squares", "cubes", "fatigue")
-        if self.effort_kind not in kinds:
-            raise InputError(f"effort_kind must be one of {', '.join(kinds)}, got {self.effort_kind!r}")
+            truth(getattr(self, name), name)
+        known_word(self.effort_kind, ("squares", "cubes", "fatigue"), "effort_kind")
         if self.effort_kind == "cubes" and self.lexicographic:
             raise InputError("lexicographic goes with effort squares or fatigue, not with cubes")
         if self.least is not None and (self.effort_kind == "cubes" or self.lexicographic):

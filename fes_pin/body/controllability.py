@@ -17,9 +17,8 @@ from scipy import linalg
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import ModeSet, modes
-from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
-from fes_pin.data.numbers import positive_number
+from fes_pin.data.numbers import between
 from fes_pin.data.tabulated import Tabulated
 
 RELATIVE_TOLERANCE = 1e-9
@@ -135,9 +134,7 @@ def modal_controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> M
     InputError
         Inputs that are none, or a horizon outside 1 ms to 1000 s.
     """
-    horizon = positive_number(horizon, "horizon")
-    if not 1e-3 <= horizon <= 1e3:
-        raise InputError(f"must lie between 0.001 and 1000 s, got {horizon:g}", column="horizon")
+    horizon = between(horizon, 1e-3, 1e3, "horizon")
     inputs = Inputs.of(inputs, linear)
     found = modes(linear)
     torque = inputs.on(linear)

@@ -10,7 +10,7 @@ import numpy as np
 from fes_pin.body.joints import JOINT_NAMES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number, positive_number, shortened
+from fes_pin.data.numbers import number, numbers, positive_number, shortened
 from fes_pin.data.read_only import ReadOnly
 
 
@@ -43,7 +43,7 @@ class Inputs(ReadOnly):
 
     def __post_init__(self) -> None:
         for name in ("matrix", "lower", "upper"):
-            object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
+            object.__setattr__(self, name, numbers(getattr(self, name), name))
         shape = (len(self.joint_names), len(self.names))
         if self.matrix.shape != shape or not np.all(np.isfinite(self.matrix)):
             raise InputError(f"the input matrix must be finite and of shape {shape}, got {self.matrix.shape}")
@@ -76,12 +76,7 @@ class Inputs(ReadOnly):
     @classmethod
     def pulling(cls, names: Sequence[str], matrix, joint_names: Sequence[str] = JOINT_NAMES) -> Inputs:
         """Muscles or nerves: u is 0 to 1, `matrix` the torque at full recruitment, N m."""
-        count = len(names)
-        try:
-            values = np.asarray(matrix, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"the input matrix must be numbers, got {type(matrix).__name__}") from None
-        return cls(tuple(names), tuple(joint_names), values, np.zeros(count), np.ones(count))
+        return cls(tuple(names), tuple(joint_names), matrix, np.zeros(len(names)), np.ones(len(names)))
 
     @classmethod
     def of(cls, thing, linear: LinearBody) -> Inputs:

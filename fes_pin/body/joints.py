@@ -16,7 +16,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
-from fes_pin.data.numbers import shortened
+from fes_pin.data.numbers import numbers, shortened
 
 SIDES = ("left", "right")
 _LEG = (
@@ -183,10 +183,7 @@ def angles_array(angles: Mapping[str, float] | Sequence[float] | np.ndarray, ord
         if locked:
             raise InputError(f"{locked[0]} is not among the joints that move")
     else:
-        try:
-            values = np.asarray(angles, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"{len(order)} joint values were expected, got {type(angles).__name__}") from None
+        values = numbers(angles, f"{len(order)} joint values")
         if values.shape != (len(order),):
             raise InputError(f"{len(order)} joint values were expected, got an array of shape {values.shape}")
     if not np.all(np.isfinite(values)):

@@ -24,7 +24,7 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.passive import Passive
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
-from fes_pin.data.numbers import between, shortened, truth
+from fes_pin.data.numbers import between, numbers, shortened, truth
 
 MOST_GRAVITY = 100.0
 """m/s2; no planet with a surface has more (ours)."""
@@ -169,10 +169,7 @@ def linearize_batch(
     """
     if isinstance(postures, NamedArray) and postures.names is not None:
         postures = postures.arranged(body.joint_names)
-    try:
-        q = np.ascontiguousarray(postures, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"postures must be numbers, got {type(postures).__name__}") from None
+    q = np.ascontiguousarray(numbers(postures, "postures"))
     model = pin.Model(model_on_slope(body, slope))
     model.gravity.linear = -model.gravity.linear  # so that Pinocchio writes -g and -dg/dq, which are C and B
     n = model.nv

@@ -22,7 +22,7 @@ from fes_pin.body.joints import SIDES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.programs import LinearProgram
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number, positive_number, truth, whole
+from fes_pin.data.numbers import known_word, number, positive_number, truth, whole
 
 ORTHOSES: dict[str, tuple[str, ...]] = {
     **{f"{side}_{name}": tuple(f"{side}_{joint}" for joint in joints) for side in SIDES for name, joints in {
@@ -218,10 +218,7 @@ class _Question:
     strength_factor: float
 
     def __post_init__(self) -> None:
-        if self.stimulation not in STIMULATIONS:
-            raise InputError(
-                f"must be one of {', '.join(STIMULATIONS)}, got {self.stimulation!r}", column="stimulation"
-            )
+        known_word(self.stimulation, STIMULATIONS, "stimulation")
         if number(self.strength_factor, "strength_factor") < 1.0:
             raise InputError(f"must be 1 or more, got {self.strength_factor}", column="strength_factor")
         for name in ("together", "gravity", "balance"):

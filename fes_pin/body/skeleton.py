@@ -12,6 +12,7 @@ import numpy as np
 from fes_pin.body.joints import JOINTS, SEGMENT_NAMES, SIDES
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
+from fes_pin.data.numbers import numbers
 from fes_pin.data.read_only import ReadOnly
 
 
@@ -171,11 +172,9 @@ def _entry(table: Mapping, group: str, key: str) -> Mapping:
 
 def _numbers(row: Mapping, field: str, key: str, shape: tuple[int, ...]) -> np.ndarray:
     try:
-        values = np.asarray(row[field], dtype=float)
+        values = numbers(row[field], f"{key}.{field}")
     except KeyError:
         raise InputError("is missing in the table of segments", column=f"{key}.{field}") from None
-    except (TypeError, ValueError):
-        raise InputError("must be numbers", column=f"{key}.{field}") from None
     if values.shape != shape or not np.all(np.isfinite(values)):
         raise InputError(f"must be finite numbers of shape {shape}, got {values.shape}", column=f"{key}.{field}")
     return values

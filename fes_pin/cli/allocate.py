@@ -11,7 +11,7 @@ import typer
 from fes_pin.cli.group import needs
 from fes_pin.cli.options import pairs
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number_in
+from fes_pin.data.numbers import between, number_in
 
 MOST_NM, MOST_DEG_S = 1e5, 1e4
 """No body's joint has more torque, N m, nor turns faster, degrees per second."""
@@ -38,19 +38,6 @@ def joint_numbers(words: list[str] | None, what: str, most: float) -> dict[str, 
             raise InputError(f"{what} of {name} must lie within {most:g} either way, got {text}")
         result[name] = number
     return result
-
-
-def within(value: float, low: float, high: float, option: str) -> float:
-    """The value of an option, if it lies in its range.
-
-    Raises
-    ------
-    InputError
-        It does not.
-    """
-    if not low <= value <= high:
-        raise InputError(f"{option} must lie between {low:g} and {high:g}, got {value:g}")
-    return value
 
 
 @needs(
@@ -89,11 +76,11 @@ def allocate(
 
     _alone(walk=walk is not None, nerves=nerves, torques=bool(torque))
     if strength is not None:
-        within(strength, 0.0, STRONGEST, "--strength")
+        between(strength, 0.0, STRONGEST, "--strength")
     if least is not None:
-        within(least, 0.0, 1.0, "--least")
-    within(threshold_us, 0.0, LONGEST_US, "--threshold-us")
-    within(saturation_us, 0.0, LONGEST_US, "--saturation-us")
+        between(least, 0.0, 1.0, "--least")
+    between(threshold_us, 0.0, LONGEST_US, "--threshold-us")
+    between(saturation_us, 0.0, LONGEST_US, "--saturation-us")
     if threshold_us >= saturation_us:
         raise InputError(f"--threshold-us must lie below --saturation-us, got {threshold_us:g} and {saturation_us:g}")
     channels = Nerves(nerve or None, strength=strength)
@@ -101,7 +88,7 @@ def allocate(
         typer.echo(str(channels))
         return
     if walk is not None:
-        typer.echo(walk_table(walk, channels, 0.0 if passive is None else within(passive, 0.0, 10.0, "--passive")))
+        typer.echo(walk_table(walk, channels, 0.0 if passive is None else between(passive, 0.0, 10.0, "--passive")))
         return
     wanted = joint_numbers(torque, "a torque", MOST_NM)
     posture = {name: radians(value) for name, value in joint_numbers(angle, "--angle", 360.0).items()}

@@ -13,6 +13,7 @@ import typer
 from fes_pin.cli.group import App, needs, python_names, release_output
 from fes_pin.cli.options import Force, output
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import between
 
 app = App(help="The walking body: modes, nerves, view.")
 
@@ -47,17 +48,10 @@ def _body_options(
         body = Body.from_subject(
             72.6 if mass is None else mass, 1.80 if height is None else height, sex or "male", stance or "right"
         )
-    legs = PassiveLegs(passive) if _within(passive, "--passive", 0.0, 10.0) else None
+    legs = PassiveLegs(passive) if between(passive, 0.0, 10.0, "--passive") else None
     linear = linearize(body, posture, slope, passive=legs)
     joints = [joint for name in brace or [] for joint in ORTHOSES.get(name, (name,))]
     return linear.brace(list(dict.fromkeys(joints))) if joints else linear
-
-
-def _within(value: float, option: str, low: float, high: float) -> float:
-    """A number between two others, both allowed."""
-    if not low <= value <= high:
-        raise InputError(f"must lie between {low:g} and {high:g}, got {value:g}", column=option)
-    return value
 
 
 def _of_a_body(command: Callable) -> Callable:
@@ -134,10 +128,10 @@ def nerves(
     from fes_pin.view.influence import check_image, influence_image, influence_table
 
     if strength is not None:
-        _within(strength, "--strength", 0.01, 10.0)
-    _within(settle, "--settle", 0.1, 90.0)
-    _within(lean, "--lean", 1e-3, 45.0)
-    _within(max_braces, "--max-braces", 0, 10)
+        between(strength, 0.01, 10.0, "--strength")
+    between(settle, 0.1, 90.0, "--settle")
+    between(lean, 1e-3, 45.0, "--lean")
+    between(max_braces, 0, 10, "--max-braces")
     outputs = Outputs("body nerves", force)
     if map_to is not None:  # what cannot be written is said before any work
         check_image(map_to)

@@ -10,6 +10,7 @@ import numpy as np
 from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, angles_array, known_joint
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
+from fes_pin.data.numbers import numbers
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.muscles.fibres import isometric_force, velocity_factor
 from fes_pin.muscles.paths import COORDINATES, LegPaths, leg_paths, read_table
@@ -54,10 +55,7 @@ def angles_of(q) -> np.ndarray:
         q = q.arranged(JOINT_NAMES)
     elif q is None or hasattr(q, "keys"):
         q = angles_array({} if q is None else q, JOINT_NAMES)
-    try:
-        angles = np.asarray(q, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("joint angles must be numbers") from None
+    angles = numbers(q, "joint angles")
     if angles.shape[-1:] != (len(JOINT_NAMES),):
         raise InputError(f"expected {len(JOINT_NAMES)} joint angles, got an array of shape {angles.shape}")
     if not np.isfinite(angles).all():

@@ -10,7 +10,7 @@ import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between, shortened
+from fes_pin.data.numbers import between, shortened, truth
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.muscles.muscles import MuscleTable, angles_of, standard_muscles
 
@@ -109,8 +109,7 @@ class Nerves(ReadOnly):
         )
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "members", members.astype(float))
-        if not isinstance(self.force_length, bool | np.bool_):
-            raise InputError(f"must be True or False, got {shortened(self.force_length)}", column="force_length")
+        truth(self.force_length, "force_length")
         self._freeze()
 
     def __hash__(self) -> int:
