@@ -44,9 +44,8 @@ def cohort_html(
         section("How large they are in the population", *_pooled(causes, pooled_)),
         section("Studies", *_studies(studies)),
         section("Where this comes from", *_provenance(seed, command)),
-        element("footer", "Made by fes-pin. Intervals are 95 %. SI units."),
     ]
-    return page("Cohort", joined([p for p in parts if p.text]))
+    return page("Cohort", parts)
 
 
 def _head(studies: Sequence[PageRow], good: Sequence[PageRow], prevalence: Sequence[PageRow]) -> Markup:

@@ -139,14 +139,27 @@ class Diagnosis(Saveable):
 
         On trials that took no part, where there are such; of a driven rig of the errors over the horizon.
         """
+        before, after, noise = self.judged_errors()
+        least = noise or 0.0
+        gone = 100.0 * (before - after) / max(before - least, before - after, 1e-300)
+        return float(np.clip(gone, 0.0, 100.0))
+
+    @property
+    def is_judged_outside(self) -> bool:
+        """Whether the errors that it is judged by are of trials that took no part."""
+        if self.over_horizon is not None:
+            return self.over_horizon.nominal_held_out is not None
+        return self.nominal_error[1] is not None and self.extended_error[1] is not None
+
+    def judged_errors(self) -> tuple[float, float, float | None]:
+        """Error E of the nominal and of the extended model, and what noise alone leaves; see `explained_percent`."""
         if (ahead := self.over_horizon) is not None:
             one, other = ahead.nominal_held_out or ahead.nominal, ahead.extended_held_out or ahead.extended
-            return _explained(one.horizon, other.horizon, other.noise or 0.0)
-        outside = self.nominal_error[1] is not None and self.extended_error[1] is not None
-        before, after = (e[1] if outside else e[0] for e in (self.nominal_error, self.extended_error))
+            return one.horizon, other.horizon, other.noise
+        before, after = (e[self.is_judged_outside] for e in (self.nominal_error, self.extended_error))
         assert before is not None
         assert after is not None
-        return _explained(before, after, self.ceiling_percent)
+        return before, after, self.ceiling_percent
 
     def headline(self) -> str:
         """The verdict in one sentence, with how much is explained and how much is not."""
@@ -235,8 +248,3 @@ class Diagnosis(Saveable):
             for g in (c.gain_held_out,)
         ]
         return by_columns(head, rows)
-
-
-def _explained(before: float, after: float, noise: float) -> float:
-    """Share of an error above that of noise alone which is gone, 0 to 100 percent."""
-    return float(np.clip(100.0 * (before - after) / max(before - noise, before - after, 1e-300), 0.0, 100.0))

@@ -9,7 +9,7 @@ from fes_pin.contrasts.result import Change, Contrast, contrast_headline, contra
 from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.text import probability
 from fes_pin.view.drawing import Drawing, rows_csv
-from fes_pin.view.page import Content, Markup, element, figure, html_table, joined, page, section, unit_text
+from fes_pin.view.page import Content, Markup, element, figure, html_table, page, section, unit_text
 from fes_pin.view.ranking import named_rows, rows_drawing
 from fes_pin.view.report_causes import value_and_interval
 
@@ -24,9 +24,8 @@ def contrast_html(found: Contrast) -> str:
         section("What changed", *_changes(found)),
         section("What did not change", *_unchanged(found)),
         section("How it was judged", *_judged(found)),
-        element("footer", "Made by fes-pin. Residual = measured - simulated. Intervals are 95 %. SI units."),
     ]
-    return page(f"{found.study.name} - contrast", joined([p for p in parts if p.text]))
+    return page(f"{found.study.name} - contrast", parts, "Residual = measured - simulated. ")
 
 
 def _head(found: Contrast) -> Markup:

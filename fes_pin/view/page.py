@@ -101,8 +101,10 @@ def folded(summary: Content, *contents: Markup, is_open: bool = False, id_: str 
     return element("details", element("summary", summary), joined(contents), **known)
 
 
-def page(title: str, body: Markup) -> str:
-    """A whole document with its style inside."""
+def page(title: str, parts: Sequence[Markup], residual: str = "") -> str:
+    """A whole document with its style inside: its parts, and a footer that says what a residual is."""
+    footer = element("footer", f"Made by fes-pin. {residual}Intervals are 95 %. SI units.")
+    body = joined([p for p in (*parts, footer) if p.text])
     files = resources.files("fes_pin.view")
     style = files.joinpath("report.css").read_text(encoding="utf-8") + STYLE.replace("INK", "var(--ink)")
     script = files.joinpath("report.js").read_text(encoding="utf-8")

@@ -24,7 +24,6 @@ from fes_pin.view.page import (
     figure,
     folded,
     html_table,
-    joined,
     page,
     section,
     unit_text,
@@ -69,9 +68,8 @@ def report_html(diagnosis: Diagnosis) -> str:
         section("Parameters and noise", *_parameters(diagnosis)),
         section("The model, to be used", *_use(diagnosis)),
         section("Where this comes from", *_provenance(diagnosis)),
-        element("footer", "Made by fes-pin. Residual = measured - simulated. Intervals are 95 %. SI units."),
     ]
-    return page(f"{diagnosis.study.name} - diagnosis", joined([p for p in parts if p.text]))
+    return page(f"{diagnosis.study.name} - diagnosis", parts, "Residual = measured - simulated. ")
 
 
 def _head(diagnosis: Diagnosis) -> Markup:

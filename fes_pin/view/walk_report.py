@@ -44,9 +44,8 @@ def walk_report_html(diagnosis: WalkDiagnosis) -> str:
         section("Ground reaction", *_trials(diagnosis)),
         section("Not testable here", *_absorbed(diagnosis)),
         section("The body, to be used", *_use(diagnosis)),
-        element("footer", "Made by fes-pin. Residual = measured - required. Intervals are 95 %. SI units."),
     ]
-    return page(f"{diagnosis.study.name} - diagnosis", joined([p for p in parts if p.text]))
+    return page(f"{diagnosis.study.name} - diagnosis", parts, "Residual = measured - required. ")
 
 
 def _facts(diagnosis: WalkDiagnosis) -> Markup:

@@ -7,7 +7,6 @@ import re
 from dataclasses import replace
 
 from fes_pin.diagnosis.cause import Cause
-from fes_pin.diagnosis.errors_ahead import Ahead
 from fes_pin.diagnosis.recorded import NEXT_FILE
 from fes_pin.diagnosis.result import STOPPED, Diagnosis
 from fes_pin.diagnosis.text import LEAST_P, estimate_text, percent, probability
@@ -123,34 +122,23 @@ def _round(count: float) -> str:
 def _explains(diagnosis: Diagnosis, share: float) -> str:
     what = "it" if len(diagnosis.causes) == 1 else "they"
     ends = "s" if what == "it" else ""
+    before, after, noise = diagnosis.judged_errors()
+    where = (
+        "trials that took no part in finding it" if diagnosis.is_judged_outside else "the trials that it was fitted to"
+    )
     if diagnosis.over_horizon is not None:
-        one, other = (
-            (diagnosis.over_horizon.nominal_held_out, diagnosis.over_horizon.extended_held_out)
-            if diagnosis.over_horizon.nominal_held_out and diagnosis.over_horizon.extended_held_out
-            else (diagnosis.over_horizon.nominal, diagnosis.over_horizon.extended)
-        )
         return (
             f"{share:.0f} % of what is not noise. Predicting {diagnosis.over_horizon.horizon_s:g} s ahead, the error E "
-            f"falls from {percent(one.horizon)} to {percent(other.horizon)}{_outside(diagnosis)}{_noise_ahead(other)}."
+            f"falls from {percent(before)} to {percent(after)}, on {where}{_noise_alone(noise)}."
         )
-    outside = diagnosis.nominal_error[1] is not None and diagnosis.extended_error[1] is not None
-    before, after = (e[1] if outside else e[0] for e in (diagnosis.nominal_error, diagnosis.extended_error))
     return (
-        f"{share:.0f} % of what is not noise{_outside(diagnosis)}: {what} take{ends} the error E from "
-        f"{percent(before)} to {percent(after)}; the noise alone is {percent(diagnosis.ceiling_percent)}."
+        f"{share:.0f} % of what is not noise, on {where}: {what} take{ends} the error E from {percent(before)} to "
+        f"{percent(after)}{_noise_alone(noise)}."
     )
 
 
-def _noise_ahead(ahead: Ahead) -> str:
-    return "" if ahead.noise is None else f"; the noise alone is {percent(ahead.noise)}"
-
-
-def _outside(diagnosis: Diagnosis) -> str:
-    if diagnosis.over_horizon is not None:
-        outside = diagnosis.over_horizon.nominal_held_out is not None
-    else:
-        outside = diagnosis.nominal_error[1] is not None and diagnosis.extended_error[1] is not None
-    return ", on trials that took no part in finding it" if outside else ", on the trials that it was fitted to"
+def _noise_alone(noise: float | None) -> str:
+    return "" if noise is None else f"; the noise alone is {percent(noise)}"
 
 
 def _left(diagnosis: Diagnosis, share: float) -> str:
@@ -166,12 +154,9 @@ def _left(diagnosis: Diagnosis, share: float) -> str:
 
 def _nothing(diagnosis: Diagnosis) -> list[tuple[str, Content]]:
     left, count = diagnosis.remainder, len(diagnosis.catalogue.effects_for(diagnosis.model.rig))
-    error = diagnosis.nominal_error[1] if diagnosis.nominal_error[1] is not None else diagnosis.nominal_error[0]
-    if diagnosis.over_horizon is not None:
-        told = diagnosis.over_horizon.nominal_held_out or diagnosis.over_horizon.nominal
-        size = f"E is {percent(told.horizon)}, {diagnosis.over_horizon.horizon_s:g} s ahead{_noise_ahead(told)}"
-    else:
-        size = f"E is {percent(error)}; the noise alone is {percent(diagnosis.ceiling_percent)}"
+    error, _, noise = diagnosis.judged_errors()
+    span = "" if diagnosis.over_horizon is None else f", {diagnosis.over_horizon.horizon_s:g} s ahead"
+    size = f"E is {percent(error)}{span}{_noise_alone(noise)}"
     if diagnosis.verdict == "adequate":
         unseen = diagnosis.absorbed
         hidden = f" {len(unseen)} of them could not show in these data: see below." if unseen else ""
