@@ -121,7 +121,7 @@ def diagnose(
         files: dict[str, str | bytes] = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
         if table is not None:
             names, columns = trajectories(diagnosis)
-            files[table] = table_bytes(columns, table, {"trial": names})
+            files[table] = table_bytes({"trial": names, **columns}, table)
         tell(1.0, "done")
     old = {NEXT_FILE, *(f"trajectories{suffix}" for suffix in SUFFIXES)}
     outputs.write(out, files, without=old - set(files))  # what an earlier diagnosis proposed is not this one's

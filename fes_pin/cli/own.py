@@ -210,8 +210,6 @@ def _wanted(
         raise InputError(f"expected {told} for rig {schema.name}", column="--urdf")
     if urdf_file is not None and schema.check_files is not None:
         schema.check_files({"urdf": urdf_file})
-    if resample == 0.0:
-        raise InputError("expected a rate above 0 Hz", column="--resample")
     doubles = [f for k, f in enumerate(files) if f.absolute() in [g.absolute() for g in files[:k]]]
     if doubles:
         raise InputError("was named twice", file=doubles[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,7 @@ from fes_pin.cohort.tables import (
     ERRORS,
     Row,
     cause_rows,
-    csv_text,
     nominal_rows,
-    parquet_bytes,
     pooled_rows,
     prevalence_rows,
     study_rows,
@@ -28,6 +27,7 @@ from fes_pin.cohort.tables import (
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.results import Saveable, shown
+from fes_pin.data.tabular import SUFFIXES, table_bytes
 from fes_pin.models.catalogue import load_library
 
 
@@ -178,10 +178,10 @@ def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
     out: dict[str, str | bytes] = {}
     for name in ("studies", "causes", "pooled", "prevalence"):
         rows: Sequence[Row] = getattr(made, name)
-        out[f"{name}.csv"] = csv_text(rows, HEADS[name])
-        parquet = parquet_bytes(rows, HEADS[name])
-        if parquet is not None:
-            out[f"{name}.parquet"] = parquet
+        columns = {n: [r[n] for r in rows] for n in HEADS[name]}
+        for suffix in SUFFIXES:
+            with suppress(InputError):  # Parquet where it can be written
+                out[name + suffix] = table_bytes(columns, name + suffix)
     out["cohort.html"] = cohort_html(made.studies, made.causes, made.pooled, made.prevalence, seed, command)
     return out
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -136,33 +134,3 @@ def prevalence_rows(causes: Sequence[Row], studies: int) -> list[Row]:
             }
         )
     return sorted(out, key=lambda r: (-r["studies"], r["cause"]))
-
-
-def csv_text(rows: Sequence[Row], head: Sequence[str]) -> str:
-    """Rows as CSV; an empty cell for a number that is not known."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(head)
-    for row in rows:
-        writer.writerow(["" if _unknown(row[n]) else row[n] for n in head])
-    return stream.getvalue()
-
-
-def _unknown(value: Any) -> bool:
-    return value is None or (isinstance(value, float) and math.isnan(value))
-
-
-def parquet_bytes(rows: Sequence[Row], head: Sequence[str]) -> bytes | None:
-    """Rows as Parquet; None where pyarrow is not installed."""
-    try:
-        import pyarrow  # noqa: PLC0415
-        import pyarrow.parquet  # noqa: PLC0415
-    except ImportError:
-        return None
-    kinds = {bool: pyarrow.bool_(), int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
-    known = {n: next((type(r[n]) for r in rows if r[n] is not None), str) for n in head}
-    types = {n: kinds[kind] for n, kind in known.items()}
-    table = pyarrow.table({n: pyarrow.array([None if _unknown(r[n]) else r[n] for r in rows], types[n]) for n in head})
-    sink = io.BytesIO()
-    pyarrow.parquet.write_table(table, sink)
-    return sink.getvalue()

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 import io
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.table import format_csv
 
 SUFFIXES = (".csv", ".parquet")
 
@@ -29,17 +31,14 @@ def check_table(path: str | Path) -> None:
             raise InputError("Parquet needs pyarrow: pip install 'fes-pin[parquet]'", file=path) from None
 
 
-def table_bytes(
-    columns: Mapping[str, np.ndarray], path: str | Path, names: Mapping[str, Sequence[str]] | None = None
-) -> bytes:
+def table_bytes(columns: Mapping[str, Sequence[Any] | np.ndarray], path: str | Path) -> bytes:
     """A table as the file's suffix says.
 
     Parameters
     ----------
     columns
-        Numbers, each of shape (n,); NaN is written as nothing.
-    names
-        Columns of words, which come first.
+        Numbers as an array of shape (n,), or a list of n numbers, words, or truths; None and NaN are written as
+        nothing.
 
     Raises
     ------
@@ -47,23 +46,23 @@ def table_bytes(
         As `check_table`.
     """
     check_table(path)
+    cells = {n: v.astype(float).tolist() if isinstance(v, np.ndarray) else v for n, v in columns.items()}
     if Path(path).suffix.lower() == ".parquet":
         import pyarrow  # noqa: PLC0415
         from pyarrow.parquet import write_table  # noqa: PLC0415
 
-        first = {n: list(v) for n, v in (names or {}).items()}
-        numbers = {n: pyarrow.array(np.asarray(v, dtype=float), from_pandas=True) for n, v in columns.items()}
-        stream = io.BytesIO()
-        write_table(pyarrow.table({**first, **numbers}), stream)
-        return stream.getvalue()
-    lines = format_csv(columns).replace("nan", "").split("\n")
-    if names:
-        words = [",".join(names), *(",".join(map(_quoted, row)) for row in zip(*names.values(), strict=True))]
-        lines = [f"{word},{line}" for word, line in zip(words, lines[:-1], strict=True)] + [""]
-    return "\n".join(lines).encode()
+        kinds = {bool: pyarrow.bool_(), int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
+        known = {n: next((type(x) for x in v if x is not None), str) for n, v in cells.items()}
+        sink = io.BytesIO()
+        made = {n: pyarrow.array(v, kinds[known[n]], from_pandas=True) for n, v in cells.items()}
+        write_table(pyarrow.table(made), sink)
+        return sink.getvalue()
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(cells)
+    writer.writerows(zip(*(["" if _is_unknown(x) else x for x in v] for v in cells.values()), strict=True))
+    return stream.getvalue().encode()
 
 
-def _quoted(word: str) -> str:
-    """A word as a cell of CSV."""
-    escaped = word.replace('"', '""')
-    return f'"{escaped}"' if {",", '"'} & set(word) else word
+def _is_unknown(value: Any) -> bool:
+    return value is None or (isinstance(value, float) and math.isnan(value))

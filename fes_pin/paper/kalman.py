@@ -31,7 +31,6 @@ from fes_pin.data.trial import Trial
 START_TIME_CONSTANT_S = 0.1
 """Where the search for tau starts, s: twice the paper's; its band reaches from 0 to beyond 1 s."""
 START_ALPHA_STD = 0.1
-GAIN_95 = float(scipy.stats.norm.ppf(0.975))
 
 
 @dataclass(frozen=True)

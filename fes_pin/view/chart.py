@@ -16,8 +16,6 @@ from fes_pin.view.style import COLOURS
 
 TICKS = 5
 """Ticks of an axis, about."""
-LETTER = 5.7
-"""Mean width of a letter of tick labels, in the units of a chart."""
 
 STYLE = """
 svg.chart { font: 11px system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }

@@ -96,7 +96,7 @@ def test_standard_input_and_output(made, monkeypatch, capsys, tmp_path):
 
 
 def test_a_trial_whose_name_has_a_comma_is_one_cell():
-    words = table_bytes({"x": np.array([1.0, 2.0])}, "a.csv", {"trial": ["a,b", 'c"']}).decode().splitlines()
+    words = table_bytes({"trial": ["a,b", 'c"'], "x": np.array([1.0, 2.0])}, "a.csv").decode().splitlines()
     assert list(csv.reader(words)) == [["trial", "x"], ["a,b", "1.0"], ['c"', "2.0"]]
 
 

@@ -7,7 +7,6 @@ that was fitted. The random effort that was found is part of the model: what is 
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import replace
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.diagnosis.decide.significance import level_of
-from fes_pin.diagnosis.remainder.open_set import SIGN_DRAWS, Remainder, beside_smooth
+from fes_pin.diagnosis.remainder.open_set import Remainder, beside_smooth, inflation_by_signs, trial_shares
 from fes_pin.diagnosis.search.score import Projection
 from fes_pin.identify.fit import Fit, fit
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -65,12 +64,12 @@ def _features_left(fitted: Fit, seed: int) -> Remainder:
     if not len(good):
         return Remainder(False, 1.0, None)
     left = left[:, good] / after[good]
-    by_trial = _by_trial(left, projection.residual, fitted)
+    by_trial = trial_shares(left, projection.residual, fitted)
     values, vectors = np.linalg.eigh(left.T @ left)
     kept = values > 1e-4 * values.max()
     shares = by_trial @ vectors[:, kept] / np.sqrt(values[kept])
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
-    inflation = _inflation(shares, rank, seed)
+    inflation = inflation_by_signs(shares, rank, seed)
     single = by_trial.sum(axis=0)
     best = int(np.argmax(np.abs(single)))
 
@@ -151,17 +150,3 @@ def _scaled(effect: Effect, fitted: Fit) -> Effect:
         "duration": max(t.duration for t in trials),
     }
     return replace(effect, **scales)
-
-
-def _by_trial(columns: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.ndarray:
-    """Each trial's part of the inner products of columns and residual, shape (trials, columns)."""
-    ends = np.cumsum([0, *(len(p.residual) for p in fitted.parts)])
-    return np.array([columns[a:b].T @ residual[a:b] for a, b in itertools.pairwise(ends)])
-
-
-def _inflation(shares: np.ndarray, rank: int, seed: int) -> float:
-    """How much larger than its rank the statistic is with random signs of the trials; 1 with fewer than 4 trials."""
-    if len(shares) < 4 or not rank:
-        return 1.0
-    signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(SIGN_DRAWS, len(shares)))
-    return max(1.0, float(np.mean(np.sum((signs @ shares) ** 2, axis=1))) / rank)

@@ -8,6 +8,7 @@ turns. All but the first see what it is blind to, and what an autoregressive noi
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -215,11 +216,11 @@ def smooth_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     names, scale = [n for n, g in zip(made.names, good, strict=True) if g], 1.0 / after[good]
     values, vectors = np.linalg.eigh(gram[np.ix_(good, good)] * np.outer(scale, scale))
     kept = values > 1e-4 * values.max(initial=1e-300)
-    by_trial = _trial_shares(columns, projection.residual, fitted)[:, good] * scale
+    by_trial = trial_shares(columns, projection.residual, fitted)[:, good] * scale
     shares = by_trial @ vectors[:, kept] / np.sqrt(values[kept])
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
     plain = float(chi2_tail(statistic, rank))
-    p_value = float(chi2_tail(statistic / _inflation(shares, rank, seed), rank))
+    p_value = float(chi2_tail(statistic / inflation_by_signs(shares, rank, seed), rank))
     strong = plain < CERTAIN_LEVEL <= p_value  # it differs from trial to trial: a spasm, not noise
     p_value = plain if strong else p_value
     unexplained = p_value < CLAIM_LEVEL
@@ -227,22 +228,18 @@ def smooth_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     for name, z in zip(names, by_trial.sum(axis=0), strict=True):
         scores[name] = max(scores.get(name, 0.0), float(z**2))
     where = max(scores, key=lambda n: scores[n]) if unexplained else None
-    inflation = _inflation(shares, rank, seed)
+    inflation = inflation_by_signs(shares, rank, seed)
     excess = max(0.0, statistic / inflation - float(chi2_quantile(0.975, rank)))
     return Remainder(unexplained, p_value, where, excess)
 
 
-def _trial_shares(columns: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.ndarray:
+def trial_shares(columns: np.ndarray, residual: np.ndarray, fitted: Fit) -> np.ndarray:
     """Each trial's part of the inner products of columns and residual, shape (trials, columns)."""
-    out, at = [], 0
-    for part in fitted.parts:
-        rows = slice(at, at + len(part.residual))
-        at = rows.stop
-        out.append(columns[rows].T @ residual[rows])
-    return np.array(out)
+    ends = np.cumsum([0, *(len(p.residual) for p in fitted.parts)])
+    return np.array([columns[a:b].T @ residual[a:b] for a, b in itertools.pairwise(ends)])
 
 
-def _inflation(shares: np.ndarray, rank: int, seed: int) -> float:
+def inflation_by_signs(shares: np.ndarray, rank: int, seed: int) -> float:
     """How much larger than its rank the statistic is with random signs of the trials; 1 with fewer than 4 trials."""
     if len(shares) < 4 or not rank:
         return 1.0
