@@ -101,7 +101,7 @@ def predict(
         raise InputError(f"expected a column {columns} to compare with{'' if residuals else ', or --out'}", file=trial)
     if out is not None:
         names, columns_out = trial_table(given, [_columns(*pair, residuals) for pair in zip(given, found, strict=True)])
-        table = table_bytes(({"trial": names} if is_study else {}) | columns_out, out)
+        table = table_bytes({**({"trial": names} if is_study else {}), **columns_out}, out)
         if out == STANDARD:
             typer.echo(table.decode(), nl=False)
         else:

@@ -83,6 +83,21 @@ def checked_role(value: object, error: KeyFault) -> str:
         raise error("role", str(problem)) from None
 
 
+def check_labels(name: object, role: object, group: object, error: KeyFault) -> None:
+    """Require of a trial's name, role and group that they are such; role and group may be None.
+
+    Raises
+    ------
+    InputError
+        Made by `error`.
+    """
+    checked_label(name, error, "name", "a name")
+    if role is not None:
+        checked_role(role, error)
+    if group is not None:
+        checked_label(group, error)
+
+
 def checked_remarks(value: object, error: KeyFault) -> tuple[str, ...]:
     """Remarks on a trial, each one line of text.
 

@@ -6,7 +6,6 @@ study. The steps are those that the data set's description names; nothing is fil
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_text
+from fes_pin.data.files import read_json
 from fes_pin.data.recorded.formats import matlab_vectors
 from fes_pin.data.units import INCH, POUND
 
@@ -75,7 +74,7 @@ def servo_pendulum(folder: Path) -> Files:
     """
     files, trials = {}, []
     for place in SERVO_LOGS:
-        log = _json(folder / place)
+        log = read_json(folder / place)
         rows = [_numbers(row, folder / place) for row in log["entries"]]
         t, q, w, pwm, volts, on = np.array(rows).T
         current = (pwm / SERVO_PULSES * volts - SERVO_TORQUE * w) / SERVO_RESISTANCE
@@ -133,7 +132,7 @@ def friction_damper(folder: Path) -> Files:
     files, trials = {}, []
     for name, (place, group) in DAMPER_FILES.items():
         try:
-            table = np.array(_json(folder / place)["data"], dtype=float)
+            table = np.array(read_json(folder / place)["data"], dtype=float)
             t, inches, kips, rate = table[:, 0], table[:, 1], table[:, 2], table[:, 3]
         except (KeyError, IndexError, TypeError, ValueError) as problem:
             raise InputError(f"not a test as it was when this was written: {problem}", file=folder / place) from None
@@ -189,13 +188,6 @@ CONVERTERS: Mapping[str, tuple[Callable[[Path], Files], tuple[str, ...]]] = {
     "servo_pendulum": (servo_pendulum, SERVO_LOGS),
 }
 """By data set what makes a study of it, and the upstream files that this needs."""
-
-
-def _json(path: Path) -> Any:
-    try:
-        return json.loads(read_text(path))
-    except (ValueError, RecursionError) as error:
-        raise error if isinstance(error, InputError) else InputError("expected JSON", file=path) from None
 
 
 def _csv(columns: Mapping[str, np.ndarray]) -> str:

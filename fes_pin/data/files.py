@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from fes_pin.data.as_read import HeldFile, note_bytes
 from fes_pin.data.errors import InputError
@@ -62,6 +64,21 @@ def read_text(path: str | Path) -> str:
         row = content[: error.start].count(b"\n") + 1
         raise InputError("expected UTF-8 text", file=path, row=row) from error
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+
+
+def read_json(path: str | Path) -> Any:
+    """What a file of JSON holds.
+
+    Raises
+    ------
+    InputError
+        As `read_text`, and for what is no JSON, with the row.
+    """
+    text = read_text(path)
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"expected JSON: {error}", file=path, row=getattr(error, "lineno", None)) from None
 
 
 def hold(path: str | Path) -> HeldFile:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import inside
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, read_motion
-from fes_pin.data.new_study import NewStudy, copied
+from fes_pin.data.new_study import NewStudy, placed
 from fes_pin.data.schema import BODY, unknown
 from fes_pin.data.study_text import HEADER, quoted
 from fes_pin.data.wanted import Wanted, label_lines, number_set
@@ -45,7 +44,7 @@ def new_body_study(wanted: Wanted) -> NewStudy:
     conditions = [f"{key} = {value!r}" for key, value in given.items()]
     origins: dict[str, Path] = {}
     for move, push in zip(moves, pushes, strict=True):
-        places = [_place(path, folder, contents) for path in (move, push)]
+        places = [placed(path, folder, contents) for path in (move, push)]
         origins.update(zip(places, (move, push), strict=True))
         text += ["", "[[trial]]", f"coordinates = {quoted(places[0])}", f"ground_reaction = {quoted(places[1])}"]
         text += [*label_lines(wanted, move, push), *conditions]
@@ -62,12 +61,3 @@ def _is_ground_reaction(path: Path) -> bool:
         coordinates_of(table, in_degrees)
         return False
     return True
-
-
-def _place(path: Path, folder: Path, contents: dict[str, str | bytes]) -> str:
-    try:
-        relative = path.absolute().relative_to(folder.absolute()).as_posix()
-        inside(folder, relative)
-        return relative
-    except ValueError:
-        return copied(path, folder, path.name, contents)

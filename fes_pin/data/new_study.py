@@ -96,7 +96,7 @@ class _Making:
             raise InputError("the files do not say everything; please add " + ", ".join(dict.fromkeys(self.missing)))
         contents: dict[str, str | bytes] = {}
         files = self._urdf(contents)
-        places = [self._place(path, contents) for path in self.wanted.files]
+        places = [placed(path, self.wanted.folder, contents, "trials/") for path in self.wanted.files]
         text = [
             *toml_table("study", {"name": self.wanted.name, "rig": self.schema.name}),
             *toml_table("rig", {**files, **rig, **known}, "known before the trials, never fitted", self._units()),
@@ -297,16 +297,7 @@ class _Making:
         if isinstance(urdf, tuple):
             contents[urdf[0]] = urdf[1]
             return {"urdf": urdf[0]}
-        return {"urdf": self._place(urdf, contents, "")}
-
-    def _place(self, path: Path, contents: dict[str, str | bytes], below: str = "trials/") -> str:
-        """The file's path below the study's folder, where it is copied to if it is elsewhere."""
-        try:
-            relative = path.absolute().relative_to(self.wanted.folder.absolute()).as_posix()
-            inside(self.wanted.folder, relative)
-            return relative
-        except ValueError:
-            return copied(path, self.wanted.folder, f"{below}{path.name}", contents)
+        return {"urdf": placed(urdf, self.wanted.folder, contents)}
 
     def _columns(self, sources: Mapping[str, Mapping[str, Any]]) -> list[str]:
         """The table `[columns]`; empty where the files are as the study format has them."""
@@ -333,14 +324,20 @@ class _Making:
         return {k: n.unit for table in (schema.constants, schema.passive, schema.start) for k, n in table.items()}
 
 
-def copied(path: Path, folder: Path, place: str, contents: dict[str, str | bytes]) -> str:
-    """Put a file that lies elsewhere among the contents of a study's folder; its place there.
+def placed(path: Path, folder: Path, contents: dict[str, str | bytes], below: str = "") -> str:
+    """A file's path below a study's folder; one that lies elsewhere is put among the contents, in a folder `below`.
 
     Raises
     ------
     InputError
         Another file has that place, in the folder or among the contents.
     """
+    try:
+        relative = path.absolute().relative_to(folder.absolute()).as_posix()
+        inside(folder, relative)
+        return relative
+    except ValueError:
+        place = f"{below}{path.name}"
     content, there = read_bytes(path), folder / place
     if place in contents or (there.exists() and not (there.is_file() and there.read_bytes() == content)):
         raise InputError(f"would be copied to {place}, where there is another file already", file=path)

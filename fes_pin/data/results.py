@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_text, write_text
+from fes_pin.data.files import read_json, write_text
 from fes_pin.data.numbers import printed
 from fes_pin.data.read_only import ReadOnly, as_dicts
 from fes_pin.data.show import frame, table_html, table_text
@@ -178,11 +178,7 @@ def load_result(path: str | Path) -> SavedResult:
     InputError
         The file cannot be read, or is no result.
     """
-    text = read_text(path)
-    try:
-        found = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"expected JSON: {error}", file=path, row=getattr(error, "lineno", None)) from None
+    found = read_json(path)
     found = found if isinstance(found, dict) else {}
     kind, lines, table = (found.pop(n, None) for n in (RESULT, TEXT, TABLE))
     whole = isinstance(kind, str) and isinstance(lines, list) and isinstance(table, dict)

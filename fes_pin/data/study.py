@@ -17,12 +17,12 @@ import tomli_w
 from fes_pin.data.as_read import AsRead, digest_of, hashing
 from fes_pin.data.checks import (
     check_constants,
+    check_labels,
     check_same_inputs,
     checked_kind,
     checked_label,
     checked_mapping,
     checked_remarks,
-    checked_role,
     known_constants,
 )
 from fes_pin.data.errors import InputError
@@ -402,13 +402,8 @@ class _Reader(StudyTables):
             return self.error(f"{where}.{key}", message)
 
         named = self.schema.recordings
-        checked_label(name, error, "name", "a name")
-        kind = checked_kind(self.schema, table.get("kind"), error)
-        role, group = table.get("role"), table.get("group")
-        if role is not None:
-            checked_role(role, error)
-        if group is not None:
-            checked_label(group, error)
+        kind, role, group = checked_kind(self.schema, table.get("kind"), error), table.get("role"), table.get("group")
+        check_labels(name, role, group, error)
         remarks = checked_remarks(table.get("remarks", ()), error)
         passed = checked_numbers({k: table[k] for k in (LOW_PASS,) if k in table}, {LOW_PASS: POSITIVE_HZ}, error)
         about = ("name", "kind", "role", "group", "remarks", LOW_PASS)

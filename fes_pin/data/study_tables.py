@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
 from fes_pin.data.as_read import HeldFile
 from fes_pin.data.checks import check_constants, checked_label, known_constants
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import hold, read_text
+from fes_pin.data.files import hold, read_json
 from fes_pin.data.recorded.columns import Columns, columns_of
 from fes_pin.data.schema import NumberKey, Rigs, RigSchema, one_of, unknown
 from fes_pin.data.toml import Document
@@ -33,13 +32,7 @@ def check_files(schema: RigSchema, files: Mapping[str, Path]) -> None:
     elif "urdf" in files:
         moving_joints(files["urdf"])
     if "segments" in files:
-        try:
-            json.loads(read_text(files["segments"]))
-        except (ValueError, RecursionError) as error:
-            if isinstance(error, InputError):
-                raise
-            row = getattr(error, "lineno", None)
-            raise InputError("expected JSON", file=files["segments"], row=row) from None
+        read_json(files["segments"])
 
 
 class StudyTables:

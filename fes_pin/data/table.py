@@ -137,14 +137,26 @@ def _number(field: str, path: Path, row: int, column: str) -> float:
     field = field.strip()
     if not field:
         raise InputError("expected a number, found nothing", file=path, row=row, column=column)
+    return number_of_cell(field, path, row, column)
+
+
+def number_of_cell(cell: str, path: Path, row: int, column: str, decimal: str = ".") -> float:
+    """The finite number that a cell says with this decimal sign.
+
+    Raises
+    ------
+    InputError
+        It says none, with row and column.
+    """
     try:
-        if "_" in field:
+        if "_" in cell or (decimal == "," and "." in cell):
             raise ValueError
-        value = float(field)
+        value = float(cell.replace(decimal, "."))
     except ValueError:
-        raise InputError(f"expected a number, found {field[:40]!r}", file=path, row=row, column=column) from None
+        what = "a number with a decimal comma" if decimal == "," else "a number"
+        raise InputError(f"expected {what}, found {cell[:40]!r}", file=path, row=row, column=column) from None
     if not math.isfinite(value):
-        raise InputError(f"expected a finite number, found {field[:40]!r}", file=path, row=row, column=column)
+        raise InputError(f"expected a finite number, found {cell[:40]!r}", file=path, row=row, column=column)
     return value
 
 

@@ -14,12 +14,12 @@ import numpy as np
 from fes_pin.data.as_read import AsRead, digest_of, hashing
 from fes_pin.data.checks import (
     check_columns,
+    check_labels,
     check_values,
     checked_kind,
     checked_label,
     checked_mapping,
     checked_remarks,
-    checked_role,
 )
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
@@ -100,12 +100,8 @@ class Trial(ReadOnly):
         def error(key: str, message: str) -> InputError:
             return self.error(message, key)
 
-        checked_label(self.name, error, "name", "a name")
+        check_labels(self.name, self.role, self.group, error)
         checked_label(self.kind, error, "kind", "a kind")
-        if self.role is not None:
-            checked_role(self.role, error)
-        if self.group is not None:
-            checked_label(self.group, error)
         remarks = checked_remarks(self.remarks, error)
         given = {key: checked_mapping(getattr(self, key), error, key) for key in ("columns", "conditions")}
         conditions = checked_numbers(given["conditions"], dict.fromkeys(given["conditions"], NumberKey("")), error)
@@ -411,8 +407,7 @@ def read_trial(
     except ValueError as problem:
         raise error("rig", str(problem)) from None
     kind = checked_kind(schema, kind, error)
-    if role is not None:
-        checked_role(role, error)
+    check_labels(name or path.stem, role, group, error)
     numbers = check_conditions(schema, kind, conditions or {}, error)
     labels: dict[str, Any] = {"name": name or path.stem, "kind": kind, "conditions": numbers}
     labels |= {"role": role, "group": group, "low_pass_hz": low_pass_hz}

@@ -12,7 +12,7 @@ import numpy as np
 from fes_pin.data.log import Log
 from fes_pin.data.provenance import Provenance
 from fes_pin.data.results import Saveable, shown
-from fes_pin.data.show import by_columns, explaining, from_to
+from fes_pin.data.show import by_columns, explaining, from_to, last_notes
 from fes_pin.data.study import Study
 from fes_pin.diagnosis import recorded
 from fes_pin.diagnosis.cause import CELLS, Cause, Ranked
@@ -193,11 +193,7 @@ class Diagnosis(Saveable):
             lines.append(f"{', '.join(own)}: {EACH_TRIAL}")
         for where, names in self.catalogue.origins().items():
             lines.append(f"looked for as well: {', '.join(names)}, code of {Path(where).name}")
-        if self.absorbed:
-            lines.append(f"not testable here: {', '.join(self.absorbed)}")
-        if self.next_experiment:
-            lines.append(f"next experiment: {self.next_experiment.why}")
-        return [*lines, *(f"warning: {words}" for words in self.warnings)]
+        return [*lines, *last_notes(self.absorbed, self.next_experiment, self.warnings)]
 
     def __repr__(self) -> str:
         names = f" ({', '.join(c.name for c in self.causes)})" if self.causes else ""

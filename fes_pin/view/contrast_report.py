@@ -11,7 +11,7 @@ from fes_pin.diagnosis.text import probability
 from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.page import Content, Markup, element, figure, html_table, page, section, unit_text
 from fes_pin.view.ranking import named_rows, rows_drawing
-from fes_pin.view.report_causes import value_and_interval
+from fes_pin.view.report_causes import card, told_apart, value_and_interval
 
 SAID = ("in all groups", "repeats scatter", "something is left", "nothing left")
 """Beginnings of the notes that stand beside how it was judged; the others have sections of their own."""
@@ -53,23 +53,14 @@ def _change(change: Change, groups: tuple[str, ...]) -> Markup:
     for name, by_group in change.parameters.items():
         unit = unit_text(next(iter(by_group.values())).unit)
         rows.append([element("code", name), unit, *(_value(by_group, g) for g in groups)])
-    told = (
-        f"These data cannot tell it from {', '.join(change.equivalents)}: read them as one set."
-        if change.equivalents
-        else "These data tell it apart from every other change in the library."
-    )
+    told = told_apart(change.equivalents, "change")
     first = next(iter(change.parameters))
-    return element(
-        "article",
-        element(
-            "div",
-            element("h3", element("code", change.name)),
-            element("p", change.words[0].upper() + change.words[1:] + "."),
-            html_table(("parameter", "unit", *groups), rows, range(2, 2 + len(groups))),
-            figure(_drawing(change, groups), f"{first} in each group, with its 95 % interval.", "narrow", change.name),
-            element("p", f"{told} Over the whole library {probability(change.p_value)}."),
-        ),
-        class_="cause",
+    return card(
+        element("h3", element("code", change.name)),
+        element("p", change.words[0].upper() + change.words[1:] + "."),
+        html_table(("parameter", "unit", *groups), rows, range(2, 2 + len(groups))),
+        figure(_drawing(change, groups), f"{first} in each group, with its 95 % interval.", "narrow", change.name),
+        element("p", f"{told} Over the whole library {probability(change.p_value)}."),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from fes_pin.diagnosis.cause import Cause, ParameterEstimate
 from fes_pin.diagnosis.result import EACH_TRIAL, Diagnosis
@@ -54,46 +55,46 @@ def _rivals(diagnosis: Diagnosis, cause: Cause) -> Markup:
 def _of_one_trial(diagnosis: Diagnosis, cause: Cause) -> Markup:
     """The card of a cause that concerns one trial, and is no part of the model."""
     gain = f"Restated, it removes {cause.gain_held_out} of that trial's error above the noise, told by its other parts."
-    return element(
-        "article",
-        element(
-            "div",
-            element("h3", element("code", cause.name), " ", stage_mark(cause.stage)),
-            element("p", f"{cause.words[0].upper()}{cause.words[1:]}."),
-            _estimates(cause),
-            element("p", gain, " Everything else here is told with that value in its place."),
-        ),
-        class_=f"cause {cause.stage}",
+    return card(
+        element("h3", element("code", cause.name), " ", stage_mark(cause.stage)),
+        element("p", f"{cause.words[0].upper()}{cause.words[1:]}."),
+        _estimates(cause),
+        element("p", gain, " Everything else here is told with that value in its place."),
+        stage=cause.stage,
     )
+
+
+def card(*contents: Markup, stage: str = "") -> Markup:
+    """A frame about what is said of a cause or a change, in the colour of its stage."""
+    return element("article", element("div", *contents), class_=f"cause {stage}".rstrip())
 
 
 def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
     if cause.trial is not None:
         return _of_one_trial(diagnosis, cause)
     kind = diagnosis.catalogue.effect(cause.name)
-    told = (
-        f"These data cannot tell it from {', '.join(cause.equivalents)}: read them as one set."
-        if cause.equivalents
-        else "These data tell it apart from every other cause in the library."
-    )
+    told = told_apart(cause.equivalents, "cause")
     where = f"held-out trials ({cause.gain_fit:.0f} % on the fitted ones)"
     if not diagnosis.was_held_out:
         where = "the trials that were fitted: there was nothing to hold out"
     gain = f"It removes {cause.gain_held_out} of the error above the noise on {where}."
-    return element(
-        "article",
-        element(
-            "div",
-            element("h3", element("code", cause.name), " ", stage_mark(cause.stage)),
-            element("p", sentence(kind)),
-            equations_mathml(equation(kind)),
-            _estimates(cause),
-            element("p", gain, " ", told, *_notes(diagnosis, cause)),
-            element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}", class_="soft"),
-            _rivals(diagnosis, cause),
-        ),
-        class_=f"cause {cause.stage}",
+    return card(
+        element("h3", element("code", cause.name), " ", stage_mark(cause.stage)),
+        element("p", sentence(kind)),
+        equations_mathml(equation(kind)),
+        _estimates(cause),
+        element("p", gain, " ", told, *_notes(diagnosis, cause)),
+        element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}", class_="soft"),
+        _rivals(diagnosis, cause),
+        stage=cause.stage,
     )
+
+
+def told_apart(equivalents: Sequence[str], what: str) -> str:
+    """Whether the data tell a cause or a change apart from the others, in words."""
+    if equivalents:
+        return f"These data cannot tell it from {', '.join(equivalents)}: read them as one set."
+    return f"These data tell it apart from every other {what} in the library."
 
 
 def _notes(diagnosis: Diagnosis, cause: Cause) -> list[str]:

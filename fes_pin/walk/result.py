@@ -12,7 +12,7 @@ import numpy as np
 from fes_pin.body.build import Body
 from fes_pin.data.numbers import printed
 from fes_pin.data.results import Recorded, Saveable
-from fes_pin.data.show import by_columns, explaining, from_to
+from fes_pin.data.show import by_columns, explaining, from_to, last_notes
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
 from fes_pin.infer.held_out import Gain
@@ -267,11 +267,7 @@ class WalkDiagnosis(Saveable):
                 )
             if cause.elsewhere:
                 lines.append(f"{cause.name}: as well at {'; '.join(cause.elsewhere[:4])}")
-        if self.absorbed:
-            lines.append(f"not testable here: {', '.join(self.absorbed)}")
-        if self.next_experiment:
-            lines.append(f"next experiment: {self.next_experiment.why}")
-        return [*lines, *(f"warning: {words}" for words in self.warnings)]
+        return [*lines, *last_notes(self.absorbed, self.next_experiment, self.warnings)]
 
     def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         head = ("cause", "site", "parameters", "held-out gain", "cannot be told from")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes
 from fes_pin.data.recorded.recording import Recording, without_twins
-from fes_pin.data.table import MIN_ROWS
+from fes_pin.data.table import MIN_ROWS, number_of_cell
 
 DELIMITERS = (";", "\t", ",", " ")
 """Semicolon, tab, comma, and any white space."""
@@ -183,23 +182,9 @@ def _slowly(
             raise InputError(message, file=path, row=row, column=names[-1])
         for k, place in enumerate(places):
             cell = cells[place] if place < len(cells) else ""
-            values[index, k] = _number(cell, form, path, row, names[place])
+            is_missing = cell.lower() in MISSING
+            values[index, k] = np.nan if is_missing else number_of_cell(cell, path, row, names[place], form.decimal)
     return values
-
-
-def _number(cell: str, form: TextForm, path: Path, row: int, column: str) -> float:
-    if cell.lower() in MISSING:
-        return math.nan
-    try:
-        if "_" in cell or (form.decimal == "," and "." in cell):
-            raise ValueError
-        value = float(cell.replace(",", ".") if form.decimal == "," else cell)
-    except ValueError:
-        what = "a number with a decimal comma" if form.decimal == "," else "a number"
-        raise InputError(f"expected {what}, found {cell[:40]!r}", file=path, row=row, column=column) from None
-    if not math.isfinite(value):
-        raise InputError(f"expected a finite number, found {cell[:40]!r}", file=path, row=row, column=column)
-    return value
 
 
 def _decimals(cell: str, decimal: str) -> int:
