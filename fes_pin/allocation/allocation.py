@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fes_pin.allocation.certificate import Certificate
-from fes_pin.allocation.problem import AllocationProblem
+from fes_pin.allocation.problem import AllocationProblem, OfProblem
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word
 from fes_pin.data.read_only import ReadOnly
@@ -25,22 +25,11 @@ WORTH_NAMING = 0.1
 """A channel is named as a reason if it makes at least this fraction of what the most helpful limited one makes."""
 
 
-class ByName:
+class ByName(OfProblem):
     """What results say by name; they hold a `problem`, pulse widths (..., n) us and torques (..., joints) N m."""
 
-    problem: AllocationProblem
     pulse_width_us: np.ndarray
     achieved: np.ndarray
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Channels."""
-        return self.problem.names
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joints."""
-        return self.problem.joints
 
     def __getitem__(self, channel: str) -> Any:
         """Pulse width of a channel, us: a number, or (samples,)."""

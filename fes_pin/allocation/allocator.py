@@ -13,7 +13,7 @@ from fes_pin.allocation.certificate import Certifier
 from fes_pin.allocation.efforts import error_then_effort, least_cubes
 from fes_pin.allocation.inputs import fractions, wanted_torque, wanted_torques
 from fes_pin.allocation.off_or_enough import best_choice, rounded_to_least
-from fes_pin.allocation.problem import AllocationProblem, Options, problem_of
+from fes_pin.allocation.problem import AllocationProblem, OfProblem, Options, problem_of
 from fes_pin.data.errors import InputError
 
 __all__ = ["Allocator"]
@@ -23,7 +23,7 @@ SAME = 1e-8
 """Recruitments are exact to this, times the number of channels; see `Certificate.flattest`."""
 
 
-class Allocator:
+class Allocator(OfProblem):
     """The program at one posture, ready for any torque.
 
         min over r of sum w (R r - torque)^2 / 2 + effort + change / 2 |r - previous|^2,  lower <= r <= upper
@@ -69,16 +69,6 @@ class Allocator:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._set_up(state["problem"])
         self.previous = state["previous"]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Channels."""
-        return self.problem.names
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joints."""
-        return self.problem.joints
 
     @property
     def previous(self) -> np.ndarray:

@@ -189,6 +189,22 @@ class AllocationProblem(ReadOnly):
         return lower, upper
 
 
+class OfProblem:
+    """Base of what holds a `problem`: its channels and joints."""
+
+    problem: AllocationProblem
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Channels."""
+        return self.problem.names
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints."""
+        return self.problem.joints
+
+
 def within_rate(before: np.ndarray, rate: float, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Limits of the next recruitments; what the rate leaves within rounding of a limit is at the limit."""
     least, most = np.clip(before - rate, lower, upper), np.clip(before + rate, lower, upper)

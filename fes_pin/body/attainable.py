@@ -15,7 +15,7 @@ import numpy as np
 from fes_pin.body.balance import balance as _balance
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.modes import Mode, modes
+from fes_pin.body.modes import Mode
 from fes_pin.body.programs import LinearProgram, ProgramAnswer
 from fes_pin.data.numbers import positive_number
 from fes_pin.data.tabulated import Tabulated
@@ -84,7 +84,7 @@ def demands(
         `settle_deg` is not positive.
     """
     settle_deg = positive_number(settle_deg, "settle_deg", infinite=True)
-    found = modes(linear)
+    found = linear.modes()
     kinds, degree = found.kinds, found.degree
     gains = found.shapes.T @ inputs.on(linear)
     constant = found.shapes.T @ linear.C * gravity

@@ -17,7 +17,7 @@ import numpy as np
 from fes_pin.body.attainable import SETTLE_DEG, Leans, lean_text
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.modes import Mode, modes
+from fes_pin.body.modes import Mode
 from fes_pin.body.plans import Plans
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number, positive_number
@@ -90,7 +90,7 @@ def modal_bound(linear: LinearBody, inputs, lag_s: float = 0.0, gravity: bool = 
     inputs = Inputs.of(inputs, linear)
     if number(lag_s, "lag_s") < 0.0:
         raise InputError(f"must not be negative, got {lag_s}", column="lag_s")
-    found = modes(linear)
+    found = linear.modes()
     fall = found.kinds == "fall"
     shapes, values = found.shapes[:, fall], found.values[fall]
     gains, constant = shapes.T @ inputs.on(linear), shapes.T @ linear.C * gravity

@@ -16,7 +16,7 @@ from scipy import linalg
 
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.modes import ModeSet, modes
+from fes_pin.body.modes import ModeSet
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import between
 from fes_pin.data.tabulated import Tabulated
@@ -136,7 +136,7 @@ def modal_controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> M
     """
     horizon = between(horizon, 1e-3, 1e3, "horizon")
     inputs = Inputs.of(inputs, linear)
-    found = modes(linear)
+    found = linear.modes()
     torque = inputs.on(linear)
     gains = found.shapes.T @ torque
     size = np.abs(gains).max(initial=0.0)

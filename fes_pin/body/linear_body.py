@@ -13,11 +13,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import null_space
+import pinocchio as pin
+from scipy.linalg import eigh, null_space
 
 from fes_pin.body.build import GRAVITY, Body
 from fes_pin.body.joints import names_of
-from fes_pin.body.modes import ModeSet, modes
+from fes_pin.body.modes import Mode, ModeSet, mode_name
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import known_word
@@ -169,8 +170,43 @@ class LinearBody(Tabulated):
         return frame({"name": list(rows), **values}, index="name")
 
     def modes(self) -> ModeSet:
-        """The eigenpairs of A^-1 B, n of them on one foot (see `fes_pin.body.modes.modes`)."""
-        return modes(self)
+        """The eigenpairs of A^-1 B with names, n of them on one foot (see `fes_pin.body.modes`).
+
+        Damping and rates are left out (with them see `poles`); of a B that is not symmetric (moving posture) the
+        symmetric part is taken.
+        """
+        N, B = self.basis, 0.5 * (self.B + self.B.T)
+        values, reduced = eigh(N.T @ B @ N, N.T @ self.A @ N)
+        values, shapes = values[::-1], N @ reduced[:, ::-1]
+        signs = np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(len(values))])
+        shapes = shapes * signs
+        shares = np.abs(shapes * (self.A @ shapes))
+        shares /= shares.sum(axis=0)
+        names, stance = self.joint_names, self.body.stance
+        named = tuple(
+            Mode(float(value), shape, names, share, mode_name(float(value), share, names, stance))
+            for value, shape, share in zip(values, shapes.T, shares.T, strict=True)
+        )
+        return ModeSet(named, values, shapes, self.conservative)
+
+    def poles(self) -> np.ndarray:
+        """The 2r eigenvalues of F with damping and rates, 1/s, fastest growing first; r = n on one foot."""
+        if self.conservative:
+            roots = np.emath.sqrt(self.modes().values).astype(complex)
+            values = np.concatenate([roots, -roots])
+        else:
+            N, r = self.basis, self.basis.shape[1]
+            inertia = N.T @ self.A @ N
+            rates = np.linalg.solve(inertia, np.hstack([N.T @ self.B @ N, -N.T @ self.E @ N]))
+            values = np.linalg.eigvals(np.vstack([np.eye(r, 2 * r, r), rates]))
+        return values[np.lexsort((values.imag, -values.real))]
+
+    def centre_of_mass_motion(self, shape: np.ndarray) -> np.ndarray:
+        """How the centre of mass moves per unit of a shape: (3,) m, world axes."""
+        model = self.body.model
+        q, v = self.body.angles(self.whole_posture, check=False), np.zeros(model.nv)
+        v[[self.body.joint_names.index(name) for name in self.joint_names]] = shape
+        return pin.jacobianCenterOfMass(model, model.createData(), q) @ v
 
     def brace(self, joints: str | Iterable[str]) -> LinearBody:
         """The same body with these joints locked at the posture: names, or one name.

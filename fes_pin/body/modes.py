@@ -7,16 +7,12 @@ and A^-1 B is similar to the symmetric Q = A^(-1/2) B A^(-1/2), which Jacobi's r
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
-from scipy import linalg
 
-from fes_pin.body.build import Body
 from fes_pin.body.joints import side_of
 from fes_pin.data.named import NamedArray
 from fes_pin.data.tabulated import Tabulated
@@ -39,42 +35,6 @@ _VERBS = {
     ("neutral", "sideways"): "drift sideways",
     ("neutral", "turning"): "drift in rotation",
 }
-
-
-class Linear(Protocol):
-    """What modes are taken of: a `fes_pin.body.linear_body.LinearBody`."""
-
-    @property
-    def joint_names(self) -> Sequence[str]:
-        """The joints that move."""
-
-    @property
-    def whole_posture(self) -> Mapping[str, float]:
-        """Angles of all joints, rad by name."""
-
-    @property
-    def A(self) -> np.ndarray:
-        """Inertia, (n, n) kg m2."""
-
-    @property
-    def B(self) -> np.ndarray:
-        """Minus stiffness, (n, n) N m/rad."""
-
-    @property
-    def E(self) -> np.ndarray:
-        """Torque per joint rate, (n, n) N m s/rad."""
-
-    @property
-    def basis(self) -> np.ndarray:
-        """Deviations that the ground allows, (n, r)."""
-
-    @property
-    def body(self) -> Body:
-        """The body."""
-
-    @property
-    def conservative(self) -> bool:
-        """Whether there is neither damping nor motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +125,7 @@ class ModeSet(Tabulated):
     shapes
         Eigenvectors in columns, shapes' A shapes = 1: (n, r), r = n on one foot.
     conservative
-        False where damping or motion is left out here; `poles` then tells the whole.
+        False where damping or motion is left out here; `LinearBody.poles` then tells the whole.
     """
 
     modes: tuple[Mode, ...]
@@ -226,58 +186,12 @@ def kind_of(value: float) -> str:
     return "fall" if value > 0.0 else "swing"
 
 
-def modes(linear: Linear) -> ModeSet:
-    """The eigenpairs of A^-1 B with names.
-
-    Parameters
-    ----------
-    linear
-        From `linearize`. Damping and rates are left out (with them see `poles`); of a B that is not symmetric (moving
-        posture) the symmetric part is taken.
-    """
-    N, B = linear.basis, 0.5 * (linear.B + linear.B.T)
-    values, reduced = linalg.eigh(N.T @ B @ N, N.T @ linear.A @ N)
-    values, shapes = values[::-1], N @ reduced[:, ::-1]
-    signs = np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(len(values))])
-    shapes = shapes * signs
-    shares = np.abs(shapes * (linear.A @ shapes))
-    shares /= shares.sum(axis=0)
-    stance, names = linear.body.stance, tuple(linear.joint_names)
-    named = tuple(
-        Mode(float(value), shape, names, share, _name(float(value), share, names, stance))
-        for value, shape, share in zip(values, shapes.T, shares.T, strict=True)
-    )
-    return ModeSet(named, values, shapes, linear.conservative)
-
-
-def poles(linear: Linear) -> np.ndarray:
-    """The 2r eigenvalues of F with damping and rates, 1/s, fastest growing first; r = n on one foot."""
-    if linear.conservative:
-        roots = np.emath.sqrt(modes(linear).values).astype(complex)
-        values = np.concatenate([roots, -roots])
-    else:
-        N, r = linear.basis, linear.basis.shape[1]
-        inertia = N.T @ linear.A @ N
-        rates = np.linalg.solve(inertia, np.hstack([N.T @ linear.B @ N, -N.T @ linear.E @ N]))
-        values = np.linalg.eigvals(np.vstack([np.eye(r, 2 * r, r), rates]))
-    return values[np.lexsort((values.imag, -values.real))]
-
-
 def state_eigenvectors(found: ModeSet) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues and modal matrix of F built from the modes: (2n,), (2n, 2n) complex; the paper's second property."""
     roots = np.emath.sqrt(found.values).astype(complex)
     both = np.concatenate([roots, -roots])
     columns = np.hstack([found.shapes, found.shapes])
     return both, np.vstack([columns, columns * both])
-
-
-def centre_of_mass_motion(linear: Linear, shape: np.ndarray) -> np.ndarray:
-    """How the centre of mass moves per unit of a shape: (3,) m, world axes."""
-    body = linear.body
-    q, v = body.angles(linear.whole_posture, check=False), np.zeros(body.model.nv)
-    v[[body.joint_names.index(name) for name in linear.joint_names]] = shape
-    data = body.model.createData()
-    return pin.jacobianCenterOfMass(body.model, data, q) @ v
 
 
 def _plane(share: np.ndarray, names: tuple[str, ...]) -> str:
@@ -297,7 +211,8 @@ def _region(name: str, stance: str) -> str:
     return f"{'stance' if side == stance else 'swing'} {place}"
 
 
-def _name(value: float, share: np.ndarray, names: tuple[str, ...], stance: str) -> str:
+def mode_name(value: float, share: np.ndarray, names: tuple[str, ...], stance: str) -> str:
+    """A mode for a person: what it does, about which joints, and how fast."""
     regions: dict[str, float] = {}
     for s, name in zip(share, names, strict=True):
         region = _region(name, stance)

@@ -19,7 +19,7 @@ import numpy as np
 from fes_pin.body.controllability import RELATIVE_TOLERANCE, _independent
 from fes_pin.body.joints import known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.modes import Mode, ModeSet, modes
+from fes_pin.body.modes import Mode, ModeSet
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number
 from fes_pin.data.tabulated import Tabulated
@@ -82,7 +82,7 @@ def observability(linear: LinearBody, sensors: Iterable[str]) -> ModalObservabil
     InputError
         Unknown or braced joint, or none.
     """
-    found = modes(linear)
+    found = linear.modes()
     names = tuple(known_joint(name) for name in names_of(sensors))
     if not names:
         raise InputError("at least one goniometer is needed")

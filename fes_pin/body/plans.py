@@ -19,7 +19,7 @@ from fes_pin.body.balance import GroundRows
 from fes_pin.body.balance import balance as _balance
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.modes import ModeSet, modes
+from fes_pin.body.modes import ModeSet
 from fes_pin.body.programs import LinearProgram
 
 PULSE_S = 0.04
@@ -66,7 +66,7 @@ class Plans:
     @cached_property
     def modes(self) -> ModeSet:
         """The body's modes."""
-        return modes(self.linear)
+        return self.linear.modes()
 
     @cached_property
     def degree(self) -> np.ndarray:

@@ -21,6 +21,7 @@ from fes_pin.cli.own import check, new_study
 from fes_pin.cli.predict import predict
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
 from fes_pin.cli.walk import diagnose_walking, print_effects
+from fes_pin.data.errors import InputError
 
 if TYPE_CHECKING:
     from fes_pin.diagnosis.result import Diagnosis
@@ -81,7 +82,6 @@ def diagnose(
     force: Force = False,
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
-    from fes_pin.data.errors import InputError
     from fes_pin.data.outputs import Outputs
     from fes_pin.data.tabular import SUFFIXES, check_table, table_bytes
 

@@ -18,6 +18,7 @@ import typer
 from fes_pin.cli.group import needs, release_output
 from fes_pin.cli.options import Exclude, Libraries, Trials, output, pairs, study_of
 from fes_pin.cli.progress import catalogue_with
+from fes_pin.data.errors import InputError
 from fes_pin.data.files import check_folder, write_files
 from fes_pin.data.outputs import Outputs
 
@@ -80,7 +81,6 @@ def new_study(
 
     With --pendulum, --rod or --slide and no recordings it writes the URDF alone.
     """
-    from fes_pin.data.errors import InputError
     from fes_pin.data.new_body_study import new_body_study
     from fes_pin.data.new_study import new_study as make
     from fes_pin.data.schema import IMPOSED
@@ -150,7 +150,6 @@ def _template(
 ) -> tuple[str, str] | None:
     """Name and text of the URDF that was asked for."""
     from fes_pin.data import templates
-    from fes_pin.data.errors import InputError
 
     asked = {"pendulum": pendulum, "rod": rod, "slide": slide}
     given = [name for name, value in asked.items() if value is not None]
@@ -190,7 +189,6 @@ def _wanted(
     fill: bool,
     given: Mapping[str, Mapping[str, str]],
 ) -> Wanted:
-    from fes_pin.data.errors import InputError
     from fes_pin.data.new_study import common_folder
     from fes_pin.data.schema import known_rigs, one_of
     from fes_pin.data.urdf import is_revolute
@@ -245,7 +243,6 @@ def _tried(made: NewStudy, wanted: Wanted, catalogue: Catalogue) -> tuple[Study,
     InputError
         As `read_study`; of the files and options that were given, not of copies and of what is not written yet.
     """
-    from fes_pin.data.errors import InputError
     from fes_pin.data.study import read_study
     from fes_pin.diagnosis.checked import odd_numbers
 

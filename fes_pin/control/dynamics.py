@@ -14,7 +14,7 @@ from fes_pin.data.tabulated import Tabulated
 from fes_pin.models.effects.frame_vibration import FrameVibration
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.ankle import Ankle
-from fes_pin.paper.equation_1 import static_stiffness_nm, static_torque_nm
+from fes_pin.paper.equation_1 import halved, static_stiffness_nm, static_torque_nm
 
 PULSE_S = 1.0 / 45.0
 """Time between pulses, s; Dombre, Fournier and Coiffet, section II-3-1."""
@@ -130,12 +130,7 @@ class AnkleDynamics(Tabulated):
 
     def rest_angle(self, activation: float = 0.0) -> float:
         """Angle in rad that a steady activation of the believed muscle holds; by bisection."""
-        low, high = ANGLES_RAD
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            rising = self.passive(middle)[0] + self.pull_nm * activation * math.sin(middle) > 0.0
-            low, high = (middle, high) if rising else (low, middle)
-        return 0.5 * (low + high)
+        return halved(lambda q: self.passive(q)[0] + self.pull_nm * activation * math.sin(q), *ANGLES_RAD, 50)
 
     def activation_for(self, q: float, v: float = 0.0, acceleration: float = 0.0, torque: float = 0.0) -> float:
         """Activation (times gain share) that moves the joint so against an unknown `torque`; unbounded."""

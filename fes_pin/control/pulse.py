@@ -9,7 +9,7 @@ from typing import Any
 from fes_pin.control.limits import Limiter, StimulationLimits
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import shortened
-from fes_pin.muscles.recruitment import LinearRecruitment, MeasuredRecruitment
+from fes_pin.muscles.recruitment import LinearRecruitment, MeasuredRecruitment, follows, through_play
 
 SWITCH = 0.1
 """Pulses begin where this recruitment is wanted, and end where as much less than none is. Near rest the feedback wants
@@ -84,24 +84,19 @@ class PulseWidth:
         """The pulse width nearest to one that the limits allow, and the recruitment that it makes; see `Limiter`."""
         width = self.limiter.allowed(min(width_us, self.saturation), at_once)
         made = self._made(width)
-        self.followed = self._follows(width)
+        self.followed = follows(self.followed, width, self.half)
         self.limiter.give(width)
         return width, made
 
     def _through_play(self, wanted: float) -> float:
-        target = self._width(wanted)
-        ahead = self.half if target > self.followed else -self.half if target < self.followed else 0.0
-        width = target + ahead
+        width = through_play(self.followed, self._width(wanted), self.half)
         if width >= self.threshold:
             return width
         off, least = self._made(0.0), self._made(self.threshold)
         return 0.0 if abs(off - wanted) < abs(least - wanted) else self.threshold
 
-    def _follows(self, width: float) -> float:
-        return min(max(self.followed, width - self.half), width + self.half)
-
     def _made(self, width: float) -> float:
-        return self._recruited(self._follows(width))
+        return self._recruited(follows(self.followed, width, self.half))
 
     def _width(self, recruitment: float) -> float:
         if not self._straight:

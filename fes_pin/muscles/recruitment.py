@@ -186,6 +186,17 @@ class HillRecruitment(LinearRecruitment):
         return np.where(straight < STRAIGHT_BELOW, straight, power ** (1.0 / n))
 
 
+def follows(acting_us: float, pulse_width_us: float, half_width_us: float) -> float:
+    """The width that acts after a pulse, us: the last one, held within half the play of the pulse's."""
+    return min(max(acting_us, pulse_width_us - half_width_us), pulse_width_us + half_width_us)
+
+
+def through_play(acting_us: float, target_us: float, half_width_us: float) -> float:
+    """The pulse width after which a wanted width acts, us: half the play beyond it, on the way there."""
+    ahead = half_width_us if target_us > acting_us else -half_width_us if target_us < acting_us else 0.0
+    return target_us + ahead
+
+
 class Hysteresis:
     """Play between stimulator and nerve: the width that acts follows the pulse width only beyond `half_width_us`.
 
@@ -217,8 +228,7 @@ class Hysteresis:
 
     def recruitment(self, pulse_width_us: float) -> float:
         """Recruitment by the next pulse, which moves the play."""
-        low, high = pulse_width_us - self.half_width_us, pulse_width_us + self.half_width_us
-        self.acting_us = min(max(self.acting_us, low), high)
+        self.acting_us = follows(self.acting_us, pulse_width_us, self.half_width_us)
         return float(self.curve.recruitment(self.acting_us))
 
     def reach(self) -> tuple[float, float]:
@@ -234,11 +244,7 @@ class Hysteresis:
             return 0.0
         target = float(self.curve.pulse_width_us(recruitment))
         threshold, saturation = float(self.curve.threshold_us), float(self.curve.saturation_us)
-        aim = (
-            self.acting_us
-            if target == self.acting_us
-            else target + np.copysign(self.half_width_us, target - self.acting_us)
-        )
+        aim = through_play(self.acting_us, target, self.half_width_us)
         return float(min(max(aim, threshold), saturation))
 
 

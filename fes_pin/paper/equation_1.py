@@ -13,7 +13,7 @@ Source: Dombre, Fournier and Coiffet, section II-3-2.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -57,3 +57,11 @@ def static_stiffness_nm(known: Mapping[str, Any], angle_rad: float, force_n: flo
     cable = known["moment_arm_m"] * force_n - known["com_distance_m"] * (antagonist - load_kg * GRAVITY)
     weight = known["foot_mass_kg"] * GRAVITY * known["com_distance_m"]
     return cable * c - known["com_distance_m"] * steeper * s - weight * s
+
+
+def halved(torque_nm: Callable[[float], float], low: float, high: float, times: int) -> float:
+    """Angle in rad between two others at which a torque that falls with it is 0; halved so many times."""
+    for _ in range(times):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if torque_nm(middle) > 0.0 else (low, middle)
+    return 0.5 * (low + high)

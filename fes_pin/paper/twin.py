@@ -15,7 +15,7 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number, positive_number
 from fes_pin.data.trial import Trial
-from fes_pin.paper.equation_1 import antagonist_n, static_torque_nm
+from fes_pin.paper.equation_1 import antagonist_n, halved, static_torque_nm
 
 MAX_STEP_S = 1.25e-3
 """Longest step of the integrator: 1/14 of the joint's fastest radian (57 rad/s at table 1); it errs by 1e-7 rad."""
@@ -98,10 +98,7 @@ class AnkleTwin:
         low, high = 0.2, 2.9
         if self._torque(low, 0.0, force_n) < 0.0 or self._torque(high, 0.0, force_n) > 0.0:
             raise InputError(f"a load of {self.load_kg:g} kg rests nowhere between {low} and {high} rad")
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self._torque(middle, 0.0, force_n) > 0.0 else (low, middle)
-        return 0.5 * (low + high)
+        return halved(lambda q: self._torque(q, 0.0, force_n), low, high, 60)
 
     def _torque(self, q: float, v: float, force_n: float) -> float:
         return static_torque_nm(vars(self), q, force_n, self.load_kg) - self.damping_nms * v

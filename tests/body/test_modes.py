@@ -9,7 +9,7 @@ from scipy import linalg
 
 from fes_pin.body.build import Body
 from fes_pin.body.linearize import linearize
-from fes_pin.body.modes import centre_of_mass_motion, kind_of, modes, poles, state_eigenvectors
+from fes_pin.body.modes import kind_of, state_eigenvectors
 from fes_pin.body.passive import ElasticJoints
 
 postures = st.integers(0, 10**6)
@@ -28,7 +28,7 @@ def random_body(seed):
 def test_the_papers_three_properties(seed):
     body, q = random_body(seed)
     linear = linearize(body, q)
-    found = modes(linear)
+    found = linear.modes()
     # the pairs, and their orthogonality
     assert np.allclose(
         linear.B @ found.shapes, linear.A @ found.shapes * found.values, atol=1e-6 * np.abs(linear.B).max()
@@ -58,7 +58,7 @@ def test_jacobis_iteration_finds_the_same_modes(body, jacobi, posture):
     Q = np.linalg.solve(L, np.linalg.solve(L, linear.B).T)
     values, vectors = jacobi(0.5 * (Q + Q.T))
     order = np.argsort(-values)
-    found = modes(linear)
+    found = linear.modes()
     assert np.allclose(values[order], found.values, rtol=1e-9, atol=1e-9 * np.abs(values).max())
     shapes = np.linalg.solve(L.T, vectors[:, order])
     for i in range(19):
@@ -67,7 +67,7 @@ def test_jacobis_iteration_finds_the_same_modes(body, jacobi, posture):
 
 
 def test_a_hanging_leg_swings_and_a_standing_body_falls(body):
-    found = modes(linearize(body, "neutral"))
+    found = linearize(body, "neutral").modes()
     assert found[0].kind == "fall"
     assert "knee" in found[0].name
     swings = [m for m in found if m.kind == "swing" and next(iter(m.joints)).startswith("left_hip_flexion")]
@@ -109,16 +109,16 @@ def test_a_fall_grows_as_its_mode_says(body):
 
 def test_poles_with_damping_are_those_of_f(body):
     damped = linearize(body, "mid_stance", passive=ElasticJoints(damping_nms=dict.fromkeys(body.joint_names, 1.0)))
-    found = poles(damped)
+    found = damped.poles()
     assert np.allclose(np.sort(found.real), np.sort(np.linalg.eigvals(damped.F).real), atol=1e-6)
     assert len(found) == 38
     assert "see poles" in str(damped.modes())
-    free = poles(linearize(body, "mid_stance"))
-    assert free[0].real == pytest.approx(modes(linearize(body, "mid_stance"))[0].rate)
+    free = linearize(body, "mid_stance").poles()
+    assert free[0].real == pytest.approx(linearize(body, "mid_stance").modes()[0].rate)
 
 
 def test_participation_and_names(body):
-    found = modes(linearize(body, "mid_stance"))
+    found = linearize(body, "mid_stance").modes()
     assert len({mode.name for mode in found}) == 19
     for mode in found:
         assert mode.participation.sum() == pytest.approx(1.0)
@@ -134,4 +134,4 @@ def test_centre_of_mass_follows_a_shape(body):
     data = body.model.createData()
     step = 1e-6
     ahead, back = (pin.centerOfMass(body.model, data, linear.q + s * shape).copy() for s in (step, -step))
-    assert np.allclose(centre_of_mass_motion(linear, shape), (ahead - back) / (2 * step), atol=1e-7)
+    assert np.allclose(linear.centre_of_mass_motion(shape), (ahead - back) / (2 * step), atol=1e-7)
