@@ -26,18 +26,21 @@ UNITS = (
 MEANT: Mapping[str, frozenset[str]] = {
     column: frozenset(words.split())
     for column, words in {
-        "effort": "torque force moment tau motor command commanded drive actuation current u",
-        "position": "angle theta q phi displacement encoder x pos",
-        "velocity": "speed rate omega qd dq v vel",
-        "pulse_width_us": "pulse width pw pulsewidth stimulus stimulation duration charge current",
+        "time_s": "t time times timestamp clock seconds zeit temps tempo tiempo",
+        "effort": "effort torque force moment tau motor motortorque command commanded drive actuation current u "
+        "drehmoment couple kraft",
+        "position": "position angle theta q phi displacement encoder x pos winkel weg angolo angulo deplacement",
+        "velocity": "velocity speed rate omega qd dq v vel angvel gyro geschwindigkeit vitesse",
+        "pulse_width_us": "pulse width pw pulsewidth stim stimulus stimulation duration charge current pulsbreite",
         "stim": "pulse pulses trigger stimulus stimulation sync",
-        "angle_rad": "theta q position goniometer ankle",
-        "force_n": "force load tension cell f",
-        "length_m": "length l lmtu lmtc mtu stretch displacement",
-        "torque_nm": "torque moment tau",
+        "angle_rad": "angle theta q position goniometer ankle winkel",
+        "force_n": "force load tension cell f kraft",
+        "length_m": "length l lmtu lmtc mtu stretch displacement laenge longueur",
+        "torque_nm": "torque moment tau drehmoment couple",
     }.items()
 }
-"""Other words for what a column holds, as measuring systems name it."""
+"""Words for what a column holds, as measuring systems name it; some are German, French, Italian or Spanish, without
+accents."""
 
 
 @dataclass(frozen=True)

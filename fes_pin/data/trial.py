@@ -493,7 +493,6 @@ def write_trial(trial: Trial, path: str | Path) -> None:
     write_text(path, trial_csv(replace(trial, as_read=None)))  # which checks it by itself
 
 
-def trial_csv(trial: Trial, columns: tuple[str, ...] | None = None) -> str:
-    """CSV text of a trial's time and all or some of its columns."""
-    names = trial.columns if columns is None else columns
-    return format_csv({"time_s": trial.time, **{name: trial[name] for name in names}})
+def trial_csv(trial: Trial) -> str:
+    """CSV text of a trial's time and columns."""
+    return format_csv({"time_s": trial.time, **trial.columns})

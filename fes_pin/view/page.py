@@ -95,10 +95,9 @@ def figure(drawing: Drawing, caption: Content = "", class_: str = "", file: str 
     return element("figure", Markup(drawing.svg), element("figcaption", caption, " ", link), **known)
 
 
-def folded(summary: Content, *contents: Markup, is_open: bool = False, id_: str = "") -> Markup:
+def folded(summary: Content, *contents: Markup) -> Markup:
     """What is behind a line that opens it; printed whole."""
-    known = {**({"open": ""} if is_open else {}), **({"id": id_} if id_ else {})}
-    return element("details", element("summary", summary), joined(contents), **known)
+    return element("details", element("summary", summary), joined(contents))
 
 
 def page(title: str, parts: Sequence[Markup], residual: str = "") -> str:

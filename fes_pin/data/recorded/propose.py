@@ -14,20 +14,6 @@ from fes_pin.data.recorded.text import TextForm, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
 from fes_pin.data.units import UNITS, known_unit, quantities_of, split_header
 
-TIMES = frozenset({"t", "time", "times", "timestamp", "clock", "seconds", "zeit", "temps", "tempo", "tiempo"})
-"""What the time of a sample is called."""
-MORE: Mapping[str, frozenset[str]] = {
-    "position": frozenset({"position", "winkel", "weg", "angolo", "angulo", "deplacement"}),
-    "velocity": frozenset({"velocity", "geschwindigkeit", "vitesse", "angvel", "gyro"}),
-    "effort": frozenset({"effort", "drehmoment", "moment", "couple", "kraft", "motortorque"}),
-    "angle_rad": frozenset({"angle", "winkel"}),
-    "force_n": frozenset({"kraft"}),
-    "torque_nm": frozenset({"torque", "moment", "drehmoment", "couple"}),
-    "length_m": frozenset({"length", "laenge", "longueur"}),
-    "pulse_width_us": frozenset({"pulsbreite", "width", "pw", "stim"}),
-}
-"""Words beside those of `MEANT`, some of them German, French, Italian or Spanish, without accents."""
-
 
 @dataclass(frozen=True)
 class Proposal:
@@ -99,7 +85,7 @@ def _candidates(
         if unit and known_unit(unit, quantities) is None and known_unit(unit, tuple(UNITS)) is not None:
             continue  # another quantity
         words = _words(bare)
-        if name == column or without_unit(column) == "_".join(words) or words & _meant(column):
+        if name == column or without_unit(column) == "_".join(words) or words & MEANT.get(column, frozenset()):
             yield name
 
 
@@ -110,12 +96,6 @@ def _by_unit(
     taken = {name for names in named.values() for name in names}
     quantities = quantities_of(column, revolute)
     return tuple(n for n, unit in units.items() if unit and n not in taken and known_unit(unit, quantities))
-
-
-def _meant(column: str) -> frozenset[str]:
-    if column == "time_s":
-        return TIMES
-    return frozenset(MEANT.get(column, ())) | MORE.get(column, frozenset())
 
 
 def _words(name: str) -> frozenset[str]:

@@ -15,11 +15,11 @@ from fes_pin.data.schema import IMPOSED, START_S, RigSchema, any_number, not_neg
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.least_squares import least_squares
-from fes_pin.models.maths import clip, cos, exp, ramp, sin, where
+from fes_pin.models.maths import cos, exp, ramp, sin, where
 from fes_pin.models.parameters import parameter
 from fes_pin.models.rigs.base import GRAVITY, IMPOSED_STOPPING, Rig, imposed_now
 from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
-from fes_pin.models.rigs.stimuli import pulse_widths
+from fes_pin.models.rigs.stimuli import pulse_widths, recruited_now
 from fes_pin.models.stage import Signals
 
 UPRIGHT = 1.5707963267948966
@@ -200,12 +200,7 @@ class Ankle(Rig):
         return s.torque if s.kind == "motion" else z
 
     def sample(self, s: Signals) -> dict[str, Any]:
-        c = s.c
-        s.commanded = s.u.pulse_width_us
-        width = s.through("pulse_width", s.commanded)
-        r = clip((width - c.threshold_us) / (c.saturation_us - c.threshold_us), 0.0, 1.0)
-        r = s.through("recruitment", r)
-        return {"r": r, "r_before": s.m.r}
+        return {"r": s.through("recruitment", recruited_now(s)), "r_before": s.m.r}
 
     def rates(self, s: Signals) -> dict[str, Any]:
         c = s.c

@@ -12,10 +12,9 @@ import numpy as np
 from fes_pin.data.schema import IMPOSED, START_S, RigSchema, not_negative, positive
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.models.maths import clip
 from fes_pin.models.parameters import HELD, parameter
 from fes_pin.models.rigs.base import Rig, imposed_now
-from fes_pin.models.rigs.stimuli import pulse_widths, trains
+from fes_pin.models.rigs.stimuli import pulse_widths, recruited_now, trains
 from fes_pin.models.stage import Signals
 
 
@@ -125,12 +124,7 @@ class Muscle(Rig):
         return z
 
     def sample(self, s: Signals) -> dict[str, Any]:
-        if hasattr(s.u, "stim"):
-            r = s.u.stim * s.c.pulse_period_s / s.c.dt
-        else:
-            s.commanded = s.u.pulse_width_us
-            width = s.through("pulse_width", s.commanded)
-            r = clip((width - s.c.threshold_us) / (s.c.saturation_us - s.c.threshold_us), 0.0, 1.0)
+        r = s.u.stim * s.c.pulse_period_s / s.c.dt if hasattr(s.u, "stim") else recruited_now(s)
         return {"r": s.through("recruitment", r), "r_before": s.m.r}
 
     def rates(self, s: Signals) -> dict[str, Any]:

@@ -1,12 +1,15 @@
-"""Stimuli of a shape from 0 (off) to 1, and trains of pulses: what a rig may be driven with in a proposed trial."""
+"""Stimuli: what a pulse width recruits, and stimuli of a shape from 0 (off) to 1 and trains for proposed trials."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from fes_pin.data.study import Study
+from fes_pin.models.maths import clip
+from fes_pin.models.stage import Signals
 
 RATES_HZ = (8.0, 15.0, 31.0, 45.0)
 """Pulse rates that are proposed, from single twitches to a fused contraction."""
@@ -21,6 +24,13 @@ def pulse_widths(study: Study, shape: np.ndarray) -> np.ndarray:
     low = float(study.constants.get("threshold_us", 180.0))
     high = float(study.constants.get("saturation_us", 1000.0))
     return np.where(shape > 0, np.round(low + (high - low) * shape), 0.0)
+
+
+def recruited_now(s: Signals) -> Any:
+    """Recruitment by the pulse width of this sample, 0 at the threshold to 1 at saturation."""
+    s.commanded = s.u.pulse_width_us
+    width = s.through("pulse_width", s.commanded)
+    return clip((width - s.c.threshold_us) / (s.c.saturation_us - s.c.threshold_us), 0.0, 1.0)
 
 
 def both_signs(study: Study, column: str, shape: np.ndarray) -> np.ndarray:
