@@ -13,7 +13,7 @@ from fes_pin.allocation.inputs import fractions, torque_matrix, wanted_torque
 from fes_pin.allocation.walk import allocate_walk
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import by_name, positive_number, shortened
+from fes_pin.data.numbers import all_known, by_name, positive_number, shortened
 from fes_pin.data.show import frame, table_html
 
 if TYPE_CHECKING:
@@ -71,9 +71,7 @@ class AttainableTorques:
         several: Any = known if joints is None else joints
         one = isinstance(joints, str) or not isinstance(several, Iterable)
         self.joints: tuple[str, ...] = (several,) if one else tuple(several)
-        unknown = [name for name in self.joints if name not in known]
-        if unknown:
-            raise InputError(f"unknown joint {unknown[0]!r}; the joints are {', '.join(known)}")
+        all_known(self.joints, known, "joint")
         if not self.joints or len(set(self.joints)) < len(self.joints):
             raise InputError(f"joints must be different names, one or more, got {shortened(self.joints)}")
         self.names, self.upper = names, fractions(upper, names, "upper limits", 1.0)

@@ -11,7 +11,7 @@ import numpy as np
 from fes_pin.allocation.inputs import fractions, torque_matrix
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
-from fes_pin.data.numbers import between, by_name, known_word, positive_number, truth
+from fes_pin.data.numbers import all_known, between, by_name, known_word, positive_number, truth
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.muscles.recruitment import ChannelRecruitment, LinearRecruitment
 
@@ -84,10 +84,7 @@ class Options:
         InputError
             Unknown name, or a value out of range.
         """
-        known = [item.name for item in fields(cls)]
-        for name in given:
-            if name not in known:
-                raise InputError(f"an allocation has no option {name!r}; there are {', '.join(known)}")
+        all_known(given, [item.name for item in fields(cls)], "option")
         return cls(**given)
 
     def __post_init__(self) -> None:
@@ -294,8 +291,7 @@ def recruitment_limits(options: Options, names: tuple[str, ...]) -> tuple[np.nda
     if not isinstance(dead, Iterable):
         raise InputError(f"dead must be names of channels, got {dead!r:.40}")
     for name in (dead,) if isinstance(dead, str) else dead:
-        if name not in names:
-            raise InputError(f"dead channel {name!r} is not one of {', '.join(names)}")
+        all_known([name], names, "channel")
         lower[names.index(name)] = upper[names.index(name)] = 0.0
     wrong = lower > upper
     if wrong.any():

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -118,12 +118,9 @@ class Leans(Tabulated):
     falling: tuple[Mode, ...]
     lean_deg: np.ndarray
 
-    @property
-    def _able(self) -> bool:
-        """Whether the posture itself is kept."""
-        raise NotImplementedError
-
     _index = "mode"
+    _able: ClassVar[str]
+    """The field that says whether the posture itself is kept."""
 
     def _table(self) -> dict[str, Any]:
         names = [mode.name for mode in self.falling]
@@ -136,7 +133,8 @@ class Leans(Tabulated):
     @property
     def least_lean_deg(self) -> float:
         """The smallest of the leans, 0 where the posture cannot be held, infinite where nothing falls."""
-        return float(np.nan_to_num(self.lean_deg, nan=0.0, posinf=np.inf).min(initial=np.inf)) if self._able else 0.0
+        least = float(np.nan_to_num(self.lean_deg, nan=0.0, posinf=np.inf).min(initial=np.inf))
+        return least if getattr(self, self._able) else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +165,7 @@ class HeldLeans(Leans):
     lean_deg: np.ndarray
     error_deg: np.ndarray = field(repr=False)
 
-    @property
-    def _able(self) -> bool:
-        return self.holds
+    _able = "holds"
 
     def __str__(self) -> str:
         if not self.holds:
@@ -258,7 +254,5 @@ def _greatest_lean(wanted: HoldingDemands, inputs: Inputs, i: int, sign: float) 
     push[i] = sign * wanted.load[i]
     tilt = np.concatenate([np.zeros(2 * len(wanted.settle_gains)), sign * wanted.ground_load[:, i]])
     cost = np.append(np.zeros(inputs.n), -1.0)
-    found = _solve(wanted, inputs, cost, push, tilt, np.zeros((0, inputs.n + 1)))
-    if found.x is None:
-        return (np.inf, 0.0) if found.unbounded else (np.nan, 0.0)
-    return max(0.0, float(found.x[-1])), found.error
+    lean, error = _solve(wanted, inputs, cost, push, tilt, np.zeros((0, inputs.n + 1))).greatest
+    return (lean if np.isnan(lean) else max(0.0, lean)), error

@@ -48,9 +48,7 @@ class CaughtLeans(Leans):
     error_deg: np.ndarray = field(repr=False)
     bound_deg: np.ndarray
 
-    @property
-    def _able(self) -> bool:
-        return self.rests
+    _able = "rests"
 
     def __str__(self) -> str:
         if not self.rests:
@@ -143,11 +141,8 @@ def catchable(
         for way, sign in enumerate((1.0, -1.0)):
             towards = still.copy()
             towards[row] = sign * plans.degree[row]
-            found = plans.program(still, still, towards).solve() if rests else None
-            if found is not None and found.x is not None:
-                leans[i, way], errors[i, way] = found.x[-1], found.error
-            elif found is not None and found.unbounded:
-                leans[i, way] = np.inf
+            if rests:
+                leans[i, way], errors[i, way] = plans.program(still, still, towards).solve().greatest
     return CaughtLeans(falling, rests, leans, errors, modal_bound(linear, inputs, gravity=gravity))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from fes_pin.body.anthropometry import HIP_SPACING
 from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, mirrored
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
-from fes_pin.data.numbers import known_word
+from fes_pin.data.numbers import all_known, known_word
 
 TABLE = Path(__file__).with_name("gait_postures.csv")
 """Degrees, right stance; made by scripts/generate/gait_postures.py from the measured walk."""
@@ -55,8 +55,7 @@ def posture_angles(name: str, stance: str) -> dict[str, float]:
     if name in STILL:
         angles = dict.fromkeys(JOINT_NAMES, 0.0)
         return {**angles, f"{stance}_ankle_inversion": -_ONE_LEG_LEAN} if name == "one_leg" else angles
-    if name not in _table():
-        raise InputError(f"unknown posture {name!r}; known are {', '.join(posture_names())}")
+    all_known([name], posture_names(), "posture")
     angles = _table()[name]
     if stance == "right":
         return dict(angles)
@@ -73,12 +72,11 @@ _ANKLE_AXIS = np.array([-0.10501355, -0.97912632, -0.17402245])
 _SUBTALAR_AXIS = np.array([0.78717961, 0.12094949, 0.60474746])
 
 
-def _turn(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotation matrices (N, 3, 3) about a fixed axis."""
-    x, y, z = axis / np.linalg.norm(axis)
+def turn(axis: Sequence[float] | np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Rotations about an axis by angles (n,), rad: (n, 3, 3)."""
+    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    return np.eye(3) + s * cross + (1.0 - c) * (cross @ cross)
+    return np.eye(3) + np.sin(angle)[:, None, None] * cross + (1.0 - np.cos(angle))[:, None, None] * (cross @ cross)
 
 
 def ankle_angles(rotation: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -94,7 +92,7 @@ def ankle_rotation(side: str, dorsiflexion: np.ndarray, inversion: np.ndarray, r
     """Rotation of the hindfoot in the shank's frame, (N, 3, 3), of ankle angles, rad (N,)."""
     sign = 1.0 if side == "right" else -1.0
     forward, left, up = np.eye(3)
-    return _turn(-left, dorsiflexion) @ _turn(sign * forward, inversion) @ _turn(sign * up, rotated)
+    return turn(-left, dorsiflexion) @ turn(sign * forward, inversion) @ turn(sign * up, rotated)
 
 
 def ankle_torques(side: str, angles: np.ndarray, torques: np.ndarray, dorsiflexion, inversion) -> np.ndarray:
@@ -116,9 +114,9 @@ def ankle_torques(side: str, angles: np.ndarray, torques: np.ndarray, dorsiflexi
     forward, left, up = np.eye(3)
     mirror = np.array([sign, 1.0, sign])
     first, second = (axis * mirror / np.linalg.norm(axis) for axis in (_ANKLE_AXIS, _SUBTALAR_AXIS))
-    theirs = np.stack([np.broadcast_to(first, (len(angles), 3)), _turn(first, angles[:, 0]) @ second], axis=1)
-    bent = _turn(-left, dorsiflexion)
-    inverted = bent @ _turn(sign * forward, inversion)
+    theirs = np.stack([np.broadcast_to(first, (len(angles), 3)), turn(first, angles[:, 0]) @ second], axis=1)
+    bent = turn(-left, dorsiflexion)
+    inverted = bent @ turn(sign * forward, inversion)
     ours = np.stack([np.broadcast_to(-left, (len(angles), 3)), bent @ (sign * forward), inverted @ (sign * up)], axis=1)
     return (ours @ np.linalg.pinv(theirs) @ torques[..., None])[..., 0]
 
@@ -160,8 +158,8 @@ def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_fo
         angles[f"{side}_knee_flexion"] = -measured(f"knee_angle_{s}")
         angles[f"{side}_mtp_extension"] = measured(f"mtp_angle_{s}")
         sign = np.array([1.0, 1.0, 1.0]) if side == "right" else np.array([-1.0, 1.0, -1.0])
-        foot = _turn(_ANKLE_AXIS * sign, measured(f"ankle_angle_{s}"))
-        foot = foot @ _turn(_SUBTALAR_AXIS * sign, measured(f"subtalar_angle_{s}"))
+        foot = turn(_ANKLE_AXIS * sign, measured(f"ankle_angle_{s}"))
+        foot = foot @ turn(_SUBTALAR_AXIS * sign, measured(f"subtalar_angle_{s}"))
         if side == stance and flat_foot:
             foot = _flat_ankle(angles, measured, side, foot)
         for joint, value in zip(
@@ -203,7 +201,7 @@ def pelvis_turns(coordinates: Mapping[str, np.ndarray]) -> np.ndarray:
     forward, left, up = np.eye(3)
     turns = []
     for name, axis in (("tilt", -left), ("list", forward), ("rotation", up)):
-        turns.append(_turn(axis, _coordinate(coordinates, f"pelvis_{name}")))
+        turns.append(turn(axis, _coordinate(coordinates, f"pelvis_{name}")))
     return turns[0] @ turns[1] @ turns[2]
 
 
@@ -214,11 +212,11 @@ def _flat_ankle(angles: Mapping[str, np.ndarray], measured, side: str, foot: np.
     pelvis = pelvis_turns({f"q_pelvis_{n}": measured(f"pelvis_{n}") for n in ("tilt", "list", "rotation")})
     shank = (
         pelvis
-        @ _turn(-left, angles[f"{side}_hip_flexion"])
-        @ _turn(sign * forward, angles[f"{side}_hip_adduction"])
-        @ _turn(sign * up, angles[f"{side}_hip_rotation"])
-        @ _turn(left, angles[f"{side}_knee_flexion"])
+        @ turn(-left, angles[f"{side}_hip_flexion"])
+        @ turn(sign * forward, angles[f"{side}_hip_adduction"])
+        @ turn(sign * up, angles[f"{side}_hip_rotation"])
+        @ turn(left, angles[f"{side}_knee_flexion"])
     )
     ahead = (shank @ foot)[:, :, 0]
-    flat = _turn(up, np.arctan2(ahead[:, 1], ahead[:, 0])) @ _turn(left, angles[f"{side}_mtp_extension"])
+    flat = turn(up, np.arctan2(ahead[:, 1], ahead[:, 0])) @ turn(left, angles[f"{side}_mtp_extension"])
     return np.swapaxes(shank, 1, 2) @ flat

@@ -10,7 +10,7 @@ Syst. Man Cybern. A 34:630-637, 2004). Each edge of the hull is then one linear 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 import pinocchio as pin
@@ -91,12 +91,7 @@ class Wrench(ReadOnly):
 
     def __sub__(self, other: Wrench) -> Wrench:
         """What another wrench leaves of this one."""
-        return Wrench(
-            self.at_rest - other.at_rest,
-            self.per_angle - other.per_angle,
-            self.per_acceleration - other.per_acceleration,
-            self.per_torque - other.per_torque,
-        )
+        return Wrench(*(getattr(self, each.name) - getattr(other, each.name) for each in fields(self)))
 
 
 def ground_wrench(body: Body, model: pin.Model, q: np.ndarray) -> Wrench:

@@ -10,7 +10,7 @@ import numpy as np
 from fes_pin.body.joints import JOINT_NAMES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number, numbers, positive_number, shortened
+from fes_pin.data.numbers import all_known, number, numbers, positive_number, shortened
 from fes_pin.data.read_only import ReadOnly
 
 
@@ -126,9 +126,7 @@ class Inputs(ReadOnly):
             A name that is not among them.
         """
         wanted = tuple(names_of(names))
-        for name in wanted:
-            if name not in self.names:
-                raise InputError(f"unknown input {name!r}; there are {', '.join(self.names)}")
+        all_known(wanted, self.names, "input")
         keep = [self.names.index(name) for name in wanted]
         return Inputs(wanted, self.joint_names, self.matrix[:, keep], self.lower[keep], self.upper[keep])
 

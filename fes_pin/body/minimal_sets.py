@@ -22,7 +22,7 @@ from fes_pin.body.joints import SIDES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.programs import LinearProgram
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import known_word, number, positive_number, truth, whole
+from fes_pin.data.numbers import all_known, known_word, number, positive_number, truth, whole
 
 ORTHOSES: dict[str, tuple[str, ...]] = {
     **{f"{side}_{name}": tuple(f"{side}_{joint}" for joint in joints) for side in SIDES for name, joints in {
@@ -199,9 +199,7 @@ def _orthoses(braces: Iterable[str] | Mapping[str, Sequence[str]]) -> dict[str, 
     if isinstance(braces, Mapping):
         return {str(name): tuple(known_joint(joint) for joint in joints) for name, joints in braces.items()}
     names = names_of(braces)
-    for name in names:
-        if name not in ORTHOSES:
-            raise InputError(f"unknown brace {name!r}; known are {', '.join(ORTHOSES)}")
+    all_known(names, ORTHOSES, "brace")
     return {name: ORTHOSES[name] for name in names}
 
 

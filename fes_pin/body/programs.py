@@ -91,3 +91,10 @@ class ProgramAnswer:
     x: np.ndarray | None
     error: float
     unbounded: bool = False
+
+    @property
+    def greatest(self) -> tuple[float, float]:
+        """The last variable, of which the most was sought, and its error; infinite without end, else NaN without x."""
+        if self.x is None:
+            return (np.inf if self.unbounded else np.nan), 0.0
+        return float(self.x[-1]), self.error

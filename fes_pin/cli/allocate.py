@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from fes_pin.cli.group import needs
-from fes_pin.cli.options import pairs
+from fes_pin.cli.options import numbers_of, pairs
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between, number_in
+from fes_pin.data.numbers import between
 
 MOST_NM, MOST_DEG_S = 1e5, 1e4
 """No body's joint has more torque, N m, nor turns faster, degrees per second."""
@@ -27,17 +27,11 @@ def joint_numbers(words: list[str] | None, what: str, most: float) -> dict[str, 
     """
     from fes_pin.body.joints import known_joint
 
-    result: dict[str, float] = {}
-    for name, text in pairs(what, words).items():
-        try:
-            number = number_in(text)
-        except ValueError as problem:
-            raise InputError(f"{problem} of {name}", column=what) from None
+    given = numbers_of(what, pairs(what, words))
+    for name, number in given.items():
         known_joint(name)
-        if not abs(number) <= most:
-            raise InputError(f"{what} of {name} must lie within {most:g} either way, got {text}")
-        result[name] = number
-    return result
+        between(number, -most, most, f"{what} of {name}")
+    return given
 
 
 @needs(

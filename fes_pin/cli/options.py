@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import number_in
 
 if TYPE_CHECKING:
     from fes_pin.data.study import Study
@@ -88,4 +89,21 @@ def pairs(option: str, words: Sequence[str] | None) -> dict[str, str]:
         if name in out:
             raise InputError(f"expected {option} {name} once, found it again as {word!r}")
         out[name] = value
+    return out
+
+
+def numbers_of(option: str, values: Mapping[str, str]) -> dict[str, float]:
+    """Numbers by name of `pairs`.
+
+    Raises
+    ------
+    InputError
+        A value that is no number.
+    """
+    out: dict[str, float] = {}
+    for name, text in values.items():
+        try:
+            out[name] = number_in(text)
+        except ValueError as problem:
+            raise InputError(str(problem), column=f"{option} {name}") from None
     return out

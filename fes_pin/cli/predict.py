@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fes_pin.cli.group import python_names, remark
-from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, pairs, study_of
+from fes_pin.cli.options import Exclude, Force, Libraries, Trials, numbers_of, output, pairs, study_of
 from fes_pin.cli.progress import catalogue_with, say_whose_code
 from fes_pin.data.errors import InputError
 from fes_pin.data.read_files import note_read
@@ -132,18 +132,12 @@ def _trial(
     inputs_only: bool,
 ) -> Trial:
     """The trial to predict; what is wrong with it names the file or the option that was given."""
-    from fes_pin.data.numbers import number_in
     from fes_pin.data.study import read_columns
     from fes_pin.data.trial import read_trial
 
     said = pairs("--set", setting)
     kind = said.pop("kind", None)
-    conditions: dict[str, float] = {}
-    for name, value in said.items():
-        try:
-            conditions[name] = number_in(value)
-        except ValueError as problem:
-            raise InputError(str(problem), column=f"--set {name}") from None
+    conditions = numbers_of("--set", said)
     schema = model.rig.described()
     own = None if columns_of is None else read_columns(columns_of, rigs=catalogue.schemas())
     with _by_option({"kind", *conditions, *schema.conditions}), _readable(path) as file:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from numbers import Real
 from typing import Any
 
@@ -146,6 +146,19 @@ def known_word(value: object, allowed: Collection[str], name: str) -> str:
         some = f"{', '.join(words[:-1])} or {words[-1]}" if words[1:] else words[0]
         raise InputError(f"must be {some}, got {shortened(value)}", column=name)
     return value
+
+
+def all_known(names: Iterable[object], known: Collection[str], what: str) -> None:
+    """Refuse names that are none of those known.
+
+    Raises
+    ------
+    InputError
+        The first of them, with what is known.
+    """
+    for name in names:
+        if name not in known:
+            raise InputError(f"unknown {what} {name!r:.40}; there are {', '.join(known)}")
 
 
 def truth(value: object, name: str) -> bool:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from fes_pin.body.gait import turn
 from fes_pin.body.joints import axis_of
 from fes_pin.data.read_only import ReadOnly
 
@@ -90,13 +91,6 @@ def read_table(name: str) -> list[dict[str, str]]:
     """Rows of one of the tables that ship with the package."""
     text = (files("fes_pin.muscles") / "tables" / name).read_text()
     return list(csv.DictReader(text.splitlines()))
-
-
-def turn(axis, angle: np.ndarray) -> np.ndarray:
-    """Rotations about an axis by angles (n,), rad: (n, 3, 3)."""
-    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle)[:, None, None] * cross + (1.0 - np.cos(angle))[:, None, None] * (cross @ cross)
 
 
 def _spline(curve: Any, x: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.stats
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between, positive_number
+from fes_pin.data.numbers import all_known, between, positive_number
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.tabulated import Tabulated
 from fes_pin.paper.ratios import RATIOS, REACH, UNITS, Optimum, RatioProblem
@@ -77,8 +77,7 @@ def ratio_place(name: str) -> int:
     InputError
         For another name.
     """
-    if name not in RATIOS:
-        raise InputError(f"expected one of {', '.join(RATIOS)}, found {name!r}")
+    all_known([name], RATIOS, "ratio")
     return RATIOS.index(name)
 
 

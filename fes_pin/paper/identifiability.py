@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import all_known
 from fes_pin.data.show import frame
 from fes_pin.data.tabulated import Tabulated
 from fes_pin.data.trial import Trial
@@ -70,8 +71,9 @@ class Identifiability(Tabulated):
             For a constant that was not moved.
         """
         w = np.zeros(len(self.names))
+        all_known(powers, self.names, "constant")
         for name, power in powers.items():
-            w[_index(self.names, name)] = power
+            w[self.names.index(name)] = power
         seen = self._seen
         return bool(np.linalg.norm(w - seen.T @ (seen @ w)) <= 1e-4 * np.linalg.norm(w))
 
@@ -130,12 +132,6 @@ def _scaled(model: Model, name: str, factor: float) -> Model:
         raise InputError(f"no constant {name}; there are {', '.join((*model.parameters(), *constants))}")
     constants[name] *= factor
     return Model(dataclasses.replace(model.rig, constants=constants), model.effects)
-
-
-def _index(names: Sequence[str], name: str) -> int:
-    if name not in names:
-        raise InputError(f"no constant {name}; there are {', '.join(names)}")
-    return list(names).index(name)
 
 
 def _reduced(rows: np.ndarray) -> np.ndarray:
