@@ -233,7 +233,7 @@ def test_the_tool_says_what_cannot_be_told():
     assert "K F_ref a / J" in str(motion) and "not determined singly" in str(motion)
     both = ankle_identifiability(nominal_model(study), [study.trials[0], study.trials[-1]])
     assert both.determines({"moment_arm_m": 1, "inertia_kgm2": -1}) and both.determines({"time_constant_s": 1})
-    with pytest.raises(InputError, match="no constant lever"):
+    with pytest.raises(InputError, match="unknown constant 'lever'"):
         both.determines({"lever": 1.0})
 
 
