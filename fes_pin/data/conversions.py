@@ -11,43 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_json
 from fes_pin.data.recorded.formats import matlab_vectors
+from fes_pin.data.templates import arm_urdf, slide_urdf
 from fes_pin.data.units import INCH, POUND
 
 Files = dict[str, str]
-
-_ARM = """<?xml version="1.0"?>
-<!-- {what} -->
-<robot name="{name}">
-  <link name="base"/>
-  <link name="arm">
-    <inertial>
-      <origin xyz="0 0 {height}"/>
-      <mass value="{mass}"/>
-      <inertia ixx="{across}" ixy="0" ixz="0" iyy="{across}" iyz="0" izz="1e-6"/>
-    </inertial>
-  </link>
-  <joint name="pivot" type="continuous">
-    <parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
-  </joint>
-</robot>
-"""
-_ROD = """<?xml version="1.0"?>
-<!-- The damper's rod, driven horizontally. The moving mass is not published: 20 kg is a guess. -->
-<robot name="friction_damper">
-  <link name="base"/>
-  <link name="rod">
-    <inertial><mass value="20"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>
-  </link>
-  <joint name="rod" type="prismatic">
-    <parent link="base"/><child link="rod"/><axis xyz="1 0 0"/>
-    <limit lower="-0.05" upper="0.05" effort="1e5" velocity="1"/>
-  </joint>
-</robot>
-"""
 
 SERVO_LOGS = tuple(
     f"bam/data.bak/raw/2026-01-15_10h{time}.json"
@@ -87,10 +59,9 @@ def servo_pendulum(folder: Path) -> Files:
         role = "fit" if log["trajectory"] in ("lift_and_drop", "sin_sin") else "held_out"
         trials.append({"file": f"trials/{name}.csv", "role": role})
     what = "0.49 kg at 0.1 m on the horn of the servo; the arm and the servo's reflected inertia are not in here."
-    files["pendulum.urdf"] = _ARM.format(name="servo_pendulum", what=what, height=-0.1, mass=0.49, across="1e-6")
-    head = 'name = "servo-pendulum"\nrig = "joint"\n\n[rig]\nurdf = "pendulum.urdf"\ngravity_scale = 1.0\n'
-    start = "[start]\ninertia_scale = 1.2\ndamping = 0.01\n"
-    return {**files, "study.toml": _study(head, start, sorted(trials, key=lambda t: t["file"]))}
+    files["pendulum.urdf"] = arm_urdf("servo_pendulum", what, 0.49, -0.1, 1e-6, 1e-6)
+    rig, start = {"urdf": "pendulum.urdf", "gravity_scale": 1.0}, {"inertia_scale": 1.2, "damping": 0.01}
+    return {**files, "study.toml": _study("servo-pendulum", rig, start, sorted(trials, key=lambda t: t["file"]))}
 
 
 def _numbers(row: Mapping[str, Any], path: Path) -> list[float]:
@@ -142,9 +113,10 @@ def friction_damper(folder: Path) -> Files:
         files[f"trials/{name}.csv"] = _csv({"time_s": time, **at})
         role = "fit" if "_0.5hz" in name else "held_out"
         trials.append({"file": f"trials/{name}.csv", "kind": "imposed", "group": group, "role": role})
-    files["damper.urdf"] = _ROD
-    head = 'name = "friction-damper"\nrig = "joint"\n\n[rig]\nurdf = "damper.urdf"\ngravity_scale = 0.0\n'
-    return {**files, "study.toml": _study(head, "[start]\ninertia_scale = 1.0\ndamping = 1e5\n", trials)}
+    what = "The damper's rod, driven horizontally. The moving mass is not published: 20 kg is a guess."
+    files["damper.urdf"] = slide_urdf("friction_damper", what, 20.0, 0.1, 0.05)
+    rig, start = {"urdf": "damper.urdf", "gravity_scale": 0.0}, {"inertia_scale": 1.0, "damping": 1e5}
+    return {**files, "study.toml": _study("friction-damper", rig, start, trials)}
 
 
 PENDULUM_FILE = "SinglePendulumDataForParameterEstimation.mat"
@@ -176,10 +148,9 @@ def free_pendulum(folder: Path) -> Files:
     if len({t["role"] for t in trials}) < 2:
         raise InputError("expected cells Y_id, Time_id, Y_vad and Time_vad", file=path)
     what = "A rigid pendulum on a fixed pivot; position 0 is upright. As its authors identified it (arXiv:2205.06231)."
-    urdf = _ARM.format(name="free_pendulum", what=what, height=0.14775, mass=0.14758, across="1.0912e-4")
-    head = 'name = "free-pendulum"\nrig = "joint"\n\n[rig]\nurdf = "pendulum.urdf"\n'
-    start = "[start]\ninertia_scale = 1.0\ngravity_scale = 1.0\ndamping = 2.2394e-4\n"
-    return {**files, "pendulum.urdf": urdf, "study.toml": _study(head, start, trials)}
+    files["pendulum.urdf"] = arm_urdf("free_pendulum", what, 0.14758, 0.14775, 1.0912e-4, 1e-6)
+    start = {"inertia_scale": 1.0, "gravity_scale": 1.0, "damping": 2.2394e-4}
+    return {**files, "study.toml": _study("free-pendulum", {"urdf": "pendulum.urdf"}, start, trials)}
 
 
 CONVERTERS: Mapping[str, tuple[Callable[[Path], Files], tuple[str, ...]]] = {
@@ -195,6 +166,5 @@ def _csv(columns: Mapping[str, np.ndarray]) -> str:
     return "\n".join([",".join(columns), *(",".join(f"{x:.6g}" for x in row) for row in rows)]) + "\n"
 
 
-def _study(head: str, start: str, trials: list[dict[str, str]]) -> str:
-    tables = ["\n".join(["[[trial]]", *(f'{k} = "{v}"' for k, v in trial.items())]) for trial in trials]
-    return "\n\n".join([f"[study]\n{head}".rstrip(), start.rstrip(), *tables]) + "\n"
+def _study(name: str, rig: Mapping[str, Any], start: Mapping[str, float], trials: list[dict[str, str]]) -> str:
+    return tomli_w.dumps({"study": {"name": name, "rig": "joint"}, "rig": rig, "start": start, "trial": trials})

@@ -5,8 +5,7 @@ from __future__ import annotations
 from fes_pin.data.errors import InputError
 
 _URDF = """<?xml version="1.0"?>
-<!-- {what} Position 0: {zero}. {axis}
-     Written by `fes-pin new-study`: better values of mass, centre (origin) and inertia about it go in below. -->
+<!-- {what} -->
 <robot name="{name}">
   <link name="base"/>
   <link name="{link}">
@@ -23,7 +22,9 @@ _URDF = """<?xml version="1.0"?>
 {limit}  </joint>
 </robot>
 """
-LIMIT = '    <limit lower="-100" upper="100" effort="1e6" velocity="1e6"/>\n'
+LIMIT = '    <limit lower="-{reach}" upper="{reach}" effort="1e6" velocity="1e6"/>\n'
+_WRITTEN = """
+     Written by `fes-pin new-study`: better values of mass, centre (origin) and inertia about it go in below."""
 _SWING = "Positive turns about +y (a hanging arm swings to -x)."
 
 
@@ -69,21 +70,40 @@ def slide(mass_kg: float) -> str:
         A mass that is not above 0.
     """
     _check(mass=mass_kg)
-    moves = ("Positive moves along +x.", "carriage", "rail", "prismatic", "1 0 0", LIMIT)
-    return _filled("slide", f"A carriage of {mass_kg:g} kg on a level rail.", "where you say", mass_kg, 0.0, 0.0, moves)
+    what = (
+        f"A carriage of {mass_kg:g} kg on a level rail. Position 0: where you say. Positive moves along +x.{_WRITTEN}"
+    )
+    return slide_urdf("slide", what, mass_kg, 0.0, 100.0)
 
 
 def _turning(name: str, what: str, mass: float, centre: float, about_centre: float, upright: bool) -> str:
     zero, height = ("upright", centre) if upright else ("hanging straight down", -centre)
-    turns = (_SWING, "arm", "pivot", "continuous", "0 1 0", "")
-    return _filled(name, what, zero, mass, height, about_centre, turns)
+    return arm_urdf(name, f"{what} Position 0: {zero}. {_SWING}{_WRITTEN}", mass, height, about_centre)
 
 
-def _filled(name: str, what: str, zero: str, mass: float, height: float, across: float, moves: tuple[str, ...]) -> str:
-    """The template with numbers, and with words on how its joint moves: axis, link, joint, kind, direction, limit."""
-    words = dict(zip(("axis", "link", "joint", "kind", "direction", "limit"), moves, strict=True))
-    numbers = {"mass": float(mass), "height": float(height), "across": float(across), "along": 0.0}
-    return _URDF.format(name=name, what=what, zero=zero, **numbers, **words)
+def arm_urdf(name: str, what: str, mass_kg: float, height_m: float, across_kgm2: float, along_kgm2: float = 0.0) -> str:
+    """URDF of an arm on a pivot along y.
+
+    Parameters
+    ----------
+    name, what
+        Of the robot; what a person is to know of it.
+    mass_kg, height_m
+        Its mass, and how far above the pivot its centre is at position 0.
+    across_kgm2, along_kgm2
+        Its inertia about its centre, across the arm and along it.
+    """
+    numbers = {"mass": mass_kg, "height": height_m, "across": across_kgm2, "along": along_kgm2}
+    words = {"link": "arm", "joint": "pivot", "kind": "continuous", "direction": "0 1 0", "limit": ""}
+    return _URDF.format(name=name, what=what, **{n: float(v) for n, v in numbers.items()}, **words)
+
+
+def slide_urdf(name: str, what: str, mass_kg: float, inertia_kgm2: float, reach_m: float) -> str:
+    """URDF of a carriage that moves along x, so far either way."""
+    numbers = {"mass": mass_kg, "height": 0.0, "across": inertia_kgm2, "along": inertia_kgm2}
+    words = {"link": "carriage", "joint": "rail", "kind": "prismatic", "direction": "1 0 0"}
+    limit = LIMIT.format(reach=f"{reach_m:g}")
+    return _URDF.format(name=name, what=what, limit=limit, **{n: float(v) for n, v in numbers.items()}, **words)
 
 
 def _check(**numbers: float) -> None:
