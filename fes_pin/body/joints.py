@@ -19,19 +19,36 @@ from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import numbers, shortened
 
 SIDES = ("left", "right")
-_LEG = (
-    "hip_flexion",
-    "hip_adduction",
-    "hip_rotation",
-    "knee_flexion",
-    "ankle_dorsiflexion",
-    "ankle_inversion",
-    "ankle_rotation",
-    "mtp_extension",
-)
+_FORWARD, _LEFT, _UP = np.eye(3)
+
+# Degrees. Ranges of motion as clinics teach them: hip -15..125, abduction 45, adduction 45, rotations 45; ankle 50
+# plantar to 20 dorsal, inversion 35, eversion 25; MTP 30 flexion to 80 extension (table "Normal values for range of
+# motion of joints", MSD Manual; read there). Wider where people are known to go further with weight on the limb: hip
+# extension 30 and knee -10..150 (AAOS, Joint Motion 1965, and Kapandji, from memory), dorsiflexion 40 in a loaded
+# lunge (Bennell 1998, from memory). Thoracolumbar: flexion 80, extension 30, bending 35, rotation 45 (AAOS 1965, from
+# memory). Foot about the leg's axis: 20 either way (our choice: no agreed figure).
+# Axes are those of a right leg; the left leg's adduction, inversion and rotations are mirrored.
+_TURNS: dict[str, tuple[np.ndarray, tuple[float, float]]] = {
+    "hip_flexion": (-_LEFT, (-30.0, 125.0)),
+    "hip_adduction": (_FORWARD, (-45.0, 45.0)),
+    "hip_rotation": (_UP, (-45.0, 45.0)),
+    "knee_flexion": (_LEFT, (-10.0, 150.0)),
+    "ankle_dorsiflexion": (-_LEFT, (-50.0, 40.0)),
+    "ankle_inversion": (_FORWARD, (-25.0, 35.0)),
+    "ankle_rotation": (_UP, (-20.0, 20.0)),
+    "mtp_extension": (-_LEFT, (-30.0, 80.0)),
+    "lumbar_extension": (-_LEFT, (-80.0, 30.0)),
+    "lumbar_bending": (_FORWARD, (-35.0, 35.0)),
+    "lumbar_rotation": (_UP, (-45.0, 45.0)),
+}
+RANGE_DEG = {name: ends for name, (_, ends) in _TURNS.items()}
+"""Smallest and greatest angle, degrees, of a joint of either side."""
+
+_LEG, _LUMBAR = tuple(_TURNS)[:8], tuple(_TURNS)[8:]
+
 JOINT_NAMES: tuple[str, ...] = (
     *(f"{side}_{joint}" for side in SIDES for joint in _LEG),
-    *("lumbar_extension", "lumbar_bending", "lumbar_rotation"),
+    *_LUMBAR,
 )
 """The 19 joints in the order in which tables and arrays without names list them."""
 
@@ -44,41 +61,6 @@ SEGMENT_NAMES: tuple[str, ...] = (
     *(f"{side}_{segment}" for side in SIDES for segment in ("thigh", "shank", "hindfoot", "forefoot")),
 )
 """The paper's ten segments; the trunk carries head and arms."""
-
-_FORWARD, _LEFT, _UP = np.eye(3)
-_AXES = {  # of a right leg; the left leg's adduction, inversion and rotations are mirrored
-    "hip_flexion": -_LEFT,
-    "hip_adduction": _FORWARD,
-    "hip_rotation": _UP,
-    "knee_flexion": _LEFT,
-    "ankle_dorsiflexion": -_LEFT,
-    "ankle_inversion": _FORWARD,
-    "ankle_rotation": _UP,
-    "mtp_extension": -_LEFT,
-    "lumbar_extension": -_LEFT,
-    "lumbar_bending": _FORWARD,
-    "lumbar_rotation": _UP,
-}
-
-# Degrees. Ranges of motion as clinics teach them: hip -15..125, abduction 45, adduction 45, rotations 45; ankle 50
-# plantar to 20 dorsal, inversion 35, eversion 25; MTP 30 flexion to 80 extension (table "Normal values for range of
-# motion of joints", MSD Manual; read there). Wider where people are known to go further with weight on the limb: hip
-# extension 30 and knee -10..150 (AAOS, Joint Motion 1965, and Kapandji, from memory), dorsiflexion 40 in a loaded
-# lunge (Bennell 1998, from memory). Thoracolumbar: flexion 80, extension 30, bending 35, rotation 45 (AAOS 1965, from
-# memory). Foot about the leg's axis: 20 either way (our choice: no agreed figure).
-_LIMITS_DEG = {
-    "hip_flexion": (-30.0, 125.0),
-    "hip_adduction": (-45.0, 45.0),
-    "hip_rotation": (-45.0, 45.0),
-    "knee_flexion": (-10.0, 150.0),
-    "ankle_dorsiflexion": (-50.0, 40.0),
-    "ankle_inversion": (-25.0, 35.0),
-    "ankle_rotation": (-20.0, 20.0),
-    "mtp_extension": (-30.0, 80.0),
-    "lumbar_extension": (-80.0, 30.0),
-    "lumbar_bending": (-35.0, 35.0),
-    "lumbar_rotation": (-45.0, 45.0),
-}
 
 
 @dataclass(frozen=True)
@@ -104,13 +86,13 @@ def _plain(name: str) -> str:
 def axis_of(name: str) -> np.ndarray:
     """Axis about which the outer segment turns when the joint's angle grows: (3,) unit vector, neutral posture."""
     plain = _plain(name)
-    axis = _AXES[plain].copy()
+    axis = _TURNS[plain][0].copy()
     return -axis if side_of(name) == "left" and abs(axis[1]) < 0.5 else axis
 
 
 def joint_limits(name: str) -> tuple[float, float]:
     """Smallest and greatest angle, rad."""
-    low, high = np.radians(_LIMITS_DEG[_plain(name)])
+    low, high = np.radians(RANGE_DEG[_plain(name)])
     return float(low), float(high)
 
 

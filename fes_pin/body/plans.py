@@ -160,10 +160,14 @@ class Plans:
         return np.kron(response, self.gains[i])
 
     @cached_property
-    def _limits(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows <= limits over all inputs, for a body that starts in the posture at rest; (rows, m pieces), (rows,)."""
-        count = len(self.pieces)
+    def _limits(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows <= limits over all inputs, for a body that starts in the posture at rest; (rows, m pieces), (rows,).
+
+        And what each row is about, (rows,): twice the mode's place on the way, one more in the end; -1 the ground.
+        """
+        count, later = len(self.pieces), int(self._later.sum())
         rows, limits = [np.zeros((0, self.inputs.n * count))], [np.zeros(0)]
+        about: list[np.ndarray] = [np.zeros(0)]
         last = np.zeros((1, count))
         last[0, -1] = 1.0
         position, rate = self._ending()
@@ -179,14 +183,16 @@ class Plans:
             spread, still = self._spread(i, response) / weight, pull * response.sum(axis=1) / weight
             room = np.ones(len(response))
             if self.kinds[i] == "fall" and self.rest_deg is not None:
-                room[self._later.sum()] = self.rest_deg / self.settle_deg
+                room[later] = self.rest_deg / self.settle_deg
             rows += [spread, -spread]
             limits += [room - still, room + still]
+            about += [2.0 * i + (np.arange(len(room)) >= later)] * 2
         if self.balance and self.gravity:
             for row, limit in self._on_the_soles():
                 rows.append(row)
                 limits.append(limit)
-        return np.vstack(rows), np.concatenate(limits)
+                about.append(np.full(len(limit), -1.0))
+        return np.vstack(rows), np.concatenate(limits), np.concatenate(about)
 
     @cached_property
     def _musts(self) -> np.ndarray:
@@ -268,7 +274,7 @@ class Plans:
             A direction of starts at rest, (r,): the start is eta + s towards, and s, the last variable, is greatest.
         """
         fall = self.kinds == "fall"
-        rows, limits = self._limits
+        rows, limits, _ = self._limits
         limits = limits + self._free(eta, rate)
         must = self._musts
         growing = eta[fall] + rate[fall] / self._rates[0] - self.constant[fall] * self._starts.sum(axis=1)
@@ -304,13 +310,5 @@ class Plans:
     @cached_property
     def _reach(self) -> np.ndarray:
         """Which rows of the limits are about which mode, on the way and in the end: (rows, 2 modes) 0 or 1."""
-        rows = []
-        for i, kind in enumerate(self.kinds[self.kinds != "neutral"]):
-            own = np.zeros(
-                (int(self._later.sum()) + (5 if kind == "swing" else 1), 2 * int((self.kinds != "neutral").sum()))
-            )
-            own[: self._later.sum(), 2 * i] = 1.0
-            own[self._later.sum() :, 2 * i + 1] = 1.0
-            rows += [own, own]
-        modal = np.vstack(rows)
-        return np.vstack([modal, np.zeros((len(self._limits[1]) - len(modal), modal.shape[1]))])
+        places = np.flatnonzero(np.repeat(self.kinds != "neutral", 2))
+        return 1.0 * (self._limits[2][:, None] == places)

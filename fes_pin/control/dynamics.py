@@ -27,17 +27,6 @@ LONGEST_STRETCH = 3.0
 """Angle in rad beyond theta_r from which eq. (1) is as there, so that no state overflows: far beyond any ankle."""
 
 
-def _frame_of(model: Model) -> dict[str, float]:
-    frame = next((e for e in model.effects if isinstance(e, FrameVibration)), None)
-    if frame is None:
-        return {}
-    return {
-        "frame_coupling": float(frame.coupling),
-        "frame_hz": float(frame.frequency_hz),
-        "frame_damping": float(frame.damping_ratio),
-    }
-
-
 @dataclass(frozen=True, eq=False)
 class AnkleDynamics(Tabulated):
     """Eq. (1) as plain numbers: the ankle that a controller believes in, with one load.
@@ -96,6 +85,7 @@ class AnkleDynamics(Tabulated):
             raise InputError(
                 f"expected a load that rests between {low} and {high} rad, found {load_kg:g}", column="load_kg"
             )
+        frame = next((e for e in model.effects if isinstance(e, FrameVibration)), None)
         return cls(
             rig.inertia_kgm2,
             rig.damping_nms,
@@ -103,7 +93,7 @@ class AnkleDynamics(Tabulated):
             c["moment_arm_m"] * rig.gain * c["force_scale_n"],
             c,
             float(load_kg),
-            **_frame_of(model),
+            *(() if frame is None else map(float, (frame.coupling, frame.frequency_hz, frame.damping_ratio))),
         )
 
     @property

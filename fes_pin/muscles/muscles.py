@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, SIDES, angles_array, known_joint
+from fes_pin.body.joints import JOINT_NAMES, MIRROR_SIGN, RANGE_DEG, SIDES, angles_array, known_joint
 from fes_pin.data.errors import InputError
 from fes_pin.data.named import NamedArray
 from fes_pin.data.numbers import numbers
@@ -15,15 +15,9 @@ from fes_pin.data.read_only import ReadOnly
 from fes_pin.muscles.fibres import isometric_force, velocity_factor
 from fes_pin.muscles.paths import COORDINATES, LegPaths, leg_paths, read_table
 
-KNOWN_DEG = {
+KNOWN_DEG = {name: RANGE_DEG[name] for name in COORDINATES} | {
     "hip_flexion": (-30.0, 85.0),
-    "hip_adduction": (-45.0, 45.0),
-    "hip_rotation": (-45.0, 45.0),
     "knee_flexion": (-10.0, 110.0),
-    "ankle_dorsiflexion": (-50.0, 40.0),
-    "ankle_inversion": (-25.0, 35.0),
-    "ankle_rotation": (-20.0, 20.0),
-    "mtp_extension": (-30.0, 80.0),
 }
 """Angles at which the paths are anatomy: a joint's whole range (`joint_limits`), but for what runs straight where bone
 would hold it off. Iliacus and psoas lose the pelvic rim in front of them beyond 85 degrees of hip flexion and would
