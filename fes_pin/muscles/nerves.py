@@ -10,7 +10,7 @@ import numpy as np
 
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import all_known, between, shortened, truth
+from fes_pin.data.numbers import between, shortened, truth
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.muscles.muscles import MuscleTable, angles_of, standard_muscles
 
@@ -193,7 +193,9 @@ class Nerves(ReadOnly):
             No name, or one that is not among these nerves.
         """
         names = nerve_names(names)
-        all_known(names, self.names, "nerve")
+        for name in names:
+            if name not in self.names:
+                raise InputError(f"{name!r} is not among the nerves {', '.join(self.names)}")
         return replace(self, names=names, fatigue={k: v for k, v in self.fatigue.items() if k in names})
 
     def tired(self, **left: float) -> Nerves:
