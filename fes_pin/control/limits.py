@@ -9,23 +9,12 @@ from typing import Any
 
 from fes_pin.control.dynamics import ANGLES_RAD, PULSE_S
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import as_number, between, number, shortened
+from fes_pin.data.numbers import as_number, between, shortened
+from fes_pin.data.pulses import RANGES, in_range
 
 BURST = 0.2
 """Share of a second's charge that may be given at once; the rest is what may be given steadily. Together they are what
 any one second can hold."""
-RANGES = {
-    "pulse_width_us": (10.0, 5000.0, "us"),
-    "rate_us_per_s": (20.0, 20_000.0, "us/s"),
-    "charge_uc_per_s": (5.0, 5000.0, "uC/s"),
-    "current_ma": (0.2, 200.0, "mA"),
-}
-"""Limits that a stimulator of nerves can have. No range spans more than a factor of 1000, so that a limit in A, C, s or
-ms in place of mA, uC and us lies outside of it. At the skin FES uses 1 to 150 mA and up to 500 us (Valtin and others,
-Eur. J. Transl. Myol. 26:6076, 2016); a stimulator for research gives 10 us and more (Hasomed RehaMove3 Science),
-section II of Dombre, Fournier and Coiffet uses 1000 us. Electrodes at the nerve need a hundredth of that current. The
-charge is the product of both, 45 times a second; a width that changes by 20 000 us/s crosses the paper's muscle in two
-pulses."""
 
 
 def check_width(value: object, name: str) -> float:
@@ -36,16 +25,7 @@ def check_width(value: object, name: str) -> float:
     InputError
         Anything else; see `RANGES`.
     """
-    return _in_range(value, "pulse_width_us", name)
-
-
-def _in_range(value: object, kind: str, name: str) -> float:
-    low, high, unit = RANGES[kind]
-    found = as_number(value)
-    if found is None or math.isnan(found) or not low <= found <= high:
-        number(value, name, infinite=True)
-        raise InputError(f"expected {low:g} to {high:g} {unit}, found {shortened(value)}", column=name)
-    return found
+    return in_range(value, "pulse_width_us", name)
 
 
 @dataclass(frozen=True)
@@ -89,7 +69,7 @@ class StimulationLimits:
         for name in RANGES:
             value = getattr(self, name)
             if value is not None if name == "current_ma" else value != math.inf:
-                _in_range(value, name, name)
+                in_range(value, name, name)
         if self.current_ma is None and self.charge_uc_per_s < math.inf:
             raise InputError("a limit of charge needs current_ma", column="charge_uc_per_s")
         between(self.ramp_s, 0.0, 1.0, "ramp_s")

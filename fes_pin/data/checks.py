@@ -24,6 +24,8 @@ LONGEST_MUSCLE_M = 1.0
 """Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""
 SHORTEST_PULSE_US = 2.0
 """Pulse width in us that recruits nothing: surface stimulators give 50 to 1000 us, and 2 is a long one in ms."""
+LONGEST_PULSE_US = 1e5
+"""Pulse width in us that no nerve is given: as long as the pause between pulses at 10 Hz; 100 us in ns."""
 
 
 def checked_mapping(value: Any, error: KeyFault, key: str) -> dict[Any, Any]:
@@ -188,6 +190,10 @@ def check_values(
         if 0.0 < (most := float(width.max())) <= min(SHORTEST_PULSE_US, threshold_us):
             told = f"reaches {most:.4g} us, and no pulse is so short: is it in {'ms' if most > 0.002 else 's'}?"
             raise error(told, "pulse_width_us", int(np.argmax(width)))
+        if most > LONGEST_PULSE_US:
+            raise error(
+                f"reaches {most:g} us, and no pulse is so long: is it in ns?", "pulse_width_us", int(width.argmax())
+            )
     if "stim" in columns and (other := ~np.isin(columns["stim"], (0.0, 1.0))).any():
         sample = int(np.argmax(other))
         raise error(f"expected 0 or 1, found {columns['stim'][sample]:g}", "stim", sample)

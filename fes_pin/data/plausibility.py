@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fes_pin.data.checks import check_values
 from fes_pin.data.counts import hunts
 from fes_pin.data.errors import InputError
 from fes_pin.data.imposed import imposed_motion
@@ -176,10 +177,13 @@ def _inputs(study: Study | ToPredict) -> Iterable[str]:
     for name in names:
         threshold = study.constants.get("threshold_us", 0.0) if name == "pulse_width_us" else 0.0
         driven = [t for t in study.trials if name in _stimuli(study, t)]
-        silent = [t.name for t in driven if not (np.abs(t[name]) > threshold).any()]
+        below = [t for t in driven if not (np.abs(t[name]) > threshold).any()]
+        silent = [t.name for t in below]
         told = f"{name} is never above the threshold of {threshold:g} us" if threshold else f"{name} is zero throughout"
         if len(silent) < len(driven):
             if silent and name in PULSES:  # a joint may swing free between driven trials
+                for trial in below:
+                    check_values({name: trial[name]}, study.schema, trial.error, threshold)
                 yield f"{told} in {trials_named(silent)}"
         elif name not in PULSES:
             yield f"no trial is driven: {told}"

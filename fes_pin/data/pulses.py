@@ -2,15 +2,46 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.data.checks import LONGEST_PULSE_US
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import as_number, number, shortened
 from fes_pin.data.trial import Trial
 
-MOST = {"width_us": 1e5, "rate_hz": 1e4, "charge_uc": 1e4, "current_ma": 1e3}
+MOST = {"width_us": LONGEST_PULSE_US, "rate_hz": 1e4, "charge_uc": 1e4}
 """What no stimulator of nerves or muscles comes near: a limit beyond it is a slip of units."""
+RANGES = {
+    "pulse_width_us": (10.0, 5000.0, "us"),
+    "rate_us_per_s": (20.0, 20_000.0, "us/s"),
+    "charge_uc_per_s": (5.0, 5000.0, "uC/s"),
+    "current_ma": (0.2, 200.0, "mA"),
+}
+"""Limits that a stimulator of nerves can have. No range spans more than a factor of 1000, so that a limit in A, C, s or
+ms in place of mA, uC and us lies outside of it. At the skin FES uses 1 to 150 mA and up to 500 us (Valtin and others,
+Eur. J. Transl. Myol. 26:6076, 2016); a stimulator for research gives 10 us and more (Hasomed RehaMove3 Science),
+section II of Dombre, Fournier and Coiffet uses 1000 us. Electrodes at the nerve need a hundredth of that current. The
+charge is the product of both, 45 times a second; a width that changes by 20 000 us/s crosses the paper's muscle in two
+pulses."""
+
+
+def in_range(value: object, kind: str, name: str) -> float:
+    """A limit of a stimulator, within `RANGES`.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    low, high, unit = RANGES[kind]
+    found = as_number(value)
+    if found is None or math.isnan(found) or not low <= found <= high:
+        number(value, name, infinite=True)
+        raise InputError(f"expected {low:g} to {high:g} {unit}, found {shortened(value)}", column=name)
+    return found
 
 
 @dataclass(frozen=True)
@@ -27,6 +58,11 @@ class PulseLimits:
         Charge of one pulse, uC: width times current.
     current_ma
         Amplitude of the pulses, mA.
+
+    Raises
+    ------
+    InputError
+        For a number that no stimulator has: too small a current, in A, would let any width pass the limit of charge.
     """
 
     width_us: float
@@ -39,6 +75,7 @@ class PulseLimits:
             if not 0.0 < getattr(self, name) <= most:
                 words = f"expected a number above 0 and at most {most:g}, found {getattr(self, name):g}"
                 raise InputError(words, column=f"limits.{name}")
+        in_range(self.current_ma, "current_ma", "limits.current_ma")
 
 
 def pulse_list(

@@ -80,6 +80,7 @@ def test_a_trial_that_cannot_be_is_refused_when_it_is_built(case):
 
 OF_A_RIG = {
     "seconds": ("ankle", {**ANKLE, "pulse_width_us": np.full(100, 3e-4)}, "motion", {"load_kg": 1.0}, "is it in s?"),
+    "nanoseconds": ("ankle", {**ANKLE, "pulse_width_us": np.full(100, 3e5)}, "motion", {"load_kg": 1.0}, "is it in ns?"),
     "milliseconds": ("ankle", {**ANKLE, "pulse_width_us": np.full(100, 0.3)}, "motion", {"load_kg": 1.0}, "is it in ms?"),
     "negative widths": ("ankle", {**ANKLE, "pulse_width_us": np.full(100, -1.0)}, "motion", {"load_kg": 1.0}, "at least 0 us, found -1"),
     "no widths": ("ankle", {"angle_rad": ANKLE["angle_rad"]}, "motion", {"load_kg": 1.0}, "pulse_width_us: missing"),
