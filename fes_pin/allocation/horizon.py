@@ -72,7 +72,7 @@ def invert_lag(
     Raises
     ------
     InputError
-        Times out of `STEP_S` and `LAG_S`, recruitments that are not numbers (samples, n).
+        Times out of `STEP_S` and `LAG_S`, recruitments that are not numbers (samples, n), a start that is not (n,).
     """
     between(step_s, *STEP_S, "step_s")
     between(time_constant_s, *LAG_S, "time_constant_s")
@@ -80,7 +80,9 @@ def invert_lag(
     if recruitment.ndim != 2 or not len(recruitment) or not np.isfinite(recruitment).all():
         raise InputError(f"recruitment must be finite numbers, samples x channels, got shape {recruitment.shape}")
     keep = np.exp(-step_s / time_constant_s)
-    act = np.array(recruitment[0] if start is None else start, dtype=float)
+    act = numbers(recruitment[0] if start is None else start, "start")
+    if act.shape != recruitment.shape[1:] or not np.isfinite(act).all():
+        raise InputError(f"expected {recruitment.shape[1]} finite numbers, got shape {act.shape}", column="start")
     commands = np.empty_like(recruitment)
     for k, wanted in enumerate(recruitment):
         commands[k] = np.clip((wanted - keep * act) / (1.0 - keep), 0.0, 1.0)

@@ -17,7 +17,7 @@ from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode
 from fes_pin.body.programs import LinearProgram, ProgramAnswer
-from fes_pin.data.numbers import positive_number
+from fes_pin.data.numbers import positive_number, truth
 from fes_pin.data.tabulated import Tabulated
 
 SETTLE_DEG = 10.0
@@ -87,13 +87,13 @@ def demands(
     found = linear.modes()
     kinds, degree = found.kinds, found.degree
     gains = found.shapes.T @ inputs.on(linear)
-    constant = found.shapes.T @ linear.C * gravity
+    constant = found.shapes.T @ linear.C * truth(gravity, "gravity")
     size = np.abs(gains).max(axis=1, initial=0.0)
     size = np.where(size > 1e-12, size, 1.0)
     fall, hang = kinds == "fall", kinds == "swing"
     swing = hang & np.isfinite(settle_deg)
     room = -found.values * degree * (settle_deg if np.isfinite(settle_deg) else 0.0)
-    ground = _balance(linear, found) if gravity and balance else None
+    ground = _balance(linear, found) if truth(balance, "balance") and gravity else None
     rows = np.zeros((0, len(found))) if ground is None else ground.at_rest
     shares = np.zeros((0, linear.n)) if ground is None else ground.per_torque
     hanging = rows[:, hang] / -found.values[hang]  # a swing hangs at F / -mu

@@ -20,7 +20,7 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode
 from fes_pin.body.plans import Plans
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import number, positive_number
+from fes_pin.data.numbers import number, positive_number, truth
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,4 +165,5 @@ def plans_of(
         raise InputError("what inputs catch is asked of a body at rest without damping")
     if rest_deg is not None and number(rest_deg, "rest_deg") < 0.0:
         raise InputError(f"must not be negative, got {rest_deg}", column="rest_deg")
+    balance, gravity = truth(balance, "balance"), truth(gravity, "gravity")
     return Plans(linear, inputs, positive_number(settle_deg, "settle_deg"), balance, rest_deg, gravity)

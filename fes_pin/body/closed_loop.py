@@ -25,7 +25,7 @@ from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.linearize import model_on_slope
 from fes_pin.body.plans import PULSE_S, Plans
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import positive_number
+from fes_pin.data.numbers import positive_number, truth
 from fes_pin.data.read_only import ReadOnly
 
 STEP_S = 0.002
@@ -101,17 +101,18 @@ def close_the_loop(
     InputError
         Inputs that are none, a body on both feet, another time than a positive one.
     """
+    given = Inputs.of(inputs, linear)
     if linear.both_feet:
         raise InputError("the closed loop is simulated on one foot only")
     start = np.asarray(angles_array(start, linear.joint_names))
-    plans = plans_of(linear, Inputs.of(inputs, linear), settle_deg, balance)
+    plans = plans_of(linear, given, settle_deg, balance)
     plant = _Plant(linear)
     q, v = plant.rest + start, np.zeros(linear.n)
     deviations, outside, lost = [start], -np.inf, ""
     given_inputs: list[np.ndarray] = []
     for _ in range(round(positive_number(seconds, "seconds") / PULSE_S)):
         now = plans
-        if moving_arms:
+        if truth(moving_arms, "moving_arms"):
             try:
                 now = replace(plans, inputs=_acting(inputs, linear, q))
             except InputError as error:
@@ -132,7 +133,7 @@ def close_the_loop(
             lost = f"{linear.joint_names[int(np.abs(deviations[-1]).argmax())]} is {LOST_DEG:g} degrees off"
             break
     time = PULSE_S * np.arange(len(deviations))
-    used = np.array(given_inputs).reshape(-1, plans.inputs.n)
+    used = np.array(given_inputs).reshape(len(given_inputs), plans.inputs.n)
     return Caught(linear.joint_names, time, np.array(deviations), used, outside, lost)
 
 

@@ -50,8 +50,9 @@ def posture_angles(name: str, stance: str) -> dict[str, float]:
     Raises
     ------
     InputError
-        Unknown posture.
+        Unknown posture or side.
     """
+    known_word(stance, SIDES, "stance")
     if name in STILL:
         angles = dict.fromkeys(JOINT_NAMES, 0.0)
         return {**angles, f"{stance}_ankle_inversion": -_ONE_LEG_LEAN} if name == "one_leg" else angles

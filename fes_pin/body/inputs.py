@@ -44,11 +44,13 @@ class Inputs(ReadOnly):
     def __post_init__(self) -> None:
         for name in ("matrix", "lower", "upper"):
             object.__setattr__(self, name, numbers(getattr(self, name), name))
+        for name in ("names", "joint_names"):
+            object.__setattr__(self, name, tuple(names_of(getattr(self, name))))
         shape = (len(self.joint_names), len(self.names))
         if self.matrix.shape != shape or not np.all(np.isfinite(self.matrix)):
             raise InputError(f"the input matrix must be finite and of shape {shape}, got {self.matrix.shape}")
-        if len(set(self.names)) < len(self.names):
-            raise InputError("an input is named twice")
+        if len(set(map(str, self.names))) < len(self.names) or not all(isinstance(n, str) for n in self.names):
+            raise InputError("an input is named twice, or by no text")
         for name in self.joint_names:
             known_joint(name)
         if self.lower.shape != shape[1:] or self.upper.shape != shape[1:]:

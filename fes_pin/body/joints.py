@@ -125,7 +125,7 @@ def known_joint(name: str) -> str:
     InputError
         It is not; the message names the nearest.
     """
-    if name not in JOINT_NAMES:
+    if not isinstance(name, str) or name not in JOINT_NAMES:
         near = difflib.get_close_matches(str(name), JOINT_NAMES, n=1, cutoff=0.0)[0]
         raise InputError(f"unknown joint {name!r}; did you mean {near!r}?")
     return name

@@ -105,7 +105,7 @@ def linearize(
     """
     if not isinstance(body, Body):
         raise InputError(f"must be a Body, got {shortened(body)}", column="body")
-    q, gravity = body.angles(posture, check), between(gravity, 0.0, MOST_GRAVITY, "gravity")
+    q, gravity = body.angles(posture, truth(check, "check")), between(gravity, 0.0, MOST_GRAVITY, "gravity")
     if passive is not None and not hasattr(passive, "stiffness"):
         raise InputError(f"must be ElasticJoints or PassiveLegs, got {shortened(passive)}", column="passive")
     if both_feet is not None:

@@ -197,7 +197,7 @@ def pareto(sets: Iterable[MinimalSet]) -> list[MinimalSet]:
 
 def _orthoses(braces: Iterable[str] | Mapping[str, Sequence[str]]) -> dict[str, tuple[str, ...]]:
     if isinstance(braces, Mapping):
-        return {str(name): tuple(known_joint(joint) for joint in joints) for name, joints in braces.items()}
+        return {str(name): tuple(map(known_joint, names_of(joints))) for name, joints in braces.items()}
     names = names_of(braces)
     all_known(names, ORTHOSES, "brace")
     return {name: ORTHOSES[name] for name in names}

@@ -21,7 +21,7 @@ from fes_pin.body.joints import known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, ModeSet
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import positive_number
+from fes_pin.data.numbers import instance, positive_number
 from fes_pin.data.tabulated import Tabulated
 
 NOISE_DEG, RATE_HZ, LOOK_S = 0.5, 200.0, 0.3
@@ -160,7 +160,8 @@ def fewest_goniometers(
         Unknown joint; a figure that is not positive; or no set sees every fall so well.
     """
     within_deg = positive_number(within_deg, "within_deg")
-    names = tuple(linear.joint_names if candidates is None else candidates)
+    instance(linear, LinearBody, "linear")
+    names = tuple(linear.joint_names if candidates is None else names_of(candidates))
     whole = observability(linear, names)
     rows = [i for i, mode in enumerate(whole.modes) if mode.kind == "fall"]
     if whole.worst_deg > within_deg or not np.all(whole.observable[rows]):

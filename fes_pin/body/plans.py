@@ -296,9 +296,9 @@ class Plans:
         """
         plan, reach = self.program(eta, rate), self._reach
         modal = reach.any(axis=1)
-        count = reach.shape[1]
+        count, spared = reach.shape[1], np.full(len(plan.cost), _SPARED / max(len(plan.cost), 1))
         return LinearProgram(
-            cost=np.concatenate([np.full(len(plan.cost), _SPARED / len(plan.cost)), np.ones(count), [1 / _OUTSIDE_M]]),
+            cost=np.concatenate([spared, np.ones(count), [1 / _OUTSIDE_M]]),
             A_ub=np.column_stack([plan.A_ub, -reach, -1.0 * ~modal]),
             b_ub=plan.b_ub - modal,
             A_eq=np.column_stack([plan.A_eq, np.zeros((len(plan.A_eq), count + 1))]),

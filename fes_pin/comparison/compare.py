@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,9 @@ import numpy as np
 from fes_pin.comparison.held_out import Parting, fits_of, left_out_errors, partings, spreads
 from fes_pin.comparison.literature import NOMINAL, RIGS, possible, published_model
 from fes_pin.comparison.result import Apart, Compared, Comparison, apart_from
+from fes_pin.data.asked import asked
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import instance, number
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import measured_study, split
@@ -72,7 +74,7 @@ def compare(
         trial.
     """
     began = time.perf_counter()
-    tell = progress or (lambda _share, _words: None)
+    tell = asked(study, progress=progress)
     if study.rig not in RIGS:
         raise InputError(f"expected a study of a rig {' or '.join(RIGS)}, found {study.rig}", file=study.folder)
     measured = measured_study(study)
@@ -123,14 +125,15 @@ def _chosen(
     library: Source | Sequence[Source] | None,
 ) -> list[_Chosen]:
     out = []
-    for name in dict.fromkeys(possible(trials) if models is None else models):
+    names = possible(trials) if models is None else instance(models, Iterable, "models")
+    for name in dict.fromkeys(str(name) for name in ([names] if isinstance(names, str) else names)):
         if name == NOMINAL:
             out.append(_Chosen(name, nominal))
             continue
         one = published_model(name)
         model = one.model(nominal, trials)
         out.append(_Chosen(name, model, one.words, one.source, one.unfelt(nominal, trials)))
-    for name, given in (extended or {}).items():
+    for name, given in instance({} if extended is None else extended, Mapping, "extended").items():
         own = given if isinstance(given, Model) else load_model(given, library=library)
         if own.rig.name != nominal.rig.name:
             raise InputError(f"expected a model of the rig {nominal.rig.name}, found one of {own.rig.name}: {name}")
@@ -203,7 +206,7 @@ def _horizon(study: Study, trials: Sequence[Trial], asked: float | None) -> floa
 
 def _check_time(value: float, trials: Sequence[Trial], name: str) -> None:
     shortest = min(t.duration for t in trials)
-    if not 0.0 < value < shortest:
+    if not 0.0 < number(value, name) < shortest:
         raise InputError(
             f"expected seconds between 0 and {shortest:.4g}, the shortest trial; found {value:g}", column=name
         )

@@ -16,6 +16,7 @@ from fes_pin.contrasts.late import is_cheaper, late_in_groups
 from fes_pin.contrasts.left import left_in_groups
 from fes_pin.contrasts.result import STOPPED, Contrast
 from fes_pin.contrasts.search import ContrastFound, ContrastSearch
+from fes_pin.data.asked import asked
 from fes_pin.data.log import EFFORT, Log
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
@@ -80,7 +81,7 @@ def contrast(
         as `diagnose`.
     """
     began = time.perf_counter()
-    tell = progress or (lambda _share, _words: None)
+    tell = asked(study, seed, limit, progress)
     catalogue = catalogue_of(library)
     measured = measured_study(grouped_study(study, after, by, groups))
     joined, nominal = measured.study, nominal_model(measured.study)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import instance
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial, derived_trial
 
@@ -22,8 +23,11 @@ def grouped_study(study: Study, other: Study | None, by: str, chosen: Sequence[s
     """
     if study.rig == "body":
         raise InputError("expected a rig whose trials are simulated; walking has no contrast", file=study.folder)
-    labelled = _joined(study, other) if other is not None else _labelled(study, by)
+    labelled = _labelled(study, by) if other is None else _joined(study, instance(other, Study, "after"))
     groups = list(dict.fromkeys(t.group for t in labelled.trials if t.group is not None))
+    if chosen is not None:
+        instance(chosen, Sequence, "groups")
+    chosen = (chosen,) if isinstance(chosen, str) else chosen
     for name in chosen or ():
         if name not in groups:
             raise InputError(f"no group {name!r}; expected some of {', '.join(groups)}", file=study.folder)
@@ -41,7 +45,7 @@ def grouped_study(study: Study, other: Study | None, by: str, chosen: Sequence[s
 def _labelled(study: Study, by: str) -> Study:
     if by == BY_GROUP:
         labels: list[str | None] = [t.group for t in study.trials]
-        expected = 'group = "..." in every [[trial]]'
+        expected = 'group = "..." in every [[trial]]' if study.document else "every trial in one"
     else:
         labels = [f"{t.conditions[by]:g}" if by in t.conditions else None for t in study.trials]
         expected = f"{BY_GROUP}, or a condition that every trial states"

@@ -146,11 +146,14 @@ def scheduled(bout_rad: np.ndarray, bouts: int, rest_s: float, rest_rad: float) 
     Raises
     ------
     InputError
-        For fewer than one bout, or another rest.
+        For fewer than one bout, another rest, or a bout that is not (n,).
     """
     bouts = whole(bouts, "bouts", least=1)
+    bout = numbers(bout_rad, "bout_rad")
+    if bout.ndim != 1:
+        raise InputError(f"expected one angle per pulse, (n,), got shape {bout.shape}", column="bout_rad")
     pause = np.full(round(between(rest_s, 0.0, LONGEST_REST_S, "rest_s") / PULSE_S), rest_rad)
-    return np.concatenate([bout_rad, *[part for _ in range(bouts - 1) for part in (pause, bout_rad)]])
+    return np.concatenate([bout, *[part for _ in range(bouts - 1) for part in (pause, bout)]])
 
 
 class EnduranceWatch:

@@ -68,7 +68,7 @@ class StimulationLimits:
     def __post_init__(self) -> None:
         for name in RANGES:
             value = getattr(self, name)
-            if value is not None if name == "current_ma" else value != math.inf:
+            if value is not None if name == "current_ma" else as_number(value) != math.inf:
                 in_range(value, name, name)
         if self.current_ma is None and self.charge_uc_per_s < math.inf:
             raise InputError("a limit of charge needs current_ma", column="charge_uc_per_s")

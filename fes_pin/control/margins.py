@@ -14,6 +14,7 @@ import numpy as np
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.control.observer import JointObserver
 from fes_pin.control.tuning import Gains, Loop, corners, loop_at
+from fes_pin.data.numbers import instance
 from fes_pin.data.tabulated import Tabulated
 
 FREQUENCIES = 4000
@@ -71,8 +72,15 @@ def delay_margin(dynamics: AnkleDynamics, observer: JointObserver, gains: Gains)
     -------
     tuple of float
         Of the believed ankle; and of the worst one within 30 % in gain, time constant and stiffness.
+
+    Raises
+    ------
+    InputError
+        Dynamics, an observer or gains that are none.
     """
-    angles = [float(q) for q in gains.angles]
+    instance(dynamics, AnkleDynamics, "dynamics")
+    instance(observer, JointObserver, "observer")
+    angles = [float(q) for q in instance(gains, Gains, "gains").angles]
     believed, worst = (
         min(margins(loop_at(truth, observer, gains, q)).delay_s for truth in truths for q in angles)
         for truths in ([dynamics], corners(dynamics))

@@ -16,11 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.data.read_only import ReadOnly
+
 _SEEN: ContextVar[dict[str, str] | None] = ContextVar("seen", default=None)
 
 
 @dataclass(frozen=True, eq=False)
-class AsRead:
+class AsRead(ReadOnly):
     """Where a study or a trial comes from, and what it was then.
 
     Attributes

@@ -21,6 +21,20 @@ SCRATCH = ".fes_pin-"
 """How the names of folders begin in which files are prepared."""
 
 
+def as_path(value: str | Path, name: str = "path") -> Path:
+    """A path.
+
+    Raises
+    ------
+    InputError
+        Anything else than text or a path.
+    """
+    try:
+        return Path(value)
+    except TypeError:
+        raise InputError(f"expected a path, found a {type(value).__name__}", column=name) from None
+
+
 def read_bytes(path: str | Path) -> bytes:
     """Content of a regular file, over which nothing is written from now on; see `read_files`.
 
@@ -31,7 +45,7 @@ def read_bytes(path: str | Path) -> bytes:
     """
     if isinstance(path, HeldFile) and path.content is not None:
         return path.content
-    path = Path(path)
+    path = as_path(path)
     try:
         if not path.exists():
             raise InputError(missing(path), file=path)
@@ -177,7 +191,7 @@ def check_folder(folder: str | Path) -> None:
     InputError
         The folder is a file, or cannot be written or made.
     """
-    path = Path(folder).absolute()
+    path = as_path(folder, "folder").absolute()
     with _input_errors(path):
         nearest = next(p for p in (path, *path.parents) if p.exists())
     if not nearest.is_dir():
@@ -207,7 +221,7 @@ def write_files(folder: str | Path, contents: Mapping[str, str | bytes], without
         The folder or a file in it cannot be written, a file in it was read (see `read_files`), or a path leaves the
         folder.
     """
-    folder = Path(folder)
+    folder = as_path(folder, "folder")
     with _input_errors(folder):
         made = _make_folder(folder)
         try:

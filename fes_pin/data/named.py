@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import numbers, shortened
 
 
 class NamedArray(np.ndarray):
@@ -27,14 +28,17 @@ class NamedArray(np.ndarray):
     Raises
     ------
     InputError
-        Another number of names than of values; two arrays whose names differ, or differ in order, in one operation.
+        Values that are no numbers, names that are no text or not as many; two arrays whose names differ, or differ in
+        order, in one operation.
     """
 
     names: tuple[str, ...] | None = None
 
     def __new__(cls, values: Any, names: Iterable[str]) -> NamedArray:
-        found = np.array(values, dtype=float).view(cls)
-        found.names = tuple(names)
+        found = numbers(values, "values").view(cls)
+        found.names = () if isinstance(names, str) or not isinstance(names, Iterable) else tuple(names)
+        if not all(isinstance(name, str) for name in found.names):
+            raise InputError(f"names are text, got {shortened(found.names)}")
         if found.shape[-1:] != (len(found.names),):
             raise InputError(f"{len(found.names)} names need as many numbers, got an array of shape {found.shape}")
         return found

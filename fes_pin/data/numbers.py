@@ -5,11 +5,36 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Sequence
 from numbers import Real
-from typing import Any
+from types import UnionType
+from typing import Any, TypeVar
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
+
+_Value = TypeVar("_Value")
+
+
+def instance(value: _Value, kind: type | UnionType, name: str, how: str = "") -> _Value:
+    """A value of a type.
+
+    Parameters
+    ----------
+    value, kind, name
+        What was given, what it must be, and as what it was given.
+    how
+        What to do instead.
+
+    Raises
+    ------
+    InputError
+        Anything else.
+    """
+    if not isinstance(value, kind):
+        raise InputError(
+            f"expected a {getattr(kind, '__name__', kind)}, found a {type(value).__name__}{how}", column=name
+        )
+    return value
 
 
 def as_number(value: object) -> float | None:
@@ -157,7 +182,7 @@ def all_known(names: Iterable[object], known: Collection[str], what: str) -> Non
         The first of them, with what is known.
     """
     for name in names:
-        if name not in known:
+        if not isinstance(name, str) or name not in known:
             raise InputError(f"unknown {what} {name!r:.40}; there are {', '.join(known)}")
 
 

@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from numbers import Real
 from typing import Any
 
+from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 
 ROLES = ("fit", "held_out")
@@ -212,7 +213,7 @@ def rigs_from(finder: Callable[[], Rigs]) -> None:
 def known_rigs(more: Rigs | None = None) -> dict[str, RigSchema]:
     """Every rig that there is, and `more`."""
     found = {name: schema for finder in _FINDERS for name, schema in finder().items()}
-    return {**found, **(more or {}), BODY.name: BODY}
+    return {**found, **instance({} if more is None else more, Mapping, "rigs"), BODY.name: BODY}
 
 
 def schema_of(rig: str | RigSchema) -> RigSchema:

@@ -26,8 +26,9 @@ from fes_pin.data.checks import (
     known_constants,
 )
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import hold, write_files
+from fes_pin.data.files import as_path, hold, write_files
 from fes_pin.data.motion import GROUND_REACTION
+from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.schema import (
@@ -103,6 +104,9 @@ class Study(ReadOnly):
 
     def __post_init__(self) -> None:
         checked_label(self.name, lambda _, message: InputError(message, column="name"), what="a name")
+        for key, kind in (("described", RigSchema), ("as_read", AsRead)):
+            if getattr(self, key) is not None:
+                instance(getattr(self, key), kind, key)
         schema = self._schema()
         given = {
             n: checked_mapping(getattr(self, n), partial(_fault, "Study"), n) for n in ("constants", "start", "files")
@@ -119,7 +123,7 @@ class Study(ReadOnly):
 
         check_constants(schema, numbers["constants"], given["files"], of_rig)
         if odd := [key for key in given["files"] if key not in schema.files]:
-            raise _fault("files", odd[0], unknown(odd[0], schema.files))
+            raise _fault("files", odd[0], unknown(str(odd[0]), schema.files))
         files = {key: hold(path) for key, path in given["files"].items()}
         if any(files[key] is not path for key, path in given["files"].items()):
             check_files(schema, files)
@@ -129,7 +133,7 @@ class Study(ReadOnly):
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
         horizon = {HORIZON: self.horizon_s} if self.horizon_s is not None else {}
         checked_numbers(horizon, {HORIZON: NumberKey("s", 0.0, required=False)}, partial(_fault, "Study"))
-        vars(self).update(numbers, files=files, folder=Path(self.folder), trials=trials, described=schema)
+        vars(self).update(numbers, files=files, folder=as_path(self.folder, "folder"), trials=trials, described=schema)
         self._freeze()
 
     def _schema(self) -> RigSchema:
@@ -242,8 +246,14 @@ class Study(ReadOnly):
         return iter(self.trials)
 
     def __getitem__(self, which: str | int) -> Trial:
-        """One trial by its name or its place."""
-        return self.trials[which] if isinstance(which, int) else self.trial(which)
+        """One trial by its name or its place.
+
+        Raises
+        ------
+        KeyError, IndexError
+            If there is none.
+        """
+        return self.trial(which) if isinstance(which, str) else self.trials[which]
 
     def __contains__(self, which: object) -> bool:
         return which in self.trials or any(trial.name == which for trial in self.trials)
@@ -324,7 +334,7 @@ def read_study(path: str | Path, *, rigs: Rigs | None = None) -> Study:
     InputError
         For anything that is not as the study format says: with file, row, and column or dotted key.
     """
-    path = Path(path)
+    path = as_path(path)
     try:
         if not path.exists():
             raise InputError("no such study; expected a folder with study.toml", file=path)
@@ -443,7 +453,7 @@ def write_study(study: Study, folder: str | Path) -> None:
         be written could not be read: samples that were not measured, an
         input that some trials lack.
     """
-    schema = study.schema
+    schema = instance(study, Study, "study").schema
     check_same_inputs([(t.kind, t.columns) for t in study.trials], schema, study.constants, _fault_of(study.trials))
     contents: dict[str, str | bytes] = {}
     rig: dict[str, Any] = {}

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import inside, read_text, what_is_at
+from fes_pin.data.files import as_path, inside, read_text, what_is_at
 from fes_pin.data.schema import NumberKey, checked_numbers
 
 _TABLE = re.compile(r"^\s*(\[\[?)\s*([^\]#]+?)\s*\]\]?\s*(?:#.*)?$")
@@ -95,7 +95,7 @@ def read_toml(path: str | Path) -> Document:
     InputError
         Not a readable file, or not TOML, with the line.
     """
-    path = Path(path)
+    path = as_path(path)
     text = read_text(path)
     try:
         data = tomllib.loads(text)

@@ -22,8 +22,9 @@ from fes_pin.data.checks import (
     checked_remarks,
 )
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import write_text
+from fes_pin.data.files import as_path, write_text
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
+from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.recorded.columns import Columns
 from fes_pin.data.recorded.hint import NEW_STUDY, read_csv_or_hint
@@ -109,6 +110,8 @@ class Trial(ReadOnly):
         passed = checked_numbers(low_pass, {LOW_PASS: POSITIVE_HZ}, error).get(LOW_PASS)
         time = _numbers(self.time, "time_s", self)
         columns = {name: _numbers(values, name, self) for name, values in given["columns"].items()}
+        if self.as_read is not None:
+            instance(self.as_read, AsRead, "as_read")
         if len(time) < MIN_ROWS:
             raise self.error(f"expected at least {MIN_ROWS} samples, found {len(time)}", "time_s")
         if odd := [name for name, values in columns.items() if values.shape != time.shape]:
@@ -397,7 +400,7 @@ def read_trial(
     InputError
         For anything that is not as the study format says: with file, row and column.
     """
-    path = Path(path)
+    path = as_path(path)
 
     def error(key: str, message: str) -> InputError:
         return InputError(message, file=path, column=key)
@@ -407,10 +410,14 @@ def read_trial(
     except ValueError as problem:
         raise error("rig", str(problem)) from None
     kind = checked_kind(schema, kind, error)
-    check_labels(name or path.stem, role, group, error)
-    numbers = check_conditions(schema, kind, conditions or {}, error)
-    labels: dict[str, Any] = {"name": name or path.stem, "kind": kind, "conditions": numbers}
+    label = path.stem if name is None else name
+    check_labels(label, role, group, error)
+    given = {} if conditions is None else checked_mapping(conditions, error, "conditions")
+    numbers = check_conditions(schema, kind, given, error)
+    labels: dict[str, Any] = {"name": label, "kind": kind, "conditions": numbers}
     labels |= {"role": role, "group": group, "low_pass_hz": low_pass_hz}
+    if own is not None:
+        instance(own, Columns, "own")
     with hashing() as sha256:
         if len(schema.recordings) > 1:
             columns, time = _body_columns(path, inputs_only)
@@ -490,7 +497,7 @@ def write_trial(trial: Trial, path: str | Path) -> None:
     InputError
         If the file cannot be written, was read, or could not be read again: a trial with samples that nobody measured.
     """
-    write_text(path, trial_csv(replace(trial, as_read=None)))  # which checks it by itself
+    write_text(path, trial_csv(replace(instance(trial, Trial, "trial"), as_read=None)))  # which checks it by itself
 
 
 def trial_csv(trial: Trial) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from fes_pin.data.asked import asked
 from fes_pin.data.numbers import printed
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.study import Study
@@ -113,6 +114,7 @@ def check(study: Study, *, library: Source | Sequence[Source] | None = None) -> 
     InputError
         For numbers that no verdict could follow from, as `diagnose`.
     """
+    asked(study)
     if study.schema.owner is None:
         return Checked(study, ())
     clean, odd = odd_numbers(study)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fes_pin.data.asked import asked
 from fes_pin.data.derived import without_derived
 from fes_pin.data.errors import InputError
 from fes_pin.data.log import EFFORT, Log
@@ -78,7 +79,7 @@ def diagnose_joint(
         from; see `plausibility.check_study`.
     """
     began = time.perf_counter()
-    tell = progress or (lambda _share, _words: None)
+    tell = asked(study, seed, limit, progress)
     catalogue, made = catalogue_of(library), provenance_now(study, seed)
     measured = measured_study(study)
     warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]

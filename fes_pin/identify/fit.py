@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import as_number, instance, number, whole
 from fes_pin.data.results import Saveable, shown
 from fes_pin.data.schema import unknown
 from fes_pin.data.show import frame
@@ -399,8 +400,13 @@ def fit(
         bounds that cannot be.
     """
     measured = accepted_trials(model, trials, inputs_only=False)
-    model = model.with_parameters(fixed) if isinstance(fixed, Mapping) else model
-    free, narrower = _chosen(model, [fixed] if isinstance(fixed, str) else list(fixed), bounds or {})
+    max_iterations = whole(max_iterations, "max_iterations", least=1)
+    if noise is not None:
+        instance(noise, Mapping, "noise")
+    if isinstance(fixed, Mapping):
+        model = model.with_parameters({n: number(v, f"fixed.{n}") for n, v in fixed.items()})
+    names = [fixed] if isinstance(fixed, str) else list(instance(fixed, Iterable, "fixed"))
+    free, narrower = _chosen(model, names, instance({} if bounds is None else bounds, Mapping, "bounds"))
 
     def problem(noise: NoiseModel) -> Problem:
         made = Problem(model, measured, noise, free)
@@ -423,15 +429,16 @@ def _chosen(
 ) -> tuple[tuple[str, ...], dict[str, tuple[float, float]]]:
     """What is fitted where some is fixed, and the bounds that were asked for, within those of the parameters."""
     fitted, info, narrower = model.fitted_parameters(), model.parameter_info(), dict[str, tuple[float, float]]()
-    free = tuple(n for n in fitted if n not in fixed)
+    free = tuple(n for n in fitted if n not in map(str, fixed))
     for column, names, known in (("fixed", fixed, fitted), ("bounds", bounds, free)):
         for name in names:
-            if name not in known:
+            if not isinstance(name, str) or name not in known:
                 raise InputError(unknown(str(name), known), column=column)
     for name, ends in bounds.items():
         least, most = info[name].lower, info[name].upper
-        low, high = ends if isinstance(ends, tuple | list) and len(ends) == 2 else (1.0, 0.0)
-        narrower[name] = (max(float(low), least), min(float(high), most))
+        pair = [as_number(end) for end in ends] if isinstance(ends, tuple | list) else []
+        low, high = [end for end in pair if end is not None] if len(pair) == 2 and None not in pair else (1.0, 0.0)
+        narrower[name] = (max(low, least), min(high, most))
         if not narrower[name][0] < narrower[name][1]:
             told = f"expected (lower, upper) of {name} within {least:g} to {most:g}, found {ends!r}"
             raise InputError(told, column="bounds")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import instance
 from fes_pin.data.trial import Trial, check_trial
 from fes_pin.models.model import Model
 
@@ -26,8 +27,7 @@ def accepted_trials(model: Model, trials: Trial | Iterable[Trial], inputs_only: 
         No model, no trials; a kind, a column or a condition that the rig does not have, or lacks; values in another
         unit.
     """
-    if not isinstance(model, Model):
-        raise InputError(f"expected a Model, found a {type(model).__name__}", column="model")
+    instance(model, Model, "model")
     given = (trials,) if isinstance(trials, Trial) else tuple(trials) if isinstance(trials, Iterable) else (trials,)
     if not given:
         raise InputError("expected at least one trial, found none", column="trials")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import instance, shortened
 from fes_pin.data.schema import unknown
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.trial import Trial
@@ -37,8 +38,9 @@ class Model:
     effects: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.rig, Rig):
-            raise InputError(f"expected a rig, found a {type(self.rig).__name__}", column="rig")
+        instance(self.rig, Rig, "rig")
+        for effect in instance(self.effects, tuple | list, "effects"):
+            instance(effect, Effect, "effects")
         names = [e.name for e in self.effects]
         if missing := set(self.rig.needed) - set(self.rig.constants):
             raise InputError(f"expected {', '.join(sorted(missing))} as well", column="constants")
@@ -55,7 +57,9 @@ class Model:
         return Model(self.rig, (*self.effects, effect))
 
     def __sub__(self, effect: str | Effect | type[Effect]) -> Model:
-        name = effect if isinstance(effect, str) else effect.name
+        name = getattr(effect, "name", effect)
+        if not isinstance(name, str):
+            raise InputError(f"expected an effect of the model or its name, found {shortened(effect)}")
         left = tuple(e for e in self.effects if e.name != name)
         if len(left) == len(self.effects):
             raise InputError(unknown(name, [e.name for e in self.effects]), column=name)
@@ -114,7 +118,7 @@ class Model:
         known = self.parameters()
         for name in values:
             if name not in known:
-                raise InputError(unknown(name, known), column=name)
+                raise InputError(unknown(str(name), known), column=str(name))
         nominal: dict[str, Any] = {n: float(v) for n, v in values.items() if "." not in n}
         rig = dataclasses.replace(self.rig, **nominal)
         effects = []

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
+from fes_pin.data.numbers import instance
 from fes_pin.data.schema import unknown
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
@@ -43,7 +44,7 @@ def rig_of(study: Study) -> type[Rig]:
     InputError
         If it has no model of trials.
     """
-    rig = study.schema.owner
+    rig = instance(study, Study, "study").schema.owner
     if rig is None:
         raise InputError(f"the rig {study.rig} has no model of single trials", file=study.folder)
     return rig

@@ -10,6 +10,7 @@ import tomli_w
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
+from fes_pin.data.numbers import instance
 from fes_pin.data.schema import NumberKey, one_of
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
@@ -59,9 +60,8 @@ def save_model(model: Model, path: str | Path) -> None:
         It is no `Model`: the body of a diagnosis of walking is saved as URDF, by its `write`. Or the file cannot be
         written, or was read and not written by this process.
     """
-    if not isinstance(model, Model):
-        how = ": its write() saves it as URDF, which Body.from_urdf reads" if hasattr(model, "urdf") else ""
-        raise InputError(f"expected a Model, found a {type(model).__name__}{how}", column="model")
+    how = ": its write() saves it as URDF, which Body.from_urdf reads" if hasattr(model, "urdf") else ""
+    instance(model, Model, "model", how)
     write_text(path, model_toml(model))
 
 

@@ -12,7 +12,7 @@ from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES, SIDES
 from fes_pin.body.linearize import LinearBody
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import known_word
+from fes_pin.data.numbers import instance, known_word
 from fes_pin.muscles.nerves import SUBJECT_HEIGHT, Nerves, nerve_names
 from fes_pin.muscles.published import share_of_a_young_mans
 
@@ -71,7 +71,7 @@ def subject_nerves(
     for name in known if names is None else nerve_names(names):
         both = [f"{side}_{name}" for side in SIDES]
         wanted += both if set(known).issuperset(both) else [name]
-    height = body.height_m or SUBJECT_HEIGHT
+    height = instance(body, Body, "body").height_m or SUBJECT_HEIGHT
     nerves = Nerves.of_subject(body.mass_kg, height, tuple(dict.fromkeys(wanted)), strength, **options)
     return replace(nerves, size=nerves.size * share_of_a_young_mans(_who(body), years))
 

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.optimize
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between, numbers, positive_number
+from fes_pin.data.numbers import between, number, numbers, positive_number
 from fes_pin.data.tabulated import Tabulated
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import GRAVITY
@@ -111,7 +111,7 @@ def fit_antagonist(
     """
     loads, angles = numbers(loads_kg, "loads_kg"), numbers(angles_rad, "angles_rad")
     positive_number(angle_std_rad, "angle_std_rad")
-    between(foot_mass_kg, 0.0, np.inf, "foot_mass_kg")
+    between(number(foot_mass_kg, "foot_mass_kg"), 0.0, np.inf, "foot_mass_kg")
     if loads.shape != angles.shape or loads.ndim != 1 or len(np.unique(loads)) < 4:
         raise InputError("expected an angle for each of at least four different loads to find F_ANT from")
     if not (np.isfinite(loads).all() and (loads >= 0.0).all()):

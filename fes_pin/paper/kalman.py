@@ -24,7 +24,7 @@ import numpy as np
 import scipy.stats
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import between, number, positive_number
+from fes_pin.data.numbers import between, instance, number, positive_number
 from fes_pin.data.tabulated import Tabulated
 from fes_pin.data.trial import Trial
 
@@ -104,7 +104,7 @@ class GainFilter:
     Raises
     ------
     InputError
-        For a time step, a noise or a gain that is not above 0, or a wander below 0.
+        For a time step, a noise or a gain that is not above 0, a wander below 0, or another recruitment.
     """
 
     def __init__(
@@ -119,6 +119,7 @@ class GainFilter:
             positive_number(value, name)
         between(wander, 0.0, math.inf, "wander")
         self.dt, self.recruitment, self.noise_std, self.wander = dt, recruitment, noise_std, wander
+        instance(recruitment, StraightRecruitment, "recruitment")
         alpha = math.exp(-dt / START_TIME_CONSTANT_S)
         beta = (1.0 - alpha) * 0.5 * greatest_gain * recruitment.force_scale_n
         self._x = (0.0, alpha, beta)
@@ -292,6 +293,7 @@ def track_gain(
     InputError
         For a trial without measured force or pulse widths, or constants without the muscle's.
     """
+    instance(trial, Trial, "trial")
     for column in ("force_n", "pulse_width_us"):
         if column not in trial:
             raise InputError(f"trial {trial.name} has no column {column}; gain and time constant need isometric trials")

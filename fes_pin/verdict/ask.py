@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from fes_pin.data.asked import asked
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.models.catalogue import Source
@@ -44,8 +45,10 @@ def diagnose(
     Raises
     ------
     InputError
-        If the study cannot be diagnosed, or a library is given for a body.
+        If the study cannot be diagnosed, a library is given for a body, the seed is no whole number of 0 or more, or
+        the limit is below 0.
     """
+    asked(study, seed, limit, progress)
     if study.rig == "body":
         from fes_pin.walk.diagnosis import diagnose_walk  # noqa: PLC0415
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from fes_pin.data.files import write_text
 from fes_pin.data.log import Log
+from fes_pin.data.numbers import instance
 from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.errors_ahead import Ahead
 from fes_pin.diagnosis.recorded import NEXT_FILE
@@ -44,14 +45,15 @@ def report(diagnosis: Diagnosis | WalkDiagnosis, path: str | Path) -> None:
     Raises
     ------
     InputError
-        If the file cannot be written, or was read.
+        It is no diagnosis; or the file cannot be written, or was read.
     """
     if isinstance(diagnosis, Diagnosis):
         write_text(path, report_html(diagnosis))
         return
     from fes_pin.view.walk_report import walk_report_html  # noqa: PLC0415
+    from fes_pin.walk.result import WalkDiagnosis  # noqa: PLC0415
 
-    write_text(path, walk_report_html(diagnosis))
+    write_text(path, walk_report_html(instance(diagnosis, WalkDiagnosis, "diagnosis")))
 
 
 def report_html(diagnosis: Diagnosis) -> str:

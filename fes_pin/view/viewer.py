@@ -26,6 +26,7 @@ from fes_pin.body.modes import Mode
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import write_text
 from fes_pin.data.named import NamedArray
+from fes_pin.data.numbers import instance
 from fes_pin.view.arrows import Arrow, arrow_commands
 
 FRAMES_A_SECOND = 30
@@ -167,8 +168,15 @@ class BodyScene:
 
 
 def show_mode(linear: LinearBody, mode: Mode) -> BodyScene:
-    """A mode in motion about its posture; a fall is shown to and fro, too, for it can go either way."""
-    body = linear.body
+    """A mode in motion about its posture; a fall is shown to and fro, too, for it can go either way.
+
+    Raises
+    ------
+    InputError
+        No linearized body, or no mode.
+    """
+    body = instance(linear, LinearBody, "linear").body
+    instance(mode, Mode, "mode")
     q = np.array([linear.whole_posture.get(name, 0.0) for name in body.joint_names])
     shape = np.zeros(len(q))
     for name, value in zip(mode.joint_names, mode.one_degree, strict=True):
@@ -180,7 +188,14 @@ def show_mode(linear: LinearBody, mode: Mode) -> BodyScene:
 
 
 def show_posture(linear: LinearBody) -> BodyScene:
-    """A linearized body in its posture, on its slope."""
+    """A linearized body in its posture, on its slope.
+
+    Raises
+    ------
+    InputError
+        No linearized body.
+    """
+    instance(linear, LinearBody, "linear")
     scene = BodyScene(linear.body, caption=f"{linear.body}; {said_of(linear)}", slope=linear.slope)
     return scene.pose(linear.whole_posture)
 

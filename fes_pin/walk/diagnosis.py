@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fes_pin.data.asked import asked
 from fes_pin.data.errors import InputError
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
@@ -71,7 +72,7 @@ def diagnose_walk(
         The study is of another rig, or a file of it cannot be used.
     """
     began = time.perf_counter()
-    tell = progress or (lambda _share, _words: None)
+    tell = asked(study, seed, limit, progress)
     trials = tuple(t for t in study.trials if t.role != "held_out")
     if not trials:
         raise InputError("expected at least one trial to fit; all have role = held_out", file=study.folder)

@@ -128,7 +128,7 @@ def test_models_are_equal_by_their_values_alone():
         (lambda: Ankle(constants=ANKLE, session=5), "session: expected rows of a begin, a later end"),
         (lambda: CoulombFriction(-0.04), "torque_nm: expected a number from 0 to "),
         (lambda: CoulombFriction("0.04"), "torque_nm: expected a number, found the text '0.04'"),
-        (lambda: Model("ankle"), "rig: expected a rig, found a str"),
+        (lambda: Model("ankle"), "rig: expected a Rig, found a str"),
         (lambda: fp.save_model(Ankle(constants=ANKLE), "model.toml"), "model: expected a Model, found a Ankle"),
         (lambda: Model(Ankle()), "constants: expected com_distance_m, f0_n"),
         (lambda: Model(RIGS["ankle"], (SensorOffset(), SensorOffset())), "the model has sensor_offset already"),
