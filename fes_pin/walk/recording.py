@@ -141,5 +141,16 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
         raise InputError(error.message, file=reaction, column=error.column) from None
     motion, plates = motion.part(rows), plates.part(rows)
     return WalkRecording(
-        trial.name, motion, plates, raw_time, raw, time, columns, hip, cutoff_hz, belt, float(time[0]), trial.role
+        trial.name,
+        motion,
+        plates,
+        raw_time,
+        dict(raw),
+        time,
+        dict(columns),
+        hip,
+        cutoff_hz,
+        belt,
+        float(time[0]),
+        trial.role,
     )
