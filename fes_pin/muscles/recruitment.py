@@ -20,9 +20,11 @@ LONGEST_US = 5000.0
 """Pulse width, us, beyond which no stimulator of nerves goes and recruitment of a nerve has long been complete: nerve
 fibres have chronaxies of 0.05 to 0.7 ms (Ranck 1975, Brain Res. 98:417-440); surface stimulators give up to 500 us
 (Valtin and others, Eur. J. Transl. Myol. 26:6076, 2016), section II of Dombre, Fournier and Coiffet uses 1000 us."""
+LEAST_US = 10.0
+"""Pulse width, us, below which no nerve is recruited whole: a curve that ends there is in ms or s."""
 RANGES = {
     "threshold_us": (0.0, LONGEST_US),
-    "saturation_us": (0.0, LONGEST_US),
+    "saturation_us": (LEAST_US, LONGEST_US),
     "curvature": (-20.0, 20.0),
     "steepness": (0.01, 30.0),
     "middle": (0.0, 1.0),
@@ -255,7 +257,8 @@ class MeasuredRecruitment(ReadOnly):
     Parameters
     ----------
     pulse_widths_us, recruitments
-        At least two points, us up to `LONGEST_US`; both must rise strictly; recruitments from 0 to 1.
+        At least two points, us, the last one from `LEAST_US` to `LONGEST_US`.
+        Both must rise strictly; recruitments from 0 to 1.
 
     Raises
     ------
@@ -276,8 +279,9 @@ class MeasuredRecruitment(ReadOnly):
             raise InputError(
                 "a measured recruitment curve must begin at recruitment 0 and end at 1, with widths from 0"
             )
-        if not widths[-1] <= LONGEST_US:
-            raise InputError(f"pulse widths of a recruitment curve end at {LONGEST_US:g} us, got {widths[-1]:g}")
+        if not LEAST_US <= widths[-1] <= LONGEST_US:
+            ends = f"{LEAST_US:g} to {LONGEST_US:g} us"
+            raise InputError(f"pulse widths of a recruitment curve end at {ends}, got {widths[-1]:g}")
         vars(self).update(pulse_widths_us=widths, recruitments=values)
         self._freeze()
 

@@ -166,7 +166,13 @@ def _left(diagnosis: Diagnosis) -> list[Markup]:
         rows: list[list[Content]] = [[element("code", e.name), stage_mark(str(e.stage)), sentence(e)] for e in unseen]
         out.append(html_table(("cause", "stage", "what it is"), rows, prose=True))
     else:
-        out.append(element("p", "Every other cause in the library could have been seen by these data.", class_="soft"))
+        out.append(
+            element(
+                "p",
+                f"Every {'other ' if diagnosis.causes else ''}cause in the library could be seen in these data.",
+                class_="soft",
+            )
+        )
     return out
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from fes_pin.diagnosis.cause import Cause, ParameterEstimate
-from fes_pin.diagnosis.result import EACH_TRIAL, Diagnosis
+from fes_pin.diagnosis.result import EACH_TRIAL, STOPPED, Diagnosis
 from fes_pin.diagnosis.text import one_sided, probability
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.mathml import equations_mathml
@@ -21,6 +21,8 @@ def stage_mark(stage: str) -> Markup:
 
 def causes_section(diagnosis: Diagnosis) -> list[Markup]:
     """The causes: a table, their gains, and a card for each."""
+    if not diagnosis.causes and diagnosis.verdict == STOPPED:
+        return [element("p", "None is named so far: the search ended before every cause was tried.")]
     if not diagnosis.causes:
         return [element("p", "None is named: no cause in the library earned its place on these data.")]
     rows: list[list[Content]] = [

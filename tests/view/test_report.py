@@ -20,6 +20,7 @@ from view.reported import NASTY, ankle_diagnosis, ankle_study, diagnosed, joint_
 import fes_pin as fp
 from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
 from fes_pin.diagnosis.record import diagnosis_record
+from fes_pin.diagnosis.result import STOPPED
 from fes_pin.models.describe import equation
 from fes_pin.models.effects import effect_named
 from fes_pin.models.predictor import Doubt
@@ -126,6 +127,11 @@ def test_text_of_the_study_cannot_become_markup():
 def test_a_report_of_an_adequate_model_names_nothing():
     text = checked(diagnosed(ankle_study()))
     assert "adequate" in text and "None is named" in text and "extended model" not in text
+
+
+def test_a_report_of_a_stopped_search_claims_nothing_of_causes_that_were_not_tried():
+    text = checked(replace(diagnosed(ankle_study()), verdict=STOPPED))
+    assert "the search ended before every cause was tried" in text and "earned its place" not in text
 
 
 def test_a_report_of_something_unexplained_says_where():
