@@ -66,15 +66,15 @@ def allocate(
     from fes_pin.allocation.allocate import allocate as solve
     from fes_pin.body.joints import joint_limits
     from fes_pin.muscles.nerves import STRONGEST, Nerves
-    from fes_pin.muscles.recruitment import LONGEST_US, LinearRecruitment
+    from fes_pin.muscles.recruitment import RANGES, LinearRecruitment
 
     _alone(walk=walk is not None, nerves=nerves, torques=bool(torque))
     if strength is not None:
         between(strength, 0.0, STRONGEST, "--strength")
     if least is not None:
         between(least, 0.0, 1.0, "--least")
-    between(threshold_us, 0.0, LONGEST_US, "--threshold-us")
-    between(saturation_us, 0.0, LONGEST_US, "--saturation-us")
+    between(threshold_us, *RANGES["threshold_us"], "--threshold-us")
+    between(saturation_us, *RANGES["saturation_us"], "--saturation-us")
     if threshold_us >= saturation_us:
         raise InputError(f"--threshold-us must lie below --saturation-us, got {threshold_us:g} and {saturation_us:g}")
     channels = Nerves(nerve or None, strength=strength)

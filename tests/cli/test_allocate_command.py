@@ -25,6 +25,11 @@ def test_threshold_and_saturation_are_kept():
     assert any(f"left tibial {w} us" in run(*words).output for w in (90, 91))
 
 
+def test_a_recruitment_curve_in_ms_is_refused_by_its_option():
+    result = run("left_knee_flexion=-40", "--threshold-us", "0.18", "--saturation-us", "1")
+    assert result.exit_code == 2 and "--saturation-us: must lie between 10 and 5000, got 1" in result.stderr
+
+
 def test_nerves_are_listed():
     assert "left_femoral" in run("--nerves").output
 

@@ -6,11 +6,12 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.recruitment import (
+    LEAST_US,
     LONGEST_US,
     RANGES,
     ChannelRecruitment,
@@ -64,6 +65,7 @@ def test_curves_rise_from_threshold_to_saturation_and_stay(curve):
     st.floats(0, 1),
 )
 def test_sigmoid_inverse_for_any_parameters(threshold, span, steepness, middle, r):
+    span = max(threshold + span, LEAST_US) - threshold
     curve = SigmoidRecruitment(threshold, threshold + span, steepness, middle)
     width = float(curve.pulse_width_us(r))
     assert width == 0.0 if r == 0 else threshold <= width <= threshold + span
@@ -213,6 +215,7 @@ def test_every_curve_that_can_be_built_gives_finite_widths_between_threshold_and
 @settings(max_examples=300, deadline=None)
 @given(st.lists(st.floats(0, LONGEST_US), min_size=2, max_size=6, unique=True), st.floats(-1, 2))
 def test_a_measured_curve_that_can_be_built_gives_finite_widths(widths, r):
+    assume(max(widths) >= LEAST_US)
     curve = MeasuredRecruitment(sorted(widths), np.linspace(0, 1, len(widths)))
     width = float(curve.pulse_width_us(r))
     assert width == 0.0 if r <= 0.0 else min(widths) <= width <= max(widths)
