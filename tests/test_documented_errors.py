@@ -1,8 +1,11 @@
 # ruff: noqa: E501  (tables, one case a line)
 """What the public functions say that they raise, they raise: one line of `InputError`, whatever is given."""
 
+import copy
 import inspect
+import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -162,6 +165,22 @@ def test_every_public_name_that_documents_an_error_is_called():
 
 def test_without_inputs_a_body_that_leans_falls_in_the_closed_loop():
     assert fp.close_the_loop(LINEAR, [], {"left_knee_flexion": 0.01}, seconds=0.1, balance=False).lost
+
+
+def test_what_a_check_says_is_hashed_and_equal_to_its_copy():
+    found = fp.check(fp.read_study(Path(__file__).parents[1] / "analysis/studies/ankle_demo"))
+    for copied in (copy.deepcopy(found), pickle.loads(pickle.dumps(found))):
+        assert copied == found and hash(copied) == hash(found)
+    with pytest.raises(TypeError):
+        found.testable.shown["x"] = 1.0
+
+
+def test_a_run_of_the_closed_loop_is_a_frame_of_its_joints():
+    run = fp.close_the_loop(LINEAR, NERVES, {"left_knee_flexion": 0.01}, seconds=0.1, balance=False)
+    pytest.importorskip("pandas")
+    table = run.to_frame().reset_index()
+    assert table["left_knee_flexion"].iloc[0] == 0.01 and table["time_s"].tolist() == run.time_s.tolist()
+    assert "left_knee_flexion" in run._repr_html_()
 
 
 def test_of_a_study_in_memory_nobody_is_sent_to_a_file():

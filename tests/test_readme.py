@@ -13,7 +13,7 @@ BLOCKS = [
     for page in PAGES
     for number, code in enumerate(re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL))
 ]
-GIVEN = {"angle_rad": 1.6, "angles_rad": [1.6, 1.7]}
+GIVEN = {"angle_rad": 1.6, "angles_rad": [1.6, 1.7], "time_s": 0.0}
 """What a block takes from the reader's own rig."""
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -26,7 +27,7 @@ from fes_pin.body.linearize import model_on_slope
 from fes_pin.body.plans import PULSE_S, Plans
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import positive_number, truth
-from fes_pin.data.read_only import ReadOnly
+from fes_pin.data.tabulated import Tabulated
 
 STEP_S = 0.002
 """Step of the Runge-Kutta integration, s; the fastest falls here double in ten of them."""
@@ -35,7 +36,7 @@ LOST_DEG = 45.0
 
 
 @dataclass(frozen=True, eq=False)
-class Caught(ReadOnly):
+class Caught(Tabulated):
     """A run of the closed loop.
 
     Parameters
@@ -59,10 +60,15 @@ class Caught(ReadOnly):
     outside_m: float
     lost: str = ""
 
+    _index = "time_s"
+
     @property
     def last_deg(self) -> float:
         """Largest deviation in the last fifth of the run, degrees."""
         return float(np.degrees(np.abs(self.deviation[-max(1, len(self.deviation) // 5) :]).max()))
+
+    def _table(self) -> dict[str, Any]:
+        return {"time_s": self.time_s.tolist(), **dict(zip(self.joint_names, self.deviation.T.tolist(), strict=True))}
 
     def __str__(self) -> str:
         if self.lost:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fes_pin.data.asked import asked
 from fes_pin.data.numbers import printed
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.decide.doubts import few_trials
@@ -26,8 +27,8 @@ FAR = 0.3
 NOT_JUDGED = "its files can be read; numbers of walking are not judged before a diagnosis"
 
 
-@dataclass(frozen=True, repr=False)
-class Checked:
+@dataclass(frozen=True, repr=False, eq=False)
+class Checked(ReadOnly):
     """What is odd about a study, and what its trials can and cannot show.
 
     Attributes

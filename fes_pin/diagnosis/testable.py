@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.long_records import searched_part
@@ -44,8 +45,8 @@ REVERSED = 0.3
 """Share of the squared error, and of the variance, that is left at most with an effort that counts the other way."""
 
 
-@dataclass(frozen=True)
-class Testable:
+@dataclass(frozen=True, eq=False)
+class Testable(ReadOnly):
     """What trials can show.
 
     Attributes
