@@ -82,7 +82,7 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
     from fes_pin.view.viewer import show_posture as show_posture
     from fes_pin.walk.diagnosis import diagnose_walk as diagnose_walk
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _WHERE = {
     "read_study": "fes_pin.data.study",
