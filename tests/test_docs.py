@@ -211,3 +211,10 @@ def test_every_number_of_a_verdict_has_its_reason(number):
 def test_the_numbers_that_decide_are_there():
     assert {n for _, n, _, _ in tables.numbers()} >= tables.DECIDING
     assert len(tables.DECIDING) <= 15  # a further one must take another's place
+
+
+def test_the_page_of_decisions_names_files_that_are_there():
+    text = (DOCS / "architecture.md").read_text()
+    names = set(re.findall(r"`((?:fes_pin|tests|data|diagnosis|identify|infer|contrasts|walk)/[\w/]+\.py)`", text))
+    assert len(names) > 30
+    assert [n for n in names if not any((ROOT / top / n).exists() for top in ("", "fes_pin"))] == []
