@@ -14,7 +14,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from cli.test_options import COMMANDS, run
+from cli.test_ignored_options import COMMANDS, run
 from cli.test_said_of_recordings import CAUSE
 from data import studies
 from view.reported import ankle_study, diagnosed, joint_study
