@@ -14,7 +14,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from fes_pin.infer.family import Family
 from fes_pin.infer.levels import UNUSUAL_LEVEL
 from fes_pin.workers import OutOfTime, Progress, seconds_left, time_limit
 
@@ -57,12 +56,9 @@ class Models(Protocol[F]):
         """Candidates in a set, at most; None for no bound."""
 
     def nominal(self) -> F:
-        """Fit the nominal model; raises where no number comes of it."""
+        """Fit the nominal model, and what sets are judged by; raises where no number comes of it."""
 
-    def family(self) -> Family:
-        """The family of tests, of all candidates in a model that contains nothing else."""
-
-    def extend(self, base: Names, most: int | None = None) -> object:
+    def extend(self, base: Names, most: int | None = None) -> None:
         """Fit a set with each further candidate, or with the `most` of largest score."""
 
     def extend_by_pairs(self, most: int) -> None:
@@ -86,11 +82,14 @@ class Models(Protocol[F]):
     def is_possible(self, fitted: F) -> bool:
         """Whether every size of a fit is physically possible."""
 
-    def smallest_p_value(self, fitted: F) -> float:
-        """Of the score tests of all further candidates, each by itself."""
+    def p_value(self, larger: F, smaller: F, gain: float | None = None) -> float:
+        """Family-wise p-value of what a larger set gains, or of a gain in its place, as far as pieces agree on it."""
 
-    def excess_scatter(self, larger: F, smaller: F) -> float:
-        """How much more a gain scatters between pieces of the data than the likelihood says; 1 where it does not."""
+    def noise_p_value(self, gain: float, degrees: int) -> float:
+        """Family-wise p-value of a gain in twice the log-likelihood against the noise."""
+
+    def extension_p_value(self, fitted: F) -> float:
+        """Family-wise p-value of the score of the best further candidate; 0 where every candidate is fitted."""
 
     def level(self, fitted: F) -> float:
         """Family-wise level of a claim."""
@@ -174,7 +173,6 @@ class Search(Generic[F]):
         self._end = time.monotonic() + seconds_left()
         with time_limit(math.inf):
             self.models.nominal()
-            self.family = self.models.family()
         self._kept: Names = ()
         try:
             return self._search()
@@ -209,24 +207,14 @@ class Search(Generic[F]):
         most = self.models.most_candidates
         return itertools.count(1) if most is None else range(1, most + 1)
 
-    def p_value(self, larger: F, smaller: F) -> float:
-        """Family-wise p-value of what a larger set adds, as far as pieces of the data agree on it."""
-        return self._p_value(smaller.sse - larger.sse, larger, smaller)
-
-    def _p_value(self, gain: float, larger: F, smaller: F) -> float:
-        """Family-wise p-value of a gain in twice the log-likelihood."""
-        return self.family.p_value(gain / self.models.excess_scatter(larger, smaller), _more(larger, smaller))
-
     def earns(self, larger: F, smaller: F, gain: float, explained: float) -> bool:
         """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood."""
-        significant = self._p_value(gain, larger, smaller) < self.models.level(larger)
+        significant = self.models.p_value(larger, smaller, gain) < self.models.level(larger)
         return significant and not self.models.is_error_of_form(larger, gain, explained)
 
     def is_accepted(self, larger: F, smaller: F) -> bool:
         """The same of two fits as they are."""
-        explained = self.nominal().sse - larger.sse
-        significant = self.p_value(larger, smaller) < self.models.level(larger)
-        return significant and not self.models.is_error_of_form(larger, smaller.sse - larger.sse, explained)
+        return self.earns(larger, smaller, smaller.sse - larger.sse, self.nominal().sse - larger.sse)
 
     def possible(self) -> dict[Names, F]:
         """All sets that are fitted, but for those that cannot be, or that were rejected."""
@@ -239,8 +227,7 @@ class Search(Generic[F]):
         Scores are slopes at the noise of the set, which takes up a candidate that is missed: they understate it.
         """
         fitted = self.models.fits[names]
-        single = self.models.smallest_p_value(fitted)
-        return self.family.adjusted(single) < UNUSUAL_LEVEL or not self.models.leaves_noise(fitted)
+        return self.models.extension_p_value(fitted) < UNUSUAL_LEVEL or not self.models.leaves_noise(fitted)
 
     def _extend(self, size: int) -> None:
         """Fit sets of a size: the best smaller ones with further candidates, and pairs of largest score together."""
@@ -271,7 +258,8 @@ class Search(Generic[F]):
         if names in self._formed:
             return False
         larger, smaller = self.models.fits[names], self.models.fits[best]
-        return self.family.p_value(2.0 * (smaller.sse - larger.sse), _more(larger, smaller)) < self.models.level(larger)
+        degrees = max(larger.degrees - smaller.degrees, 1)
+        return self.models.noise_p_value(2.0 * (smaller.sse - larger.sse), degrees) < self.models.level(larger)
 
     def _is_accepted(self, names: Names, best: Names) -> bool:
         """Whether a set can be, and is worth more than the best smaller one."""
@@ -318,7 +306,7 @@ class Search(Generic[F]):
         """Drop candidates that the others have made superfluous."""
         while names:
             less = {n: self.models.without(names, n) for n in names}
-            p_values = {n: self.p_value(self.models.fits[names], less[n]) for n in names}
+            p_values = {n: self.models.p_value(self.models.fits[names], less[n]) for n in names}
             weakest = max(names, key=lambda n: (p_values[n], -less[n].sse))
             if self.is_accepted(self.models.fits[names], less[weakest]):
                 break
@@ -370,10 +358,5 @@ class Search(Generic[F]):
             finite = (f for k in others if math.isfinite((f := models.fits[k]).sse) and models.is_possible(f))
             rivals[name] = sorted(finite, key=lambda f: f.price)
         best = models.fits[names]
-        p_values = {n: self.p_value(best, without[n]) for n in names}
+        p_values = {n: models.p_value(best, without[n]) for n in names}
         return SearchResult(models.fits[()], best, p_values, rivals, without)
-
-
-def _more(larger: Fitted, smaller: Fitted) -> int:
-    """Degrees of freedom that a larger set has more, at least 1."""
-    return max(larger.degrees - smaller.degrees, 1)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from fes_pin.infer.distributions import chi2_tail, f_tail
 from fes_pin.infer.family import Family
-from fes_pin.infer.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
+from fes_pin.infer.fits import Candidate, FittedSets
+from fes_pin.infer.levels import PARAMETER_PRICE, SEPARABLE
 from fes_pin.infer.search import Names
 
 COUNT = 60
@@ -30,7 +33,7 @@ class Line:
         return self.sse + PARAMETER_PRICE * self.degrees
 
 
-class Regression:
+class Regression(FittedSets[Line, None]):
     """Sets of columns fitted to runs that are repeats of each other, or of their group.
 
     Parameters
@@ -43,16 +46,14 @@ class Regression:
         Of each run, 0 or 1: a column by the name `name@1` acts in the runs of group 1 alone.
     """
 
-    most_candidates: int | None = 3
-
     def __init__(self, columns: dict[str, np.ndarray], runs: np.ndarray, groups: np.ndarray | None = None) -> None:
+        super().__init__()
         count = len(runs)
         self.runs, self.groups = runs, np.zeros(count, int) if groups is None else groups
         self.columns = {n: np.tile(c, count) for n, c in columns.items()}
         if groups is not None:
             in_group = np.repeat(groups == 1, COUNT)
             self.columns |= {f"{n}@1": np.tile(c, count) * in_group for n, c in columns.items()}
-        self.fits: dict[Names, Line] = {}
 
     def fit(self, names: Names) -> Line:
         y, one = self.runs.ravel(), np.ones(self.runs.size)
@@ -66,6 +67,11 @@ class Regression:
         self.fits[()] = self.fit(())
         return self.fits[()]
 
+    @cached_property
+    def family(self) -> Family:
+        x = np.stack(list(self._projected(()).values()), axis=1)
+        return Family(x.T @ x, [slice(k, k + 1) for k in range(x.shape[1])], seed=0)
+
     def _projected(self, names: Names) -> dict[str, np.ndarray]:
         """Further columns, without the part that a set takes up."""
         x = np.stack([np.ones(self.runs.size), *(self.columns[n] for n in names)], axis=1)
@@ -76,50 +82,22 @@ class Regression:
         left = self.fits[names].residual.ravel()
         return {n: float((c @ left) ** 2 / (c @ c)) for n, c in self._projected(names).items() if c @ c > 1e-9}
 
-    def family(self) -> Family:
-        x = np.stack(list(self._projected(()).values()), axis=1)
-        return Family(x.T @ x, [slice(k, k + 1) for k in range(x.shape[1])], seed=0)
+    def candidates(self, base: Line) -> dict[str, Candidate[None]]:
+        return {n: Candidate(score, None) for n, score in self._scores(self._names(base)).items()}
 
-    def extend(self, base: Names, most: int | None = None) -> None:
-        scores = self._scores(base)
-        for name in sorted(scores, key=lambda n: -scores[n])[:most]:
-            names = tuple(sorted((*base, name)))
-            self.fits.setdefault(names, self.fit(names))
+    def begin(self, base: Line, starts: Mapping[Names, None]) -> dict[Names, Line]:
+        return {names: self.fit(names) for names in starts}
 
-    def extend_by_pairs(self, most: int) -> None:
-        """Of a linear model every pair has its better half among the singles."""
-
-    def converge(self, size: int, without: object = ()) -> None:
-        """Linear fits have converged."""
-
-    def converge_rivals(self, base: Names, name: str) -> None:
-        """Linear fits have converged."""
-
-    def ranked(self, size: int) -> list[Names]:
-        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (self.fits[n].price, n))
-
-    def near(self, size: int, without: object = ()) -> list[Names]:
-        return [n for n in self.ranked(size) if n not in without]
+    def _names(self, fitted: Line) -> Names:
+        return next(n for n, f in self.fits.items() if f is fitted)
 
     def without(self, names: Names, name: str) -> Line:
         rest = tuple(n for n in names if n != name)
         return self.fits.setdefault(rest, self.fit(rest))
 
-    def is_possible(self, fitted: Line) -> bool:
-        return True
-
-    def smallest_p_value(self, fitted: Line) -> float:
-        names = next(n for n, f in self.fits.items() if f is fitted)
-        return min((float(chi2_tail(s, 1)) for s in self._scores(names).values()), default=1.0)
-
-    def excess_scatter(self, larger: Line, smaller: Line) -> float:
-        return 1.0
-
-    def level(self, fitted: Line) -> float:
-        return CLAIM_LEVEL
-
-    def is_error_of_form(self, larger: Line, gain: float, explained: float) -> bool:
-        return False
+    def extension_p_value(self, fitted: Line) -> float:
+        scores = self._scores(self._names(fitted)).values()
+        return self.family.adjusted(min((float(chi2_tail(s, 1)) for s in scores), default=1.0))
 
     def predicts_better(self, larger: Line, smaller: Line) -> bool:
         return larger.price < smaller.price
@@ -132,12 +110,6 @@ class Regression:
         free = COUNT * len(sizes) - fitted.degrees - 1
         pure = fitted.sse - between
         return f_tail((between / free) / (pure / (self.runs.size - COUNT * len(sizes))), free, self.runs.size) > 0.01
-
-    def better_form(self, fitted: Line) -> None:
-        return None
-
-    def other_form(self, fitted: Line) -> None:
-        return None
 
 
 def equivalents(best: Line, rivals: list[Line], fits: dict[Names, Line]) -> list[Names]:

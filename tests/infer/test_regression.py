@@ -44,10 +44,10 @@ def test_two_of_twenty_are_found_and_their_intervals_hold():
 def test_a_thousand_nulls_alarm_at_the_stated_rate():
     rng = np.random.default_rng(1)
     x, alarms = columns(rng), 0
-    family = Regression(x, np.zeros((RUNS, COUNT))).family()
+    family = Regression(x, np.zeros((RUNS, COUNT))).family
     for _ in range(1000):
         models = Regression(x, rng.standard_normal((RUNS, COUNT)))
-        models.family = lambda: family  # it depends on the columns alone
+        models.family = family  # it depends on the columns alone
         found = searched(models)
         alarms += found.best is not found.nominal
     low, high = scipy.stats.binom.interval(0.999, 1000, CLAIM_LEVEL)

@@ -38,8 +38,11 @@ class Models:
     def nominal(self):
         return self.fits[()]
 
-    def family(self):
-        return SimpleNamespace(p_value=lambda gain, degrees: 1e-6 if gain > 10.0 else 0.5, adjusted=lambda p: p)
+    def noise_p_value(self, gain, degrees):
+        return 1e-6 if gain > 10.0 else 0.5
+
+    def p_value(self, larger, smaller, gain=None):
+        return self.noise_p_value(smaller.sse - larger.sse if gain is None else gain, 1)
 
     def extend(self, base, most=None):
         for name in ("lag", "tendon", "velocity"):
@@ -58,9 +61,6 @@ class Models:
 
     def is_possible(self, fitted):
         return True
-
-    def excess_scatter(self, larger, smaller):
-        return 1.0
 
     def level(self, fitted):
         return 0.01
@@ -81,7 +81,6 @@ class Models:
 @pytest.fixture
 def search():
     made = Search(Models(), lambda share, words: None)
-    made.family = made.models.family()
     made.models.extend(())
     made.models.extend(("lag",))
     return made
@@ -110,7 +109,7 @@ def test_an_answer_has_the_lowest_price_of_its_size(search):
 def test_a_set_of_lower_price_with_a_candidate_that_is_not_significant_is_no_answer(search, monkeypatch):
     """As a hum that the pieces of the data do not agree on."""
     cheapest = ("tendon", "velocity")
-    monkeypatch.setattr(search, "p_value", lambda more, less: 0.5 if more.names == cheapest else 1e-6)
+    monkeypatch.setattr(search.models, "p_value", lambda more, less, gain=None: 0.5 if more.names == cheapest else 1e-6)
     found = search.settle(("lag", "velocity"))
     assert search.models.fits[cheapest].price < found.best.price
     assert found.best.names == ("lag", "velocity")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Self
 
@@ -16,7 +16,7 @@ from fes_pin.diagnosis.search.likelihood_forms import LikelihoodForms
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.possible import is_possible
-from fes_pin.diagnosis.search.score import Scored, best_by_effect
+from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, started
 from fes_pin.identify.covariance import step_gain
 from fes_pin.identify.doubts import first_guess, stilled
@@ -26,14 +26,12 @@ from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import normal_equations
 from fes_pin.identify.scoring import LITTLE, WORTH
-from fes_pin.infer.levels import SEPARABLE
+from fes_pin.infer.fits import Candidate, FittedSets
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
-CONVERGED_SETS = 4
-"""Best sets of a size that go on until they converge."""
 FIRST_DOUBTS = (1.0, 30.0)
 """Sizes of random effort that the nominal fit begins with, in units of the smallest: a likelihood can have two optima,
 one in which the model explains and one in which randomness does. Beside a fit whose random effort is beyond the larger,
@@ -44,11 +42,11 @@ AFRESH_SETS = 3
 """Sets that go on from little randomness: the lowest of all that begin there, once what is random has had a turn.
 Before, a muscle's best cause, by 20 000 in twice the log-likelihood, was not among the first eight of twenty."""
 
-_Refined = tuple[tuple[str, tuple[str, ...]], ...]
-"""Of each cause of a set its name, and which refinements it has."""
+Starts = list[tuple[Scored, ...]]
+"""Causes that a set is extended by, with their linear estimates; of one cause several shapes, best first."""
 
 
-class LikelihoodFits:
+class LikelihoodFits(FittedSets[Fit, Starts]):
     """Fits of sets of causes to one set of trials, by the names of the causes; `()` is the nominal model.
 
     Parameters
@@ -79,12 +77,10 @@ class LikelihoodFits:
         effects: Sequence[type[Effect]] | None = None,
         answered: bool = True,
     ) -> None:
+        super().__init__()
         self.model, self.trials = Model(model.rig), tuple(trials)
         self.library = Library(self.model, trials, effects, answered)
-        self.fits: dict[Names, Fit] = {}
         self._calm: Doubt | None = None
-        self._converged: set[Names] = set()
-        self._begun: set[tuple[Names, _Refined]] = set()
         self._compared: dict[tuple[Names, str], Fit] = {}
         self._maxima = LikelihoodMaxima(trials)
         self.screen = LikelihoodScreen(self.library)
@@ -140,12 +136,28 @@ class LikelihoodFits:
         guess = first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
         return fresh(guess, self.trials) if known and known.timed else guess
 
-    def _begin(self, base: Fit, scored: Sequence[Scored]) -> tuple[Model, list[Fit]]:
-        """Begin a base with one more effect, from its shapes of largest score: the start, and first fits from there."""
-        worth = [s for s in scored[:STARTS] if s.gain >= 0.5 * scored[0].gain]
-        starts = [base.model + started(s.probe.effect, s.amplitudes) for s in worth]
-        others = [] if base.model.effects else self._elsewhere(worth[0].probe.effect)
-        return starts[0], [*(self._maxima.look(s, base) for s in starts), *others]
+    def candidates(self, base: Fit) -> dict[str, Candidate[Starts]]:
+        """Causes that a fit does not have, each with its shapes of largest score."""
+        by_effect = best_by_effect(self.screen.scores(base).scored)
+        return {n: Candidate(many[0].gain, [(s,) for s in _of_much(many)]) for n, many in by_effect.items()}
+
+    def pairs(self, most: int) -> dict[Names, Starts]:
+        """Starts of the pairs of causes of largest joint score in the nominal model."""
+        found = best_pairs(self.screen.scores(self.fits[()]), most)
+        return {tuple(sorted((a.probe.name, b.probe.name))): [(a, b)] for a, b in found}
+
+    def begin(self, base: Fit, starts: Mapping[Names, Starts]) -> dict[Names, Fit]:
+        """The best of several first fits of each set: at what is random in the base, with little of that, from afar."""
+        begun = {k: [_extended(base.model, one) for one in many] for k, many in starts.items()}
+        looks = in_parallel(lambda k: self._first_fits(base, starts[k], begun[k]), list(starts))
+        afresh = self._afresh({names: models[0] for names, models in begun.items()}, base)
+        each = zip(begun, looks, strict=True)
+        return {names: min((*fits, *afresh.get(names, ())), key=lambda f: f.price) for names, fits in each}
+
+    def _first_fits(self, base: Fit, starts: Starts, models: Sequence[Model]) -> list[Fit]:
+        alone = not base.model.effects and len(starts[0]) == 1
+        others = self._elsewhere(starts[0][0].probe.effect) if alone else []
+        return [*(self._maxima.look(one, base) for one in models), *others]
 
     def _elsewhere(self, effect: Effect) -> list[Fit]:
         """Fits from sizes of a cause that no line from its null leads to, beside the rig as it was believed.
@@ -155,25 +167,6 @@ class LikelihoodFits:
         guess = self._guess()
         begun = [self.model + one for one in from_afar(effect, self.library.measured)]
         return [self._maxima.from_start(one, guess, rounds=AFRESH_ROUNDS) for one in begun]
-
-    def extend_with_both(self, base: Fit, pair: tuple[Scored, Scored]) -> tuple[Model, list[Fit]]:
-        """Begin a base with two more effects at once, from their linear estimates."""
-        model = base.model
-        for one in pair:
-            model = model + started(one.probe.effect, one.amplitudes)
-        return model, [self._maxima.look(model, base)]
-
-    def add(self, base: Fit, made: Mapping[Names, Callable[[], tuple[Model, list[Fit]]]]) -> None:
-        """Fit sets that extend a base side by side; of several fits of a set the best stays."""
-        begun = dict(zip(made, in_parallel(lambda make: make(), made.values()), strict=True))
-        afresh = self._afresh({names: start for names, (start, _) in begun.items()}, base)
-        for names, (_, fits) in begun.items():
-            best = min((*fits, *afresh.get(names, ())), key=lambda f: f.price)
-            if names not in self.fits or best.price < self.fits[names].price:
-                self.fits[names] = best
-                self._converged.discard(names)
-        for size in sorted({len(n) for n in made}):
-            self.converge(size)
 
     def _afresh(self, starts: Mapping[Names, Model], base: Fit) -> dict[Names, list[Fit]]:
         """Fits that begin with little that is random, where another's random effort takes what a model should.
@@ -189,73 +182,19 @@ class LikelihoodFits:
         gone_on = in_parallel(lambda one: self._maxima.go_on(one[1], AFRESH_ROUNDS - 1), lowest)
         return {names: [fitted] for (names, _), fitted in zip(lowest, gone_on, strict=True)}
 
-    def converge(self, size: int, without: Sequence[Names] = ()) -> None:
-        """Let the best of a size converge, and what is half way there: equivalents of one cause are no others.
+    def converged(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Fits once they have converged."""
+        return in_parallel(self._maxima.go_on, fits)
 
-        Parameters
-        ----------
-        without
-            Sets that are not asked for.
-        """
-        while slow := [n for n in self._hopeful(size, without) if n not in self._converged]:
-            self._go_on(slow)
-
-    def _go_on(self, slow: Sequence[Names]) -> None:
-        """Let sets go on until they converge."""
-        self.fits.update(zip(slow, in_parallel(lambda n: self._maxima.go_on(self.fits[n]), slow), strict=True))
-        self._converged.update(slow)
-
-    def converge_rivals(self, base: Names, name: str) -> None:
-        """Let sets converge that hold another cause beside a base, where slopes promise as much of it.
-
-        A spring fell short by 37 of the constant torque that it can be, for its fit had ended on the way.
-        """
-        promised = {n: many[0].gain for n, many in best_by_effect(self.screen.scores(self.fits[base]).scored).items()}
-        least = promised.get(name, math.inf) - SEPARABLE
-        rivals = [tuple(sorted((*base, n))) for n, gain in promised.items() if gain > least]
-        self._go_on([n for n in rivals if n in self.fits and n not in self._converged])
-
-    def _hopeful(self, size: int, without: Sequence[Names]) -> list[Names]:
-        """The sets of a size that promise to be the best, and those that come near the best."""
-        near, ranked = self.near(size, without), [n for n in self.ranked(size) if n not in without]
-        first = sorted(ranked, key=lambda n: self.fits[n].price - self._promised(n))[:CONVERGED_SETS]
-        return [n for n in ranked if n in first or n in near]
-
-    def _promised(self, names: Names) -> float:
-        """What a further step from where a fit of a set has come to promises; 0 where it has converged."""
-        fitted = self.fits[names]
-        if names in self._converged or fitted.gradient_norm < LITTLE or not math.isfinite(fitted.sse):
+    def step_gain(self, fitted: Fit) -> float:
+        """What a further step of a fit gains, by its slope and curvature; 0 where it has converged."""
+        if fitted.gradient_norm < LITTLE or not math.isfinite(fitted.sse):
             return 0.0
         return step_gain(normal_equations(fitted.parts), [n not in fitted.at_bound for n in fitted.free])
 
-    def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
-        """Sets of a size that gain half of what the best does beside the best smaller one, best first; the best."""
-        ranked = [n for n in self.ranked(size) if n not in without]
-        if not ranked:
-            return []
-        smaller = self.fits[self.ranked(size - 1)[0]].price if size else math.inf
-        half = 0.5 * (smaller + self.fits[ranked[0]].price)
-        return [n for n in ranked if n == ranked[0] or self.fits[n].price < half]
-
-    def extend(self, base: Names, most: int | None = None) -> list[Names]:
-        """Fit a set with each further cause beside it, or with those of largest score; returns their names.
-
-        Those that are fitted begin once more where the causes of the base have another form in them: it may have had
-        another, and each begins with that of its base.
-        """
-        fitted = self.fits[base]
-        by_effect = best_by_effect(self.screen.scores(fitted).scored)
-        chosen = sorted(by_effect, key=lambda n: (-by_effect[n][0].gain, n))[:most]
-        keys = {tuple(sorted((*base, n))): by_effect[n] for n in chosen}
-        form = _form(fitted)
-        missing = {k: v for k, v in keys.items() if (k, form) not in self._begun and not self._has(k, form)}
-        self._begun.update((k, form) for k in missing)
-        self.add(fitted, {k: lambda v=v: self._begin(fitted, v) for k, v in missing.items()})  # type: ignore[misc]
-        return list(keys)
-
-    def _has(self, names: Names, form: _Refined) -> bool:
-        """Whether a set is fitted with some causes in a form."""
-        return names in self.fits and set(form) <= set(_form(self.fits[names]))
+    def form_of(self, fitted: Fit) -> frozenset[tuple[str, tuple[str, ...]]]:
+        """Of each cause of a fit its name, and which refinements it has."""
+        return frozenset((e.name, e.refined()) for e in fitted.model.effects)
 
     def without(self, names: Names, name: str) -> Fit:
         """The fit of a set less one cause, from the set's own values where that is better."""
@@ -293,11 +232,14 @@ class LikelihoodFits:
         """False if the size of a cause is nothing that it can be; see `possible.is_possible`."""
         return is_possible(fitted, self.library.measured)
 
-    def ranked(self, size: int) -> list[Names]:
-        """Sets of a size, cheapest first; those that have converged to what cannot be come last."""
-        absurd = {n for n in self._converged if not self.is_possible(self.fits[n])}
-        return sorted((n for n in self.fits if len(n) == size), key=lambda n: (n in absurd, self.fits[n].price, n))
+
+def _of_much(shapes: Sequence[Scored]) -> list[Scored]:
+    """The shapes of a cause of largest score."""
+    return [s for s in shapes[:STARTS] if s.gain >= 0.5 * shapes[0].gain]
 
 
-def _form(fitted: Fit) -> _Refined:
-    return tuple((e.name, e.refined()) for e in fitted.model.effects)
+def _extended(model: Model, scored: Sequence[Scored]) -> Model:
+    """A model with further causes, at their linear estimates."""
+    for one in scored:
+        model = model + started(one.probe.effect, one.amplitudes)
+    return model

@@ -14,13 +14,12 @@ from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.remainder.driven import driven_remainder
 from fes_pin.diagnosis.search.cause_sets import MOST_CAUSES
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.diagnosis.search.score import Scored, best_pairs
+from fes_pin.diagnosis.search.score import Scored
 from fes_pin.diagnosis.search.simulation_search import NominalFitError
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.scatter import excess_scatter
 from fes_pin.infer.distributions import chi2_tail
-from fes_pin.infer.family import Family
 from fes_pin.infer.search import Search, SearchResult
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -53,22 +52,16 @@ class LikelihoodModels(LikelihoodFits):
     ) -> None:
         super().__init__(model, trials, effects, answered)
         self.seed, self._horizon_s = seed, horizon_s
+        # no bound where motion is imposed: that excites a rig as nothing else does, and a muscle is a set of causes
+        self.most_candidates = None if any(t.kind == IMPOSED for t in self.trials) else MOST_CAUSES
 
     @property
     def horizon_s(self) -> float:
         """How far ahead errors over a horizon look, s."""
         return self._horizon_s or default_horizon(self.trials)
 
-    @property
-    def most_candidates(self) -> int | None:
-        """Causes in a set, at most; no bound where motion is imposed.
-
-        An imposed motion excites a rig as nothing else does, and a muscle is a set of such causes.
-        """
-        return None if any(t.kind == IMPOSED for t in self.trials) else MOST_CAUSES
-
     def nominal(self) -> Fit:
-        """Fit the nominal model.
+        """Fit the nominal model, and simulate the family of score tests of all causes in it.
 
         Raises
         ------
@@ -78,25 +71,14 @@ class LikelihoodModels(LikelihoodFits):
         fitted = super().nominal()
         if not math.isfinite(fitted.sse):
             raise NominalFitError("the nominal model foretells nothing finite from its start values on", fitted)
+        self.family = self.screen.scores(fitted).family(self.seed)
         return fitted
 
-    def family(self) -> Family:
-        """The family of score tests of all causes in a model that contains no other."""
-        return self.screen.scores(self.fits[()]).family(self.seed)
-
-    def extend_by_pairs(self, most: int) -> None:
-        """Fit the pairs of causes of largest score together that no single cause leads to."""
-        base = self.fits[()]
-        pairs = {
-            tuple(sorted((a.probe.name, b.probe.name))): (a, b) for a, b in best_pairs(self.screen.scores(base), most)
-        }
-        missing = {k: v for k, v in pairs.items() if k not in self.fits}
-        self.add(base, {k: lambda v=v: self.extend_with_both(base, v) for k, v in missing.items()})  # type: ignore[misc]
-
-    def smallest_p_value(self, fitted: Fit) -> float:
-        """Of the score tests of all further causes, each by itself."""
+    def extension_p_value(self, fitted: Fit) -> float:
+        """Family-wise p-value of the largest score of a further cause."""
         scored = [s for s in self.screen.scores(fitted).scored if s.gain > 0.0]
-        return min((float(chi2_tail(s.gain, max(len(s.amplitudes), 1))) for s in scored), default=1.0)
+        single = min((float(chi2_tail(s.gain, max(len(s.amplitudes), 1))) for s in scored), default=1.0)
+        return self.family.adjusted(single)
 
     def scored(self, found: Found) -> list[Scored]:
         """Score of every cause in the nominal model, and of those that the best set lacks in that."""
