@@ -15,14 +15,15 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+import pinocchio as pin
 
 from fes_pin.body.build import Body
+from fes_pin.body.linearize import linearize
 from fes_pin.body.measured_walk import data_folder
 from fes_pin.body.passive import PassiveLegs
 from fes_pin.data.errors import InputError
 from fes_pin.data.motion import read_coordinates, read_ground_reaction
 from fes_pin.walk.dynamics import about, centre_of_mass, joint_torques, required
-from fes_pin.walk.linear import TERMS, along
 from fes_pin.walk.motion import motion_of, pelvis_to_hip, rooted_motion
 from fes_pin.walk.plates import plates_of
 
@@ -127,36 +128,82 @@ print(
 print("whether those markers were right is not told by this: that needs inverse kinematics without them")
 
 # %% Linear equations along the stance
+TERMS = ("change of inertia", "Coriolis", "curvature of gravity")
+
+
+def along(rooted, postures, moving=False):
+    """Torques along a stance by the full equations and by the linear ones of the posture nearest in time, N m.
+
+    The full torque is A(q) a + c(q, v) + g(q), that of A G'' - B G - C = D at rest in q0 is A(q0) a + g(q0)
+    + dg/dq (q - q0). They differ by the sum of three terms: (A(q) - A(q0)) a, c(q, v), and the curvature of gravity.
+
+    Parameters
+    ----------
+    postures
+        How many postures, evenly spread over the stance; or where, as shares of it.
+    moving
+        Linearize about the motion at these samples, with its rates and accelerations, not at rest in its postures.
+
+    Returns
+    -------
+    full, linear
+        (n, 19).
+    neglected
+        (3, n, 19) by `TERMS`; zeros about the motion itself.
+    """
+    body, count = rooted.body, len(rooted.time)
+    q, v, a = rooted.q[:, 7:], rooted.v[:, 6:], rooted.a[:, 6:]
+    model, data = body.model, body.model.createData()
+    shares = (np.arange(postures) + 0.5) / postures if isinstance(postures, int) else np.asarray(postures)
+    at = np.clip(np.round(shares * count - 0.5), 0, count - 1).astype(int)
+    nearest = at[np.argmin(np.abs(np.arange(count)[:, None] - at), axis=1)]
+    known = {k: linearize(body, q[k], check=False, **({"rates": v[k], "accelerations": a[k]} if moving else {}))
+             for k in at}  # fmt: skip
+    full, linear, neglected = np.empty_like(q), np.empty_like(q), np.zeros((3, *q.shape))
+    for t, k in enumerate(nearest):
+        lin, away = known[k], q[t] - q[k]
+        full[t] = pin.rnea(model, data, q[t], v[t], a[t])
+        if moving:
+            linear[t] = lin.A @ (a[t] - a[k]) + lin.E @ (v[t] - v[k]) - lin.B @ away - lin.C
+            continue
+        linear[t] = lin.A @ a[t] - lin.B @ away - lin.C
+        inertia, gravity = pin.crba(model, data, q[t]), pin.computeGeneralizedGravity(model, data, q[t])
+        neglected[:, t] = (inertia - lin.A) @ a[t], full[t] - inertia @ a[t] - gravity, gravity + lin.B @ away + lin.C
+    return full, linear, neglected
+
+
+def missed(full, linear, rows=slice(None)):
+    return 100.0 * np.linalg.norm((full - linear)[rows]) / np.linalg.norm(full[rows])
+
+
 side, rows = next((s, r) for s, r in plates.single_supports() if s == "right")
 rooted = rooted_motion(motion, own, HIP, rows)
-one = along(rooted, 1)
+full, one, neglected = along(rooted, 1)
+assert np.abs(full - one - neglected.sum(axis=0)).max() < 1e-8  # the three terms are the whole difference
+joints = rooted.body.joint_names
 print("\nlinear against full equations, right single support; error in percent of the torque, worst joints")
-shown = np.argsort(-rms(one.full - one.linear))[:6]
-print(f"{'':24s}" + "".join(f"{one.joint_names[i][:20]:>22s}" for i in shown))
+shown = np.argsort(-rms(full - one))[:6]
+print(f"{'':24s}" + "".join(f"{joints[i][:20]:>22s}" for i in shown))
 variants = {
     "one posture": one,
-    "two postures": along(rooted, 2),
-    "four postures": along(rooted, 4),
-    "one, with E and a0": along(rooted, 1, moving=True),
-    "four, with E and a0": along(rooted, 4, moving=True),
+    "two postures": along(rooted, 2)[1],
+    "four postures": along(rooted, 4)[1],
+    "one, with E and a0": along(rooted, 1, moving=True)[1],
+    "four, with E and a0": along(rooted, 4, moving=True)[1],
 }
 for name, each in variants.items():
-    print(f"{name:24s}" + "".join(f"{each.error_percent[i]:22.1f}" for i in shown))
+    print(f"{name:24s}" + "".join(f"{100.0 * (rms(full - each) / rms(full))[i]:22.1f}" for i in shown))
 print("neglected by one posture, N m rms")
 for k, name in enumerate(TERMS):
-    print(f"{name:24s}" + "".join(f"{rms(one.neglected[k])[i]:22.2f}" for i in shown))
-total = {n: 100 * np.linalg.norm(e.full - e.linear) / np.linalg.norm(e.full) for n, e in variants.items()}
+    print(f"{name:24s}" + "".join(f"{rms(neglected[k])[i]:22.2f}" for i in shown))
+total = {n: missed(full, e) for n, e in variants.items()}
 print(
     "by the posture that one linearizes at, percent of the torque: whole stance, and the tenth of it about the posture"
 )
 for share in (0.1, 0.3, 0.5, 0.7, 0.9):
-    here = along(rooted, [share])
+    here, still = along(rooted, [share])[1], along(rooted, [share], moving=True)[1]
     near = np.abs(np.arange(len(rooted.time)) / len(rooted.time) - share) < 0.05
-    still = along(rooted, [share], moving=True)
-    parts = [
-        100 * np.linalg.norm((e.full - e.linear)[rows]) / np.linalg.norm(e.full[rows])
-        for e, rows in ((here, slice(None)), (here, near), (still, slice(None)), (still, near))
-    ]
+    parts = [missed(full, e, rows) for e in (here, still) for rows in (slice(None), near)]
     print(
         f"  at {100 * share:3.0f} % of the stance: at rest {parts[0]:4.0f}, {parts[1]:4.0f}; "
         f"with E and a0 {parts[2]:4.0f}, {parts[3]:4.0f}"
@@ -202,10 +249,10 @@ axes[1, 0].set_xticks(place + 0.32, ["forward", "left", "up"])
 axes[1, 0].set_ylabel("measured - required, N rms")
 axes[1, 0].legend(frameon=False, fontsize=7.5)
 i = int(shown[0])
-axes[1, 1].plot(rooted.time, one.full[:, i], color="#17191c", label="full equations")
+axes[1, 1].plot(rooted.time, full[:, i], color="#17191c", label="full equations")
 for name, colour in (("one posture", "#8b8f96"), ("four postures", "#56b4e9"), ("four, with E and a0", "#d55e00")):
-    axes[1, 1].plot(rooted.time, variants[name].linear[:, i], color=colour, label=name)
-axes[1, 1].set_ylabel(f"{one.joint_names[i].replace('_', ' ')} (N m)")
+    axes[1, 1].plot(rooted.time, variants[name][:, i], color=colour, label=name)
+axes[1, 1].set_ylabel(f"{joints[i].replace('_', ' ')} (N m)")
 axes[1, 1].legend(frameon=False, fontsize=8)
 for panel in (*axes[0], axes[1, 1]):
     panel.set_xlabel("time (s)")

@@ -38,6 +38,19 @@ def about(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
     return moved
 
 
+def segment_poses(motion: Motion) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Every segment's link frame: orientation (n, 3, 3) and origin (n, 3) m in the world."""
+    model, data = motion.model, motion.model.createData()
+    frames = {s: model.getFrameId(s) for s in SEGMENT_NAMES}
+    turn = {s: np.empty((len(motion.time), 3, 3)) for s in frames}
+    origin = {s: np.empty((len(motion.time), 3)) for s in frames}
+    for k, q in enumerate(motion.q):
+        pin.framesForwardKinematics(model, data, q)
+        for s, frame in frames.items():
+            turn[s][k], origin[s][k] = data.oMf[frame].rotation, data.oMf[frame].translation
+    return {s: (turn[s], origin[s]) for s in frames}
+
+
 def segment_regressors(motion: Motion) -> dict[str, np.ndarray]:
     """What each segment's mass parameters add to the required ground reaction.
 

@@ -7,8 +7,7 @@ from scipy.ndimage import uniform_filter1d
 
 from fes_pin.body.joints import SIDES
 from fes_pin.data.errors import InputError
-from fes_pin.walk.dynamics import centre_of_mass, required
-from fes_pin.walk.misfit import segment_poses
+from fes_pin.walk.dynamics import centre_of_mass, required, segment_poses
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import LOADED_N, Plates
 

@@ -7,8 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from fes_pin.walk.dynamics import about, centre_of_mass, required, segment_parameters, segment_regressors
-from fes_pin.walk.misfit import segment_poses
+from fes_pin.walk.dynamics import (
+    about,
+    centre_of_mass,
+    required,
+    segment_parameters,
+    segment_poses,
+    segment_regressors,
+)
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import Plates, plates_of
 from fes_pin.walk.recording import WalkRecording
