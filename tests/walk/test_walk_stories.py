@@ -28,8 +28,8 @@ def test_the_claims_are_told_with_numbers(walk, tmp_path):
     for words in ("A resting forefoot costs", "free feet gain", "one posture leaves", "not identifiable"):
         assert words in said
     (line,) = (one for one in said.splitlines() if one.startswith("all joints together"))
-    one, two, four, one_moving, four_moving = map(float, re.findall(r" ([\d.]+)(?:,|$)", line))
-    assert one > two > four > four_moving and one > one_moving > four_moving
+    one, two, four, _, four_moving = map(float, re.findall(r" ([\d.]+)(?:,|$)", line))
+    assert one > two > four > 2.0 * four_moving
 
 
 def test_a_hidden_trunk_is_found_and_the_walk_can_be_watched(walk, tmp_path):
