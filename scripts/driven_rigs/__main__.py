@@ -17,19 +17,11 @@ from driven_rigs import arm as arms
 from driven_rigs import laboratory as laboratories
 from driven_rigs import stimulated as ankles
 from driven_rigs import swing_up as pendulums
-from driven_rigs.draw import CAUSES, OUTSIDE, Drawn, draw
+from driven_rigs.draw import CAUSES, OUTSIDE, PAIRS, Drawn, draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.infer.levels import CONFIDENCE_95
-
-PAIRS = (
-    ("coulomb_friction", "quadratic_damping"),
-    ("coulomb_friction", "effort_offset"),
-    ("coulomb_friction", "sensor_lag"),
-    ("coulomb_friction", "periodic_torque"),
-    ("coulomb_friction", "parallel_stiffness"),
-)
 
 UNKNOWN = (*OUTSIDE, *ankles.OUTSIDE)
 """What no library has, of any generator."""

@@ -24,6 +24,13 @@ CAUSES = (
     "cogging",
     "backlash",
 )
+PAIRS = (
+    ("coulomb_friction", "quadratic_damping"),
+    ("coulomb_friction", "effort_offset"),
+    ("coulomb_friction", "sensor_lag"),
+    ("coulomb_friction", "periodic_torque"),
+    ("coulomb_friction", "parallel_stiffness"),
+)
 OUTSIDE = ("damping_drift",)
 """Not in the library."""
 BRISTLES = (3e-5, 1e-3)

@@ -1,0 +1,72 @@
+"""Command line; see `scripts/accuracy`."""
+
+from __future__ import annotations
+
+import os
+from itertools import islice
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import fes_pin as fp
+from fes_pin.data.sources import code_hash
+from harness import page
+from harness.compare import compared
+from harness.generator import GENERATORS, Item, generator_of
+from harness.row import Row
+from harness.run import rows_of, run
+from harness.table import HEAD, counts, lines_of, notes, table, worse, wrong
+
+
+def planned(name: str, count: int, seed: int, nulls: bool, only: list[str]) -> list[Item]:
+    """The studies that are asked for."""
+    items = (item for item in generator_of(name).plan(seed) if not (nulls and item.hidden))
+    return [item for item in islice(items, count) if not only or item.key in only]
+
+
+def shown(rows: list[Row]) -> str:
+    """The table of some rows, with notes and every study that was not answered rightly."""
+    found = counts(rows)
+    return "\n".join([table(HEAD, lines_of(found)), "", *notes(found), *wrong(rows)])
+
+
+def main(
+    generators: Annotated[list[str], typer.Argument(help=f"{', '.join(GENERATORS)}; or folders of studies.")],
+    count: Annotated[int, typer.Option(help="Studies of each generator.")] = 40,
+    seed: Annotated[int, typer.Option(help="Of the first; each next one has the next seed.")] = 0,
+    nulls: Annotated[bool, typer.Option("--nulls", help="Only studies that hide nothing.")] = False,
+    only: Annotated[list[str] | None, typer.Option(help="Of these, the one of this key; may be repeated.")] = None,
+    workers: Annotated[int, typer.Option(help="Processes.")] = os.cpu_count() or 1,
+    store: Annotated[Path | None, typer.Option(help="Folder of answers, with which a run goes on.")] = None,
+    studies: Annotated[Path | None, typer.Option(help="Folder of studies: kept there, and read from there.")] = None,
+    stored: Annotated[bool, typer.Option("--stored", help="Run nothing: the store's answers, of any code.")] = False,
+    compare: Annotated[Path | None, typer.Option(help="Another store: both on the same studies.")] = None,
+    check: Annotated[bool, typer.Option("--check", help="Exit code 1 if worse than the committed page.")] = False,
+    onto_page: Annotated[bool, typer.Option("--page", help="Write the counts into docs/accuracy.md.")] = False,
+) -> None:
+    """Hide known causes in studies, and count what the answers make of them."""
+    typer.echo(f"fes_pin of {Path(fp.__file__).parent}, code {code_hash()[:12]}")
+    bad = False
+    for name in generators:
+        items = planned(name, count, seed, nulls, only or [])
+        label = Path(name).name
+        file = store / f"{label}.jsonl" if store else None
+        known = rows_of(file, None)
+        rows = [known[i.key] for i in items if i.key in known] if stored else run(name, items, file, studies, workers)
+        typer.echo(f"\n{label}\n\n{shown(rows)}")
+        if compare:
+            typer.echo("\n".join(["", *compared(rows, rows_of(compare / f"{label}.jsonl", None))]))
+        if check:
+            said = worse(counts(rows), page.read().get(label, {"rows": {}}))
+            bad = bad or bool(said)
+            typer.echo("\n".join(said) or "no worse than docs/accuracy.md")
+        if onto_page:
+            command = f"scripts/accuracy {name} --count {count} --seed {seed}" + " --nulls" * nulls
+            page.write(label, command, rows)
+    if bad:
+        raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    typer.run(main)

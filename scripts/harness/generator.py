@@ -1,0 +1,103 @@
+"""What makes studies with known causes: one interface, and the generators by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Protocol
+
+import fes_pin as fp
+
+
+@dataclass(frozen=True)
+class Item:
+    """One study of a plan.
+
+    Attributes
+    ----------
+    key
+        Its name, unlike all others of its generator.
+    seed
+        Of everything that is random in it.
+    hidden
+        Causes that are hidden in it, or changes between its groups.
+    part
+        Row of the table that it counts in, beside that of its number of causes; "" for none.
+    outside
+        The library has none of the causes.
+    """
+
+    key: str
+    seed: int
+    hidden: tuple[str, ...] = ()
+    part: str = ""
+    outside: bool = False
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is true of a study.
+
+    Attributes
+    ----------
+    parameters
+        True values by their names in the answer; of a cause with a site, "cause at site".
+    beside
+        Causes that act a little and may be named as well.
+    part
+        Row of the table, where it is known only after the study was made.
+    """
+
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    beside: tuple[str, ...] = ()
+    part: str | None = None
+
+
+class Generator(Protocol):
+    """Makes studies."""
+
+    def plan(self, seed: int) -> Iterator[Item]:
+        """Studies, as many as are asked for; any beginning holds some of each kind."""
+        ...
+
+    def make(self, item: Item, folder: Path) -> tuple[fp.Study, Truth]:
+        """Make a study and say what is true of it; `folder` is for its files."""
+        ...
+
+    def ask(self, study: fp.Study) -> Any:
+        """The answer of the package."""
+        ...
+
+
+GENERATORS = {
+    "free": ("free", "Free"),
+    "driven": ("driven", "Driven", "plain"),
+    "recorded": ("driven", "Driven", "recorded"),
+    "low-passed": ("driven", "Driven", "low-passed"),
+    "every-fifth": ("driven", "Driven", "every-fifth"),
+    "play": ("driven", "Driven", "play"),
+    "laboratory": ("driven", "Driven", "laboratory"),
+    "swing-up": ("driven", "Driven", "swing-up"),
+    "arm": ("driven", "Driven", "arm"),
+    "stimulated": ("driven", "Driven", "stimulated"),
+    "imposed": ("imposed", "Imposed"),
+    "contrast": ("contrast", "Pairs"),
+    "walking": ("walking", "Walks"),
+}
+"""By name: module of this package, class, and what it is made with."""
+
+
+def generator_of(name: str) -> Generator:
+    """The generator of a name, or of a folder of studies whose answers lie in its folder `answers`.
+
+    Raises
+    ------
+    KeyError
+        There is none.
+    """
+    if Path(name, "answers").is_dir():
+        return import_module("harness.practice").Practice(Path(name))
+    module, kind, *given = GENERATORS[name]
+    return getattr(import_module(f"harness.{module}"), kind)(*given)

@@ -1,0 +1,56 @@
+"""The table of docs/accuracy.md, written from the counts of the last run of each generator, docs/data/accuracy.json."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from harness.generator import GENERATORS
+from harness.row import Row
+from harness.table import HEAD, counts, interval, lines_of, table
+
+DOCS = Path(__file__).parents[2] / "docs"
+DATA, PAGE = DOCS / "data" / "accuracy.json", DOCS / "accuracy.md"
+BEGIN, END = "<!-- written by scripts/accuracy --page -->", "<!-- end -->"
+
+
+def read() -> dict[str, Any]:
+    """Command, hash of the code and counts of the last run of each generator."""
+    found: dict[str, Any] = json.loads(DATA.read_text(encoding="utf-8"))
+    return found
+
+
+def write(name: str, command: str, rows: Sequence[Row]) -> None:
+    """Put the counts of a run into the data, and write the page."""
+    (code,) = {row.code for row in rows}
+    data = {**read(), name: {"command": command, "code": code[:12], **counts(rows)}}
+    order = [*GENERATORS, *sorted(data.keys() - GENERATORS.keys())]
+    data = {known: data[known] for known in order if known in data}
+    DATA.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), data), encoding="utf-8")
+
+
+def with_tables(text: str, data: Mapping[str, Any]) -> str:
+    """The page with the tables of these data in it."""
+    before, after = text.split(BEGIN, maxsplit=1)[0], text.split(END)[1]
+    return f"{before}{BEGIN}\n{tables(data)}\n{END}{after}"
+
+
+def tables(data: Mapping[str, Any]) -> str:
+    """Counts of all generators, and beneath them what was run, and intervals, errors and times."""
+    lines = [[f"`{name}`" if not k else "", *row] for name in data for k, row in enumerate(lines_of(data[name]))]
+    runs = [[f"`{one['command']}`", one["code"], *_measured(one)] for one in data.values()]
+    head = ("command", "code", "95 % intervals that hold the truth", "error E, nominal to extended", "processor time")
+    return "\n\n".join([table(("generator", *HEAD), lines), table(head, runs)])
+
+
+def _measured(found: Mapping[str, Any]) -> list[str]:
+    held, count = found["intervals"]
+    errors = found["errors"].get("horizon") or found["errors"].get("held_out")
+    return [
+        interval(held, count) if count else "",
+        f"{errors[0]:g} to {errors[1]:g} %" if errors else "",
+        f"{found['cpu_s']:g} s",
+    ]

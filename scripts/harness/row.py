@@ -1,0 +1,139 @@
+"""One answer beside the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from harness.generator import Item, Truth
+
+KINDS = ("nothing", "one", "two", "outside")
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was answered of a study.
+
+    Attributes
+    ----------
+    sets
+        Each named cause or change with what cannot be told from it, in their order.
+    left
+        Something is left that nothing named explains.
+    estimates
+        Name, truth, estimate of the nominal model (None where it has none), estimate and its standard deviation.
+    errors
+        By kind, in percent: of the nominal model, and of the extended one.
+    cpu_s
+        Processor time of the answer.
+    study
+        Hash of the study's files.
+    code
+        Hash of the code that answered.
+    error
+        Of a study without an answer.
+    """
+
+    key: str
+    hidden: tuple[str, ...]
+    part: str
+    outside: bool
+    code: str
+    study: str = ""
+    verdict: str = ""
+    sets: tuple[tuple[str, ...], ...] = ()
+    left: bool = False
+    estimates: tuple[tuple[str, float, float | None, float, float], ...] = ()
+    errors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    cpu_s: float = 0.0
+    error: str | None = None
+
+    @classmethod
+    def of(cls, stored: Mapping[str, Any]) -> Row:
+        """The row that a line of a store holds."""
+        return cls(**{name: _read_only(value) for name, value in stored.items()})
+
+    @property
+    def kind(self) -> str:
+        """One of `KINDS`."""
+        return "outside" if self.outside else KINDS[min(len(self.hidden), 2)]
+
+    @property
+    def right(self) -> bool:
+        """Nothing is named where nothing is hidden; one cause stands in the first set, of more each in a set of its
+        own; of what the library does not have it is said that something is left."""
+        if self.outside:
+            return self.left
+        if not self.hidden:
+            return not self.sets
+        if len(self.hidden) == 1:
+            return bool(self.sets) and self.hidden[0] in self.sets[0]
+        found = [{k for k, names in enumerate(self.sets) if cause in names} for cause in self.hidden]
+        return all(found) and len(set().union(*found)) >= len(found)
+
+    @property
+    def first(self) -> bool:
+        """It is right, and each hidden cause is the one that its set is named by."""
+        return self.right and not self.outside and set(self.hidden) <= {names[0] for names in self.sets}
+
+    @property
+    def alone(self) -> bool:
+        """It is right, nothing is named besides, and nothing else could be it."""
+        return self.right and not self.outside and sorted(self.sets) == sorted((cause,) for cause in self.hidden)
+
+    @property
+    def further(self) -> bool:
+        """More is named than is hidden."""
+        return len(self.sets) > len(self.hidden)
+
+    @property
+    def exact(self) -> bool:
+        """The extended model has the causes that are hidden, and no other."""
+        return sorted(names[0] for names in self.sets) == sorted(self.hidden)
+
+
+def _read_only(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _read_only(one) for name, one in value.items()}
+    return tuple(_read_only(one) for one in value) if isinstance(value, list) else value
+
+
+def judged(item: Item, truth: Truth, record: Mapping[str, Any], **known: Any) -> Row:
+    """An answer, as JSON has it, beside the truth."""
+    beside = set(truth.beside) - set(item.hidden)
+    causes = record["causes"] if "causes" in record else record["changes"]
+    sets = [(c["name"], *c["equivalents"]) for c in causes]
+    return Row(
+        item.key,
+        item.hidden,
+        truth.part or item.part,
+        item.outside,
+        verdict=record["verdict"],
+        sets=tuple(names for names in sets if not beside & set(names)),
+        left=bool(record["verdict"] == "unexplained" or record["remainder"]["unexplained"]),
+        estimates=tuple(_estimates(truth.parameters, record)),
+        errors=dict(_errors(record)),
+        **known,
+    )
+
+
+def _estimates(
+    true: Mapping[str, float], record: Mapping[str, Any]
+) -> Iterator[tuple[str, float, float | None, float, float]]:
+    fitted = dict(record.get("extended", {}).get("parameters", {}))
+    for cause in record.get("causes", ()):
+        if "site" in cause:
+            fitted |= {f"{cause['name']} at {cause['site']}": one for one in cause["parameters"].values()}
+    nominal = record.get("nominal", {}).get("parameters", {})
+    for name, value in true.items():
+        if (found := fitted.get(name)) and found["std"] and math.isfinite(found["std"]):
+            yield name, value, nominal.get(name, {}).get("value"), found["value"], found["std"]
+
+
+def _errors(record: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float, float]]]:
+    before, after = (record.get(which, {}).get("error_percent", {}) for which in ("nominal", "extended"))
+    for kind in ("held_out", "horizon"):
+        if before.get(kind) is not None and after.get(kind) is not None:
+            yield kind, (before[kind], after[kind])

@@ -1,0 +1,129 @@
+"""Counts of rows, and one table of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from statistics import median
+from typing import Any
+
+from scipy.stats import binomtest, fisher_exact
+
+from fes_pin.infer.levels import CONFIDENCE_95
+from harness.row import KINDS, Row
+
+COLUMNS = ("studies", "right", "first", "alone", "further", "left")
+HEAD = ("hidden", "studies", "right", "named first", "alone", "further names", "something left")
+WORSE = 0.01
+"""Level at which counts are worse than those of another run."""
+
+Counts = Mapping[str, Any]
+"""What a run of a generator amounts to, as plain values for JSON; see `counts`."""
+
+
+def counts(rows: Iterable[Row]) -> dict[str, Any]:
+    """Counts of rows.
+
+    Returns
+    -------
+    dict
+        `rows`: of each kind, and of its parts, how many studies there are and of how many what `COLUMNS` say holds;
+        `intervals`: how many of so many 95 % intervals hold the truth, where the model has the causes that are hidden;
+        `off`: by parameter how far it is off in percent, in the median, of the nominal model and of the extended one;
+        `errors`: by kind the median error of both; `cpu_s`: median; `unanswered`.
+    """
+    rows = list(rows)
+    good = [row for row in rows if row.error is None]
+    lines = {}
+    for kind in KINDS:
+        own = [row for row in good if row.kind == kind]
+        parts = sorted({row.part for row in own if row.part})
+        for name, some in [(kind, own), *((f"{kind}: {p}", [r for r in own if r.part == p]) for p in parts)]:
+            if some:
+                lines[name] = [len(some), *(sum(getattr(row, column) for row in some) for column in COLUMNS[1:])]
+    held = [abs(x - true) < CONFIDENCE_95 * std for r in good if r.exact for _, true, _, x, std in r.estimates]
+    return {
+        "unanswered": len(rows) - len(good),
+        "rows": lines,
+        "intervals": [sum(held), len(held)],
+        "off": _off(good),
+        "errors": _errors(good),
+        "cpu_s": round(median([row.cpu_s for row in good] or [0.0]), 1),
+    }
+
+
+def _off(good: Sequence[Row]) -> dict[str, list[float]]:
+    """Of parameters that the nominal model has and that are true of at least half of the studies."""
+    every: dict[str, list[tuple[float, float]]] = {}
+    for row in good:
+        for name, true, before, after, _ in row.estimates:
+            if before is not None and true:
+                every.setdefault(name, []).append((before / true - 1.0, after / true - 1.0))
+    return {
+        name: [float(f"{100.0 * median(abs(x) for x in off):.2g}") for off in zip(*pairs, strict=True)]
+        for name, pairs in sorted(every.items())
+    }
+
+
+def _errors(good: Sequence[Row]) -> dict[str, list[float]]:
+    kinds = sorted({kind for row in good for kind in row.errors})
+    pairs = {kind: [row.errors[kind] for row in good if row.hidden and kind in row.errors] for kind in kinds}
+    return {kind: [float(f"{median(e):.2g}") for e in zip(*some, strict=True)] for kind, some in pairs.items() if some}
+
+
+def interval(hits: int, count: int) -> str:
+    """A share with its 95 % interval, after Wilson, J. Am. Stat. Assoc. 22 (1927)."""
+    low, high = binomtest(hits, count).proportion_ci(method="wilson")
+    return f"{hits} of {count}: {100 * hits / count:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A table in Markdown."""
+    lines = [[str(cell) for cell in row] for row in rows]
+    return "\n".join("| " + " | ".join(row) + " |" for row in [list(head), ["---"] * len(head), *lines])
+
+
+def lines_of(found: Counts) -> list[list[Any]]:
+    """Rows of the table, below `HEAD`."""
+    out = []
+    for name, (count, right, *others) in found["rows"].items():
+        kind, _, part = name.partition(": ")
+        first, alone, further, left = others
+        told = [first, alone] if kind in ("one", "two") else ["", ""]
+        out.append([f"{kind}, {part}" if part else kind, count, interval(right, count), *told, further, left])
+    return out
+
+
+def notes(found: Counts) -> list[str]:
+    """What is counted beside the table, a line each."""
+    held, count = found["intervals"]
+    lines = [f"95 % intervals that hold the truth: {interval(held, count)}"] if count else []
+    for kind, (before, after) in found["errors"].items():
+        words = "over the horizon" if kind == "horizon" else "held out"
+        lines.append(f"error E {words}, where something is hidden, median: {before:g} % nominal, {after:g} % extended")
+    for name, (before, after) in found["off"].items():
+        lines.append(f"{name} off by, median: {before:g} % nominal, {after:g} % extended")
+    return [*lines, f"processor time of an answer, median: {found['cpu_s']:g} s"]
+
+
+def wrong(rows: Iterable[Row]) -> list[str]:
+    """Every study without the right answer, or with a further name, a line each."""
+    return [f"  {one_line(row)}" for row in rows if row.error or not row.right or row.further]
+
+
+def one_line(row: Row) -> str:
+    """One answer in words."""
+    if row.error:
+        return f"{row.key}: no answer: {row.error}"
+    named = " and ".join("|".join(names) for names in row.sets) or "nothing"
+    hidden = " and ".join(row.hidden) or "nothing"
+    return f"{row.key}: {hidden} -> {row.verdict}: {named}" + " and something left" * row.left
+
+
+def worse(now: Counts, before: Counts) -> list[str]:
+    """Kinds of studies of which significantly fewer are right than before, after Fisher; a line each."""
+    out = []
+    for name in now["rows"].keys() & before["rows"].keys():
+        (count, right, *_), (many, good, *_) = now["rows"][name], before["rows"][name]
+        if fisher_exact([[right, count - right], [good, many - good]], "less").pvalue < WORSE:
+            out.append(f"{name}: {interval(right, count)}, before {interval(good, many)}")
+    return sorted(out)

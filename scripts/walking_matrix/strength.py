@@ -1,0 +1,43 @@
+"""How clearly a hidden cause shows in a walk."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fes_pin.data.smooth import CUTOFF_HZ
+from fes_pin.data.study import Study, read_study
+from fes_pin.walk.banks import Banks
+from fes_pin.walk.diagnosis import white_noise
+from fes_pin.walk.fits import WalkFits
+from fes_pin.walk.recording import recordings_of
+from walking_matrix.synthetic import Gait, Wrong, make
+
+
+def strength(gait: Gait, wrong: Wrong, seed: int, study: Study) -> float:
+    """Twice the expected log-likelihood ratio of the truth against nothing.
+
+    What the cause changes in the mean stride is the difference of two walks of the same errors, with and without it; it
+    is weighed by the noise and the nuisance of the walk without it. Of marker noise the deviance that it saves.
+    """
+    banks = _banks(study)
+    if wrong.cause == "marker_noise":
+        return float((white_noise(banks) or (0.0, 0.0, 0.0))[2])
+    with tempfile.TemporaryDirectory() as folder:
+        make(gait, Path(folder), replace(wrong, cause="none"), seed)
+        twin = _banks(read_study(folder))
+    waves = min(len(twin.strides.harmonics), len(banks.strides.harmonics))
+    y = [b.as_read.y[:, :, :waves] for b in (banks, twin)]
+    noise, variance = twin.noise, WalkFits(twin).fit(()).fitted.variance[:, :, :waves]
+    means = twin.strides.harmonics[:waves] == 0
+    change = np.where(means, y[0] - y[1], np.einsum("ij,njk->nik", noise.turn, y[0] - y[1])).ravel()
+    nuisance = noise.nuisance[:, :, :waves].reshape(change.size, -1)
+    covariance = np.diag(variance.ravel()) + nuisance @ nuisance.T
+    return float(change @ np.linalg.solve(covariance, change))
+
+
+def _banks(study: Study) -> Banks:
+    return Banks(recordings_of(study, cutoff_hz=CUTOFF_HZ)[1], CUTOFF_HZ)

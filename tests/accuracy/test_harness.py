@@ -1,0 +1,193 @@
+"""The harness: plans, judging, counting, going on, and two codes compared; its generators by their own tests."""
+
+import json
+from collections import Counter
+from itertools import islice
+
+import pytest
+from harness import run as runs
+from harness.compare import compared
+from harness.generator import GENERATORS, Item, Truth, generator_of
+from harness.row import Row, judged
+from harness.run import answered, rows_of, run
+from harness.table import counts, interval, lines_of, notes, worse, wrong
+
+
+def row(key="a", hidden=("fatigue",), sets=(("fatigue",),), **more):
+    known = {"part": "", "outside": False, "code": "x", "verdict": "causes_found", "cpu_s": 2.0}
+    return Row(key, hidden, **{**known, "sets": sets, **more})
+
+
+@pytest.mark.parametrize(
+    ("hidden", "sets", "right", "first", "alone"),
+    [
+        ((), (), True, True, True),
+        ((), (("fatigue",),), False, False, False),
+        (("fatigue",), (("fatigue",),), True, True, True),
+        (("fatigue",), (("load_error", "fatigue"),), True, False, False),
+        (("fatigue",), (("load_error",), ("fatigue",)), False, False, False),
+        (("fatigue", "cogging"), (("cogging",), ("fatigue",)), True, True, True),
+        (("fatigue", "cogging"), (("cogging", "fatigue"),), False, False, False),
+        (("fatigue", "cogging"), (("cogging", "fatigue"), ("load_error", "fatigue")), True, False, False),
+    ],
+)
+def test_who_is_right(hidden, sets, right, first, alone):
+    one = row(hidden=hidden, sets=sets)
+    assert (one.right, one.first, one.alone) == (right, first, alone)
+
+
+def test_what_no_library_has_is_answered_by_what_is_left():
+    assert row(outside=True, sets=(), left=True).right and not row(outside=True).right
+
+
+RECORD = {
+    "verdict": "causes_found",
+    "causes": [
+        {"name": "fatigue", "equivalents": ["load_error"], "site": "", "parameters": {}},
+        {"name": "cogging", "equivalents": []},
+    ],
+    "remainder": {"unexplained": True},
+    "nominal": {"parameters": {"gain": {"value": 2.0, "std": 0.1}}, "error_percent": {"held_out": 4.0, "fit": 1.0}},
+    "extended": {
+        "parameters": {"gain": {"value": 1.1, "std": 0.1}, "fatigue.rate_per_s": {"value": 0.3, "std": 0.0}},
+        "error_percent": {"held_out": 3.0, "fit": 1.0},
+    },
+}
+
+
+def test_an_answer_is_judged_by_its_record():
+    item, truth = Item("k", 1, ("fatigue",)), Truth({"gain": 1.0, "fatigue.rate_per_s": 0.2}, ("cogging",), "d = 40")
+    found = judged(item, truth, RECORD, code="x")
+    assert found.sets == (("fatigue", "load_error"),) and found.right and found.left and found.part == "d = 40"
+    assert found.estimates == (("gain", 1.0, 2.0, 1.1, 0.1),)
+    assert found.errors == {"held_out": (4.0, 3.0)}
+
+
+def test_a_cause_has_its_value_at_its_site():
+    cause = {"name": "segment_mass", "equivalents": [], "site": "trunk"}
+    cause["parameters"] = {"share": {"value": 0.2, "std": 0.01}}
+    record = {**RECORD, "causes": [cause]}
+    found = judged(Item("k", 1, ("segment_mass",)), Truth({"segment_mass at trunk": 0.21}), record, code="x")
+    assert found.estimates == (("segment_mass at trunk", 0.21, None, 0.2, 0.01),)
+    elsewhere = judged(Item("k", 1, ("segment_mass",)), Truth({"segment_mass at pelvis": 0.21}), record, code="x")
+    assert elsewhere.estimates == ()
+
+
+ROWS = [
+    row("a", part="d = 40", estimates=(("gain", 1.0, 1.4, 1.01, 0.01),), errors={"held_out": (5.0, 1.0)}),
+    row("b", part="d = 15", sets=(), verdict="adequate", estimates=(("gain", 1.0, 1.2, 1.2, 0.01),), cpu_s=4.0),
+    row("c", part="d = 40", estimates=(("gain", 1.0, 1.4, 1.03, 0.01),)),
+    row("d", hidden=(), sets=(), verdict="adequate"),
+    row("e", hidden=(), cpu_s=6.0),
+    row("f", hidden=("fatigue", "cogging"), sets=(("fatigue",), ("cogging", "load_error"), ("base_tilt",))),
+    row("g", hidden=("spasms",), outside=True, sets=(), left=True),
+    row("h", error="E: x"),
+]
+
+
+def test_what_is_counted():
+    found = counts(ROWS)
+    assert found["unanswered"] == 1 and found["cpu_s"] == 2.0
+    assert found["rows"] == {
+        "nothing": [2, 1, 1, 1, 1, 0],
+        "one": [3, 2, 2, 2, 0, 0],
+        "one: d = 15": [1, 0, 0, 0, 0, 0],
+        "one: d = 40": [2, 2, 2, 2, 0, 0],
+        "two": [1, 1, 1, 0, 1, 0],
+        "outside": [1, 1, 0, 0, 0, 1],
+    }
+    assert found["intervals"] == [1, 2]  # where the causes are right alone
+    assert found["off"] == {"gain": [40.0, 3.0]} and found["errors"] == {"held_out": [5.0, 1.0]}
+    assert lines_of(found)[2] == ["one, d = 15", 1, interval(0, 1), 0, 0, 0, 0]
+    assert "hold the truth: 1 of 2" in notes(found)[0] and "4" not in notes(found)[-1]
+    assert [line.split()[0] for line in wrong(ROWS)] == ["b:", "e:", "f:", "h:"]
+    assert json.loads(json.dumps(found)) == found
+
+
+def test_intervals_are_wilsons():
+    assert interval(9, 10) == "9 of 10: 90.0 % (59.6 to 98.2)"
+
+
+def test_worse_is_told_where_chance_is_no_reason():
+    before = {"rows": {"one": [100, 97, 0, 0, 0, 0], "two": [10, 9, 0, 0, 0, 0]}}
+    assert worse({"rows": {"one": [30, 28, 0, 0, 0, 0], "two": [4, 3, 0, 0, 0, 0]}}, before) == []
+    assert len(worse({"rows": {"one": [30, 20, 0, 0, 0, 0], "outside": [4, 0, 0, 0, 0, 0]}}, before)) == 1
+
+
+def test_two_codes_are_compared_on_the_same_files_alone():
+    before = {r.key: r for r in ROWS[:6]}
+    before["b"] = row("b")
+    before["c"] = row("c", study="another file")
+    before["d"] = row("d", hidden=(), sets=(), cpu_s=4.0)
+    text = compared(ROWS, before)
+    assert text[0].startswith("5 of 8")
+    assert "| all | 5 | 3 | 0 | 1 | 1 | 1 |" in text[1] and "| one | 2 | 1 | 0 | 1 | 0 | 1 |" in text[1]
+    assert "median: 1.00" in text[2] and [line.split()[:2] for line in text[3:]] == [["before", "b:"], ["now", "b:"]]
+
+
+@pytest.mark.parametrize("name", GENERATORS)
+def test_a_plan_holds_some_of_each_and_goes_on(name):
+    items = list(islice(generator_of(name).plan(7), 120))
+    assert len({item.key for item in items}) == 120
+    assert items[:20] == list(islice(generator_of(name).plan(7), 20))
+    hidden = Counter(min(len(item.hidden), 2) for item in items)
+    assert hidden[0] >= 6 and hidden[1] + hidden[2] >= 60
+
+
+class Fake:
+    """Answers that nothing took: studies of one number."""
+
+    made = 0
+
+    def plan(self, seed):
+        return iter(())
+
+    def make(self, item, folder):
+        Fake.made += 1
+        import numpy as np
+
+        import fes_pin as fp
+
+        time = np.arange(50) * 0.01
+        trial = fp.Trial("one", "isometric", {"pulse_width_us": 0.0 * time, "force_n": time}, time)
+        start = {"gain": 30.0, "time_constant_s": 0.05}
+        known = {"threshold_us": 180.0, "saturation_us": 1000.0}
+        return fp.Study("fake", "muscle", known, start, (trial,)), Truth({"gain": 1.0})
+
+    def ask(self, study):
+        if study.trials[0]["force_n"][1] != 0.01:
+            raise ValueError("not as it was made")
+        return self
+
+    def to_json(self):
+        return json.dumps(RECORD)
+
+
+@pytest.fixture
+def fake(monkeypatch):
+    Fake.made = 0
+    monkeypatch.setattr(runs, "generator_of", lambda name: Fake())
+
+
+ITEMS = [Item("a", 1, ("fatigue",)), Item("b", 2)]
+
+
+def test_a_run_that_was_broken_off_goes_on_and_other_code_begins_again(fake, tmp_path, monkeypatch):
+    store = tmp_path / "store/fake.jsonl"
+    first = run("fake", ITEMS[:1], store, None, 1)
+    both = run("fake", ITEMS, store, None, 1)
+    assert both[0] == first[0] and Fake.made == 2 and [r.key for r in both] == ["a", "b"]
+    assert [r.right for r in both] == [True, False]
+    monkeypatch.setattr(runs, "code_hash", lambda: "other code")
+    again = run("fake", ITEMS, store, None, 1)
+    assert Fake.made == 4 and {r.code for r in again} == {"other code"}
+    assert rows_of(store, None) == {r.key: r for r in again} and len(store.read_text().splitlines()) == 4
+
+
+def test_studies_that_are_kept_are_not_made_again(fake, tmp_path):
+    one, other = (answered("fake", ITEMS[0], tmp_path) for _ in range(2))
+    assert Fake.made == 1 and one.study == other.study and one.error is None
+    file = tmp_path / "fake/a/trials/one.csv"
+    file.write_text(file.read_text().replace("0.01,0.0,0.01", "0.01,0.0,0.02"))
+    changed = answered("fake", ITEMS[0], tmp_path)
+    assert changed.study != one.study and changed.error == "ValueError: not as it was made"
