@@ -9,13 +9,13 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from paper_ankle.carried import carried_covariance, with_antagonist
+from paper_ankle.constants import ANGLE_NOISE_RAD, paper_trial, paper_twin
+from paper_ankle.error_region import profile_intervals
+from paper_ankle.ratios import RATIOS, RatioProblem, ankle_of, least_error
 
 import fes_pin as fp
-from fes_pin.paper.antagonist import carried_covariance, with_antagonist
-from fes_pin.paper.constants import ANGLE_NOISE_RAD, paper_trial, paper_twin
 from fes_pin.paper.equation_1 import GRAVITY
-from fes_pin.paper.error_region import profile_intervals
-from fes_pin.paper.ratios import RATIOS, RatioProblem, ankle_of, least_error
 
 OUT = Path("out")
 OUT.mkdir(exist_ok=True)

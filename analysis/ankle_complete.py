@@ -8,14 +8,14 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from paper_ankle.constants import PRINTED, STEPWISE, paper_study, paper_twin
+from paper_ankle.ratios import RatioProblem, ankle_of, error_percent, least_error
+from paper_ankle.twin import RunningTwin, staircase
 
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.fit import fit
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
-from fes_pin.paper.constants import PRINTED, STEPWISE, paper_study, paper_twin
-from fes_pin.paper.ratios import RatioProblem, ankle_of, error_percent, least_error
-from fes_pin.paper.twin import RunningTwin, staircase
 
 OUT = Path("out")
 OUT.mkdir(exist_ok=True)

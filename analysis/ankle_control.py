@@ -11,14 +11,14 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from paper_ankle.constants import STEPWISE, paper_twin
+from paper_ankle.ratios import RatioProblem, ankle_of, least_error
+from paper_ankle.twin import RunningTwin, record, staircase
 
 import fes_pin as fp
 from fes_pin.control.loop import sine, steps
 from fes_pin.control.margins import margins
 from fes_pin.control.tuning import loop_at
-from fes_pin.paper.constants import STEPWISE, paper_twin
-from fes_pin.paper.ratios import RatioProblem, ankle_of, least_error
-from fes_pin.paper.twin import RunningTwin, record, staircase
 
 OUT = Path("out")
 OUT.mkdir(exist_ok=True)

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from paper_ankle.constants import ANGLE_NOISE_RAD, PRINTED, STEPWISE, paper_study, paper_trial, paper_twin
+from paper_ankle.error_region import ellipsoid_floor, error_domain, error_holding, profile_intervals
+from paper_ankle.identifiability import ankle_identifiability
+from paper_ankle.ratios import RATIOS, UNITS, RatioProblem, ankle_of, least_error
+from paper_ankle.twin import record, staircase
 
 from fes_pin.models.nominal import nominal_model
-from fes_pin.paper.constants import ANGLE_NOISE_RAD, PRINTED, STEPWISE, paper_study, paper_trial, paper_twin
-from fes_pin.paper.error_region import ellipsoid_floor, error_domain, error_holding, profile_intervals
-from fes_pin.paper.identifiability import ankle_identifiability
-from fes_pin.paper.ratios import RATIOS, UNITS, RatioProblem, ankle_of, least_error
-from fes_pin.paper.twin import record, staircase
 
 OUT = Path("out")
 OUT.mkdir(exist_ok=True)

@@ -8,15 +8,16 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from paper_ankle.consistency import chi2_band, nees
+from paper_ankle.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_twin
+from paper_ankle.twin import record, staircase
 
 import fes_pin as fp
 from fes_pin.identify.fit import fit
 from fes_pin.identify.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
-from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_twin
-from fes_pin.paper.kalman import StraightRecruitment, chi2_band, nees
-from fes_pin.paper.twin import record, staircase
+from fes_pin.paper.kalman import StraightRecruitment
 
 OUT = Path("out")
 OUT.mkdir(exist_ok=True)

@@ -4,20 +4,22 @@
 .venv/bin/python scripts/control_safety.py --faults 80 --hours 0.5
 .venv/bin/python scripts/control_safety.py --faults 0 --hours 0 --steps 100000    # whatever callers do
 
-The ankles are twins (`fes_pin.paper.twin`), whose integrator shares no line with the controller's model. Each is off by
-up to 30 % in gain, time constant and stiffness from what the controller believes, half of them tire, a third stand on
-a frame that swings, of which the controller knows in half of the cases; readings have 2 mrad of noise and steps of
-1 mrad, 2 in 100 are lost and 1 in 1000 is a spike.
+The ankles are twins (`analysis/paper_ankle/twin.py`), whose integrator shares no line with the controller's model. Each
+is off by up to 30 % in gain, time constant and stiffness from what the controller believes, half of them tire, a third
+stand on a frame that swings, of which the controller knows in half of the cases; readings have 2 mrad of noise and
+steps of 1 mrad, 2 in 100 are lost and 1 in 1000 is a spike.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from multiprocessing import Pool
+from pathlib import Path
 
 import numpy as np
 from scipy.stats import chi2
@@ -31,9 +33,11 @@ from fes_pin.control.observer import JointObserver
 from fes_pin.data.errors import InputError
 from fes_pin.models.effects.fatigue import Fatigue
 from fes_pin.models.effects.frame_vibration import FrameVibration
-from fes_pin.paper.constants import paper_twin
-from fes_pin.paper.ratios import ankle_of
-from fes_pin.paper.twin import AnkleTwin, RunningTwin
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
+from paper_ankle.constants import paper_twin
+from paper_ankle.ratios import ankle_of
+from paper_ankle.twin import AnkleTwin, RunningTwin
 
 BELIEVED = replace(paper_twin("3-23"), load_kg=0.5)
 NOISE_RAD, STEP_RAD, LOST, SPIKED = 2e-3, 1e-3, 0.02, 0.001

@@ -1,4 +1,5 @@
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -6,6 +7,7 @@ import pytest
 from fes_pin.body.build import Body
 
 REPOSITORY = Path(__file__).parents[1]
+sys.path.insert(0, str(REPOSITORY / "analysis"))  # paper_ankle: the twins that many tests take for a joint
 ROUNDING = {
     "allocation": "active sets, and certificates to the last digit",
     "body/test_controllability.py": "eigen-decompositions",

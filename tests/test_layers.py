@@ -1,8 +1,8 @@
 """The imports run one way: view -> diagnosis -> identify -> models -> data; control -> allocation -> muscles -> body.
 
 Inference (infer) knows no rig and no body: all may use it, and it uses nothing of ours but `workers`.
-The controller takes eq. (1) from paper. Measured walking (walk) reads the body, and the parameters and stages of models
-for its causes.
+The controller takes eq. (1) from paper, which takes recruitment from muscles. Measured walking (walk) reads the body,
+and the parameters and stages of models for its causes.
 """
 
 import ast
@@ -22,7 +22,7 @@ ALLOWED = {
     "diagnosis": {"identify", "models", "data"},
     "contrasts": {"diagnosis", "identify", "models", "data"},
     "comparison": {"diagnosis", "identify", "models", "data"},
-    "paper": {"identify", "models", "data"},
+    "paper": {"muscles", "body", "data"},
     "body": {"data"},
     "walk": {"body", "models", "data"},
     "muscles": {"body", "models", "data"},

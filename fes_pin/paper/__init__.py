@@ -1,1 +1,1 @@
-"""What is section II's own: gain and time constant pulse by pulse, error region, antagonist, twins."""
+"""What is section II's own: eq. (1) in plain numbers, gain and time constant pulse by pulse, the passive antagonist."""

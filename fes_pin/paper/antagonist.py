@@ -8,7 +8,6 @@ evaluated").
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,9 +17,7 @@ import scipy.optimize
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, number, numbers, positive_number
 from fes_pin.data.tabulated import Tabulated
-from fes_pin.models.model import Model
-from fes_pin.models.rigs.base import GRAVITY
-from fes_pin.paper.ratios import RATIOS, Optimum, RatioProblem, least_error
+from fes_pin.paper.equation_1 import GRAVITY, antagonist_n, halved, static_torque_nm
 
 NAMES = ("f0_n", "f1_per_rad", "theta_r_rad")
 RESTS_RAD = (0.1, 3.0)
@@ -51,8 +48,7 @@ class Antagonist(Tabulated):
 
     def force(self, angle_rad: np.ndarray) -> np.ndarray:
         """F_ANT in N at angles in rad."""
-        f0, f1, start = self.values
-        return f0 * np.expm1(f1 * np.maximum(np.asarray(angle_rad) - start, 0.0))
+        return antagonist_n(self.constants, np.asarray(angle_rad, dtype=float))
 
     def force_std(self, angle_rad: np.ndarray) -> np.ndarray:
         """Standard deviation of F_ANT in N at angles in rad, to first order."""
@@ -80,15 +76,11 @@ def _slope(angle: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def rest_angles(values: np.ndarray, loads_kg: np.ndarray, foot_mass_kg: float) -> np.ndarray:
-    """Angles in rad at which loads rest, shape (n,); by Newton's method from above, where the curve is convex."""
-    q = np.full(len(loads_kg), 2.6)
-    weight = foot_mass_kg * GRAVITY
-    for _ in range(60):
-        missing = values[0] * np.expm1(values[1] * np.maximum(q - values[2], 0.0))
-        missing = missing - loads_kg * GRAVITY - weight / np.tan(q)
-        stiff = values[0] * values[1] * np.exp(values[1] * np.maximum(q - values[2], 0.0)) * (q > values[2])
-        q = np.clip(q - np.clip(missing / (stiff + weight / np.sin(q) ** 2), -0.2, 0.2), *RESTS_RAD)
-    return q
+    """Angles in rad at which loads rest, shape (n,)."""
+    known = {**dict(zip(NAMES, values, strict=True)), "foot_mass_kg": foot_mass_kg}
+    known |= {"moment_arm_m": 0.0, "com_distance_m": 1.0}  # no muscle pulls, and the lever does not move the balance
+    low, high = np.outer(RESTS_RAD, np.ones(len(loads_kg)))
+    return halved(lambda q: static_torque_nm(known, q, 0.0, loads_kg), low, high, 60)
 
 
 def fit_antagonist(
@@ -130,9 +122,8 @@ def fit_antagonist(
     def jacobian(x: np.ndarray) -> np.ndarray:
         p = values(x)
         q = rest_angles(p, loads, foot_mass_kg)
-        slope, (f0, f1, start) = _slope(q, p), p
-        stiff = f0 * f1 * np.exp(f1 * np.maximum(q - start, 0.0)) * (q > start)
-        rise = slope / (stiff + foot_mass_kg * GRAVITY / np.sin(q) ** 2)[:, None]
+        slope = _slope(q, p)  # by theta_r it is minus that by the angle
+        rise = slope / (foot_mass_kg * GRAVITY / np.sin(q) ** 2 - slope[:, 2])[:, None]
         return rise * [p[0], p[1], 1.0] / angle_std_rad
 
     found = scipy.optimize.least_squares(residual, [*START, angles.min() - 0.3], jac=jacobian, x_scale="jac")
@@ -141,29 +132,3 @@ def fit_antagonist(
     to_values = np.diag([*np.exp(found.x[:2]), 1.0])
     covariance = to_values @ np.linalg.pinv(found.jac.T @ found.jac) @ to_values
     return Antagonist(values(found.x), covariance, found.fun * angle_std_rad)
-
-
-def with_antagonist(model: Model, constants: dict[str, float]) -> Model:
-    """The same ankle with another passive curve."""
-    return Model(dataclasses.replace(model.rig, constants={**model.rig.constants, **constants}), model.effects)
-
-
-def carried_covariance(problem: RatioProblem, optimum: Optimum, antagonist: Antagonist) -> np.ndarray:
-    """What the uncertainty of F_ANT alone does to k1, k2 and k3: covariance of their logarithms, shape (3, 3).
-
-    The ratios are found again with the curve one standard deviation off, up and down, along each principal axis.
-    """
-    values, vectors = np.linalg.eigh(antagonist.covariance)
-    start = problem.model_at(optimum.x)
-    covariance = np.zeros((len(RATIOS), len(RATIOS)))
-    for size, axis in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = dict(zip(NAMES, (float(v) for v in antagonist.values + sign * size * axis), strict=True))
-            moved_model = with_antagonist(problem.model, moved).with_parameters(start.parameters())
-            # the start moves with the model; the gain that is known does not
-            again = RatioProblem(moved_model, problem.trials, known_gain=problem.known["gain"])
-            ends.append(least_error(again, starts=1).x)
-        change = 0.5 * (ends[0] - ends[1])
-        covariance += np.outer(change, change)
-    return covariance

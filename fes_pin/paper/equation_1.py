@@ -59,9 +59,13 @@ def static_stiffness_nm(known: Mapping[str, Any], angle_rad: float, force_n: flo
     return cable * c - known["com_distance_m"] * steeper * s - weight * s
 
 
-def halved(torque_nm: Callable[[float], float], low: float, high: float, times: int) -> float:
-    """Angle in rad between two others at which a torque that falls with it is 0; halved so many times."""
+def halved(torque_nm: Callable[[Any], Any], low: Any, high: Any, times: int) -> Any:
+    """Angle in rad between two others at which a torque that falls with it is 0; halved so many times.
+
+    Numbers, or arrays of one shape.
+    """
     for _ in range(times):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if torque_nm(middle) > 0.0 else (low, middle)
+        below = torque_nm(middle) > 0.0
+        low, high = np.where(below, middle, low)[()], np.where(below, high, middle)[()]
     return 0.5 * (low + high)

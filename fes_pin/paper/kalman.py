@@ -18,43 +18,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
-import scipy.stats
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, instance, number, positive_number
 from fes_pin.data.tabulated import Tabulated
 from fes_pin.data.trial import Trial
+from fes_pin.muscles.recruitment import LinearRecruitment
 
 START_TIME_CONSTANT_S = 0.1
 """Where the search for tau starts, s: twice the paper's; its band reaches from 0 to beyond 1 s."""
 START_ALPHA_STD = 0.1
 
 
-@dataclass(frozen=True)
-class StraightRecruitment:
+@dataclass(frozen=True, eq=False)
+class StraightRecruitment(LinearRecruitment):
     """Straight recruitment from threshold to saturation, and the force that belongs to gain 1.
 
     Raises
     ------
     InputError
-        For numbers that are none, a threshold below 0, a saturation that is not above it, a force that is not above 0.
+        As `LinearRecruitment`, and for a force that is not above 0.
     """
 
-    threshold_us: float = 180.0
-    saturation_us: float = 1000.0
-    force_scale_n: float = 1.0
+    force_scale_n: Any = 1.0
 
     def __post_init__(self) -> None:
-        between(self.threshold_us, 0.0, math.inf, "threshold_us")
+        super().__post_init__()
         positive_number(self.force_scale_n, "force_scale_n")
-        if not number(self.saturation_us, "saturation_us") > self.threshold_us:
-            raise InputError(
-                f"expected more than the threshold of {self.threshold_us:g} us, found {self.saturation_us:g}",
-                column="saturation_us",
-            )
 
     @classmethod
     def of(cls, constants: Mapping[str, float]) -> StraightRecruitment:
@@ -65,19 +59,48 @@ class StraightRecruitment:
         InputError
             If one of the three is missing, or as the class.
         """
-        names = ("threshold_us", "saturation_us", "force_scale_n")
+        names = [item.name for item in fields(cls)]
         if missing := [n for n in names if n not in constants]:
             raise InputError(f"expected the rig's {', '.join(missing)}", column="constants")
-        return cls(**{n: float(constants[n]) for n in names})
+        return cls(**{n: constants[n] for n in names})
 
     def __call__(self, pulse_width_us: float) -> float:
         if not math.isfinite(pulse_width_us):
             raise InputError(f"expected a finite number of us, found {pulse_width_us}", column="pulse_width_us")
-        share = (pulse_width_us - self.threshold_us) / (self.saturation_us - self.threshold_us)
-        return min(max(share, 0.0), 1.0)
+        return float(self.recruitment(pulse_width_us))
 
 
-class GainFilter:
+class _Tracker:
+    """What is known of a muscle from a mean `x` that ends with (alpha, beta), and its covariance `p`."""
+
+    x: np.ndarray
+    p: np.ndarray
+
+    def __init__(self, dt: float, recruitment: StraightRecruitment, noise_std: float) -> None:
+        self.dt, self.recruitment, self.noise_std = dt, recruitment, noise_std
+        self.nis, self.skipped = math.nan, 0
+
+    def _decay(self) -> float:
+        return min(max(float(self.x[-2]), 1e-6), 1.0 - 1e-6)
+
+    def gain_and_time_constant(self) -> tuple[float, float]:
+        """K and tau in s, from the means."""
+        alpha = self._decay()
+        gain = self.x[-1] / ((1.0 - alpha) * self.recruitment.force_scale_n)
+        return float(gain), -self.dt / math.log(alpha)
+
+    def stds(self) -> tuple[float, float]:
+        """Standard deviations of K and of tau in s, to first order."""
+        alpha = self._decay()
+        left = (1.0 - alpha) * self.recruitment.force_scale_n
+        by_alpha_and_beta = np.array(
+            [[self.x[-1] / left / (1.0 - alpha), 1.0 / left], [self.dt / (alpha * math.log(alpha) ** 2), 0.0]]
+        )
+        gain, time_constant = np.sqrt(np.diag(by_alpha_and_beta @ self.p[-2:, -2:] @ by_alpha_and_beta.T))
+        return float(gain), float(time_constant)
+
+
+class GainFilter(_Tracker):
     """Kalman filter of (F, alpha, beta), one sample at a time.
 
     Parameters
@@ -96,6 +119,8 @@ class GainFilter:
 
     Attributes
     ----------
+    x, p
+        Mean, shape (3,), and covariance, shape (3, 3), of (F, alpha, beta).
     nis
         Normalised innovation squared of the last sample; one degree of freedom.
     skipped
@@ -118,25 +143,10 @@ class GainFilter:
         for name, value in (("dt", dt), ("noise_std", noise_std), ("greatest_gain", greatest_gain)):
             positive_number(value, name)
         between(wander, 0.0, math.inf, "wander")
-        self.dt, self.recruitment, self.noise_std, self.wander = dt, recruitment, noise_std, wander
-        instance(recruitment, StraightRecruitment, "recruitment")
-        alpha = math.exp(-dt / START_TIME_CONSTANT_S)
+        super().__init__(dt, instance(recruitment, StraightRecruitment, "recruitment"), noise_std)
+        self.wander, alpha = wander, math.exp(-dt / START_TIME_CONSTANT_S)
         beta = (1.0 - alpha) * 0.5 * greatest_gain * recruitment.force_scale_n
-        self._x = (0.0, alpha, beta)
-        # upper triangle by rows
-        self._p = (noise_std**2, 0.0, 0.0, START_ALPHA_STD**2, 0.0, beta**2)
-        self.nis, self.skipped = math.nan, 0
-
-    @property
-    def x(self) -> np.ndarray:
-        """Mean of (F, alpha, beta), shape (3,)."""
-        return np.array(self._x)
-
-    @property
-    def p(self) -> np.ndarray:
-        """Covariance of (F, alpha, beta), shape (3, 3)."""
-        ff, fa, fb, aa, ab, bb = self._p
-        return np.array([[ff, fa, fb], [fa, aa, ab], [fb, ab, bb]])
+        self.x, self.p = np.array([0.0, alpha, beta]), np.diag([noise_std**2, START_ALPHA_STD**2, beta**2])
 
     def step(self, force_n: float, pulse_width_us: float) -> None:
         """Take in one measured force (NaN: none), and the pulse width that is held from now on.
@@ -154,36 +164,25 @@ class GainFilter:
         self._predict(recruitment)
 
     def _correct(self, force_n: float) -> None:
-        (force, alpha, beta), (ff, fa, fb, aa, ab, bb) = self._x, self._p
-        innovation, noise = force_n - force, self.noise_std**2
-        size = ff + noise
-        self.nis = innovation * innovation / size
-        gain, left = innovation / size, noise / size
-        self._x = (force + gain * ff, alpha + gain * fa, beta + gain * fb)
-        self._p = (left * ff, left * fa, left * fb, aa - fa * fa / size, ab - fa * fb / size, bb - fb * fb / size)
+        innovation, noise = force_n - self.x[0], self.noise_std**2
+        size = self.p[0, 0] + noise
+        self.nis, gain = float(innovation**2 / size), self.p[0] / size
+        left = noise / size * self.p[0]
+        self.x, self.p = self.x + gain * innovation, self.p - np.outer(gain, self.p[0])
+        self.p[0] = self.p[:, 0] = left  # without the difference of two numbers that are nearly the same
 
     def _predict(self, r: float) -> None:
-        (force, alpha, beta), (ff, fa, fb, aa, ab, bb) = self._x, self._p
-        self._x = (alpha * force + fa + beta * r, alpha, beta)
-        # a row of the transition: alpha, force, r; and what the product of two Gaussians adds
-        to_f = alpha * ff + force * fa + r * fb
-        to_a = alpha * fa + force * aa + r * ab
-        to_b = alpha * fb + force * ab + r * bb
-        own = alpha * to_f + force * to_a + r * to_b + ff * aa + fa * fa
-        self._p = (own, to_a, to_b, aa, ab, bb + (self.wander * beta) ** 2 * self.dt)
-
-    def gain_and_time_constant(self) -> tuple[float, float]:
-        """K and tau in s, from the means."""
-        return _physical(self._x[1], self._x[2], self.dt, self.recruitment.force_scale_n)
-
-    def stds(self) -> tuple[float, float]:
-        """Standard deviations of K and of tau in s, to first order."""
-        slope = _slope(self._x[1], self._x[2], self.dt, self.recruitment.force_scale_n)
-        covariance = slope @ self.p[1:, 1:] @ slope.T
-        return float(np.sqrt(covariance[0, 0])), float(np.sqrt(covariance[1, 1]))
+        force, alpha, beta = self.x
+        (ff, fa, _), (_, aa, _), _ = self.p
+        row = np.array([alpha, force, r])
+        carried = self.p @ row
+        carried[0] = row @ carried + ff * aa + fa * fa  # with what the product of two Gaussians adds
+        self.p[0] = self.p[:, 0] = carried
+        self.p[2, 2] += (self.wander * beta) ** 2 * self.dt
+        self.x[0] = alpha * force + fa + beta * r
 
 
-class RegressionFilter:
+class RegressionFilter(_Tracker):
     """Plain linear Kalman filter of (alpha, beta): the measured force explains the next one.
 
     Same parameters as `GainFilter`; its innovation is y+ - alpha y - beta r, whose noise it takes for white.
@@ -193,10 +192,9 @@ class RegressionFilter:
         self, dt: float, recruitment: StraightRecruitment, noise_std: float, greatest_gain: float = 2.0
     ) -> None:
         start = GainFilter(dt, recruitment, noise_std, greatest_gain)
-        self.dt, self.recruitment, self.noise_std = dt, recruitment, noise_std
+        super().__init__(dt, recruitment, noise_std)
         self.x, self.p = start.x[1:], start.p[1:, 1:]
         self.before: np.ndarray | None = None
-        self.nis, self.skipped = math.nan, 0
 
     def step(self, force_n: float, pulse_width_us: float) -> None:
         """Take in one measured force (NaN: none, nor anything to explain the next one by), and the next pulse width."""
@@ -211,28 +209,6 @@ class RegressionFilter:
             self.nis = innovation**2 / size
             self.x, self.p = self.x + gain * innovation, self.p - np.outer(gain, gain) * size
         self.before = known
-
-    def gain_and_time_constant(self) -> tuple[float, float]:
-        """K and tau in s."""
-        return _physical(self.x[0], self.x[1], self.dt, self.recruitment.force_scale_n)
-
-    def stds(self) -> tuple[float, float]:
-        """Standard deviations of K and of tau in s that the filter believes."""
-        slope = _slope(self.x[0], self.x[1], self.dt, self.recruitment.force_scale_n)
-        covariance = slope @ self.p @ slope.T
-        return float(np.sqrt(covariance[0, 0])), float(np.sqrt(covariance[1, 1]))
-
-
-def _physical(alpha: float, beta: float, dt: float, force_scale: float) -> tuple[float, float]:
-    alpha = min(max(alpha, 1e-6), 1.0 - 1e-6)
-    return float(beta / ((1.0 - alpha) * force_scale)), float(-dt / math.log(alpha))
-
-
-def _slope(alpha: float, beta: float, dt: float, force_scale: float) -> np.ndarray:
-    """Derivative of (K, tau) by (alpha, beta), shape (2, 2)."""
-    alpha = min(max(alpha, 1e-6), 1.0 - 1e-6)
-    left = (1.0 - alpha) * force_scale
-    return np.array([[beta / left / (1.0 - alpha), 1.0 / left], [dt / (alpha * math.log(alpha) ** 2), 0.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,29 +274,14 @@ def track_gain(
         if column not in trial:
             raise InputError(f"trial {trial.name} has no column {column}; gain and time constant need isometric trials")
     recruitment = StraightRecruitment.of(constants)
-    filter_: GainFilter | RegressionFilter
-    if plain:
-        filter_ = RegressionFilter(trial.dt, recruitment, noise_std)
-    else:
-        filter_ = GainFilter(trial.dt, recruitment, noise_std, wander=wander)
+    filter_: GainFilter | RegressionFilter = (
+        RegressionFilter(trial.dt, recruitment, noise_std)
+        if plain
+        else GainFilter(trial.dt, recruitment, noise_std, wander=wander)
+    )
     rows = []
     for force, width in zip(trial["force_n"], trial["pulse_width_us"], strict=True):
         filter_.step(float(force), float(width))
         (gain, tau), (gain_std, tau_std) = filter_.gain_and_time_constant(), filter_.stds()
         rows.append((gain, gain_std, tau, tau_std, filter_.nis))
     return GainHistory(trial.time, *np.array(rows).T)
-
-
-def nees(filter_: GainFilter, gain: float, time_constant_s: float) -> float:
-    """Normalised estimation error squared of (alpha, beta) against the truth: two degrees of freedom."""
-    alpha = math.exp(-filter_.dt / time_constant_s)
-    truth = np.array([alpha, (1.0 - alpha) * gain * filter_.recruitment.force_scale_n])
-    error = filter_.x[1:] - truth
-    return float(error @ np.linalg.solve(filter_.p[1:, 1:], error))
-
-
-def chi2_band(degrees: int, runs: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Band of the mean of `runs` independent chi-squared numbers: where NEES and NIS of an honest filter lie."""
-    tail = 0.5 * (1.0 - confidence)
-    low, high = scipy.stats.chi2.ppf([tail, 1.0 - tail], degrees * runs) / runs
-    return float(low), float(high)

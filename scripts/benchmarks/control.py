@@ -4,18 +4,22 @@
 """
 
 import math
+import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from fes_pin.control.control import PositionController
 from fes_pin.control.loop import sine, track
 from fes_pin.models.effects.fatigue import Fatigue
-from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_twin
 from fes_pin.paper.kalman import GainFilter, StraightRecruitment
-from fes_pin.paper.ratios import ankle_of
-from fes_pin.paper.twin import RunningTwin, record
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "analysis"))
+from paper_ankle.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_twin
+from paper_ankle.ratios import ankle_of
+from paper_ankle.twin import RunningTwin, record
 
 FATIGUE = {"rate_per_s": 0.068, "recovery_s": 60.0}
 

@@ -6,14 +6,17 @@ Four numbers are free (k1, k2, k3 and the frame's coupling); four conditions hol
     .venv/bin/python scripts/generate/paper_twins.py
 """
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import scipy.optimize
 
-from fes_pin.paper.constants import FRAME_DAMPING, FRAME_HZ, PRINTED, STEPWISE, twin_of_ratios
-from fes_pin.paper.ratios import RATIOS, RatioProblem, ankle_of, least_error
-from fes_pin.paper.twin import AnkleTwin, record, staircase
+sys.path.insert(0, str(Path(__file__).parents[2] / "analysis"))
+from paper_ankle.constants import FRAME_DAMPING, FRAME_HZ, PRINTED, STEPWISE, twin_of_ratios
+from paper_ankle.ratios import RATIOS, RatioProblem, ankle_of, least_error
+from paper_ankle.twin import AnkleTwin, record, staircase
 
 
 def on_frame(name: str, x: np.ndarray) -> AnkleTwin:
@@ -37,7 +40,7 @@ def conditions(x: np.ndarray, name: str) -> np.ndarray:
 
 
 def main() -> None:
-    """Print the constants of `fes_pin.paper.constants.ON_FRAME`."""
+    """Print the constants of `paper_ankle.constants.ON_FRAME`."""
     for name, printed in PRINTED.items():
         table = np.log([printed.ratios[n] for n in RATIOS])
         start = np.r_[table + np.log([0.8, 0.8, 0.35]), np.log(1.2)]

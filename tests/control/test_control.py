@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from paper_ankle.constants import paper_twin
+from paper_ankle.ratios import ankle_of
+from paper_ankle.twin import RunningTwin
 
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
@@ -23,9 +26,6 @@ from fes_pin.models.effects.recruitment_hysteresis import RecruitmentHysteresis
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Muscle
 from fes_pin.muscles.recruitment import LinearRecruitment, SaturatingRecruitment
-from fes_pin.paper.constants import paper_twin
-from fes_pin.paper.ratios import ankle_of
-from fes_pin.paper.twin import RunningTwin
 
 LOAD = 0.5
 TWIN = replace(paper_twin("3-23"), load_kg=LOAD)

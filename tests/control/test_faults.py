@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from paper_ankle.constants import paper_twin
+from paper_ankle.ratios import ankle_of
+from paper_ankle.twin import RunningTwin
 
 from fes_pin.control.control import START_READINGS, PositionController
 from fes_pin.control.dynamics import PULSE_S
 from fes_pin.control.faults import BAD_READINGS, CLIP, FALSE_STOPS_PER_HOUR, WINDOW, FaultMonitor, Status, most_repeats
 from fes_pin.control.loop import sine, track
 from fes_pin.data.errors import InputError
-from fes_pin.paper.constants import paper_twin
-from fes_pin.paper.ratios import ankle_of
-from fes_pin.paper.twin import RunningTwin
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
 import control_safety

@@ -5,6 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from paper_ankle.constants import paper_twin
+from paper_ankle.ratios import ankle_of
+from paper_ankle.twin import RunningTwin
 
 import fes_pin as fp
 from fes_pin.control.control import PositionController
@@ -17,9 +20,6 @@ from fes_pin.control.observer import JointObserver
 from fes_pin.control.tuning import Loop, loop_at, plant, swinging, tune
 from fes_pin.data.errors import InputError
 from fes_pin.models.catalogue import shipped
-from fes_pin.paper.constants import paper_twin
-from fes_pin.paper.ratios import ankle_of
-from fes_pin.paper.twin import RunningTwin
 
 TWIN = replace(paper_twin("3-23"), load_kg=0.5)
 LOW = TWIN.rest_angle() + math.radians(1.0)

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from paper_ankle.constants import paper_twin
+from paper_ankle.ratios import ankle_of
+from paper_ankle.twin import RunningTwin
 
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S
@@ -16,9 +19,6 @@ from fes_pin.control.loop import sine, track
 from fes_pin.control.pulse import PulseWidth
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.recruitment import LinearRecruitment
-from fes_pin.paper.constants import paper_twin
-from fes_pin.paper.ratios import ankle_of
-from fes_pin.paper.twin import RunningTwin
 
 TWIN = replace(paper_twin("3-23"), load_kg=0.5)
 REST = TWIN.rest_angle()

@@ -9,6 +9,19 @@ from functools import cache
 
 import numpy as np
 import pytest
+from paper_ankle.constants import (
+    FORCE_NOISE_N,
+    HELD_AT_RAD,
+    PRINTED,
+    isometric_stimulus,
+    paper_trial,
+    paper_twin,
+    twin_of_ratios,
+)
+from paper_ankle.error_region import ellipsoid_floor, error_domain, error_holding, profile_intervals
+from paper_ankle.identifiability import ankle_identifiability
+from paper_ankle.ratios import RatioProblem, ankle_of, least_error
+from paper_ankle.twin import AnkleTwin, RunningTwin, record
 
 import fes_pin as fp
 from fes_pin.control.control import PositionController
@@ -21,20 +34,7 @@ from fes_pin.control.observer import JointObserver
 from fes_pin.control.tuning import Gains, loop_at
 from fes_pin.data.errors import InputError
 from fes_pin.paper.antagonist import fit_antagonist
-from fes_pin.paper.constants import (
-    FORCE_NOISE_N,
-    HELD_AT_RAD,
-    PRINTED,
-    isometric_stimulus,
-    paper_trial,
-    paper_twin,
-    twin_of_ratios,
-)
-from fes_pin.paper.error_region import ellipsoid_floor, error_domain, error_holding, profile_intervals
-from fes_pin.paper.identifiability import ankle_identifiability
 from fes_pin.paper.kalman import track_gain
-from fes_pin.paper.ratios import RatioProblem, ankle_of, least_error
-from fes_pin.paper.twin import AnkleTwin, RunningTwin, record
 
 TWIN = replace(paper_twin("3-23"), load_kg=0.5)
 TIRING = ankle_of(TWIN) + fp.effects.Fatigue()

@@ -9,6 +9,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from paper_ankle.constants import STEPWISE, paper_twin
+from paper_ankle.ratios import ankle_of
+from paper_ankle.twin import RunningTwin, record, staircase
 
 import fes_pin as fp
 from fes_pin.control.control import RISE_PULSES, START_RAD, START_READINGS, PositionController
@@ -18,9 +21,6 @@ from fes_pin.control.loop import track
 from fes_pin.control.observer import JointObserver
 from fes_pin.control.timing import CLOCK_PAUSE_S, PAUSE_S
 from fes_pin.data.errors import InputError
-from fes_pin.paper.constants import STEPWISE, paper_twin
-from fes_pin.paper.ratios import ankle_of
-from fes_pin.paper.twin import RunningTwin, record, staircase
 
 TWIN = replace(paper_twin("3-23"), load_kg=0.5)
 REST = TWIN.rest_angle()

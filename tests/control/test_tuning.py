@@ -6,6 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg
+from paper_ankle.constants import STEPWISE, paper_trial, paper_twin
+from paper_ankle.ratios import RatioProblem, ankle_of, least_error
+from paper_ankle.twin import RunningTwin, record, staircase
 
 from fes_pin.control.control import PositionController
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, PulseToPulse
@@ -16,9 +19,6 @@ from fes_pin.control.oscillation import OscillationWatch
 from fes_pin.control.tuning import LADDER, corners, loop_at, plant, swinging, tune
 from fes_pin.data.errors import InputError
 from fes_pin.models.effects.frame_vibration import FrameVibration
-from fes_pin.paper.constants import STEPWISE, paper_trial, paper_twin
-from fes_pin.paper.ratios import RatioProblem, ankle_of, least_error
-from fes_pin.paper.twin import RunningTwin, record, staircase
 
 TWIN = replace(paper_twin("3-23"), load_kg=0.5)
 SHAKEN = paper_twin("3-23", frame=True)

@@ -1,8 +1,8 @@
 """The derivative of the equation that a controller takes from the oracle."""
 
 import pytest
+from paper_ankle.constants import paper_twin
 
-from fes_pin.paper.constants import paper_twin
 from fes_pin.paper.equation_1 import static_stiffness_nm, static_torque_nm
 
 

@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
+from paper_ankle.consistency import chi2_band, nees
+from paper_ankle.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_trial, paper_twin
+from paper_ankle.twin import record
 
 from fes_pin.data.errors import InputError
 from fes_pin.identify.fit import fit
 from fes_pin.identify.noise import Noise
 from fes_pin.models.nominal import nominal_model
-from fes_pin.paper.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_trial, paper_twin
-from fes_pin.paper.kalman import GainFilter, RegressionFilter, StraightRecruitment, chi2_band, nees, track_gain
-from fes_pin.paper.twin import record
+from fes_pin.paper.kalman import GainFilter, RegressionFilter, StraightRecruitment, track_gain
 
 TWIN = paper_twin("3-23")
 CONSTANTS = TWIN.constants()

@@ -5,6 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.optimize
+from paper_ankle.carried import carried_covariance, with_antagonist
+from paper_ankle.constants import ANGLE_NOISE_RAD, PRINTED, paper_study, paper_trial, paper_twin
+from paper_ankle.error_region import ellipsoid_floor, error_domain, error_holding, follow, profile_intervals
+from paper_ankle.identifiability import ankle_identifiability
+from paper_ankle.ratios import RATIOS, RatioProblem, ankle_of, error_percent, least_error
+from paper_ankle.twin import AnkleTwin, record, staircase
 
 from fes_pin.data.errors import InputError
 from fes_pin.diagnosis.diagnosis import diagnose_joint
@@ -13,12 +19,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs import Muscle
 from fes_pin.models.simulate import simulate
-from fes_pin.paper.antagonist import carried_covariance, fit_antagonist, with_antagonist
-from fes_pin.paper.constants import ANGLE_NOISE_RAD, PRINTED, paper_study, paper_trial, paper_twin
-from fes_pin.paper.error_region import ellipsoid_floor, error_domain, error_holding, follow, profile_intervals
-from fes_pin.paper.identifiability import ankle_identifiability
-from fes_pin.paper.ratios import RATIOS, RatioProblem, ankle_of, error_percent, least_error
-from fes_pin.paper.twin import AnkleTwin, record, staircase
+from fes_pin.paper.antagonist import fit_antagonist
 
 
 def problem_of(name, frame=False, **noise):

@@ -22,7 +22,7 @@ from fes_pin.infer.held_out import percent_of_spread
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Ankle
 from fes_pin.models.simulate import Simulator, max_step
-from fes_pin.paper.twin import AnkleTwin
+from paper_ankle.twin import AnkleTwin
 
 RATIOS = ("k1", "k2", "k3")
 UNITS = {"k1": "1/(kg m)", "k2": "1/(kg m)", "k3": "1/s"}

@@ -21,7 +21,7 @@ from fes_pin.data.numbers import positive_number
 from fes_pin.data.study import Study
 from fes_pin.data.tabulated import Tabulated
 from fes_pin.data.trial import Trial
-from fes_pin.paper.twin import AnkleTwin, record, staircase
+from paper_ankle.twin import AnkleTwin, record, staircase
 
 LEVER_M = 0.08
 """l; not printed."""
