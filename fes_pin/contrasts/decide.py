@@ -28,10 +28,10 @@ from fes_pin.contrasts.fits import Fits
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.promises import UNFELT, Promise, units
 from fes_pin.contrasts.repeats import Repeats
-from fes_pin.identify.scatter import excess_scatter
 from fes_pin.infer.distributions import f_tail
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import CLAIM_LEVEL, UNUSUAL_LEVEL
+from fes_pin.infer.scatter import excess_scatter
 
 
 @dataclass(frozen=True)

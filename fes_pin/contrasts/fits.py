@@ -17,15 +17,17 @@ from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.score import Scores
 from fes_pin.diagnosis.search.starts import STARTS, forms_beside, refinements
 from fes_pin.identify.doubts import first_guess
-from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.fit import Fit, fit_multistart, fit_of, fit_problem, noise_of, rough_noise
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel, as_white
 from fes_pin.identify.noise_floor import rich_noise
-from fes_pin.identify.problem import Linearized, Problem
-from fes_pin.identify.turns import by_turns, maximise
+from fes_pin.identify.problem import Problem
+from fes_pin.identify.turns import maximise
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.levels import DRIVEN_LEVEL
+from fes_pin.infer.maximise import alternate
+from fes_pin.infer.problem import Linearized
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
@@ -119,7 +121,7 @@ class Fits:
         if not self.driven:
             fitted = fit_problem(problem, model.parameters(), unknowns)  # type: ignore[arg-type]
             return self._scattered(Grouped(tuple(items), fitted, weights))
-        fitted = by_turns(problem, model.parameters(), unknowns, ROUNDS, LOOK_DRIVEN)
+        fitted = fit_of(problem, alternate(problem, model.parameters(), unknowns, ROUNDS, LOOK_DRIVEN))
         return Grouped(tuple(items), fitted, {g: p.doubt for g, p in problem.parts.items()})
 
     def _scattered(self, one: Grouped) -> Grouped:

@@ -15,9 +15,10 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel
-from fes_pin.identify.problem import Linearized, Problem, Unknowns
-from fes_pin.identify.scoring import Point, Told
+from fes_pin.identify.problem import Problem, products_of
 from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.problem import Linearized, Unknowns
+from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.predictor import Doubt
@@ -172,8 +173,8 @@ def _agreed(model: GroupedModel) -> GroupedModel:
     return model.with_parameters(values)
 
 
-class GroupedProblem:
-    """A grouped model on the trials of all groups; a `Problem` to `Descent`.
+class GroupedProblem(NoisyProblem):
+    """A grouped model on the trials of all groups.
 
     Parameters
     ----------
@@ -203,11 +204,6 @@ class GroupedProblem:
         """The unknowns of each trial as its first samples suggest."""
         return [u for p in self.parts.values() for u in p.start_unknowns()]
 
-    def completed(self, unknowns: Unknowns) -> Unknowns:
-        """Unknowns of another model on these trials with what this one has besides."""
-        both = zip(self.start_unknowns(), unknowns, strict=True)
-        return [{n: known.get(n, value) for n, value in start.items()} for start, known in both]
-
     def by_group(self, rows: Sequence[Any]) -> dict[str, list[Any]]:
         """What belongs to each trial, cut into groups."""
         out, at = {}, 0
@@ -217,33 +213,40 @@ class GroupedProblem:
         return out
 
     @property
-    def randomness(self) -> dict[str, float]:
-        """What is random, by name and group. Of driven rigs, as all that has to do with it."""
-        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.randomness.items()}
+    def noise_parameters(self) -> dict[str, float]:
+        """Those of the noise that may change, by name and group. Of driven rigs, as all that has to do with it."""
+        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.noise_parameters.items()}
 
     @property
-    def randomness_limits(self) -> dict[str, tuple[float, float]]:
-        """How small and how large that may become."""
-        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.randomness_limits.items()}
+    def noise_limits(self) -> dict[str, tuple[float, float]]:
+        """How small and how large those may become."""
+        return {f"{n}@{g}": v for g, p in self.parts.items() for n, v in p.noise_limits.items()}
 
-    def become(self, randomness: Mapping[str, float]) -> None:
-        """Change what is random, in place."""
+    def set_noise(self, parameters: Mapping[str, float]) -> None:
+        """Change parameters of the noise, in place."""
         for g, p in self.parts.items():
-            p.become(_of_group(randomness, g))
+            p.set_noise(_of_group(parameters, g))
 
-    def told(self, points: Sequence[Point]) -> list[Told]:
-        """Every trial as foretold at each of several points, group after group."""
+    def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
+        """One-step predictions of all trials at each of several points, group after group."""
         cut = [self.by_group(unknowns) for _, unknowns, _ in points]
         each = [
-            p.told([(self.model.of(g, v), own[g], _of_group(r, g)) for (v, _, r), own in zip(points, cut, strict=True)])
+            p.evaluate(
+                [(self.model.of(g, v), own[g], _of_group(r, g)) for (v, _, r), own in zip(points, cut, strict=True)]
+            )
             for g, p in self.parts.items()
         ]
-        return [Told.joined(one) for one in zip(*each, strict=True)]
+        return [Evaluation.joined(one) for one in zip(*each, strict=True)]
 
-    def score(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Improve what is random in each group, in place; returns by how much that lowers the cost. Of driven rigs."""
+    def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Improve the noise of each group, in place; returns by how much that lowers the cost. Of driven rigs."""
         own = self.by_group(unknowns)
-        return sum(p.score(self.model.of(g, values), own[g]) for g, p in self.parts.items())
+        return sum(p.noise_step(self.model.of(g, values), own[g]) for g, p in self.parts.items())
+
+    @cached_property
+    def products(self) -> list[tuple[int, int]]:
+        """Places in `free` of shapes and of the amplitudes that they are factors of."""
+        return products_of(self.free, self.model.parameter_info())
 
     @property
     def is_final(self) -> bool:
@@ -251,15 +254,15 @@ class GroupedProblem:
         return all(p.is_final for p in self.parts.values())
 
     @property
-    def abreast(self) -> int:
-        """How many points `bounds` takes at once."""
-        return max(p.abreast for p in self.parts.values())
+    def batch(self) -> int:
+        """How many points `costs` evaluates in one run."""
+        return max(p.batch for p in self.parts.values())
 
-    def bounds(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
-        """What the cost is at least at several parameter values."""
+    def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
+        """A lower bound of the cost at several parameter values."""
         cut = [self.by_group(unknowns) for _, unknowns in points]
         each = [
-            part.bounds([(self.model.of(g, values), own[g]) for (values, _), own in zip(points, cut, strict=True)])
+            part.costs([(self.model.of(g, values), own[g]) for (values, _), own in zip(points, cut, strict=True)])
             for g, part in self.parts.items()
         ]
         return [sum(costs) for costs in zip(*each, strict=True)]
@@ -279,9 +282,9 @@ class GroupedProblem:
         return out
 
 
-def _of_group(randomness: Mapping[str, float], group: str) -> dict[str, float]:
-    """What is random in a group, by name."""
-    split = ((name.rpartition("@"), v) for name, v in randomness.items())
+def _of_group(parameters: Mapping[str, float], group: str) -> dict[str, float]:
+    """Parameters of a group's noise, by name."""
+    split = ((name.rpartition("@"), v) for name, v in parameters.items())
     return {name: v for (name, _, g), v in split if g == group}
 
 

@@ -14,8 +14,8 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.score import Projection, Scores
 from fes_pin.diagnosis.search.starts import started
-from fes_pin.identify.problem import Linearized
 from fes_pin.infer.family import MIN_UNITS
+from fes_pin.infer.problem import Linearized, completed
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
@@ -153,7 +153,7 @@ def _columns(bench: Bench, effect: type[Effect], base: Grouped) -> dict[str, lis
             if form not in problems:
                 problems[form] = _problem(bare + one, trials, weight)
             problem, at = problems[form]
-            parts = problem.linearize((bare + one).parameters(), problem.completed(cut[group]))
+            parts = problem.linearize((bare + one).parameters(), completed(problem.start_unknowns(), cut[group]))
             out[group].append(np.concatenate([p.jacobian[:, at] for p in parts]))
     return out
 

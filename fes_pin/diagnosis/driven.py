@@ -54,8 +54,8 @@ from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_reading
-from fes_pin.identify.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.held_out import Evidence, Gain
+from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.models.stage import Effect
 
 

@@ -12,12 +12,13 @@ from fes_pin.diagnosis.decide.gains_ahead import Fold
 from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
 from fes_pin.diagnosis.search.likelihood_models import Found
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.fit import Fit, fit_of
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import Unknowns, normal_equations
-from fes_pin.identify.scatter import at_rest
-from fes_pin.identify.turns import maximise, together
+from fes_pin.identify.turns import maximise
 from fes_pin.infer.held_out import Evidence
+from fes_pin.infer.maximise import together
+from fes_pin.infer.problem import Unknowns, normal_equations
+from fes_pin.infer.scatter import at_rest
 from fes_pin.workers import in_parallel
 
 WIDE = 10.0
@@ -84,8 +85,8 @@ def afresh(fitted: Fit, trials: Sequence[Trial]) -> Fit:
 def as_random_as_in_all(fitted: Fit, trials: Sequence[Trial]) -> Fit:
     """A fit again, to other trials, at what was random in its own."""
     problem, unknowns = _problem(fitted, trials)
-    found = together(problem, fitted.values, unknowns, random=False)
-    return replace(found, doubt=fitted.doubt)
+    found = together(problem, fitted.values, unknowns, with_noise=False)
+    return replace(fit_of(problem, found), doubt=fitted.doubt)
 
 
 def _problem(fitted: Fit, trials: Sequence[Trial]) -> tuple[LikelihoodProblem, Unknowns]:

@@ -13,9 +13,9 @@ from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.search.likelihood_models import Found
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import WORTH
 from fes_pin.infer.held_out import Evidence, Gain, speaks_for
 from fes_pin.infer.levels import CERTAIN_LEVEL, NOTHING_PERCENT
+from fes_pin.infer.optimize import WORTH
 
 UNMOVED = "the motion is as likely without the recorded input, so something else moves the rig"
 """Why no cause is named where `is_moved_by_what_is_recorded` is False."""
@@ -80,7 +80,7 @@ def is_moved_by_what_is_recorded(fitted: Fit) -> bool:
         return True
     assert fitted.doubt is not None
     still = [t.with_columns(**{n: np.zeros(len(t)) for n in inputs[id(t)]}) for t in fitted.trials]
-    (without,) = LikelihoodProblem(fitted.model, still, fitted.doubt).bounds([(fitted.values, fitted.unknowns)])
+    (without,) = LikelihoodProblem(fitted.model, still, fitted.doubt).costs([(fitted.values, fitted.unknowns)])
     return without > fitted.sse + WORTH
 
 

@@ -12,8 +12,9 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import Linearized, NormalEquations, Problem, measured_columns, normal_equations
+from fes_pin.identify.problem import Problem, measured_columns
 from fes_pin.infer.levels import SEPARABLE, SURE
+from fes_pin.infer.problem import Linearized, NormalEquations, normal_equations
 from fes_pin.models.nominal import rig_of
 from fes_pin.models.simulate import Simulator
 

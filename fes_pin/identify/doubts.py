@@ -14,7 +14,7 @@ from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 
 FIRST_SHARE = 0.003
-"""Random effort that a fit begins with, as a share of what drives the rig: little, see `identify.turns`."""
+"""Random effort that a fit begins with, as a share of what drives the rig: little, see `infer.maximise`."""
 FIRST_TIME_S = 0.1
 """Time constant that it begins with."""
 SMALLEST = 1e-6

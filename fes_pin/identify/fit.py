@@ -17,12 +17,12 @@ from fes_pin.data.results import Saveable, shown
 from fes_pin.data.schema import unknown
 from fes_pin.data.show import frame
 from fes_pin.data.trial import Trial
-from fes_pin.identify.covariance import covariance_of, promised_gain
-from fes_pin.identify.descent import Descent
 from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
-from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations, whitened_sse
-from fes_pin.identify.profile import profile_interval, reach_at_bound
-from fes_pin.infer.levels import CONFIDENCE_95, PARAMETER_PRICE
+from fes_pin.identify.problem import Problem
+from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
+from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
+from fes_pin.infer.profile import profile_interval
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
@@ -30,9 +30,6 @@ from fes_pin.workers import one_thread_each
 
 if TYPE_CHECKING:
     import pandas
-
-MAX_ITERATIONS = 60
-"""Steps of a fit, at most; what has not converged then says so."""
 
 GROWTH = (1 / 8, 1 / 4, 1 / 2)
 """Shares of every trial that a fit from afar begins with, one after another."""
@@ -42,8 +39,8 @@ GROSS = 10.0
 """Reduced chi-square from which a fit may have ended far from the optimum."""
 
 
-@dataclass(frozen=True, repr=False, eq=False)
-class Fit(Saveable):
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
+class Fit(Optimum, Saveable):
     """A model with fitted parameters; it can prove its own quality.
 
     Attributes
@@ -54,45 +51,19 @@ class Fit(Saveable):
         What it was fitted to.
     noise
         By output column, as assumed in the fit.
-    free
-        Names of the fitted parameters.
-    covariance
-        Shape (free, free); infinite where the data identify nothing, 0 of what is at its bound. Read-only.
-    at_bound
-        Names of the fitted parameters that ended at a bound, and would go beyond it.
-    sse
-        Sum of squared whitened residuals: minus twice the log-likelihood, but for a constant.
-    samples
-        Number of whitened residuals.
-    gradient_norm
-        Largest Newton decrement of a single free parameter at the end: 0 at an optimum.
-    unknowns
-        Of each trial.
-    parts
-        Whitened residuals and sensitivities at the optimum, by trial.
-    doubt
-        What is random, of a fit by `identify.turns`: its `sse` holds the log-determinant.
-    together
-        True where slopes for gains as they are lead no further: parameters and what is random move together from there.
     bounds
         By name, where somebody asked for narrower ones than the parameters have.
+    free, parameters, covariance, at_bound, sse, converged, gradient_norm, unknowns, parts, together
+        Of every `Optimum`; read-only.
+    doubt
+        What is random, of a fit by the likelihood: its `sse` holds the log-determinant.
     """
 
     model: Model
     trials: tuple[Trial, ...]
     noise: NoiseModel
-    free: tuple[str, ...]
-    covariance: np.ndarray
-    sse: float
-    samples: int
-    converged: bool
-    gradient_norm: float
-    unknowns: Unknowns
-    at_bound: tuple[str, ...]
-    parts: tuple[Linearized, ...] = field(repr=False)
-    doubt: Doubt | None = None
-    together: bool = False
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    doubt: Doubt | None = None
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -103,28 +74,17 @@ class Fit(Saveable):
             for array in (part.residual, part.jacobian, part.local):
                 array.setflags(write=False)
 
-    @property
-    def values(self) -> dict[str, float]:
-        """Every parameter by name."""
-        return self.model.parameters()
-
-    def _place(self, name: str) -> int:
-        if name not in self.free:
-            raise InputError(unknown(name, self.free), column=name)
-        return self.free.index(name)
-
-    def std(self, name: str) -> float:
-        """Standard deviation of a fitted parameter: infinite where the data say nothing of it, NaN at its bound.
-
-        An estimate at its bound does not scatter about it; `interval` says how far the parameter may be from there.
+    def place(self, name: str) -> int:
+        """Where a fitted parameter stands in `free` and `covariance`.
 
         Raises
         ------
         InputError
             If the parameter was not fitted.
         """
-        variance = self.covariance[(k := self._place(name)), k]
-        return math.nan if name in self.at_bound else float(np.sqrt(variance))
+        if name not in self.free:
+            raise InputError(unknown(name, self.free), column=name)
+        return super().place(name)
 
     def interval(self, name: str, method: str = "wald") -> tuple[float, float]:
         """95 % interval of a fitted parameter, cut at its bounds; one-sided, by profile, of one that is at its bound.
@@ -135,7 +95,7 @@ class Fit(Saveable):
             Of the parameter.
         method
             "wald": value +- 1.96 std. "profile": where twice the log-likelihood, all other parameters fitted again,
-            falls by 3.84; see `identify.profile`. The fits of a diagnosis of driven rigs, and of a contrast, have no
+            falls by 3.84; see `infer.profile`. The fits of a diagnosis of driven rigs, and of a contrast, have no
             such profile: their intervals at a bound are those of the parabola that the fit ended on.
 
         Raises
@@ -144,31 +104,24 @@ class Fit(Saveable):
             If the parameter was not fitted, the method is another, or the fit has no profile.
         """
         is_plain = isinstance(self.model, Model) and self.doubt is None
-        self._place(name)
+        self.place(name)
         if method not in ("wald", "profile"):
             raise InputError(f"expected wald or profile, found {method!r}", column="method")
         if method == "profile" and not is_plain:
             raise InputError("expected wald: this fit is of random processes or of groups", column="method")
         if is_plain and (method == "profile" or name in self.at_bound):
             return self._one_sided[name] if name in self.at_bound else self._profile(name)
-        info, value, reach = self.model.parameter_info()[name], self.values[name], self._reach(name)
-        low, high = self.bounds.get(name, (info.lower, info.upper))
-        return max(value - reach, low), min(value + reach, high)
+        info = self.model.parameter_info()[name]
+        return self.within(name, *self.bounds.get(name, (info.lower, info.upper)))
 
     @cached_property
     def _one_sided(self) -> dict[str, tuple[float, float]]:
         return {n: self._profile(n) for n in self.at_bound}
 
-    def _reach(self, name: str) -> float:
-        """Half of a parameter's 95 % interval, all of it at a bound, by the parabola that the fit ended on."""
-        if name not in self.at_bound:
-            return CONFIDENCE_95 * self.std(name)
-        return reach_at_bound(self.parts, self.free.index(name), [n in self.at_bound for n in self.free])
-
     def _profile(self, name: str) -> tuple[float, float]:
         problem = Problem(self.model, self.trials, self.noise, self.free)
         problem.limits |= self.bounds
-        if not math.isfinite(reach := self._reach(name)):
+        if not math.isfinite(reach := self.reach(name)):
             return problem.limits[name]
         with one_thread_each():
             return profile_interval(problem, name, self.values, self.unknowns, reach, name in self.at_bound)
@@ -179,7 +132,7 @@ class Fit(Saveable):
 
     def not_identified(self) -> tuple[str, ...]:
         """Parameters that these data say nothing about."""
-        return tuple(n for n in self.free if math.isinf(self._reach(n)))
+        return tuple(n for n in self.free if math.isinf(self.reach(n)))
 
     def _note(self, name: str) -> str:
         at = "at its bound" if name in self.at_bound else ""
@@ -286,15 +239,11 @@ def fit_problem(
     start: Mapping[str, float],
     unknowns: Unknowns | None = None,
     max_iterations: int = MAX_ITERATIONS,
+    parts: Sequence[Linearized] | None = None,
 ) -> Fit:
-    """Fit a problem from a start value of every parameter.
-
-    Returns
-    -------
-    Fit
-        Also if it did not converge: then `converged` is False.
-    """
-    return _run(Descent(problem, start, unknowns), max_iterations)
+    """Fit a problem from a start value of every parameter; see `infer.optimum.minimise`."""
+    found = minimise(problem, start, unknowns, max_iterations, parts)
+    return fit_of(problem, found)
 
 
 def fit_growing(problem: Problem, start: Mapping[str, float], max_iterations: int = MAX_ITERATIONS) -> Fit:
@@ -335,30 +284,14 @@ def go_on(problem: Problem, fitted: Fit, max_iterations: int = MAX_ITERATIONS) -
     at = {id(t): i for i, t in enumerate(fitted.trials)}
     rows = [at[id(t)] for t in problem.trials]
     known = [fitted.parts[i] for i in rows] if problem.noise == fitted.noise and problem.free == fitted.free else None
-    return _run(Descent(problem, fitted.values, [fitted.unknowns[i] for i in rows], known), max_iterations)
+    return fit_problem(problem, fitted.values, [fitted.unknowns[i] for i in rows], max_iterations, known)
 
 
-def _run(search: Descent, max_iterations: int) -> Fit:
-    problem, done = search.problem, search.run(max_iterations)
-    with np.errstate(all="ignore"):
-        system = normal_equations(search.parts)
-        free = search.free_now(system.gradient)
-        decrement = promised_gain(system.hessian, system.gradient, free)
-    model = problem.model.with_parameters(search.values(search.x))
-    return Fit(
-        model=model,
-        trials=problem.trials,
-        noise=problem.noise,
-        free=problem.free,
-        covariance=covariance_of(system.hessian, free),
-        sse=search.sse,
-        samples=sum(len(p.residual) for p in search.parts),
-        converged=done,
-        gradient_norm=decrement,
-        unknowns=search.unknowns,
-        at_bound=tuple(n for n, f in zip(problem.free, free, strict=True) if not f),
-        parts=tuple(search.parts),
-    )
+def fit_of(problem: Any, found: Optimum) -> Fit:
+    """The fit of a problem that has ended."""
+    model = problem.model.with_parameters(found.values)
+    own = {"model": model, "parameters": model.parameters(), "trials": problem.trials, "noise": problem.noise}
+    return Fit(**{**vars(found), **own})
 
 
 def fit(

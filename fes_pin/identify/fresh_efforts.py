@@ -43,7 +43,7 @@ def beside_fresh_efforts(fitted: Fit) -> Fit:
     """
     assert fitted.doubt is not None
     problem = LikelihoodProblem(fitted.model, fitted.trials, fresh(fitted.doubt, fitted.trials))
-    problem.score(fitted.values, fitted.unknowns)
+    problem.noise_step(fitted.values, fitted.unknowns)
     return maximise(problem, fitted.values, fitted.unknowns)
 
 

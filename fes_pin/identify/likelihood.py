@@ -4,7 +4,7 @@ Twice the negative log-likelihood of the innovations r_k of an extended Kalman f
 
     cost = sum r_k^2 / V_k + log V_k - (1 - 1 / n_k) log N_k,
 
-depends on the model's parameters and on what is random (`Doubt`) alone. Its maximum: `identify.turns`. The last term
+depends on the model's parameters and on what is random (`Doubt`) alone. Its maximum: `infer.maximise`. The last term
 is 0 but where a count is read n times in a row: that is one reading, to which the filter gives the variance
 N = n white^2 each time (`models.compile.predictor`). Its one error has one logarithm, and not n of them.
 
@@ -25,8 +25,9 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.autoregressions import autoregressions, with_autoregressions
 from fes_pin.identify.doubts import doubt_limits, first_doubt
 from fes_pin.identify.noise import ORDERS, Noise
-from fes_pin.identify.problem import Linearized, Unknowns, limits_of, whitened_sse
-from fes_pin.identify.scoring import TURN, Point, Told, climb
+from fes_pin.identify.problem import limits_of, products_of
+from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
+from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point, fisher_scoring
 from fes_pin.models.autoregression import stationary_variance
 from fes_pin.models.compile.layout import WIDE
 from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial
@@ -34,12 +35,14 @@ from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, Predictor
 from fes_pin.workers import check_limit, in_parallel
 
+NOISE_STEPS = 2
+"""Steps of the noise before parameters move again."""
 FOLLOWED_STEP = 0.01
 """Step of a difference of the cost by a parameter of the reading, in its standard deviations."""
 
 
-class LikelihoodProblem:
-    """A model structure on trials under what is random about them; a `Problem` to `Descent`.
+class LikelihoodProblem(NoisyProblem):
+    """A model structure on trials under what is random about them.
 
     Parameters
     ----------
@@ -70,7 +73,7 @@ class LikelihoodProblem:
         self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
         self.priors = [first_doubt(model, t) for t in starts or self.trials]
         self._predictor: Predictor | None = None
-        self._abreast: Predictor | None = None
+        self._batched: Predictor | None = None
 
     @property
     def noise(self) -> dict[str, Noise]:
@@ -89,14 +92,14 @@ class LikelihoodProblem:
             self._predictor = Predictor(self.model, self.trials, columns, *own)
         return self._predictor
 
+    @cached_property
+    def products(self) -> list[tuple[int, int]]:
+        """Places in `free` of shapes and of the amplitudes that they are factors of."""
+        return products_of(self.free, self.model.parameter_info())
+
     def start_unknowns(self) -> Unknowns:
         """What effects have of each trial's own, as known before: at their nulls."""
         return [self.model.own_nulls() for _ in self.trials]
-
-    def completed(self, unknowns: Unknowns) -> Unknowns:
-        """Unknowns of another model on these trials with what this one has besides, without what it has not."""
-        both = zip(self.start_unknowns(), unknowns, strict=True)
-        return [{n: known.get(n, value) for n, value in start.items()} for start, known in both]
 
     def innovations(
         self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None
@@ -108,39 +111,38 @@ class LikelihoodProblem:
             return self.predictor.run(values, doubt or self.doubt, own)
 
     @property
-    def randomness(self) -> dict[str, float]:
-        """What is random and may change, by name: not the noise of a reading that none of the trials has."""
-        known, given = self.randomness_limits, [f"time.{n}" for n in self.doubt.timed]
+    def noise_parameters(self) -> dict[str, float]:
+        """Those of the noise that may change, by name: not the noise of a reading that none of the trials has."""
+        known, given = self.noise_limits, [f"time.{n}" for n in self.doubt.timed]
         given += [f"{part}.{n}" for part in ("std", "time") for n in self.doubt.still]
         return {n: v for n, v in self.doubt.values().items() if n in known and n not in given}
 
     @property
-    def randomness_limits(self) -> dict[str, tuple[float, float]]:
-        """How small and how large that may become."""
+    def noise_limits(self) -> dict[str, tuple[float, float]]:
+        """How small and how large those may become."""
         return doubt_limits(self.model, self.trials, self.doubt.lasts_s)
 
-    def told(self, points: Sequence[Point]) -> list[Told]:
-        """Every trial as foretold at each of several points."""
-        return self._told([(values, unknowns, self.doubt.with_values(random)) for values, unknowns, random in points])
+    def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
+        """One-step predictions of all trials at each of several points."""
+        return self._evaluated([(values, unknowns, self.doubt.with_values(own)) for values, unknowns, own in points])
 
-    def bounds(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
+    def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
         """The cost at several parameter values, without sensitivities: less work than linearizing at one of them."""
-        return [one.cost for one in self._told([(*point, self.doubt) for point in points])]
+        return [one.cost for one in self._evaluated([(*point, self.doubt) for point in points])]
 
-    def _told(self, points: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[Told]:
-        """What every trial tells at each of several points."""
+    def _evaluated(self, points: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[Evaluation]:
         with np.errstate(all="ignore"):
             return [_joined(run) for run in self._runs(points)]
 
     def _runs(self, points: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[list[ForetoldTrial]]:
         """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
-        count, trials = self.abreast, len(self.trials)
-        if self._abreast is None:
+        count, trials = self.batch, len(self.trials)
+        if self._batched is None:
             own = (self.doubt.processes, self.priors * count, self.doubt.lasts_s)
-            self._abreast = Predictor(self.model, self.trials * count, (), *own)
-        predictor = self._abreast
+            self._batched = Predictor(self.model, self.trials * count, (), *own)
+        predictor = self._batched
 
-        def abreast(some: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[list[ForetoldTrial]]:
+        def in_batch(some: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[list[ForetoldTrial]]:
             check_limit()
             filled = [*some, *[some[-1]] * (count - len(some))]
             values, doubts = ([one[j] for one in filled for _ in range(trials)] for j in (0, 2))
@@ -149,11 +151,11 @@ class LikelihoodProblem:
                 run = predictor.run(values, doubts, own)  # type: ignore[arg-type]
             return [run[j * trials : (j + 1) * trials] for j in range(len(some))]
 
-        told = in_parallel(abreast, [points[k : k + count] for k in range(0, len(points), count)])
+        told = in_parallel(in_batch, [points[k : k + count] for k in range(0, len(points), count)])
         return [one for some in told for one in some]
 
     @property
-    def abreast(self) -> int:
+    def batch(self) -> int:
         """How many points are tried in one run."""
         return max(1, WIDE // len(self.trials))
 
@@ -179,10 +181,10 @@ class LikelihoodProblem:
         """
         return not all(self.model.rig.unknowns(t.kind) for t in self.trials)
 
-    def score(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
-        """Improve what is random, in place; returns by how much that lowers the cost."""
-        reached = climb(self, values, unknowns, {}, TURN)
-        self.become(reached.randomness)
+    def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Improve the noise, in place; returns by how much that lowers the cost."""
+        reached = fisher_scoring(self, values, unknowns, {}, NOISE_STEPS)
+        self.set_noise(reached.noise)
         return reached.gained + self.renew(values, unknowns)
 
     def renew(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
@@ -204,9 +206,9 @@ class LikelihoodProblem:
         (run,) = self._runs([(values, unknowns, self.doubt)])
         return replace(self.doubt, ar=autoregressions(run, dict.fromkeys(self.doubt.white, ORDERS)))
 
-    def become(self, randomness: Mapping[str, float]) -> None:
-        """Change what is random, in place."""
-        self.doubt = self.doubt.with_values(randomness)
+    def set_noise(self, parameters: Mapping[str, float]) -> None:
+        """Change parameters of the noise, in place."""
+        self.doubt = self.doubt.with_values(parameters)
 
     @cached_property
     def _scales(self) -> tuple[str, ...]:
@@ -237,7 +239,7 @@ class LikelihoodProblem:
         felt = np.flatnonzero(sizes) if np.isfinite(now) else np.empty(0, dtype=int)
         names, steps = [self._scales[k] for k in felt], FOLLOWED_STEP / sizes[felt]
         moved = [{**values, n: values[n] + float(h)} for n, h in zip(names, steps, strict=True)]
-        slopes = 0.5 * (np.array(self.bounds([(m, unknowns) for m in moved])) - now) / steps
+        slopes = 0.5 * (np.array(self.costs([(m, unknowns) for m in moved])) - now) / steps
         out[felt] = -slopes - sum(p.residual @ p.jacobian[:, at] for p in parts)[felt]
         return np.nan_to_num(out)
 
@@ -262,8 +264,8 @@ def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Lineariz
     return replace(part, jacobian=jacobian)
 
 
-def _joined(run: Sequence[ForetoldTrial]) -> Told:
-    return Told(
+def _joined(run: Sequence[ForetoldTrial]) -> Evaluation:
+    return Evaluation(
         float(sum(one.cost() for one in run)),
         np.concatenate([one.whitened[0] for one in run]),
         np.concatenate([one.seen_variances for one in run]),

@@ -17,7 +17,8 @@ from fes_pin.identify.doubts import first_doubt
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.noise import Noise, NoiseModel
-from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations
+from fes_pin.identify.problem import Problem
+from fes_pin.infer.problem import Linearized, Unknowns, normal_equations
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt

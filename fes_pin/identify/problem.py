@@ -1,59 +1,29 @@
-"""Whitened residuals and sensitivities of a model on trials, and their normal equations."""
+"""Whitened residuals and sensitivities of a model that is simulated freely on trials."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.noise import NoiseModel, thinning
+from fes_pin.infer import problem as infer
+from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
+from fes_pin.models.parameters import ParameterInfo
 from fes_pin.models.simulate import Abreast, Simulated, Simulator
 from fes_pin.workers import check_limit
 
-Unknowns = list[dict[str, float]]
-TOLERANCE = 0.01
-"""A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
-WORTH = 1.0
-"""Change of twice the log-likelihood that is worth more work, as where it is promised and no step keeps it: a standard
-deviation of one parameter."""
-SINGULAR = 1e-12
-"""Share of an unknown's own information added to it: two that the trial cannot tell apart do not stop a fit."""
-
-STEEPEST = 1e120
-"""Sensitivities beyond this, in deviations of the noise per unit, count as infinite: their squares would be."""
 NEXT_TO = 1e-6
 """Scales from its null that what switches a form with a memory on stays: nothing beside what data tell of it."""
 
 
-@dataclass(frozen=True)
-class Linearized:
-    """One trial near a parameter value: whitened residual and sensitivities, all channels end to end.
-
-    Attributes
-    ----------
-    residual
-        Shape (m,).
-    jacobian
-        Shape (m, parameters): derivative of the simulation, so the residual falls along it.
-    local
-        Shape (m, unknowns of the trial).
-    log_determinant
-        Logarithms of the variances that the residuals were whitened with; 0 where they are given.
-    """
-
-    residual: np.ndarray
-    jacobian: np.ndarray
-    local: np.ndarray
-    log_determinant: float = 0.0
-
-
-class Problem:
+class Problem(infer.Problem):
     """A model structure on trials, with the noise that weighs them.
 
     Parameters
@@ -83,14 +53,14 @@ class Problem:
         self.simulator = Simulator(model, self.trials, (*self.free, *self.unknown_names))
         self._beside: dict[tuple[int, ...], np.ndarray] = {}
 
+    @cached_property
+    def products(self) -> list[tuple[int, int]]:
+        """Places in `free` of shapes and of the amplitudes that they are factors of."""
+        return products_of(self.free, self.model.parameter_info())
+
     def start_unknowns(self) -> Unknowns:
         """The unknowns of each trial as its first samples suggest."""
         return [self.model.initial_unknowns(t) for t in self.trials]
-
-    def completed(self, unknowns: Unknowns) -> Unknowns:
-        """Unknowns of another model on these trials with what this one has besides, without what it has not."""
-        both = zip(self.start_unknowns(), unknowns, strict=True)
-        return [{n: known.get(n, value) for n, value in start.items()} for start, known in both]
 
     def residuals(self, values: Mapping[str, float], unknowns: Unknowns) -> list[dict[str, np.ndarray]]:
         """Measured minus simulated, for each trial by output column; not whitened."""
@@ -125,15 +95,6 @@ class Problem:
             for i, part in zip(block.trials, self._whitened(block), strict=True):
                 out[i] = part
         return [p for p in out if p is not None]
-
-    abreast = 1
-    """How many points `bounds` takes at once."""
-    is_final = True
-    """False where a descent need not try everything at its end, as better slopes will go on from there."""
-
-    def bounds(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
-        """What the sums of squares are at least: nothing is cheaper to tell than all that `linearize` does."""
-        return [0.0] * len(points)
 
     def rows(self, trial: Trial) -> int:
         """How many whitened residuals a trial has, all channels end to end."""
@@ -182,6 +143,17 @@ class Problem:
         return Linearized(residual, rows[:, :split], rows[:, split:])
 
 
+def products_of(names: Sequence[str], info: Mapping[str, ParameterInfo]) -> list[tuple[int, int]]:
+    """Places of shapes and of the amplitudes that they are factors of; those of a group are that group's."""
+    out = []
+    for at, name in enumerate(names):
+        path, mark, group = name.partition("@")
+        amplitude = f"{path.rpartition('.')[0]}.{info[name].times}{mark}{group}"
+        if info[name].times and amplitude in names:
+            out.append((at, names.index(amplitude)))
+    return out
+
+
 def measured_columns(model: Model, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
     """Every measured output, imposed motion and effort, all trials end to end, by column name.
 
@@ -224,70 +196,3 @@ def limits_of(model: Model, trials: Sequence[Trial]) -> dict[str, tuple[float, f
             (low, high), one = limits[f"{effect.name}.{n}"], effect.parameters()[n]
             limits[f"{effect.name}.{n}"] = (min(low + NEXT_TO * one.scale, high) if low == one.null else low, high)
     return limits
-
-
-@dataclass(frozen=True)
-class NormalEquations:
-    """Gauss-Newton system with the unknowns of each trial eliminated.
-
-    Attributes
-    ----------
-    sse
-        Sum of squared whitened residuals.
-    gradient, hessian
-        Of half of it, shape (parameters,) and (parameters, parameters), after elimination.
-    local_gain
-        What steps of the trials' unknowns alone promise.
-    """
-
-    sse: float
-    gradient: np.ndarray
-    hessian: np.ndarray
-    local_gain: float
-    eliminated: tuple[tuple[np.ndarray, np.ndarray], ...]
-
-    def local_steps(self, step: np.ndarray) -> list[np.ndarray]:
-        """Steps of each trial's unknowns that go with a step of the parameters."""
-        return [constant - slope @ step for constant, slope in self.eliminated]
-
-
-@np.errstate(all="ignore")
-def normal_equations(parts: Sequence[Linearized], damping: float = 0.0) -> NormalEquations:
-    """Sum the trials; each trial's unknowns are eliminated by its Schur complement, damped as Marquardt does.
-
-    Of a model that runs away the sums are no numbers; `whitened_sse` is infinite there.
-    """
-    size = parts[0].jacobian.shape[1]
-    sse, gradient, hessian, local_gain = 0.0, np.zeros(size), np.zeros((size, size)), 0.0
-    eliminated = []
-    for part in parts:
-        r, j, local = part.residual, part.jacobian, part.local
-        sse += float(r @ r)
-        g, h = j.T @ r, j.T @ j
-        if local.shape[1]:
-            own = local.T @ local
-            if not np.isfinite(own).all():
-                return NormalEquations(math.inf, np.zeros(size), np.zeros((size, size)), 0.0, ())
-            solved = _solved(own, np.column_stack([local.T @ r, local.T @ j]), damping)
-            constant, slope = solved[:, 0], solved[:, 1:]
-            g, h = g - j.T @ (local @ constant), h - j.T @ (local @ slope)
-            eliminated.append((constant, slope))
-            local_gain += float(r @ (local @ constant))
-        gradient += g
-        hessian += h
-    return NormalEquations(sse, gradient, hessian, local_gain, tuple(eliminated))
-
-
-def _solved(own: np.ndarray, right: np.ndarray, damping: float) -> np.ndarray:
-    """Solution of a trial's own system, damped and scaled; an unknown that is not felt stays where it is."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-150))
-    scaled = own * np.outer(scale, scale) + (damping + SINGULAR) * np.eye(len(own))
-    return scale[:, None] * np.linalg.solve(scaled, scale[:, None] * right)
-
-
-def whitened_sse(parts: Sequence[Linearized]) -> float:
-    """Sum of squared whitened residuals and log-determinants; infinite where a simulation or its slopes run away."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        total = float(sum(p.residual @ p.residual + p.log_determinant for p in parts))
-    tame = all(float(np.abs(x).max(initial=0.0)) < STEEPEST for p in parts for x in (p.jacobian, p.local))
-    return total if math.isfinite(total) and tame else math.inf

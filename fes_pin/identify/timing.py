@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.identify.covariance import covariance_of, widened
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import Linearized, normal_equations, whitened_sse
-from fes_pin.identify.scatter import at_rest, scores_of, with_honest_intervals
+from fes_pin.infer.covariance import covariance_of, widened
+from fes_pin.infer.problem import Linearized, normal_equations, whitened_sse
+from fes_pin.infer.scatter import at_rest, scores_of, with_honest_intervals
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 

@@ -105,7 +105,7 @@ def _share(
     no error would else show gains of any size.
     """
     excess = np.maximum(np.maximum(nominal - noise, nominal - extended), np.sqrt(scatter))
-    return 100.0 * (without - extended) / excess
+    return np.asarray(100.0 * (without - extended) / excess)
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ def speaks_for(evidence: Evidence | None, gain: Gain, alone: bool) -> bool:
 
 def within(errors: np.ndarray, most: float) -> np.ndarray:
     """Errors, or readings, no larger than `most`; what is no number is as large."""
-    return np.clip(np.nan_to_num(errors, nan=most, posinf=most, neginf=-most), -most, most)
+    return np.asarray(np.clip(np.nan_to_num(errors, nan=most, posinf=most, neginf=-most), -most, most))
 
 
 def added_likelihood(without: np.ndarray, extended: np.ndarray) -> Evidence:

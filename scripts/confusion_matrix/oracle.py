@@ -15,7 +15,8 @@ from confusion_matrix.plan import DISTANCES, Item
 from fes_pin.diagnosis.decide.rivals import alternatives
 from fes_pin.diagnosis.search.score import Scored, best_by_effect
 from fes_pin.diagnosis.search.simulation_fits import SimulationFits
-from fes_pin.identify.fit import MAX_ITERATIONS, Fit, fit_multistart, fit_problem
+from fes_pin.identify.fit import Fit, fit_multistart, fit_problem
+from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.models.nominal import nominal_model
 
 LEVEL = 0.05

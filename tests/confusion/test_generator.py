@@ -8,7 +8,8 @@ import pytest
 from confusion_matrix import drafts, generator, noise, plan, stimuli
 from confusion_matrix.plan import Item
 
-from fes_pin.identify.problem import Problem, whitened_sse
+from fes_pin.identify.problem import Problem
+from fes_pin.infer.problem import whitened_sse
 from fes_pin.models.effects import EFFECTS, effect_named
 from fes_pin.models.nominal import nominal_model
 

@@ -12,7 +12,8 @@ from fes_pin.contrasts.grouped import Item
 from fes_pin.contrasts.promises import Promise
 from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, scatter, without_locals, without_scatter
 from fes_pin.identify.fit import fit
-from fes_pin.identify.problem import Linearized, Problem
+from fes_pin.identify.problem import Problem
+from fes_pin.infer.problem import Linearized
 from fes_pin.models.nominal import nominal_model
 
 

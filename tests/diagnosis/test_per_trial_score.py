@@ -6,8 +6,8 @@ import scipy.stats
 
 from fes_pin.diagnosis.search.library import Probe
 from fes_pin.diagnosis.search.score import Projection
-from fes_pin.identify.problem import Linearized
 from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.problem import Linearized
 from fes_pin.models.effects.mains_hum import MainsHum
 
 TRIALS, ROWS = 4, 60

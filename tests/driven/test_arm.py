@@ -16,8 +16,8 @@ from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts, fresh
-from fes_pin.identify.scatter import as_wide_as_estimates_differ, with_honest_intervals
 from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.infer.scatter import as_wide_as_estimates_differ, with_honest_intervals
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model

@@ -11,9 +11,9 @@ from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.driven_held_out import as_random_as_in_all
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.identify.turns import maximise
 from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.effects import CoulombFriction, PeriodicTorque
 from fes_pin.models.nominal import nominal_model
 
@@ -40,7 +40,7 @@ def test_what_has_moved_together_is_where_no_single_step_leads_down(tmp_path):
         if n not in fitted.at_bound
         for side in (-1.0, 1.0)
     ]
-    assert min(problem.bounds(points)) > fitted.sse - 0.2
+    assert min(problem.costs(points)) > fitted.sse - 0.2
 
 
 def test_a_torque_is_found_beside_friction_whose_cost_is_rough(tmp_path):

@@ -26,7 +26,7 @@ def test_a_fit_ends_at_its_limit(study):
     problem = LikelihoodProblem(nominal.model, study.trials, nominal.doubt)
     with time_limit(0.0):
         time.sleep(0.01)
-        for work in (problem.linearize, lambda values, unknowns: problem.bounds([(values, unknowns)])):
+        for work in (problem.linearize, lambda values, unknowns: problem.costs([(values, unknowns)])):
             with pytest.raises(OutOfTime):
                 work(nominal.values, nominal.unknowns)
 

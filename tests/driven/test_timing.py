@@ -10,8 +10,8 @@ from driven_rigs.draw import Base, draw, urdf
 from fes_pin.data.study import Study, read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.identify.scatter import with_honest_intervals
 from fes_pin.identify.timing import with_doubt_of_timing
+from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.nominal import nominal_model
 
 MASS, DAMPING = 12.0, 30.0

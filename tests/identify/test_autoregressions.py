@@ -39,7 +39,7 @@ def test_a_filter_beside_nothing_random_leaves_what_free_simulation_leaves(study
     guess = stilled(model, trials, first_guess(model, trials))
     doubt = replace(guess, white={"angle_rad": STD}, ar={"angle_rad": AR})
     problem = LikelihoodProblem(model, trials, doubt)
-    assert not set(problem.randomness) & {"std.effort", "time.effort"}
+    assert not set(problem.noise_parameters) & {"std.effort", "time.effort"}
     freely = Problem(model, trials, {"angle_rad": Noise(STD, AR, STD)}, problem.free)
     values, unknowns = model.parameters(), problem.start_unknowns()
     both = zip(problem.linearize(values, unknowns), freely.linearize(values, unknowns), strict=True)

@@ -10,10 +10,11 @@ from identify.rigs import SIZE, WHITE, by_scipy, measured, off, trials_of
 from models.cases import JOINT, RIGS, trial
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.descent import TOLERANCE
 from fes_pin.identify.fit import GROSS, fit, fit_multistart, fit_problem, noise_of
 from fes_pin.identify.noise import Noise, thinning
-from fes_pin.identify.problem import Problem, normal_equations
+from fes_pin.identify.problem import Problem
+from fes_pin.infer.optimize import TOLERANCE
+from fes_pin.infer.problem import normal_equations
 from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import parameter

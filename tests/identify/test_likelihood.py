@@ -7,8 +7,8 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls, one_step, over_horizon
 from fes_pin.identify.doubts import driving_size, first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import whitened_sse
 from fes_pin.identify.turns import maximise
+from fes_pin.infer.problem import whitened_sse
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.effects.sensor_gain import SensorGain
 from fes_pin.models.model import Model
@@ -208,7 +208,7 @@ def test_costs_of_points_side_by_side_are_those_of_each_linearized(fitted):
         ({**fitted.values, "inertia_scale": k * fitted.values["inertia_scale"]}, fitted.unknowns[:2])
         for k in (1.0, 1.1, 0.8)
     ]
-    assert problem.abreast > 1
+    assert problem.batch > 1
     costs = [whitened_sse(problem.linearize(*point)) for point in points]
-    assert problem.bounds(points) == pytest.approx(costs, rel=1e-12)
+    assert problem.costs(points) == pytest.approx(costs, rel=1e-12)
     assert len(set(costs)) == len(points)

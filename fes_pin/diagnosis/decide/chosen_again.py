@@ -25,10 +25,10 @@ import numpy as np
 
 from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.problem import normal_equations
-from fes_pin.identify.scatter import at_rest
-from fes_pin.identify.scoring import LITTLE
 from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.problem import normal_equations
+from fes_pin.infer.scatter import at_rest
+from fes_pin.infer.scoring import LITTLE
 
 Worthwhile = Callable[[Fit, Fit, float, float], bool]
 """Whether a set is worth more than a smaller one where it gains so much in twice the log-likelihood, and all its causes

@@ -130,7 +130,7 @@ class _Featured:
         limits = limits_of(self._model, fitted.trials)
         tried = [{n: float(np.clip(values[n] + t * m, *limits[n])) for n, m in moves.items()} for t in (0.0, *TRIED)]
         points = [({**values, **one}, fitted.unknowns) for one in tried]
-        now, *costs = self._problem.bounds(points)
+        now, *costs = self._problem.costs(points)
         return max(0.0, now - min(costs))
 
 

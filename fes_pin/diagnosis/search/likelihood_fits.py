@@ -18,15 +18,16 @@ from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, started
-from fes_pin.identify.covariance import step_gain
 from fes_pin.identify.doubts import first_guess, stilled
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import fresh
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import normal_equations
-from fes_pin.identify.scoring import LITTLE, WORTH
+from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets
+from fes_pin.infer.optimize import WORTH
+from fes_pin.infer.problem import normal_equations
+from fes_pin.infer.scoring import LITTLE
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect

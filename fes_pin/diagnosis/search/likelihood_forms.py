@@ -11,8 +11,8 @@ from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnosis.search.refined_forms import is_identified
 from fes_pin.diagnosis.search.starts import STARTS, begun_anew, forms_beside, refinements
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.scoring import WORTH
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
+from fes_pin.infer.optimize import WORTH
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 

@@ -9,12 +9,14 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import STARTS
-from fes_pin.identify.covariance import moved_with
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import limits_of
-from fes_pin.identify.turns import ROUNDS, maximise
+from fes_pin.identify.turns import maximise
+from fes_pin.infer.covariance import moved_with
 from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.maximise import ROUNDS
+from fes_pin.infer.problem import completed
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
@@ -81,7 +83,7 @@ class LikelihoodMaxima:
         left = off - effect.name if set(gone) >= set(effect.amplitudes()) else off
         assert whole.doubt is not None
         problem = LikelihoodProblem(left, self.trials, whole.doubt)
-        unknowns = problem.completed(whole.unknowns)
+        unknowns = completed(problem.start_unknowns(), whole.unknowns)
         moved = left.with_parameters({n: v for n, v in values.items() if n in left.parameters()})
-        costs = problem.bounds([(one.parameters(), unknowns) for one in (left, moved)])
+        costs = problem.costs([(one.parameters(), unknowns) for one in (left, moved)])
         return moved if costs[1] < costs[0] else left

@@ -18,8 +18,8 @@ from fes_pin.diagnosis.search.score import Scored
 from fes_pin.diagnosis.search.simulation_search import NominalFitError
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.scatter import excess_scatter
 from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Search, SearchResult
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -86,7 +86,7 @@ class LikelihoodModels(LikelihoodFits):
         return self.screen.scores(found.nominal).scored + more
 
     def excess_scatter(self, larger: Fit, smaller: Fit) -> float:
-        """See `identify.scatter.excess_scatter`."""
+        """See `infer.scatter.excess_scatter`."""
         return excess_scatter(larger, smaller)
 
     def level(self, fitted: Fit) -> float:

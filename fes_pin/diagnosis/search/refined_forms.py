@@ -8,8 +8,9 @@ import numpy as np
 
 from fes_pin.diagnosis.search.model_fitter import ModelFitter
 from fes_pin.diagnosis.search.starts import fits_rig
-from fes_pin.identify.fit import MAX_ITERATIONS, Fit
+from fes_pin.identify.fit import Fit
 from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.diagnosis.search.library import Probe
-from fes_pin.identify.problem import Linearized
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.problem import Linearized
 from fes_pin.workers import in_parallel
 
 RIDGE = 1e-8

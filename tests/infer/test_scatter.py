@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fes_pin.identify.problem import Linearized
-from fes_pin.identify.scatter import (
+from fes_pin.infer.distributions import chi2_quantile
+from fes_pin.infer.problem import Linearized
+from fes_pin.infer.scatter import (
     as_wide_as_estimates_differ,
     as_wide_as_trials_differ,
     excess_scatter,
     with_honest_intervals,
 )
-from fes_pin.infer.distributions import chi2_quantile
 
 EACH, TRIALS, DRAWS = 500, 4, 200
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fes_pin.identify.covariance import step_gain
-from fes_pin.identify.problem import Linearized, normal_equations
+from fes_pin.infer.covariance import step_gain
+from fes_pin.infer.problem import Linearized, normal_equations
 
 
 def linear(seed):

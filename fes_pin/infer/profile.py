@@ -15,21 +15,17 @@ under nonstandard conditions, Journal of the American Statistical Association 82
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
-import numpy as np
 from scipy.optimize import brentq
 
-from fes_pin.identify.covariance import covariance_of
-from fes_pin.identify.descent import Descent
-from fes_pin.identify.problem import Linearized, Problem, Unknowns, normal_equations
 from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.infer.optimize import Descent
+from fes_pin.infer.optimum import RISE_AT_A_BOUND
+from fes_pin.infer.problem import Problem, Unknowns
 
 RISE = CONFIDENCE_95**2
 """95 % quantile of a chi-square with one degree of freedom."""
-RISE_AT_A_BOUND = 1.6448536269514722**2
-"""The normal's 95 % quantile, squared."""
 STEPS = 20
 """Fits of the other parameters, at most, for each value of the one; they begin near their end."""
 DOUBLINGS = 30
@@ -78,28 +74,3 @@ def _end(too_far: Callable[[float], float], here: float, bound: float, step: flo
             return float(brentq(too_far, inner, outer, xtol=EXACT * abs(outer - here), rtol=1e-12))
         inner, step = outer, 2.0 * step
     return bound
-
-
-def reach_at_bound(parts: Sequence[Linearized], k: int, held: Sequence[bool]) -> float:
-    """How far a parameter at its bound may go by the parabola that the fit ended on; infinite if nothing is felt of it.
-
-    With g and h the slope and curvature of half the sum of squares, what else moves gone with it: the s with
-    2 |g| s + h s^2 = 2.71.
-
-    Parameters
-    ----------
-    parts
-        Of the fit, linearized at its end.
-    k
-        Place of the parameter.
-    held
-        Which parameters stand at a bound.
-    """
-    system = normal_equations(parts)
-    free = np.array([not at or j == k for j, at in enumerate(held)])
-    covariance = covariance_of(system.hessian, free)
-    if not np.isfinite(covariance[k, k]):
-        return math.inf
-    known = np.isfinite(np.diag(covariance))
-    slope = abs(float(covariance[k, known] @ system.gradient[known])) / covariance[k, k]
-    return float(RISE_AT_A_BOUND / (slope + math.sqrt(slope**2 + RISE_AT_A_BOUND / covariance[k, k])))

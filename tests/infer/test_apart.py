@@ -5,9 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fes_pin.identify.apart import least_apart
-from fes_pin.identify.scatter import PIECES
 from fes_pin.infer.levels import SEPARABLE
+from fes_pin.infer.scatter import PIECES, least_apart
 
 LONG, DRAWS = 25, 1000
 """Samples of a piece, and studies."""

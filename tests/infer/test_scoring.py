@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fes_pin.identify.scoring import Told, climb
+from fes_pin.infer.scoring import Evaluation, fisher_scoring
 
 X = np.linspace(-1.0, 2.0, 400)
 SLOPE, OFFSET, STD = 3.0, -1.0, 0.2
@@ -14,31 +14,31 @@ SLOPE, OFFSET, STD = 3.0, -1.0, 0.2
 class Line:
     """y = slope x + offset, with white noise."""
 
-    abreast = 1
+    batch = 1
 
     def __init__(self, slope=(-1e3, 1e3)):
         self.y = SLOPE * X + OFFSET + STD * np.random.default_rng(0).standard_normal(len(X))
         self.limits = {"slope": slope, "offset": (-1e3, 1e3)}
-        self.randomness, self.randomness_limits = {"std": 1.7}, {"std": (1e-3, 10.0)}
+        self.noise_parameters, self.noise_limits = {"std": 1.7}, {"std": (1e-3, 10.0)}
         self.asked = 0
 
-    def told(self, points):
+    def evaluate(self, points):
         self.asked += len(points)
         return [self.one(values, random) for values, _, random in points]
 
     def one(self, values, random):
         left = self.y - values["slope"] * X - values["offset"]
-        std = random.get("std", self.randomness["std"])
+        std = random.get("std", self.noise_parameters["std"])
         variance = np.full(len(X), std**2)
         cost = float(np.sum(left**2 / variance + np.log(variance)))
-        return Told(cost, left / std, variance, variance, np.zeros_like(variance))
+        return Evaluation(cost, left / std, variance, variance, np.zeros_like(variance))
 
     def sizes(self):
         return {"slope": float(np.linalg.norm(X)) / STD, "offset": len(X) ** 0.5 / STD}
 
 
 def climbed(line, steps=12, **how):
-    return climb(line, {"slope": 0.5, "offset": 4.0}, [], line.sizes(), steps, **how)
+    return fisher_scoring(line, {"slope": 0.5, "offset": 4.0}, [], line.sizes(), steps, **how)
 
 
 def test_the_maximum_is_that_of_least_squares_and_the_residual_is_the_noise():
@@ -50,22 +50,22 @@ def test_the_maximum_is_that_of_least_squares_and_the_residual_is_the_noise():
         line.one(values, {"std": s}).cost
         for values, s in (
             ({"slope": 0.5, "offset": 4.0}, 1.7),
-            (found.values, found.randomness["std"]),
+            (found.values, found.noise["std"]),
             ({"slope": slope, "offset": offset}, std),
         )
     )
     assert found.converged
     assert best <= end < best + 0.1
     assert found.values == pytest.approx({"slope": slope, "offset": offset}, rel=1e-3)
-    assert found.randomness["std"] == pytest.approx(std, rel=0.02)
+    assert found.noise["std"] == pytest.approx(std, rel=0.02)
     assert found.gained == pytest.approx(begin - end)
     assert found.left < 0.1
 
 
 def test_what_is_not_asked_for_does_not_move():
     line = Line()
-    found = climbed(line, random=False)
-    assert found.randomness == {}
+    found = climbed(line, with_noise=False)
+    assert found.noise == {}
     assert found.values["slope"] == pytest.approx(SLOPE, abs=0.05)
 
 
@@ -75,13 +75,13 @@ def test_what_a_prediction_runs_away_beside_stays_and_the_others_move():
     class RunsAway(Line):
         def one(self, values, random):
             told = super().one(values, random)
-            beside = random.get("std", self.randomness["std"]) != self.randomness["std"]
+            beside = random.get("std", self.noise_parameters["std"]) != self.noise_parameters["std"]
             return replace(told, innovations=told.innovations * 1e200 * 1e200) if beside else told
 
     line = RunsAway()
     with np.errstate(over="ignore"):
         found = climbed(line)
-    assert found.randomness["std"] == line.randomness["std"]
+    assert found.noise["std"] == line.noise_parameters["std"]
     assert found.values["slope"] == pytest.approx(SLOPE, abs=0.05)
 
 
@@ -90,14 +90,14 @@ def test_where_slopes_are_of_what_flips_what_is_random_leaps():
 
     class Flips(Line):
         def one(self, values, random):
-            told, std = super().one(values, random), random.get("std", self.randomness["std"])
-            flips = np.abs(np.sin(1e4 * np.log(std / self.randomness["std"])))
+            told, std = super().one(values, random), random.get("std", self.noise_parameters["std"])
+            flips = np.abs(np.sin(1e4 * np.log(std / self.noise_parameters["std"])))
             return replace(told, innovations=told.innovations * (1.0 + 50.0 * flips))
 
     line = Flips()
-    line.randomness = {"std": 0.03 * STD}
-    found = climb(line, {"slope": SLOPE, "offset": OFFSET}, [], {}, 12)
-    assert found.randomness["std"] == pytest.approx(STD, rel=0.8)
+    line.noise_parameters = {"std": 0.03 * STD}
+    found = fisher_scoring(line, {"slope": SLOPE, "offset": OFFSET}, [], {}, 12)
+    assert found.noise["std"] == pytest.approx(STD, rel=0.8)
 
 
 def test_a_bound_holds_a_parameter_and_the_others_move_beside_it():
@@ -116,9 +116,9 @@ def test_near_the_maximum_one_step_that_keeps_its_promise_is_the_last():
     """Nothing is asked once more about a slope that the step has just used up."""
     line = Line()
     best = climbed(line)
-    line.randomness, line.asked = best.randomness, 0
+    line.noise_parameters, line.asked = best.noise, 0
     near = {n: v + 0.1 / s for (n, v), s in zip(best.values.items(), line.sizes().values(), strict=True)}
-    found = climb(line, near, [], line.sizes(), 12)
+    found = fisher_scoring(line, near, [], line.sizes(), 12)
     assert found.converged
     assert line.asked <= 2 * (1 + 3)
 

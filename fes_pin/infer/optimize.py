@@ -1,24 +1,28 @@
-"""Levenberg-Marquardt with exact sensitivities, bounds, and each trial's own unknowns."""
+"""Nonlinear least squares by Levenberg and Marquardt's method, with bounds and with unknowns of each trial."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.identify.problem import (
-    TOLERANCE,
-    WORTH,
+from fes_pin.infer.covariance import UNIDENTIFIED
+from fes_pin.infer.problem import (
     Linearized,
     NormalEquations,
     Problem,
     Unknowns,
+    completed,
     normal_equations,
     whitened_sse,
 )
-from fes_pin.models.parameters import ParameterInfo
 
+TOLERANCE = 0.01
+"""A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
+WORTH = 1.0
+"""Change of twice the log-likelihood that is worth more work, as where it is promised and no step keeps it: a standard
+deviation of one parameter."""
 TRIES = 12
 """Steps that are tried, each ten times as damped as the last, before a point counts as the lowest there is."""
 SHORTER = 0.5
@@ -26,8 +30,6 @@ SHORTER = 0.5
 that the data tell well, ten times the damping changes nothing at first."""
 LARGEST_DAMPING = 1e12
 """Beyond it a step is none."""
-UNIDENTIFIED = 1e-10
-"""Eigenvalue of the scaled information matrix, relative to the largest, below which a direction is not identified."""
 
 
 @dataclass(frozen=True)
@@ -69,10 +71,10 @@ class Descent:
         self.problem, self.names = problem, problem.free
         self.lower = np.array([problem.limits[n][0] for n in self.names])
         self.upper = np.array([problem.limits[n][1] for n in self.names])
-        self.products = list(_products(self.names, problem.model.parameter_info()))
+        self.products = problem.products
         self.fixed = dict(start)
         self.x = np.clip([start[n] for n in self.names], self.lower, self.upper)
-        self.unknowns = problem.start_unknowns() if unknowns is None else problem.completed(unknowns)
+        self.unknowns = completed(problem.start_unknowns(), unknowns)
         self.damping, self._gained = 1e-4, 0.0
         known = parts is not None and all(start[n] == v for n, v in zip(self.names, self.x, strict=True))
         self._system: NormalEquations | None = None
@@ -107,10 +109,10 @@ class Descent:
             return first.promises_little or self._gained < TOLERANCE
         left, last = TRIES - 1, first
         while left > 0:
-            shorter = self._shorter(last, min(left, self.problem.abreast))
+            shorter = self._shorter(last, min(left, self.problem.batch))
             left, last = left - len(shorter), shorter[-1]
             worth = [one for one in shorter if self._is_worth(one)]
-            bounds = self.problem.bounds([(self.values(one.x), one.unknowns) for one in worth])
+            bounds = self.problem.costs([(self.values(one.x), one.unknowns) for one in worth])
             for one, bound in zip(worth, bounds, strict=True):
                 self.damping = one.damping
                 if bound <= self.sse and self._takes(one):
@@ -166,7 +168,7 @@ class Descent:
             if share[first] >= 1.0:
                 break
             move[first], free[first] = room[first], False
-        return np.clip(self.x + move, self.lower, self.upper) - self.x
+        return np.asarray(np.clip(self.x + move, self.lower, self.upper) - self.x)
 
     def _end(self, move: np.ndarray) -> np.ndarray:
         """Where a step leads that is straight in an amplitude k and in its product k r with a shape."""
@@ -175,7 +177,7 @@ class Descent:
             if out[k] != 0.0:
                 bent = self.x[shape] + move[shape] * self.x[k] / out[k]
                 out[shape] = np.clip(bent, self.lower[shape], self.upper[shape])
-        return out
+        return np.asarray(out)
 
     def _moved(self, steps: list[np.ndarray]) -> Unknowns:
         if not steps:
@@ -185,15 +187,6 @@ class Descent:
             {n: u[n] + float(d) for n, d in zip(names, step, strict=True)}
             for u, step in zip(self.unknowns, steps, strict=True)
         ]
-
-
-def _products(names: Sequence[str], info: Mapping[str, ParameterInfo]) -> Iterator[tuple[int, int]]:
-    """Places of shapes and of the amplitudes that they are factors of; those of a group are that group's."""
-    for at, name in enumerate(names):
-        path, mark, group = name.partition("@")
-        amplitude = f"{path.rpartition('.')[0]}.{info[name].times}{mark}{group}"
-        if info[name].times and amplitude in names:
-            yield at, names.index(amplitude)
 
 
 def _relief(kept: float) -> float:

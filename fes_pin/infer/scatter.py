@@ -11,28 +11,32 @@ difference chi-square test statistic for moment structure analysis, Psychometrik
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
-from fes_pin.identify.covariance import covariance_of, scattered, widened
-from fes_pin.identify.fit import Fit
-from fes_pin.identify.problem import Linearized, normal_equations
-from fes_pin.infer.distributions import chi2_quantile
-from fes_pin.infer.levels import UNUSUAL_LEVEL
+from fes_pin.infer.covariance import covariance_of, scattered, widened
+from fes_pin.infer.distributions import chi2_quantile, normal_quantile
+from fes_pin.infer.levels import CLAIM_LEVEL, SEPARABLE, SURE, UNUSUAL_LEVEL
+from fes_pin.infer.optimum import Optimum
+from fes_pin.infer.problem import Linearized, normal_equations
+
+F = TypeVar("F", bound=Optimum)
 
 PIECES = 40
 """Pieces of the data by whose scores a model's errors of form show: as many as tell a deviation within a tenth, and so
 as long as they can be."""
 
 
-def with_honest_intervals(fitted: Fit) -> Fit:
+def with_honest_intervals(fitted: F) -> F:
     """The fit with intervals as wide as the scores of its trials, cut into `PIECES` pieces, scatter."""
-    return replace(fitted, covariance=widened(*_told(fitted)))
+    return replace(fitted, covariance=widened(*_information_and_scores(fitted)))
 
 
-def as_wide_as_trials_differ(fitted: Fit, again: Sequence[Fit]) -> Fit:
+def as_wide_as_trials_differ(fitted: F, again: Sequence[Optimum]) -> F:
     """The fit with intervals of parameters that trials differ in by more than each is sure of as wide as they differ.
 
     Of fits without one of k parts of the trials each, the jackknife's variance is
@@ -62,7 +66,7 @@ def as_wide_as_trials_differ(fitted: Fit, again: Sequence[Fit]) -> Fit:
     return replace(fitted, covariance=fitted.covariance * np.outer(wider, wider))
 
 
-def as_wide_as_estimates_differ(fitted: Fit, other: Fit) -> Fit:
+def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
     """The fit with intervals that hold another estimate of the same parameters where chance does not set both apart.
 
     Both estimate the same where the model is right, and the other no better: their difference varies by less than that
@@ -85,12 +89,12 @@ def as_wide_as_estimates_differ(fitted: Fit, other: Fit) -> Fit:
     return replace(fitted, covariance=fitted.covariance + np.outer(apart, apart))
 
 
-def excess_scatter(larger: Fit, smaller: Fit) -> float:
+def excess_scatter(larger: Optimum, smaller: Optimum) -> float:
     """How many times wider than of a right model that is scattered what a larger fit has besides; at least 1."""
     more = [k for k, n in enumerate(larger.free) if n not in smaller.free]
     if not more:
         return 1.0
-    covariance, scores = _told(larger)
+    covariance, scores = _information_and_scores(larger)
     more = [k for k in more if np.isfinite(covariance[k, k]) and covariance[k, k] > 0.0]
     if not more or len(scores) < 2:
         return 1.0
@@ -98,7 +102,29 @@ def excess_scatter(larger: Fit, smaller: Fit) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(own, hermitian=True) @ wide)) / len(more))
 
 
-def _told(fitted: Fit) -> tuple[np.ndarray, np.ndarray]:
+def least_apart(likelier: Optimum, other: Optimum) -> float:
+    """Twice the log-likelihood by which a fit must be likelier than another of the same trials to be distinguished.
+
+    With Delta the difference of their whitened residuals, what the right one of two is likelier by, in twice the
+    log-likelihood, has the mean |Delta|^2 and scatters by 2 |Delta|, or as pieces of the data show where that is more.
+    The wrong one is likelier by `SEPARABLE` in no more than 5 % of cases, however far apart they are. Where one is
+    likelier by less than it must be if it were right, at `CLAIM_LEVEL`, neither is right, and the nearer one is
+    distinguished where the pieces agree on it.
+
+    Source: Cox, Tests of separate families of hypotheses, 4th Berkeley Symposium 1, 1961; Vuong, Likelihood ratio tests
+    for model selection and non-nested hypotheses, Econometrica 57 (1989).
+    """
+    pairs = [(a.residual, b.residual) for a, b in zip(likelier.parts, other.parts, strict=True)]
+    if any(a.shape != b.shape for a, b in pairs):
+        return SEPARABLE
+    squares = float(sum((a - b) @ (a - b) for a, b in pairs))
+    gains = np.concatenate([in_pieces(b**2 - a**2, len(pairs)) for a, b in pairs])
+    scatter = math.sqrt(len(gains)) * float(np.std(gains, ddof=1))
+    least = squares - normal_quantile(1.0 - CLAIM_LEVEL) * max(scatter, 2.0 * math.sqrt(squares))
+    return SEPARABLE if other.sse - likelier.sse >= least else max(SEPARABLE, SURE * scatter)
+
+
+def _information_and_scores(fitted: Optimum) -> tuple[np.ndarray, np.ndarray]:
     """The inverse information of a fit that has ended, and the slopes of the log-likelihood of its pieces."""
     parts, free = at_rest(fitted.parts), np.array([n not in fitted.at_bound for n in fitted.free])
     return covariance_of(normal_equations(parts).hessian, free), scores_of(parts)
@@ -133,7 +159,7 @@ def _beside_own(part: Linearized) -> np.ndarray:
     """A trial's sensitivities without what its own unknowns take up, as the information is without it."""
     if not part.local.any():
         return part.jacobian
-    return part.jacobian - part.local @ np.linalg.lstsq(part.local, part.jacobian, rcond=1e-10)[0]
+    return np.asarray(part.jacobian - part.local @ np.linalg.lstsq(part.local, part.jacobian, rcond=1e-10)[0])
 
 
 def at_rest(parts: Sequence[Linearized]) -> list[Linearized]:

@@ -1,8 +1,9 @@
-"""Parameters of a model and what is random about it, made more likely by Fisher scoring.
+"""Parameters of a model and of its noise, made more likely by Fisher scoring.
 
-In parameters and in logarithms of what is random, with e_k = r_k / sqrt(V_k) the innovations over their deviations,
-less what noise foretells of itself, e_i and V_i their derivatives and the variances' by differences, in which the
-filter's gains go with the parameters, and N_k the noise of what is read n_k times in a row (`identify.likelihood`):
+In parameters and in logarithms of those of the noise, with e_k = r_k / sqrt(V_k) the innovations over their deviations,
+less what noise predicts of itself, e_i and V_i their derivatives and the variances' by differences, in which the
+filter's gains change with the parameters, and N_k the noise of what is read n_k times in a row
+(`identify.likelihood`):
 
     g_i = sum e e_i + V_i / (2 V) - (1 - 1 / n) N_i / (2 N)
     I_ij = sum s_i s_j + V_i V_j / (2 n V^2),    s_i = e_i + e V_i / (2 V),    which is r_i / sqrt(V) of white noise
@@ -19,10 +20,11 @@ from typing import Protocol
 
 import numpy as np
 
-from fes_pin.identify.problem import WORTH, Unknowns
+from fes_pin.infer.optimize import WORTH
+from fes_pin.infer.problem import Problem, Unknowns
 
 LITTLE = 0.1
-"""Fall of twice the log-likelihood with which turns end: a third of a standard deviation of one parameter."""
+"""Fall of twice the log-likelihood with which alternation ends: a third of a standard deviation of one parameter."""
 STEPS = (1e-3, 0.03)
 """Steps of the differences in logarithms: the second where the first promises what no step keeps, as where the cost is
 rough: that of a filter which takes for linear what bends sharply."""
@@ -30,20 +32,18 @@ DEVIATIONS = 10.0
 """How many deviations of a parameter, as far as it is known with gains as they are, count as one of a logarithm: a
 difference is then 0.01 of them, or 0.3."""
 LONGEST_MOVE = 1.5
-"""Longest step of a logarithm: randomness changes by a factor of 4.5 at most before parameters move again."""
-TURN = 2
-"""Steps of what is random before parameters move again."""
+"""Longest step of a logarithm: noise changes by a factor of 4.5 at most before parameters move again."""
 
 
 Point = tuple[Mapping[str, float], Unknowns, Mapping[str, float]]
-"""Values of parameters, unknowns of each trial, and what is random by name."""
+"""Values of parameters, unknowns of each trial, and parameters of the noise by name."""
 
 
 @dataclass(frozen=True)
-class Told:
-    """What was seen, all trials end to end, each of shape (m,); and its cost.
+class Evaluation:
+    """What was measured at a point, all trials end to end, each array of shape (m,); and its cost.
 
-    Innovations over their deviations, variances, 1 - 1 / n; and of what was told before, the noise in its variance.
+    Innovations over their deviations, variances, 1 - 1 / n; and of repeated readings, the noise in their variance.
     """
 
     cost: float
@@ -53,38 +53,31 @@ class Told:
     again: np.ndarray
 
     @classmethod
-    def joined(cls, parts: Sequence[Told]) -> Told:
-        """What several sets of trials tell, end to end."""
-        return cls(
-            float(sum(p.cost for p in parts)),
-            np.concatenate([p.innovations for p in parts]),
-            np.concatenate([p.variances for p in parts]),
-            np.concatenate([p.noise for p in parts]),
-            np.concatenate([p.again for p in parts]),
-        )
+    def joined(cls, parts: Sequence[Evaluation]) -> Evaluation:
+        """Those of several sets of trials, end to end."""
+        arrays = ([getattr(p, n) for p in parts] for n in ("innovations", "variances", "noise", "again"))
+        return cls(float(sum(p.cost for p in parts)), *(np.concatenate(each) for each in arrays))
 
 
-class Foretelling(Protocol):
-    """A problem that foretells its trials at any point."""
+class NoisyProblem(Problem, Protocol):
+    """A problem whose noise has parameters of its own."""
 
     @property
-    def limits(self) -> Mapping[str, tuple[float, float]]:
-        """Of its parameters."""
+    def noise_parameters(self) -> Mapping[str, float]:
+        """Those of the noise that may change, by name."""
 
     @property
-    def randomness(self) -> Mapping[str, float]:
-        """What is random, by name."""
+    def noise_limits(self) -> Mapping[str, tuple[float, float]]:
+        """How small and how large each may become."""
 
-    @property
-    def randomness_limits(self) -> Mapping[str, tuple[float, float]]:
-        """How small and how large that may become."""
+    def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
+        """One-step predictions of all trials at each of several points."""
 
-    @property
-    def abreast(self) -> int:
-        """How many points are tried in one run."""
+    def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Improve the noise in place, parameters held; returns by how much that lowers the cost."""
 
-    def told(self, points: Sequence[Point]) -> list[Told]:
-        """Every trial as foretold at each of several points."""
+    def set_noise(self, parameters: Mapping[str, float]) -> None:
+        """Change parameters of the noise, in place."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +86,8 @@ class Reached:
 
     Attributes
     ----------
-    values, randomness
-        Those that moved.
+    values, noise
+        Parameters of the model and of the noise that moved.
     gained
         By how much the cost has fallen.
     held
@@ -106,7 +99,7 @@ class Reached:
     """
 
     values: dict[str, float]
-    randomness: dict[str, float]
+    noise: dict[str, float]
     gained: float
     held: tuple[str, ...]
     left: float
@@ -131,20 +124,20 @@ class _Slopes:
 
 
 class _Scale:
-    """Where parameters and randomness are on an axis each: in `DEVIATIONS` of them, and in logarithms."""
+    """Where parameters and those of the noise are on an axis each: in `DEVIATIONS` of them, and in logarithms."""
 
     def __init__(
-        self, problem: Foretelling, values: Mapping[str, float], sizes: Mapping[str, float], random: bool
+        self, problem: NoisyProblem, values: Mapping[str, float], sizes: Mapping[str, float], with_noise: bool
     ) -> None:
         self.units = {n: DEVIATIONS / size for n, size in sizes.items() if 0.0 < size < math.inf}
-        self.random = dict(problem.randomness) if random else {}
-        limits = problem.randomness_limits if random else {}
+        self.of_noise = dict(problem.noise_parameters) if with_noise else {}
+        limits = problem.noise_limits if with_noise else {}
         self.limits = problem.limits
         ends = [[self.limits[n][k] / u for n, u in self.units.items()] for k in (0, 1)]
         self.low, self.high = (
-            np.array([*e, *(math.log(limits[n][k]) for n in self.random)]) for k, e in enumerate(ends)
+            np.array([*e, *(math.log(limits[n][k]) for n in self.of_noise)]) for k, e in enumerate(ends)
         )
-        here = [*(values[n] / u for n, u in self.units.items()), *(math.log(v) for v in self.random.values())]
+        here = [*(values[n] / u for n, u in self.units.items()), *(math.log(v) for v in self.of_noise.values())]
         self.here = np.clip(here, self.low, self.high)
 
     def values(self, z: np.ndarray) -> dict[str, float]:
@@ -155,29 +148,29 @@ class _Scale:
             out[name] = ends[0] if v <= low else ends[1] if v >= high else float(v * unit)
         return out
 
-    def randomness(self, z: np.ndarray) -> dict[str, float]:
-        """What is random there."""
-        return {n: float(np.exp(v)) for n, v in zip(self.random, z[len(self.units) :], strict=True)}
+    def noise(self, z: np.ndarray) -> dict[str, float]:
+        """Parameters of the noise there."""
+        return {n: float(np.exp(v)) for n, v in zip(self.of_noise, z[len(self.units) :], strict=True)}
 
     def held(self, z: np.ndarray, gradient: np.ndarray) -> np.ndarray:
         """What a bound holds where the cost has a gradient."""
         return np.asarray(((z <= self.low) & (gradient > 0)) | ((z >= self.high) & (gradient < 0)))
 
     def end(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Where a step leads, no longer than `LONGEST_MOVE` of what is random."""
+        """Where a step leads, no longer than `LONGEST_MOVE` in the noise."""
         longest = float(np.abs(step[len(self.units) :]).max(initial=0.0))
         return np.asarray(np.clip(z - step * min(1.0, LONGEST_MOVE / max(longest, 1e-300)), self.low, self.high))
 
 
-def climb(
-    problem: Foretelling,
+def fisher_scoring(
+    problem: NoisyProblem,
     values: Mapping[str, float],
     unknowns: Unknowns,
     sizes: Mapping[str, float],
     steps: int,
-    random: bool = True,
+    with_noise: bool = True,
 ) -> Reached:
-    """Go down the cost, until what a step has missed of its promise is `LITTLE`: no further one gains more.
+    """Lower the cost, until what a step has missed of its predicted gain is `LITTLE`: no further one gains more.
 
     Parameters
     ----------
@@ -187,22 +180,22 @@ def climb(
         Of each parameter that moves, one over its deviation as far as it is known with gains as they are.
     steps
         At most.
-    random
-        Whether what is random moves.
+    with_noise
+        Whether the noise moves.
     """
-    scale = _Scale(problem, values, sizes, random)
+    scale = _Scale(problem, values, sizes, with_noise)
 
-    def at_all(many: np.ndarray) -> list[Told]:
-        return problem.told([({**values, **scale.values(z)}, unknowns, scale.randomness(z)) for z in many])
+    def at_all(many: np.ndarray) -> list[Evaluation]:
+        return problem.evaluate([({**values, **scale.values(z)}, unknowns, scale.noise(z)) for z in many])
 
-    return _Climb(scale, at_all, problem.abreast).run(steps)
+    return _Scoring(scale, at_all, problem.batch).run(steps)
 
 
-class _Climb:
+class _Scoring:
     """A way down the cost, from where a scale begins."""
 
-    def __init__(self, scale: _Scale, at_all: Callable[[np.ndarray], list[Told]], abreast: int) -> None:
-        self.scale, self.at_all, self.abreast = scale, at_all, abreast
+    def __init__(self, scale: _Scale, at_all: Callable[[np.ndarray], list[Evaluation]], batch: int) -> None:
+        self.scale, self.at_all, self.batch = scale, at_all, batch
         self.z, self.lengths, self.damping = scale.here, list(STEPS), 1e-3
         self.now, *self.moved = at_all(np.vstack([self.z, self._beside()]))
         self.held, self.left = np.zeros(len(self.z), dtype=bool), 0.0
@@ -227,7 +220,7 @@ class _Climb:
                 self.moved = self.at_all(self._beside())
         held = tuple(n for n, h in zip(scale.units, self.held, strict=False) if h)
         fallen = begin - self.now.cost if math.isfinite(begin) else 0.0
-        return Reached(scale.values(self.z), scale.randomness(self.z), fallen, held, self.left, done)
+        return Reached(scale.values(self.z), scale.noise(self.z), fallen, held, self.left, done)
 
     def _step(self) -> bool:
         """Go down once, or look at longer differences; True where there is nothing left to gain."""
@@ -241,7 +234,7 @@ class _Climb:
             return True
         dampings = self.damping * 10.0 ** np.arange(1 + len(self.z))
         ends = np.array([self.scale.end(self.z, slopes.step(d)) for d in dampings])
-        found = _first_below(self.now, ends, self.at_all, self.abreast)
+        found = _first_below(self.now, ends, self.at_all, self.batch)
         if found is None:
             done = self.left < WORTH or len(self.lengths) == 1
             self.lengths = self.lengths[1:] or self.lengths
@@ -254,26 +247,26 @@ class _Climb:
         return min(gained, self.left) < LITTLE
 
     def _leap(self) -> bool:
-        """Go as far as a step may in one logarithm of what is random; False if that leads nowhere.
+        """Go as far as a step may in one logarithm of the noise; False if that leads nowhere.
 
         Where a prediction goes another way at every change of its gains, as of friction that flips, slopes are of that.
         """
         axes = np.eye(len(self.z))[len(self.scale.units) :] * LONGEST_MOVE
         ends = np.array([np.clip(self.z + m, self.scale.low, self.scale.high) for m in (*axes, *-axes)])
-        told = [one for k in range(0, len(ends), self.abreast) for one in self.at_all(ends[k : k + self.abreast])]
-        best = min(range(len(told)), key=lambda k: told[k].cost, default=None)
-        if best is None or not told[best].cost < self.now.cost - WORTH:
+        tried = [one for k in range(0, len(ends), self.batch) for one in self.at_all(ends[k : k + self.batch])]
+        best = min(range(len(tried)), key=lambda k: tried[k].cost, default=None)
+        if best is None or not tried[best].cost < self.now.cost - WORTH:
             return False
-        self.z, self.now, self.lengths = ends[best], told[best], list(STEPS)
+        self.z, self.now, self.lengths = ends[best], tried[best], list(STEPS)
         return True
 
 
 def _first_below(
-    now: Told, ends: np.ndarray, at_all: Callable[[np.ndarray], list[Told]], abreast: int
-) -> tuple[int, np.ndarray, Told] | None:
+    now: Evaluation, ends: np.ndarray, at_all: Callable[[np.ndarray], list[Evaluation]], batch: int
+) -> tuple[int, np.ndarray, Evaluation] | None:
     """The lowest of the first points in a run that has one below: its place, itself, and what it tells."""
-    for k in range(0, len(ends), abreast):
-        after = at_all(ends[k : k + abreast])
+    for k in range(0, len(ends), batch):
+        after = at_all(ends[k : k + batch])
         best = int(np.argmin([one.cost for one in after]))
         if after[best].cost < now.cost:
             return k + best, ends[k + best], after[best]
@@ -281,7 +274,7 @@ def _first_below(
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _scored(now: Told, moved: Sequence[Told], widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _scored(now: Evaluation, moved: Sequence[Evaluation], widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gradient and expected information of half the cost, from differences of such widths; see the module."""
     e, v, width = now.innovations, now.variances, widths[:, None]
     de = (np.array([m.innovations for m in moved]) - e) / width

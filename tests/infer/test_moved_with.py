@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fes_pin.identify.covariance import moved_with
+from fes_pin.infer.covariance import moved_with
 
 
 def test_it_is_the_least_squares_fit_with_those_held():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fes_pin.identify.covariance import widened
+from fes_pin.infer.covariance import widened
 
 PIECES, EACH = 40, 100
 

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.identify.descent import UNIDENTIFIED
-from fes_pin.identify.problem import NormalEquations
+from fes_pin.infer.problem import NormalEquations
+
+UNIDENTIFIED = 1e-10
+"""Eigenvalue of the scaled information matrix, relative to the largest, below which a direction is not identified."""
 
 
 def covariance_of(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:

@@ -1,0 +1,86 @@
+"""The maximum of a likelihood with noise: parameters and noise by alternating maximisation, and then together.
+
+Parameters move by Gauss-Newton steps with the filter's gains as they are (`infer.optimize`), the noise by Fisher
+scoring (`infer.scoring`), until neither gains. The likelihood demands gains that change with the parameters; the two
+are one only where a model is right, and it is the first that lead there from afar. Where their derivatives still
+predict a gain that none of their steps keeps, parameters and noise move together by Fisher scoring. Noise begins small:
+begun large it explains all that the model gets wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.infer.covariance import covariance_of
+from fes_pin.infer.optimize import WORTH
+from fes_pin.infer.optimum import Optimum, minimise
+from fes_pin.infer.problem import Unknowns, normal_equations
+from fes_pin.infer.scatter import at_rest
+from fes_pin.infer.scoring import LITTLE, NoisyProblem, fisher_scoring
+
+ROUNDS = 12
+"""Alternations of parameters and noise, at most; and steps of both together."""
+ITERATIONS = 6
+"""Steps of the parameters before the noise moves again."""
+
+
+def alternate(
+    problem: NoisyProblem,
+    start: Mapping[str, float],
+    unknowns: Unknowns | None = None,
+    rounds: int = ROUNDS,
+    iterations: int = ITERATIONS,
+) -> Optimum:
+    """Fit parameters and noise in turn, and together where that leads further.
+
+    Returns
+    -------
+    Optimum
+        `sse` is twice the negative log-likelihood. `converged` is False where the rounds ran out. The noise is the
+        problem's.
+    """
+    fitted = minimise(problem, start, unknowns, iterations)
+    for _ in range(rounds):
+        before, moved = fitted.sse, problem.noise_step(fitted.values, fitted.unknowns) >= LITTLE
+        if moved or not fitted.converged:
+            fitted = minimise(problem, fitted.values, fitted.unknowns, iterations)
+        goes_on = fitted.gradient_norm > WORTH and not problem.is_final
+        if fitted.sse < before - (WORTH if goes_on else LITTLE):
+            continue
+        return together(problem, fitted.values, fitted.unknowns) if goes_on else fitted
+    return replace(fitted, converged=False)
+
+
+def together(
+    problem: NoisyProblem, start: Mapping[str, float], unknowns: Unknowns | None = None, with_noise: bool = True
+) -> Optimum:
+    """Fit parameters and noise together, from near their end.
+
+    Parameters
+    ----------
+    with_noise
+        Whether the noise moves.
+    """
+    values, own = dict(start), len(problem.unknown_names)
+    for _ in range(ROUNDS if own else 1):
+        fitted = minimise(problem, values, unknowns, ROUNDS if own else 0)
+        hessian = normal_equations(fitted.parts).hessian
+        sizes = dict(zip(fitted.free, np.sqrt(np.diag(hessian)), strict=True))
+        reached = fisher_scoring(problem, fitted.values, fitted.unknowns, sizes, ROUNDS, with_noise)
+        problem.set_noise(reached.noise)
+        values, unknowns = {**fitted.values, **reached.values}, fitted.unknowns
+        if reached.gained < LITTLE:
+            break
+    fitted = minimise(problem, values, unknowns, 0)
+    free = np.array([n not in reached.held for n in fitted.free])
+    return replace(
+        fitted,
+        converged=reached.converged,
+        gradient_norm=reached.left,
+        at_bound=reached.held,
+        covariance=covariance_of(normal_equations(at_rest(fitted.parts)).hessian, free),
+        together=True,
+    )

@@ -1,0 +1,170 @@
+"""Where a fit has ended: values with their covariance, and the derivatives there that everything else is made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fes_pin.infer.covariance import covariance_of, promised_gain
+from fes_pin.infer.levels import CONFIDENCE_95, PARAMETER_PRICE
+from fes_pin.infer.optimize import Descent
+from fes_pin.infer.problem import Linearized, Problem, Unknowns, normal_equations
+
+MAX_ITERATIONS = 60
+"""Steps of a fit, at most; what has not converged then says so."""
+RISE_AT_A_BOUND = 1.6448536269514722**2
+"""The normal's 95 % quantile, squared: twice the log-likelihood at the end of a one-sided interval."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Optimum:
+    """The end of a fit.
+
+    Attributes
+    ----------
+    free
+        Names of the fitted parameters.
+    parameters
+        Value of every parameter by name, of those that were not fitted too.
+    covariance
+        Shape (free, free); infinite where the data identify nothing, 0 of what is at its bound.
+    at_bound
+        Names of the fitted parameters that ended at a bound, and would go beyond it.
+    sse
+        Sum of squared whitened residuals and of their log-determinants: minus twice the log-likelihood, but for a
+        constant.
+    converged
+        False where the steps ran out.
+    gradient_norm
+        Largest predicted gain of a step of a single free parameter, in twice the log-likelihood: 0 at an optimum.
+    unknowns
+        Of each trial.
+    parts
+        Whitened residuals and sensitivities at the optimum, by trial.
+    together
+        True where the last steps moved parameters and noise together: derivatives for constant noise lead no further.
+    """
+
+    free: tuple[str, ...]
+    parameters: Mapping[str, float]
+    covariance: np.ndarray
+    at_bound: tuple[str, ...]
+    sse: float
+    converged: bool
+    gradient_norm: float
+    unknowns: Unknowns
+    parts: Sequence[Linearized]
+    together: bool = False
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter by name."""
+        return dict(self.parameters)
+
+    @property
+    def samples(self) -> int:
+        """Number of whitened residuals."""
+        return sum(len(p.residual) for p in self.parts)
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of freedom of the model."""
+        return len(self.free)
+
+    @property
+    def price(self) -> float:
+        """Twice the negative log-likelihood, with a penalty for each degree of freedom."""
+        return self.sse + PARAMETER_PRICE * self.degrees
+
+    def place(self, name: str) -> int:
+        """Where a fitted parameter stands in `free` and `covariance`."""
+        return self.free.index(name)
+
+    def std(self, name: str) -> float:
+        """Standard deviation of a fitted parameter: infinite where the data say nothing of it, NaN at its bound.
+
+        An estimate at its bound does not scatter about it; `reach` says how far the parameter may be from there.
+        """
+        variance = self.covariance[(k := self.place(name)), k]
+        return math.nan if name in self.at_bound else float(np.sqrt(variance))
+
+    def reach(self, name: str) -> float:
+        """Half of a parameter's 95 % interval, all of it at a bound, by the parabola that the fit ended on."""
+        if name not in self.at_bound:
+            return CONFIDENCE_95 * self.std(name)
+        return reach_at_bound(self.parts, self.place(name), [n in self.at_bound for n in self.free])
+
+    def within(self, name: str, low: float, high: float) -> tuple[float, float]:
+        """A parameter's 95 % interval by the parabola that the fit ended on, cut at these bounds."""
+        value, reach = self.parameters[name], self.reach(name)
+        return max(value - reach, low), min(value + reach, high)
+
+
+def minimise(
+    problem: Problem,
+    start: Mapping[str, float],
+    unknowns: Unknowns | None = None,
+    max_iterations: int = MAX_ITERATIONS,
+    parts: Sequence[Linearized] | None = None,
+) -> Optimum:
+    """Fit a problem from a start value of every parameter.
+
+    Parameters
+    ----------
+    unknowns
+        Of each trial; by default the problem's own first guess.
+    max_iterations
+        Steps, at most.
+    parts
+        The problem linearized at the start, where that is known already.
+
+    Returns
+    -------
+    Optimum
+        Also if it did not converge: then `converged` is False.
+    """
+    search = Descent(problem, start, unknowns, parts)
+    done = search.run(max_iterations)
+    with np.errstate(all="ignore"):
+        system = normal_equations(search.parts)
+        free = search.free_now(system.gradient)
+        decrement = promised_gain(system.hessian, system.gradient, free)
+    return Optimum(
+        free=problem.free,
+        parameters=search.values(search.x),
+        covariance=covariance_of(system.hessian, free),
+        at_bound=tuple(n for n, f in zip(problem.free, free, strict=True) if not f),
+        sse=search.sse,
+        converged=done,
+        gradient_norm=decrement,
+        unknowns=search.unknowns,
+        parts=tuple(search.parts),
+    )
+
+
+def reach_at_bound(parts: Sequence[Linearized], k: int, held: Sequence[bool]) -> float:
+    """How far a parameter at its bound may go by the parabola that the fit ended on; infinite if nothing is felt of it.
+
+    With g and h the slope and curvature of half the sum of squares, what else moves gone with it: the s with
+    2 |g| s + h s^2 = 2.71.
+
+    Parameters
+    ----------
+    parts
+        Of the fit, linearized at its end.
+    k
+        Place of the parameter.
+    held
+        Which parameters stand at a bound.
+    """
+    system = normal_equations(parts)
+    free = np.array([not at or j == k for j, at in enumerate(held)])
+    covariance = covariance_of(system.hessian, free)
+    if not np.isfinite(covariance[k, k]):
+        return math.inf
+    known = np.isfinite(np.diag(covariance))
+    slope = abs(float(covariance[k, known] @ system.gradient[known])) / covariance[k, k]
+    return float(RISE_AT_A_BOUND / (slope + math.sqrt(slope**2 + RISE_AT_A_BOUND / covariance[k, k])))
