@@ -16,6 +16,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
+from fes_pin.diagnosis.decide.claims import FORM_SHARE
 from fes_pin.diagnosis.decide.gains_ahead import Fold, gains_of
 from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
@@ -28,19 +29,12 @@ from fes_pin.diagnosis.driven_held_out import (
     make_folds,
     with_choices,
 )
-from fes_pin.diagnosis.driven_refused import (
-    UNMOVED,
-    Refused,
-    is_moved_by_what_is_recorded,
-    refused_from,
-    share_in,
-    unsupported,
-    with_refused_causes,
-)
+from fes_pin.diagnosis.driven_refused import UNMOVED, is_moved_by_what_is_recorded, with_refused_causes
 from fes_pin.diagnosis.errors_ahead import (
     Ahead,
     AheadErrors,
     RandomPart,
+    are_large,
     errors_ahead,
     random_parts,
 )
@@ -54,9 +48,95 @@ from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_reading
-from fes_pin.infer.held_out import Evidence, Gain
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
+from fes_pin.infer.verdict import State, Verdict, Weighed, share_in, word_of
 from fes_pin.models.stage import Effect
+
+
+@dataclass(frozen=True)
+class DrivenWeighed(Weighed):
+    """What trials say of a set of causes; gains are over the horizon.
+
+    Attributes
+    ----------
+    folds
+        Trials that are held out, and fits without them; none where none can be.
+    random
+        What acts at random beside the set.
+    """
+
+    lack_of_fit: Remainder
+    folds: Sequence[Fold]
+    random: tuple[RandomPart, ...]
+
+
+Judgement = State[Fit, DrivenWeighed]
+
+
+class DrivenVerdict(Verdict[Fit, DrivenWeighed]):
+    """How it is judged what a search by the likelihood found.
+
+    Trials that took no part speak for a cause, or not, by `speaks_for`, with errors over the horizon: several forms
+    together, none of them quite right, come near to anything one sample ahead.
+
+    Parameters
+    ----------
+    search
+        That has run.
+    test
+        Trials that the study itself holds out.
+    seed
+        Of critical values.
+    """
+
+    def __init__(self, search: LikelihoodSearch, test: Sequence[Trial], seed: int) -> None:
+        super().__init__(search)
+        self.models, self.test, self.seed = search.models, tuple(test), seed
+        self.horizon_s = self.models.horizon_s
+        self.again, self._alike = Again(afresh), Again(as_random_as_in_all)
+        self._chosen: dict[int, tuple[Found, list[Fit]]] = {}
+
+    def weigh(self, found: Found) -> DrivenWeighed:
+        """What held-out trials, and the tests of lack of fit, say of a set."""
+        folds = make_folds(found, self.models.trials, self.test, self.again)
+        within = folds or [Fold(found.nominal, found.best, found.without, self.models.trials)]
+        return DrivenWeighed(
+            gains=gains_of(within, found.without, self.horizon_s, self.seed),
+            evidence=evidence_of(folds, found, self._alike) if folds else {},
+            lack_of_fit=driven_remainder(found.best, self.seed),
+            folds=folds,
+            random=random_parts(found.best),
+        )
+
+    def unsupported(self, state: Judgement) -> list[str]:
+        """Causes that trials which took no part do not speak for.
+
+        Where something acts that no cause explains, one that explains no more than an error of form may be of that.
+        """
+        gains = state.weighed.gains
+        if are_large(state.weighed.random) and (form := [n for n in gains if gains[n].low < 100.0 * FORM_SHARE]):
+            return form
+        return super().unsupported(state)
+
+    def lack_of_fit(self, state: Judgement) -> Remainder:
+        """What is left: by the features, or a random effort that is too large, or a cause that was refused."""
+        stages = {e.name: str(e.stage) for e in self.models.library.effects}
+        return with_refused_causes(state.weighed.lack_of_fit, state.weighed.random, state.refused, stages)
+
+    def is_rarely_chosen(self, state: Judgement, name: str) -> bool:
+        """Whether most folds choose neither a cause nor what cannot be told from it."""
+        return not is_chosen(share_of(self.chosen(state), _alike(state.found, name)))
+
+    def chosen(self, state: Judgement) -> list[Fit]:
+        """For each fold, the fit to all trials of the set that is chosen without its own; none where none are made."""
+        found, folds = state.found, state.weighed.folds
+        if not folds or not folds[0].within:
+            return []
+        if id(found) not in self._chosen:
+            fits = {**self.search.possible(), names_of(found.best): found.best}
+            choose = ChosenAgain(fits, self.search.earns)
+            self._chosen[id(found)] = found, [choose.without(out) for out in folds_of(self.models.trials)]
+        return self._chosen[id(found)][1]
 
 
 @dataclass(frozen=True)
@@ -65,16 +145,10 @@ class Judged:
 
     Attributes
     ----------
-    found
-        Of the search.
+    state
+        That no claim objects to.
     left
         What is left.
-    refused
-        Causes that were certain in the fit, but that held-out trials did not bear out.
-    evidence
-        Of each cause, from trials held out.
-    gains
-        Of each cause, over the horizon on held-out trials; in sample where nothing could be held out.
     ahead
         Errors of the nominal and of the extended model on the trials that were fitted.
     held_out_ahead
@@ -83,107 +157,58 @@ class Judged:
         For each fold, the fit to all trials of the set that is chosen without its own.
     reason
         Why no cause may be named, if none may.
-    again
-        The extended model fitted again without each part of the trials that is held out.
     """
 
-    found: Found
+    state: Judgement
     left: Remainder
-    refused: dict[str, Refused]
-    evidence: dict[str, Evidence]
-    gains: dict[str, Gain]
     ahead: tuple[Ahead, Ahead]
     held_out_ahead: tuple[Ahead, Ahead] | None
     horizon_s: float
-    random: tuple[RandomPart, ...]
-    ceiling_percent: float
     chosen: tuple[Fit, ...]
     reason: str | None
-    again: tuple[Fit, ...]
 
-    def gain_fit(self, name: str) -> float:
-        """Share, in percent, of what the extended model adds to the log-likelihood that is lost without a cause."""
-        return 100.0 * share_in(self.found, name)
+    @property
+    def found(self) -> Found:
+        """The set, its rivals, and the set less each cause."""
+        return self.state.found
+
+    @property
+    def again(self) -> tuple[Fit, ...]:
+        """The extended model fitted again without each part of the trials that is held out."""
+        return tuple(f.best for f in self.state.weighed.folds if f.within)
 
 
-def judge_driven(
-    search: LikelihoodSearch,
-    found: Found,
-    train: Sequence[Trial],
-    test: Sequence[Trial],
-    seed: int,
-) -> Judged:
-    """Hold out, and judge what is left.
-
-    Trials that took no part speak for a cause, or not, by the rule of rigs that are simulated freely (`speaks_for`),
-    with errors over the horizon: several forms together, none of them quite right, come near to anything one sample
-    ahead. Before it is said that something is left, other forms of the causes are tried.
+def judge_driven(search: LikelihoodSearch, found: Found, test: Sequence[Trial], seed: int) -> Judged:
+    """Hold out, and judge what is left; see `DrivenVerdict` and `infer.verdict`.
 
     Parameters
     ----------
     search, found
         A search that has run, and what it found.
-    train, test
-        Trials that were fitted, and those that the study itself holds out.
+    test
+        Trials that the study itself holds out.
     seed
         Of critical values.
     """
-    refused: dict[str, Refused] = {}
     reason = None if is_moved_by_what_is_recorded(found.best) else UNMOVED
-    found = search.result(()) if reason else found
-    horizon = search.models.horizon_s
-    settled, formed = frozenset(found.without), set[frozenset[str]]()
-    again, alike = Again(afresh), Again(as_random_as_in_all)
-    while True:
-        folds = make_folds(found, train, test, again)
-        evidence = evidence_of(folds, found, alike) if folds else {}
-        within = folds or [Fold(found.nominal, found.best, found.without, tuple(train))]
-        gains = gains_of(within, found.without, horizon, seed)
-        seen, random = driven_remainder(found.best, seed), random_parts(found.best)
-        names = frozenset(found.without)
-        if weak := unsupported(evidence, gains, seen, random):
-            weakest = min(weak, key=lambda n: gains[n].low)
-            refused[weakest] = refused_from(found, weakest, gains[weakest].percent)
-            found = search.result(tuple(sorted(names - {weakest})))
-            continue
-        if names != settled:
-            found, settled = search.settle(tuple(sorted(names)), {n: r.p_value for n, r in refused.items()}), names
-            continue
-        chosen = _chosen(search, found, train) if folds and folds[0].within and not reason else []
-        if rare := [n for n in names if not is_chosen(share_of(chosen, _alike(found, n)))]:
-            rarest = min(rare, key=lambda n: gains[n].low)
-            refused[rarest] = refused_from(found, rarest, gains[rarest].percent)
-            found = search.result(tuple(sorted(names - {rarest})))
-            continue
-        left = with_refused_causes(seen, random, refused)
-        if not left.unexplained or names in formed or not search.form_otherwise(tuple(sorted(names))):
-            break
-        formed.add(names)
-        refused, found = {}, search.settle(tuple(sorted(names)))  # what was refused was so beside another form
-        settled = frozenset(found.without)
+    verdict = DrivenVerdict(search, test, seed)
+    state = verdict.of(search.result(()) if reason else found)
+    found, train = state.found, search.models.trials
     falling = falls(found.best.model, train)
-    folds = with_choices(folds, chosen, again) if chosen and found.without else folds
+    chosen = [] if reason else verdict.chosen(state)
+    folds = (
+        with_choices(state.weighed.folds, chosen, verdict.again) if chosen and found.without else state.weighed.folds
+    )
+    one, other = (errors_ahead([(f, train)], verdict.horizon_s, falling) for f in (found.nominal, found.best))
     return Judged(
-        found=found,
-        left=left,
-        refused=refused,
-        evidence=evidence,
-        gains=gains,
-        ahead=tuple(errors_ahead([(f, train)], horizon, falling) for f in (found.nominal, found.best)),  # type: ignore[arg-type]
-        held_out_ahead=held_errors_ahead(folds, horizon, falling),
-        horizon_s=horizon,
-        random=random,
-        ceiling_percent=_ceiling(found.best),
+        state=state,
+        left=verdict.lack_of_fit(state),
+        ahead=(one, other),
+        held_out_ahead=held_errors_ahead(folds, verdict.horizon_s, falling),
+        horizon_s=verdict.horizon_s,
         chosen=tuple(chosen),
         reason=reason,
-        again=tuple(f.best for f in folds if f.within),
     )
-
-
-def _chosen(search: LikelihoodSearch, found: Found, train: Sequence[Trial]) -> list[Fit]:
-    """What each fold would have chosen without its trials, fitted to all."""
-    choose = ChosenAgain({**search.possible(), names_of(found.best): found.best}, search.earns)
-    return [choose.without(out) for out in folds_of(train)]
 
 
 def _alike(found: Found, name: str) -> tuple[str, ...]:
@@ -204,11 +229,11 @@ def driven_diagnosis(
     study: Study, search: LikelihoodSearch, found: Found, trials: tuple[list[Trial], list[Trial]], seed: int
 ) -> Diagnosis:
     """The diagnosis of a rig whose effort answers what is read, from a search that has run."""
-    judged = likeliest = judge_driven(search, found, search.models.trials, trials[1], seed)
+    judged = likeliest = judge_driven(search, found, trials[1], seed)
     fresh = beside_what_is_new(search, judged.found)
     again = None if fresh is None else judged_again(search, judged.found, fresh)
     if again is not None:
-        judged = _foretelling_more(judge_driven(*again, search.models.trials, trials[1], seed), judged)
+        judged = _foretelling_more(judge_driven(*again, trials[1], seed), judged)
     found, left = judged.found, judged.left
     best = as_wide_as_trials_differ(with_honest_intervals(found.best), judged.again)
     other = fresh if judged.found is likeliest.found else likeliest.found.best
@@ -229,7 +254,7 @@ def driven_diagnosis(
     fitted, held = judged.ahead, judged.held_out_ahead
     return Diagnosis(
         study=study,
-        verdict="causes_found" if causes else ("unexplained" if left.unexplained else "adequate"),
+        verdict=word_of(bool(causes), left),
         causes=tuple(causes),
         remainder=left,
         absorbed=absorbed(searched, search.models.library.silent()),
@@ -237,14 +262,14 @@ def driven_diagnosis(
         extended=best,
         nominal_error=(fitted[0].free, held[0].free if held else None),
         extended_error=(fitted[1].free, held[1].free if held else None),
-        ceiling_percent=judged.ceiling_percent,
+        ceiling_percent=_ceiling(found.best),
         next_experiment=experiment(searched, causes, study),
         ranking=ranking(searched),
         held_out_by=SEPARATE if trials[1] else CROSS_VALIDATED if held else NOTHING,
         left_out={},
         wall_s=0.0,
         warnings=_words(best, trials[0]),
-        random=judged.random,
+        random=judged.state.weighed.random,
         reason=judged.reason,
         ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
     )
@@ -281,8 +306,8 @@ def _cause(judged: Judged, one: Effect, best: Fit) -> Cause:
         parameters=estimates(best, name),
         equivalents=alike[1:],
         p_value=found.p_values[name],
-        gain_fit=judged.gain_fit(name),
-        gain_held_out=judged.gains[name],
-        evidence=judged.evidence.get(name),
+        gain_fit=100.0 * share_in(found, name),
+        gain_held_out=judged.state.weighed.gains[name],
+        evidence=judged.state.weighed.evidence.get(name),
         chosen_again=share_of(judged.chosen, alike),
     )

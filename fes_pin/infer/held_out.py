@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,28 @@ RESAMPLES = 2000
 """Bootstrap draws of a gain: the standard error of its 95 % bounds is 1.5 % of their distance, of a normal gain."""
 FAR = 1e6
 """Whitened residuals count as no larger, in standard deviations."""
+
+
+FOLDS = 5
+"""Parts that units are dealt to: each is predicted by the other four, which hold most of what is known."""
+
+
+def deal(order: Sequence[int], groups: Sequence[Hashable] | None = None, count: int = FOLDS) -> list[list[int]]:
+    """Units to hold out together, by their numbers; each group is dealt round, and stays in what is fitted.
+
+    A unit that is alone in its group is never held out: the others say nothing of it.
+
+    Parameters
+    ----------
+    order
+        Numbers of the units as they are dealt: neighbours come to different folds.
+    groups
+        Of each unit, by its number; by default all are of one.
+    """
+    of = {i: None if groups is None else groups[i] for i in order}
+    sizes = Counter(of.values())
+    dealt = [i for g in sizes for i in order if of[i] == g and sizes[g] > 1]
+    return [sorted(dealt[k::count]) for k in range(min(count, len(dealt)))]
 
 
 def percent_of_spread(squares: ArrayLike, around: ArrayLike) -> float:

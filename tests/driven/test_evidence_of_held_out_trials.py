@@ -1,6 +1,7 @@
 """What trials held out say of the causes of a driven rig, and what a cause that they refuse says of the rig."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,17 +11,23 @@ from scipy.signal import lfilter
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.driven_refused import Refused, unsupported, with_refused_causes
+from fes_pin.diagnosis.driven import DrivenVerdict, DrivenWeighed
+from fes_pin.diagnosis.driven_refused import with_refused_causes
 from fes_pin.diagnosis.errors_ahead import RandomPart
 from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.infer.held_out import Evidence, Gain
+from fes_pin.infer.verdict import Refused, State
 
 NOTHING = Remainder(False, 0.5, None)
 LITTLE = (RandomPart("effort", 0.1, 0.1, 0.01),)
 
 
-def gain(low):
-    return Gain(low + 1.0, low, low + 2.0)
+def unsupported(evidence, low, random):
+    """What is refused of a friction with the low end of its gain."""
+    verdict = DrivenVerdict(SimpleNamespace(models=SimpleNamespace(horizon_s=0.3)), (), 0)
+    gains = {"coulomb_friction": Gain(low + 1.0, low, low + 2.0)}
+    found = SimpleNamespace(without={"coulomb_friction": None})
+    return verdict.unsupported(State(found, DrivenWeighed(gains, evidence, NOTHING, (), random), {}, frozenset(gains)))
 
 
 @pytest.mark.parametrize(
@@ -29,28 +36,15 @@ def gain(low):
     ids=["certain", "another's error of form", "not certain", "nothing over the horizon"],
 )
 def test_a_refused_cause_is_something_where_it_is_certain_and_no_error_of_form(p_value, share, percent, unexplained):
-    left = with_refused_causes(NOTHING, LITTLE, {"sensor_lag": Refused("sensor", p_value, share, percent)})
+    refused = Refused(p_value, share, Gain(percent, percent, percent))
+    left = with_refused_causes(NOTHING, LITTLE, {"sensor_lag": refused}, {"sensor_lag": "sensor"})
     assert left.unexplained == unexplained
     assert left.where == ("sensor" if unexplained else None)
 
 
 def test_a_large_random_effort_is_something_whatever_was_refused():
-    left = with_refused_causes(NOTHING, (RandomPart("effort", 1.0, 0.1, 0.4),), {})
+    left = with_refused_causes(NOTHING, (RandomPart("effort", 1.0, 0.1, 0.4),), {}, {})
     assert left.unexplained and left.where == "effort"
-
-
-def test_of_a_single_trial_a_cause_beside_others_gains_something_over_the_horizon():
-    """Before, a torque that repeats was named beside friction for 0.00 % of the error."""
-    gains = {"coulomb_friction": gain(40.0), "periodic_torque": gain(0.0)}
-    assert unsupported({}, gains, NOTHING, ()) == ["periodic_torque"]
-    assert unsupported({}, {"periodic_torque": gain(0.0)}, NOTHING, ()) == []
-
-
-def test_of_several_trials_a_cause_beside_others_needs_their_likelihood_too():
-    gains = {"coulomb_friction": gain(40.0), "sensor_lag": gain(2.0)}
-    evidence = {"coulomb_friction": Evidence(500.0, 500.0), "sensor_lag": Evidence(-3.0, 0.0)}
-    assert unsupported(evidence, gains, NOTHING, ()) == ["sensor_lag"]
-    assert unsupported(evidence, gains, Remainder(True, 1e-9, "effort"), ()) == []
 
 
 @pytest.mark.parametrize(("low", "refused"), [(2.0, True), (5.9, True), (6.5, False)])
@@ -60,8 +54,8 @@ def test_beside_what_no_cause_explains_a_cause_is_more_than_an_error_of_form(low
     large = (RandomPart("effort", 1.0, 1.1, 0.32),)
     evidence = {"coulomb_friction": Evidence(500.0, 500.0)}
     for known in (evidence, {}):
-        assert (unsupported(known, {"coulomb_friction": gain(low)}, NOTHING, large) != []) is refused
-        assert unsupported(known, {"coulomb_friction": gain(low)}, NOTHING, LITTLE) == []
+        assert (unsupported(known, low, large) != []) is refused
+        assert unsupported(known, low, LITTLE) == []
 
 
 def test_one_trial_unlike_the_others_silences_no_cause(tmp_path):

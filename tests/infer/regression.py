@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import SimpleNamespace
 
 import numpy as np
 
 from fes_pin.infer.distributions import chi2_tail, f_tail
 from fes_pin.infer.family import Family
 from fes_pin.infer.fits import Candidate, FittedSets
+from fes_pin.infer.held_out import Errors, Evidence, added_likelihood, deal, held_out_gain
 from fes_pin.infer.levels import PARAMETER_PRICE, SEPARABLE
-from fes_pin.infer.search import Names
+from fes_pin.infer.search import Names, SearchResult
+from fes_pin.infer.verdict import Verdict, Weighed
 
 COUNT = 60
 """Samples of a run."""
@@ -63,6 +66,13 @@ class Regression(FittedSets[Line, None]):
         covariance = np.linalg.pinv(x.T @ x)
         return Line(float(left @ left), len(names), values[1:], covariance[1:, 1:], left.reshape(self.runs.shape))
 
+    def left(self, names: Names, held: np.ndarray) -> np.ndarray:
+        """What runs that are held out leave of a set that is fitted to the others."""
+        x = np.stack([np.ones(self.runs.size), *(self.columns[n] for n in names)], axis=1)
+        rows = np.repeat(held, COUNT)
+        values, *_ = np.linalg.lstsq(x[~rows], self.runs[~held].ravel(), rcond=None)
+        return self.runs[held] - (x[rows] @ values).reshape(-1, COUNT)
+
     def nominal(self) -> Line:
         self.fits[()] = self.fit(())
         return self.fits[()]
@@ -83,12 +93,12 @@ class Regression(FittedSets[Line, None]):
         return {n: float((c @ left) ** 2 / (c @ c)) for n, c in self._projected(names).items() if c @ c > 1e-9}
 
     def candidates(self, base: Line) -> dict[str, Candidate[None]]:
-        return {n: Candidate(score, None) for n, score in self._scores(self._names(base)).items()}
+        return {n: Candidate(score, None) for n, score in self._scores(self.names(base)).items()}
 
     def begin(self, base: Line, starts: Mapping[Names, None]) -> dict[Names, Line]:
         return {names: self.fit(names) for names in starts}
 
-    def _names(self, fitted: Line) -> Names:
+    def names(self, fitted: Line) -> Names:
         return next(n for n, f in self.fits.items() if f is fitted)
 
     def without(self, names: Names, name: str) -> Line:
@@ -96,7 +106,7 @@ class Regression(FittedSets[Line, None]):
         return self.fits.setdefault(rest, self.fit(rest))
 
     def extension_p_value(self, fitted: Line) -> float:
-        scores = self._scores(self._names(fitted)).values()
+        scores = self._scores(self.names(fitted)).values()
         return self.family.adjusted(min((float(chi2_tail(s, 1)) for s in scores), default=1.0))
 
     def predicts_better(self, larger: Line, smaller: Line) -> bool:
@@ -110,6 +120,25 @@ class Regression(FittedSets[Line, None]):
         free = COUNT * len(sizes) - fitted.degrees - 1
         pure = fitted.sse - between
         return f_tail((between / free) / (pure / (self.runs.size - COUNT * len(sizes))), free, self.runs.size) > 0.01
+
+
+class RegressionVerdict(Verdict[Line, Weighed]):
+    """Runs are held out in turn, every group staying in what is fitted; what is left is judged as the search does."""
+
+    def weigh(self, found: SearchResult[Line]) -> Weighed:
+        models, sets = self.search.models, {"": found.nominal, "+": found.best, **found.without}
+        runs, groups = models.runs, models.groups
+        squares, evidence = {n: [] for n in sets}, {n: Evidence(0.0, 0.0) for n in found.without}
+        for out in deal(range(len(runs)), groups.tolist()):
+            held = np.isin(np.arange(len(runs)), out)
+            left = {n: models.left(models.names(f), held) for n, f in sets.items()}
+            for n, rows in left.items():
+                squares[n] += np.sum(rows**2, axis=1).tolist()
+            evidence = {n: e + added_likelihood(left[n].ravel(), left["+"].ravel()) for n, e in evidence.items()}
+        spread, noise = np.full(len(squares[""]), COUNT), np.full(len(squares[""]), float(COUNT))
+        errors = {n: Errors(np.array(v), spread, noise) for n, v in squares.items()}
+        gains = {n: held_out_gain(errors[""], errors[n], errors["+"], seed=0) for n in found.without}
+        return Weighed(gains, evidence, SimpleNamespace(unexplained=not models.leaves_noise(found.best)))
 
 
 def equivalents(best: Line, rivals: list[Line], fits: dict[Names, Line]) -> list[Names]:

@@ -13,13 +13,10 @@ from fes_pin.identify.fit import Fit, fit_problem, go_on
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.held_out import Errors, Evidence, added_likelihood, joined_errors, within
+from fes_pin.infer.held_out import Errors, Evidence, added_likelihood, deal, joined_errors, within
 from fes_pin.infer.levels import RUNAWAY
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
-
-FOLDS = 5
-"""Parts that trials are dealt to: each is foretold by the other four, which hold most of what is known."""
 
 
 def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
@@ -47,11 +44,9 @@ def errors_of(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Error
     return Errors(np.array(squares), np.array(spread), np.array(counts, dtype=float))
 
 
-def folds_of(trials: Sequence[Trial], count: int = FOLDS) -> list[list[int]]:
-    """Trials to hold out together: every kind and every load dealt round."""
-    order = sorted(range(len(trials)), key=lambda i: (trials[i].kind, sorted(trials[i].conditions.items()), i))
-    count = min(count, len(trials))
-    return [sorted(order[k::count]) for k in range(count)]
+def folds_of(trials: Sequence[Trial]) -> list[list[int]]:
+    """Trials to hold out together: every kind and every load dealt round; none where there is but one."""
+    return deal(sorted(range(len(trials)), key=lambda i: (trials[i].kind, sorted(trials[i].conditions.items()), i)))
 
 
 @dataclass(frozen=True)

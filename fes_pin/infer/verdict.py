@@ -1,0 +1,213 @@
+"""The verdict on what a search found: a table of claims in a stated order, each of which may change that.
+
+A claim looks at a state and returns another one, or None where it has nothing to object. After each change the table is
+gone through from its beginning; the state that no claim objects to is the verdict.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic, Protocol, TypeVar
+
+from fes_pin.infer.held_out import Evidence, Gain, speaks_for
+from fes_pin.infer.search import Fitted, Search, SearchResult
+
+F = TypeVar("F", bound=Fitted)
+
+CAUSES_FOUND, UNEXPLAINED, ADEQUATE, STOPPED = "causes_found", "unexplained", "adequate", "stopped"
+
+
+class LackOfFit(Protocol):
+    """What the tests of lack of fit say of a fit."""
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether the fit leaves more than noise."""
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A candidate that was significant in the fit, and is not claimed.
+
+    Attributes
+    ----------
+    p_value
+        Family-wise, of what it added.
+    share
+        Of what all candidates together added to the log-likelihood.
+    gain
+        On the data that it was judged by.
+    """
+
+    p_value: float
+    share: float
+    gain: Gain
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """What the data say of each candidate of a set.
+
+    Attributes
+    ----------
+    gains
+        On data held out; on the data that were fitted where none could be.
+    evidence
+        What each candidate adds to the likelihood of data held out; empty where none could be.
+    lack_of_fit
+        Of the set.
+    """
+
+    gains: Mapping[str, Gain]
+    evidence: Mapping[str, Evidence]
+    lack_of_fit: LackOfFit
+
+
+W = TypeVar("W", bound=Weighed)
+
+
+@dataclass(frozen=True)
+class State(Generic[F, W]):
+    """A verdict on its way.
+
+    Attributes
+    ----------
+    found
+        A set of candidates, its rivals, and the set less each candidate.
+    weighed
+        What the data say of it.
+    refused
+        Candidates that no answer may hold.
+    settled
+        The set for which rivals were searched last.
+    formed
+        Sets that were tried in another form.
+    steps
+        The claims that changed the state, in their order.
+    """
+
+    found: SearchResult[F]
+    weighed: W
+    refused: Mapping[str, Refused]
+    settled: frozenset[str]
+    formed: frozenset[frozenset[str]] = frozenset()
+    steps: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The candidates of the set."""
+        return frozenset(self.found.without)
+
+    @property
+    def weak(self) -> list[str]:
+        """The candidates of the set, smallest gain first."""
+        return sorted(sorted(self.names), key=lambda n: self.weighed.gains[n].low)
+
+
+Claim = Callable[[State[F, W]], State[F, W] | None]
+
+
+class Verdict(ABC, Generic[F, W]):
+    """The claims of one front end, in `claims` by their order, and what they are made of.
+
+    Parameters
+    ----------
+    search
+        That has run.
+    """
+
+    def __init__(self, search: Search[F]) -> None:
+        self.search = search
+        self.claims: Sequence[Claim[F, W]] = (
+            self.drop_unsupported,
+            self.settle,
+            self.drop_rarely_chosen,
+            self.try_another_form,
+        )
+
+    @abstractmethod
+    def weigh(self, found: SearchResult[F]) -> W:
+        """What data held out, and the tests of lack of fit, say of a set."""
+
+    def lack_of_fit(self, state: State[F, W]) -> LackOfFit:
+        """What is left by a set, and by the candidates that were refused beside it."""
+        return state.weighed.lack_of_fit
+
+    def unsupported(self, state: State[F, W]) -> list[str]:
+        """Candidates that data held out do not speak for."""
+        weighed, names = state.weighed, state.names
+        if not weighed.evidence:
+            return [n for n in names if len(names) > 1 and not weighed.gains[n].is_material]
+        open_ = weighed.lack_of_fit.unexplained
+        known = {n: None if open_ else weighed.evidence[n] for n in names}
+        return [n for n, e in known.items() if not speaks_for(e, weighed.gains[n], alone=len(names) == 1)]
+
+    def is_rarely_chosen(self, state: State[F, W], name: str) -> bool:
+        """Whether most folds of the data choose a set without a candidate."""
+        return False
+
+    def of(self, found: SearchResult[F]) -> State[F, W]:
+        """The state that no claim objects to."""
+        state = State(found, self.weigh(found), {}, frozenset(found.without))
+        while True:
+            for claim in self.claims:
+                if (changed := claim(state)) is not None:
+                    state = replace(changed, steps=(*state.steps, claim.__name__))
+                    break
+            else:
+                return state
+
+    def drop_unsupported(self, state: State[F, W]) -> State[F, W] | None:
+        """Refuse the weakest of the candidates that data held out do not speak for."""
+        return self._without_weakest(state, self.unsupported(state))
+
+    def settle(self, state: State[F, W]) -> State[F, W] | None:
+        """Search the rivals of a set that candidates were taken from."""
+        if state.names == state.settled:
+            return None
+        found = self.search.settle(tuple(sorted(state.names)), state.refused)
+        return replace(state, found=found, weighed=self.weigh(found), settled=state.names)
+
+    def drop_rarely_chosen(self, state: State[F, W]) -> State[F, W] | None:
+        """Refuse the weakest of the candidates that most folds of the data do not choose."""
+        return self._without_weakest(state, [n for n in state.names if self.is_rarely_chosen(state, n)])
+
+    def try_another_form(self, state: State[F, W]) -> State[F, W] | None:
+        """Where something is left, give the set a form that was reached another way; what was refused may come back."""
+        names = tuple(sorted(state.names))
+        if not self.lack_of_fit(state).unexplained or state.names in state.formed:
+            return None
+        if not self.search.form_otherwise(names):
+            return None
+        found = self.search.settle(names)
+        settled, formed = frozenset(found.without), state.formed | {state.names}
+        return replace(state, found=found, weighed=self.weigh(found), refused={}, settled=settled, formed=formed)
+
+    def _without_weakest(self, state: State[F, W], some: Sequence[str]) -> State[F, W] | None:
+        """The set less the weakest of some of its candidates; None if these are none."""
+        weakest = next((n for n in state.weak if n in some), None)
+        if weakest is None:
+            return None
+        refused = {**state.refused, weakest: refused_from(state.found, weakest, state.weighed.gains[weakest])}
+        found = self.search.result(tuple(sorted(state.names - {weakest})))
+        return replace(state, found=found, weighed=self.weigh(found), refused=refused)
+
+
+def refused_from(found: SearchResult[F], name: str, gain: Gain) -> Refused:
+    """What is kept of a candidate that is taken from a set."""
+    return Refused(found.p_values[name], share_in(found, name), gain)
+
+
+def share_in(found: SearchResult[F], name: str) -> float:
+    """Share of a candidate in what all that were found add to the log-likelihood."""
+    whole = found.nominal.sse - found.best.sse
+    return (found.without[name].sse - found.best.sse) / max(whole, 1e-9)
+
+
+def word_of(has_candidates: bool, lack_of_fit: LackOfFit, stopped: bool = False) -> str:
+    """The verdict in a word."""
+    if stopped:
+        return STOPPED
+    return CAUSES_FOUND if has_candidates else UNEXPLAINED if lack_of_fit.unexplained else ADEQUATE

@@ -1,0 +1,104 @@
+"""The verdict is a table of claims: each may change what was found, and what no claim objects to is the answer."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from infer.regression import COUNT, Regression, RegressionVerdict
+
+from fes_pin.infer.held_out import Evidence, Gain, deal
+from fes_pin.infer.search import Search
+from fes_pin.infer.verdict import State, Verdict, Weighed, word_of
+
+NOISE, SOMETHING = SimpleNamespace(unexplained=False), SimpleNamespace(unexplained=True)
+
+
+def gain(low):
+    return Gain(low + 1.0, low, low + 2.0)
+
+
+def state(gains, evidence, left=NOISE):
+    found = SimpleNamespace(without=dict.fromkeys(gains))
+    return State(found, Weighed(gains, evidence, left), {}, frozenset(gains))
+
+
+class Claims(Verdict):
+    def weigh(self, found):
+        raise NotImplementedError
+
+
+CLAIMS = Claims(SimpleNamespace())
+
+
+def test_of_a_single_unit_a_candidate_together_with_others_gains_something():
+    """Before, a torque that repeats was named beside friction for 0.00 % of the error."""
+    gains = {"friction": gain(40.0), "periodic": gain(0.0)}
+    assert CLAIMS.unsupported(state(gains, {})) == ["periodic"]
+    assert CLAIMS.unsupported(state({"periodic": gain(0.0)}, {})) == []
+
+
+def test_of_several_units_a_candidate_together_with_others_needs_their_likelihood_too():
+    gains = {"friction": gain(40.0), "lag": gain(2.0)}
+    evidence = {"friction": Evidence(500.0, 500.0), "lag": Evidence(-3.0, 0.0)}
+    assert CLAIMS.unsupported(state(gains, evidence)) == ["lag"]
+    assert CLAIMS.unsupported(state(gains, evidence, SOMETHING)) == []
+
+
+@pytest.mark.parametrize(
+    ("has_candidates", "left", "stopped", "word"),
+    [
+        (True, SOMETHING, False, "causes_found"),
+        (False, SOMETHING, False, "unexplained"),
+        (False, NOISE, False, "adequate"),
+        (True, NOISE, True, "stopped"),
+    ],
+)
+def test_the_word_says_what_is_claimed_first(has_candidates, left, stopped, word):
+    assert word_of(has_candidates, left, stopped) == word
+
+
+def test_folds_keep_every_group():
+    groups = ["a", "a", "b", "a", "b", "c"]
+    folds = deal(range(6), groups)
+    assert sorted(i for fold in folds for i in fold) == [0, 1, 2, 3, 4]
+    for fold in folds:
+        assert {"a", "b", "c"} == {g for i, g in enumerate(groups) if i not in fold}
+    assert deal([0]) == []
+
+
+@pytest.fixture
+def judged():
+    def judge(runs, x, groups=None):
+        search = Search(Regression(x, runs, groups), lambda share, words: None)
+        return RegressionVerdict(search).of(search.run())
+
+    return judge
+
+
+def test_two_hidden_columns_are_borne_out_by_runs_held_out(judged):
+    rng = np.random.default_rng(3)
+    x = {f"x{k:02d}": rng.standard_normal(COUNT) for k in range(20)}
+    runs = 0.5 * x["x03"] - 0.4 * x["x11"] + rng.standard_normal((6, COUNT))
+    found = judged(runs, x)
+    assert found.names == {"x03", "x11"} and not found.steps
+    assert all(g.low > 0.0 for g in found.weighed.gains.values())
+    assert all(e.low > 0.0 for e in found.weighed.evidence.values())
+
+
+def test_a_change_of_one_group_is_borne_out_and_what_the_others_lack_is_left(judged):
+    rng = np.random.default_rng(4)
+    x = {f"x{k:02d}": rng.standard_normal(COUNT) for k in range(20)}
+    groups = np.array([0, 0, 0, 1, 1, 1])
+    runs = 0.6 * np.outer(groups, x["x05"]) + rng.standard_normal((6, COUNT))
+    assert judged(runs, x, groups).names == {"x05@1"}
+
+
+def test_what_one_run_alone_shows_is_refused_and_said_to_be_refused(judged):
+    """A column that acts in one of three runs is significant in their mean, and the others speak against it."""
+    rng = np.random.default_rng(5)
+    x = {f"x{k:02d}": rng.standard_normal(COUNT) for k in range(20)}
+    runs = rng.standard_normal((3, COUNT))
+    runs[1] += 1.6 * x["x07"]
+    found = judged(runs, x)
+    assert found.names == frozenset() and "drop_unsupported" in found.steps
+    assert "x07" in found.refused and found.refused["x07"].p_value < 1e-3
