@@ -43,13 +43,8 @@ def searched_part(
         said.append(f"{_size(trials)} samples are more than a search needs: they were {done} to {_size(short)}")
     left: list[Trial] = []
     if _size(short) > room and len(short) > 1:
-        longest = max(map(len, short))
-        count = max(1, min(len(short) - 1, room // longest))
-        chosen = {round(k) for k in np.linspace(0, len(short) - 1, count)}
-        others = [t for k, t in enumerate(short) if k not in chosen]
-        if groups == 1:
-            left = [others[round(k)] for k in np.linspace(0, len(others) - 1, min(count, len(others)))]
-        short = [t for k, t in enumerate(short) if k in chosen]
+        short, left = _spread(short, max(1, min(len(short) - 1, room // max(map(len, short)))))
+        left = left if groups == 1 else []
         judged = f", and {len(left)} others judged it" if left else ""
         said.append(f"{len(short)} of {len(trials)} trials were searched, evenly spread{judged}")
     most = room // len(short)
@@ -58,6 +53,14 @@ def searched_part(
         seconds = sum(t.duration for t in cut) / len(cut)
         said.append(f"only the first {most * cut[0].dt:.4g} s of {seconds:.4g} s were searched of trial {cut[0].name}")
     return [t.first(most) for t in short], [t.first(most) for t in left], said
+
+
+def _spread(trials: Sequence[Trial], count: int) -> tuple[list[Trial], list[Trial]]:
+    """So many trials, evenly spread, and as many of the others."""
+    chosen = {round(k) for k in np.linspace(0, len(trials) - 1, count)}
+    others = [t for k, t in enumerate(trials) if k not in chosen]
+    left = [others[round(k)] for k in np.linspace(0, len(others) - 1, min(count, len(others)))]
+    return [t for k, t in enumerate(trials) if k in chosen], left
 
 
 def thinned(trial: Trial, schema: RigSchema, driven: bool = False) -> Trial:
