@@ -26,7 +26,7 @@ ROUNDING = {
 LONG = {
     "allocation/test_walk.py": ("[allocate_walking-with what paralysed",),
     "body/test_body_viewer.py": ("test_a_live_viewer_shows", "test_a_nerve_paints"),
-    "confusion/test_matrix.py": ("test_slice_from_end",),
+    "accuracy/test_generators.py": ("test_a_cause_is_named",),
     "confusion/test_named.py": ("[ankle-joint_stop", "[joint-sensor_lag", "[muscle-potentiation"),
     "contrasts/test_contrast.py": (
         *("test_a_misread_trial_is_told_as_such[changes1]", "test_a_common_cause_is_no_change"),

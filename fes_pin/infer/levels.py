@@ -16,8 +16,8 @@ changes, all forms of a set that are tried, or all tests of what is left. A diag
 noise that is not quite autoregressive."""
 DRIVEN_LEVEL = 1e-3
 """The same where a random effort acts in what is judged by the likelihood. 54 driven rigs with nothing hidden brought
-p-values of 0.002 and 0.004 (`scripts/driven --nulls`): as many as 0.01 allows, more than a person who is told a name
-would accept. What acts in a rig that is recorded for a minute is far beyond either."""
+p-values of 0.002 and 0.004 (`scripts/accuracy driven --nulls`): as many as 0.01 allows, more than a person who is
+told a name would accept. What acts in a rig that is recorded for a minute is far beyond either."""
 CERTAIN_LEVEL = 1e-6
 """At which something is there, whatever it stands for: a cause whose name held-out trials refuse, a further score, an
 effort that answers its reading or was written down late."""
@@ -36,8 +36,8 @@ SMALL_PERCENT = 100.0 * SMALL_SHARE**2
 """Error E that is small: 1 %, a tenth of what Dombre, Fournier and Coiffet take for a good one."""
 NOTHING_PERCENT = SMALL_SHARE * SMALL_PERCENT
 """Gain of a cause beside others that is nothing: lags and hums that were not there made up to 0.04 % beside forms that
-are not the library's (`scripts/imposed`, seeds 991015 and 992000); of the second causes of nine drawn rigs the low end
-was 0.27 % and more."""
+are not the library's (`scripts/accuracy imposed`, seeds 991015 and 992000); of the second causes of nine drawn rigs
+the low end was 0.27 % and more."""
 CONFIDENCE_95 = normal_quantile(1.0 - 0.5 * UNUSUAL_LEVEL)
 """Half a 95 % interval of a normal variable, in standard deviations."""
 PARAMETER_PRICE = float(chi2_quantile(1.0 - UNUSUAL_LEVEL, 1))

@@ -2,7 +2,7 @@
 
     .venv/bin/python scripts/benchmarks/adequate.py [--count 40] [--seed 0]
 
-Studies that hide nothing, made without the engine (`scripts/confusion`), in white, first-order autoregressive (0.6 to
+Studies that hide nothing, of `scripts/accuracy free`, in white, first-order autoregressive (0.6 to
 0.9) and coloured noise (a random torque, or ARMA(2, 1) in the sensor), are fitted with the nominal model. Printed are
 quantiles of `claims.slowness`, and how many studies lie beyond `levels.SMALL_SHARE`, where no model is adequate.
 """
@@ -34,7 +34,7 @@ def ratios(rig: str, noise: str, count: int, seed: int) -> np.ndarray:
     found = []
     with tempfile.TemporaryDirectory(prefix="adequate") as folder:
         for item in items:
-            (made,) = make([item], Path(folder))
+            made = make(item, Path(folder))
             found.append(slowness(fit(nominal_model(made.study), made.study.trials)))
     return np.array(found)
 

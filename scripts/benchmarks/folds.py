@@ -2,7 +2,7 @@
 
     .venv/bin/python scripts/benchmarks/folds.py [--count 20] [--distance 25] [--seed 0]
 
-Ankles that hide one cause or nothing, made without the engine (`scripts/confusion`). Printed are, over all folds of all
+Ankles that hide one cause or nothing, of `scripts/accuracy free`. Printed are, over all folds of all
 studies, how often both choose the named cause, only one does, or neither, and what either takes.
 """
 
@@ -43,7 +43,7 @@ def main() -> None:
     alike, once, anew = Counter[str](), 0.0, 0.0
     with tempfile.TemporaryDirectory(prefix="folds") as folder:
         for item in drawn(given.count, given.distance, given.seed):
-            study = make([item], Path(folder))[0].study
+            study = make(item, Path(folder)).study
             began = time.perf_counter()
             whole = diagnose_joint(study)
             once += time.perf_counter() - began

@@ -2,7 +2,7 @@
 
     .venv/bin/python scripts/benchmarks/misread.py [--count 20] [--seed 0]
 
-Ankle studies, made without the engine (`scripts/contrasts`), in white, first-order autoregressive and random-torque
+Ankle studies of `scripts/accuracy contrast` in white, first-order autoregressive and random-torque
 noise; every other one has trials whose strength scatters by 0.3 %. Each is tried as it is, and with one motion that
 states a load 5 to 30 % off, either way.
 """

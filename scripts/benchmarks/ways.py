@@ -2,7 +2,7 @@
 
     .venv/bin/python scripts/benchmarks/ways.py [--count 24] [--distance 25] [--seed 0]
 
-Ankles that hide one cause or nothing, made without the engine (`scripts/confusion`), in white, autoregressive and
+Ankles that hide one cause or nothing, made without the engine (`scripts/accuracy free`), in white, autoregressive and
 process noise in turn. Counted is in how many the cause stands in the first set, and alone, before trials are held out.
 """
 
@@ -80,7 +80,7 @@ def main() -> None:
     counts, seconds = {way: Counter[str]() for way in ways}, Counter[str]()
     with tempfile.TemporaryDirectory(prefix="ways") as folder:
         for item in drawn(given.count, given.distance, given.seed):
-            study = make([item], Path(folder))[0].study
+            study = make(item, Path(folder)).study
             for way, driven in ways.items():
                 began = time.perf_counter()
                 sets = sets_of(study, driven)

@@ -17,8 +17,6 @@ from confusion_matrix.stimuli import times
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 
-FRESH = 2
-"""Motion trials (for a muscle: isometric) of each study that the diagnosis never sees."""
 COLUMN = {"ankle": "angle_rad", "joint": "position", "muscle": "force_n"}
 
 
@@ -29,7 +27,6 @@ class Draft:
     item: Item
     plant: Plant
     trials: list[Protocol]
-    fresh: list[Protocol]
     shapes: list[dict[str, float]]
     sizes: list[float]
     distances: list[float]
@@ -43,22 +40,10 @@ def draft(item: Item, folder: Path) -> Draft:
     motion = 0 if item.rig == "muscle" else 8
     isometric = {"ankle": 3 if rng.random() < 2 / 3 else 0, "joint": 0, "muscle": 6}[item.rig]
     trials = draw_trials(rng, plant, motion, isometric)
-    fresh = draw_trials(item.rng(1), plant, FRESH if motion else 0, 0 if motion else FRESH)
-    if item.rig != "muscle":
-        driven = trials[0].input is not None
-        fresh = [p if driven or item.rig == "ankle" else Protocol(p.kind, None, p.conditions) for p in fresh]
-        fresh = [p if p.input is not None or not driven else _driven(item, plant, p) for p in fresh]
     urdf = folder / f"{item.name}.urdf"
     if item.rig == "joint":
         urdf.write_text(urdf_text(plant.known), encoding="utf-8")
-    return Draft(item, plant, trials, fresh, [], [], [], urdf)
-
-
-def _driven(item: Item, plant: Plant, p: Protocol) -> Protocol:
-    rng = item.rng(2)
-    while (other := draw_trials(rng, plant, 1, 0)[0]).input is None:
-        pass
-    return Protocol(p.kind, other.input, p.conditions)
+    return Draft(item, plant, trials, [], [], [], urdf)
 
 
 def study_of(one: Draft, readings: Sequence[np.ndarray]) -> Study:
@@ -86,22 +71,21 @@ def run_trials(
     forms: Sequence[type[Form]],
     steps: int,
     *,
-    fresh: bool = False,
+    pushed: bool = False,
     only: int = 0,
 ) -> list[list[np.ndarray]]:
-    """Readings of every trial of every draft, all side by side."""
-    each = [one.trials + (one.fresh if fresh else []) for one in drafts]
-    owner = [i for i, trials in enumerate(each) for _ in trials]
-    flat = [p for trials in each for p in trials]
+    """Readings of every trial of every draft, all side by side; `pushed` by random torques where the noise has them."""
+    owner = [i for i, one in enumerate(drafts) for _ in one.trials]
+    flat = [p for one in drafts for p in one.trials]
     numbers = [drafts[i].plant.numbers() for i in owner]
     k = {n: np.array([x[n] for x in numbers]) for n in numbers[0]}
     for name, default in (("load_kg", 0.0), ("angle_rad", 1.8), ("position0", 0.0), ("velocity0", 0.0)):
         k[name] = np.array([p.conditions.get(name, default) for p in flat])
-    k["number"] = np.concatenate([np.arange(len(trials)) for trials in each])
+    k["number"] = np.concatenate([np.arange(len(one.trials)) for one in drafts])
     count = len(times())
     drive = np.stack([p.input if p.input is not None else np.zeros(count) for p in flat], axis=1)
     moving = np.array([p.kind == "motion" for p in flat])
-    torque = _torques(drafts, each, count) if fresh else None
+    torque = _torques(drafts, count) if pushed else None
     built = []
     for n, form in enumerate(forms):
         at = only + n
@@ -115,18 +99,17 @@ def run_trials(
     return out
 
 
-def _torques(drafts: Sequence[Draft], each: Sequence[Sequence[Protocol]], count: int) -> np.ndarray | None:
-    """Random torques of the studies whose noise has them, shape (n, L); fresh trials have none."""
+def _torques(drafts: Sequence[Draft], count: int) -> np.ndarray | None:
+    """Random torques of the studies whose noise has them, shape (n, L)."""
     if not any(one.item.noise == "process" for one in drafts) or drafts[0].plant.rig == "muscle":
         return None
     columns = []
-    for one, trials in zip(drafts, each, strict=True):
+    for one in drafts:
         rng = one.item.rng(3)
         colour, kind = rng.random(), rng.random()
         weight = one.plant.numbers()["damping"] / 0.075
-        for n, _ in enumerate(trials):
-            pushed = one.item.noise == "process" and kind < TORQUE_SHARE and n < len(one.trials)
-            columns.append(random_torque(rng, count, weight, colour) if pushed else np.zeros(count))
+        pushed = one.item.noise == "process" and kind < TORQUE_SHARE
+        columns += [random_torque(rng, count, weight, colour) if pushed else np.zeros(count) for _ in one.trials]
     return np.stack(columns, axis=1)
 
 

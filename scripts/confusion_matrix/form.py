@@ -45,7 +45,7 @@ class Form:
 
     @classmethod
     def truth(cls, size: float, p: dict[str, float]) -> dict[str, float]:
-        """Parameters of the engine's effect that this is, by name; empty where the form differs."""
+        """Parameters of the engine's effect, by name, where this is the engine's form."""
         return {}
 
     def begin(self, s: Any, lanes: Any) -> None:
@@ -98,3 +98,22 @@ class Form:
 
     def reading(self, y: np.ndarray, v: np.ndarray, time: np.ndarray, rest: np.ndarray) -> np.ndarray:
         return y
+
+
+class Signed(Form):
+    """A form that acts either way, with an equal chance, or with those of `ways`, down and up."""
+
+    ways: ClassVar[tuple[float, float] | None] = None
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, angles: np.ndarray) -> dict[str, float]:
+        return {"sign": float(rng.choice((-1.0, 1.0), p=cls.ways))}
+
+
+def play(y: np.ndarray, half: np.ndarray, follower: np.ndarray) -> np.ndarray:
+    """A slack of +- half between a signal and its follower, which starts where it is said to; shape (n, L)."""
+    out = np.empty_like(y)
+    for i, now in enumerate(y):
+        follower = np.clip(follower, now - half, now + half)
+        out[i] = follower
+    return out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from confusion_matrix.form import Form
+from confusion_matrix.form import Form, play
 
 BOTH = ("ankle", "joint")
 
@@ -23,10 +23,6 @@ class Friction(Form):
 
 class Stiction(Friction):
     name = "stribeck"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def torque(self, torque, s):
         creep = 0.006 + 1.5 * self.size * s.h / (2.0 * s.k["inertia"])
@@ -47,10 +43,6 @@ class Drag(Form):
 
 class SteeperDrag(Drag):
     name = "power_2.4"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def torque(self, torque, s):
         return torque - self.size * s.v * np.abs(s.v) ** 1.4
@@ -74,10 +66,6 @@ class Stop(Form):
 class QuadraticStop(Stop):
     name, cap = "quadratic", 200.0
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def torque(self, torque, s):
         depth = np.maximum(s.q - self.p["angle"], 0.0)
         return torque - 10.0 * self.size * depth**2
@@ -100,10 +88,6 @@ class Spring(Form):
 
 class HardeningSpring(Spring):
     name = "hardening"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def torque(self, torque, s):
         away = s.q - self.p["angle"]
@@ -134,10 +118,6 @@ class Maxwell(Form):
 class TwoMaxwell(Maxwell):
     name, states = "two_elements", ("relaxed", "slow")
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def rates(self, s):
         slow = (s.q - self.own(s, "slow")) / (5.0 * self.p["time"])
         return {**super().rates(s), "slow": slow}
@@ -161,10 +141,6 @@ class LoadInertia(Form):
 
 class PulleyInertia(LoadInertia):
     name = "pulley"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def accelerate(self, acceleration, s):
         moved, j = self.size * s.load * s.k["com_distance_m"] ** 2, s.k["inertia"]
@@ -193,10 +169,6 @@ class Reflex(Form):
 
 class PureReflex(Reflex):
     name, states = "pure_delay", ()
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def begin(self, s, lanes):
         self.back = np.maximum(np.round(self.p["delay"] / s.h).astype(int), 1)
@@ -233,10 +205,6 @@ class Detented(Cogging):
 
     name = "sawtooth"
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def torque(self, torque, s):
         angle = self.p["waves"] * s.q + self.p["phase"]
         return torque + self.size * (np.sin(angle) + 0.4 * np.sin(2.0 * angle) + 0.15 * np.sin(3.0 * angle))
@@ -250,11 +218,7 @@ class Backlash(Form):
         return {"half_width": size}
 
     def reading(self, y, v, time, rest):
-        out, follower = np.empty_like(y), rest.copy()
-        for i, now in enumerate(y):
-            follower = np.clip(follower, now - self.size, now + self.size)
-            out[i] = follower
-        return out
+        return play(y, self.size, rest)
 
 
 class WornBacklash(Backlash):
@@ -262,17 +226,8 @@ class WornBacklash(Backlash):
 
     name = "two_plays"
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def reading(self, y, v, time, rest):
-        whole, self.size = self.size, 0.5 * self.size
-        narrow = super().reading(y, v, time, rest)
-        self.size = 3.0 * self.size
-        wide = super().reading(y, v, time, rest)
-        self.size = whole
-        return 0.5 * (narrow + wide)
+        return 0.5 * (play(y, 0.5 * self.size, rest) + play(y, 1.5 * self.size, rest))
 
 
 FORMS: tuple[type[Form], ...] = (

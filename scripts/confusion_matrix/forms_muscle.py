@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from confusion_matrix.form import Form
+from confusion_matrix.form import Form, Signed
 
 BOTH = ("ankle", "muscle")
 
@@ -36,10 +36,6 @@ class Fatigue(Form):
 class DingFatigue(Fatigue):
     name = "ding"
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def rates(self, s):
         c = self.own(s, "capacity")
         return {"capacity": (1.0 - c) / self.p["recovery"] - self.size * s.act}
@@ -47,10 +43,6 @@ class DingFatigue(Fatigue):
 
 class TwoPools(Fatigue):
     name, states = "two_pools", ("fast", "slow")
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def rates(self, s):
         fast, slow = self.own(s, "fast"), self.own(s, "slow")
@@ -84,10 +76,6 @@ class Potentiation(Form):
 class SaturatingPotentiation(Potentiation):
     name = "saturating"
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def force(self, force, s):
         return force * (1.0 + self.size * np.tanh(2.5 * self.own(s, "level")))
 
@@ -105,10 +93,6 @@ class Delay(Form):
 
 class DispersedDelay(Delay):
     name = "dispersed"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def delays(self):
         return [(0.5, 0.7 * self.size), (0.5, 1.3 * self.size)]
@@ -133,10 +117,6 @@ class TwoFibreLags(SecondLag):
 
     name, states = "two_fibres", ("short", "long")
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def rates(self, s):
         size = np.maximum(self.size, 1e-3)
         return {
@@ -148,12 +128,9 @@ class TwoFibreLags(SecondLag):
         return 0.5 * (self.own(s, "short") + self.own(s, "long"))
 
 
-class Asymmetry(Form):
+class Asymmetry(Signed):
     cause, rigs, unit, cap = "rise_fall_asymmetry", BOTH, 0.1, 1.5
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"sign": float(rng.choice((-1.0, 1.0), p=(0.3, 0.7)))}
+    ways = (0.3, 0.7)
 
     @classmethod
     def truth(cls, size, p):
@@ -165,10 +142,6 @@ class Asymmetry(Form):
 
 class SmoothAsymmetry(Asymmetry):
     name = "smooth"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def time_constant(self, tau, s):
         falls = 0.5 * (1.0 + np.tanh((s.act - s.r) / 0.1))
@@ -194,10 +167,6 @@ class ForceLength(Form):
 class Parabola(ForceLength):
     name = "parabola"
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def force(self, force, s):
         return force * np.maximum(1.0 - self.size * (s.q - self.p["best"]) ** 2, 0.05)
 
@@ -217,10 +186,6 @@ class HillForceVelocity(ForceVelocity):
     """Hill's hyperbola when shortening, its mirror up to 1.4 when lengthening."""
 
     name = "hill"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def force(self, force, s):
         v = self.size * s.v * s.moving

@@ -6,26 +6,13 @@ import math
 
 import numpy as np
 
-from confusion_matrix.form import Form
+from confusion_matrix.form import Form, Signed, play
 
 BOTH = ("ankle", "muscle")
 
 
-def play(w: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """A slack of +- half between a signal and its follower, which starts at 0; shape (n, L)."""
-    out, follower = np.empty_like(w), np.zeros(w.shape[1])
-    for i, now in enumerate(w):
-        follower = np.clip(follower, now - half, now + half)
-        out[i] = follower
-    return out
-
-
-class Shift(Form):
+class Shift(Signed):
     cause, rigs, unit, cap = "threshold_shift", BOTH, 10.0, 150.0
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"sign": float(rng.choice((-1.0, 1.0)))}
 
     @classmethod
     def truth(cls, size, p):
@@ -37,10 +24,6 @@ class Shift(Form):
 
 class ShiftMoreAtSaturation(Shift):
     name = "wider"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def width(self, w, time, lanes):
         k = lanes.k
@@ -92,22 +75,19 @@ class Play(Form):
         return {"half_width_us": size}
 
     def width(self, w, time, lanes):
-        return play(w, self.size)
+        return play(w, self.size, 0.0 * w[0])
 
 
 class TwoPlays(Form):
     cause, name, rigs, unit, cap = "recruitment_hysteresis", "two_plays", BOTH, 5.0, 150.0
 
     def width(self, w, time, lanes):
-        return 0.5 * (play(w, 0.5 * self.size) + play(w, 1.5 * self.size))
+        return 0.5 * (play(w, 0.5 * self.size, 0.0 * w[0]) + play(w, 1.5 * self.size, 0.0 * w[0]))
 
 
-class ThresholdDrift(Form):
+class ThresholdDrift(Signed):
     cause, rigs, unit, cap = "threshold_drift", BOTH, 1.0, 40.0
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"sign": float(rng.choice((-1.0, 1.0), p=(0.3, 0.7)))}
+    ways = (0.3, 0.7)
 
     @classmethod
     def truth(cls, size, p):
@@ -119,10 +99,6 @@ class ThresholdDrift(Form):
 
 class SettlingThreshold(ThresholdDrift):
     name = "settling"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def width(self, w, time, lanes):
         return w - self.size * self.p["sign"] * (5.0 * -np.expm1(-time / 5.0))[:, None]
@@ -152,10 +128,6 @@ class Spillover(Form):
 
 class LaggedSpillover(Spillover):
     name, states = "smooth_lagged", ("pulled",)
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def shape(self, room):
         return np.log1p(np.exp(np.minimum(10.0 * room, 30.0))) / math.log1p(math.exp(10.0)) * (room > -1.0)

@@ -6,17 +6,13 @@ import math
 
 import numpy as np
 
-from confusion_matrix.form import Form
+from confusion_matrix.form import Form, Signed
 
 BOTH = ("ankle", "joint")
 
 
-class EffortOffset(Form):
+class EffortOffset(Signed):
     cause, rigs, unit, cap = "effort_offset", ("joint",), 0.005, 0.5
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"sign": float(rng.choice((-1.0, 1.0)))}
 
     @classmethod
     def truth(cls, size, p):
@@ -26,12 +22,8 @@ class EffortOffset(Form):
         s.offset = s.offset + self.size * self.p["sign"]
 
 
-class EffortGain(Form):
+class EffortGain(Signed):
     cause, rigs, unit, cap = "effort_gain", ("joint",), 0.05, 0.9
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"sign": float(rng.choice((-1.0, 1.0)))}
 
     @classmethod
     def truth(cls, size, p):
@@ -50,21 +42,13 @@ class EffortSaturates(EffortGain):
     def draw(cls, rng, angles):
         return {"sign": -1.0}
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def begin(self, s, lanes):
         share = np.abs(s.effort) / np.maximum(np.abs(s.effort).max(axis=0), 1e-9)
         s.effort = s.effort * (1.0 - self.size * (0.8 + 0.4 * share))
 
 
-class Tilt(Form):
+class Tilt(Signed):
     cause, rigs, unit, cap = "base_tilt", BOTH, 0.02, 0.5
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"sign": float(rng.choice((-1.0, 1.0)))}
 
     @classmethod
     def truth(cls, size, p):
@@ -74,12 +58,8 @@ class Tilt(Form):
         s.tilt = s.tilt + self.size * self.p["sign"]
 
 
-class LoadError(Form):
+class LoadError(Signed):
     cause, unit, cap = "load_error", 0.003, 0.3
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"sign": float(rng.choice((-1.0, 1.0)))}
 
     @classmethod
     def truth(cls, size, p):
@@ -115,10 +95,6 @@ class FrameSeen(Frame):
 
     name = "sensor_on_frame"
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def sensed(self, y, s):
         return y + 0.3 * self.own(s, "phi")
 
@@ -141,10 +117,6 @@ class Breathing(Form):
 
 class BreathingWithHarmonic(Breathing):
     name = "harmonic"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def torque(self, torque, s):
         phase = 2.0 * math.pi * self.p["hz"] * s.t + self.p["phase"]

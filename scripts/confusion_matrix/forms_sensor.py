@@ -7,19 +7,13 @@ import math
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from confusion_matrix.form import Form
+from confusion_matrix.form import Form, Signed, play
 
 ALL = ("ankle", "joint", "muscle")
 BOTH = ("ankle", "joint")
 
 
-class _Signed(Form):
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"sign": float(rng.choice((-1.0, 1.0)))}
-
-
-class Offset(_Signed):
+class Offset(Signed):
     cause, rigs, unit, cap = "sensor_offset", ALL, 1e-3, 20.0
 
     @classmethod
@@ -30,7 +24,7 @@ class Offset(_Signed):
         return y + self.size * self.p["sign"]
 
 
-class _Deviating(_Signed):
+class _Deviating(Signed):
     """Deviations from a trial's rest; on a joint from there, from where it hangs or from zero."""
 
     @classmethod
@@ -59,7 +53,7 @@ class Gain(_Deviating):
         return rest + (1.0 + self.size * self.p["sign"]) * (y - rest)
 
 
-class Drift(_Signed):
+class Drift(Signed):
     cause, rigs, unit, cap = "sensor_drift", ALL, 2e-4, 5.0
 
     @classmethod
@@ -72,10 +66,6 @@ class Drift(_Signed):
 
 class SettlingDrift(Drift):
     name = "settling"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def reading(self, y, v, time, rest):
         return y + self.size * self.p["sign"] * (5.0 * -np.expm1(-time / 5.0))[:, None]
@@ -100,10 +90,6 @@ class LowPass(Form):
 
 class TimeShift(LowPass):
     name, states = "time_shift", ()
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def sensed(self, y, s):
         return y
@@ -130,10 +116,6 @@ class Curved(_Deviating):
 class CurvedMore(Curved):
     name = "exponential"
 
-    @classmethod
-    def truth(cls, size, p):
-        return {}
-
     def reading(self, y, v, time, rest):
         away, sign = y - self.rest_of(rest), self.p["sign"]
         return y + self.size * sign * (np.expm1(3.0 * away) - 3.0 * away) / 4.5
@@ -158,10 +140,6 @@ class HumUnlocked(Hum):
     """Each trial begins at another phase of the mains."""
 
     name = "own_phase"
-
-    @classmethod
-    def truth(cls, size, p):
-        return {}
 
     def begin(self, s, lanes):
         self.number = lanes.k["number"]
@@ -216,11 +194,7 @@ class SensorBacklash(Form):
     cause, name, unit, cap = "sensor_backlash", "outside", 1e-3, 0.1
 
     def reading(self, y, v, time, rest):
-        out, follower = np.empty_like(y), rest.copy()
-        for i, now in enumerate(y):
-            follower = np.clip(follower, now - self.size, now + self.size)
-            out[i] = follower
-        return out
+        return play(y, self.size, rest)
 
 
 class SensorSlip(Form):

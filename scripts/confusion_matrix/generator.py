@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from confusion_matrix.drafts import Draft, as_trial, draft, run_trials, sensor_family, study_of, with_noise
+from confusion_matrix.drafts import Draft, draft, run_trials, study_of, with_noise
 from confusion_matrix.form import Form
-from confusion_matrix.noise import LEVEL, innovations
+from confusion_matrix.noise import LEVEL
 from confusion_matrix.plan import Item
 from fes_pin.data.study import Study
-from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Problem
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.rigs.base import Rig
 
 WHITE = {name: Noise(level, (), level, 0.0) for name, level in LEVEL.items()}
 COARSE = 5
@@ -35,80 +33,63 @@ class Made:
 
     Attributes
     ----------
-    fresh
-        Noiseless trials that the study does not hold.
-    sizes, distances
-        Of each cause alone.
-    felt
-        d of a single cause against the noise as it is; None with a random torque.
+    distances
+        d of each cause alone, as it came out.
     truth
         Parameters of the extended model by name, where the form is the engine's.
-    orthogonal
-        d that remains beside the nearest single cause of the library, for a cause outside it.
     """
 
-    item: Item
     study: Study
-    fresh: tuple[Trial, ...]
-    sizes: tuple[float, ...]
     distances: tuple[float, ...]
-    felt: float | None
     truth: Mapping[str, float]
-    orthogonal: float | None
 
 
-def make(items: Sequence[Item], folder: Path) -> list[Made]:
-    """Make studies that hide the same forms on the same rig.
+def make(item: Item, folder: Path) -> Made:
+    """Make a study.
 
     Parameters
     ----------
     folder
-        For the URDFs of joints.
+        For the URDF of a joint.
     """
-    forms = items[0].forms()
-    drafts, quiet = sized(items, folder)
+    one, forms = sized(item, folder), item.forms()
     finest = max([COARSE, *(form.fine for form in forms)])
-    run = run_trials(drafts, [one.sizes for one in drafts], forms, finest, fresh=True)
-    return [
-        _made(one, forms, readings, quiet[0][i] if quiet else None)
-        for i, (one, readings) in enumerate(zip(drafts, run, strict=True))
-    ]
+    (readings,) = run_trials([one], [one.sizes], forms, finest, pushed=True)
+    return Made(study_of(one, with_noise(one, readings)), tuple(one.distances), true_values(one, forms))
 
 
-def sized(items: Sequence[Item], folder: Path) -> tuple[list[Draft], list[list[list[np.ndarray]]]]:
-    """Drafts that know how large each of their causes is, and noiseless readings with each cause alone."""
-    forms = items[0].forms()
-    drafts = [draft(item, folder) for item in items]
-    bare = run_trials(drafts, [()] * len(drafts), (), COARSE) if forms else []
-    for one, quiet in zip(drafts, bare, strict=False):
-        angles = np.concatenate([y for y, p in zip(quiet, one.trials, strict=True) if p.kind == "motion"] or [[0.0]])
-        one.shapes = [form.draw(one.item.rng(10 + k), angles) for k, form in enumerate(forms)]
-    return drafts, [_size(drafts, k, form) for k, form in enumerate(forms)]
-
-
-def _size(drafts: list[Draft], k: int, form: type[Form]) -> list[list[np.ndarray]]:
-    """Find each study's size of one cause, alone; its noiseless readings at that size."""
-    tried: list[list[tuple[float, float]]] = [[] for _ in drafts]
-    best: list[tuple[float, float, float, list[np.ndarray]]] = [(np.inf, 0.0, 0.0, []) for _ in drafts]
-    for turn in range(ROUNDS):
-        open_ = [i for i in range(len(drafts)) if best[i][0] > CLOSE]
-        sizes = [_propose(tried[i], form, drafts[i].item.distance, turn) for i in open_]
-        open_ = [i for i, s in zip(open_, sizes, strict=True) if s is not None]
-        sizes = [s for s in sizes if s is not None]
-        if not open_:
-            break
-        part = [drafts[i] for i in open_]
-        run = run_trials(part, [[s] for s in sizes], (form,), min(form.fine, 10), only=k)
-        for i, size, readings in zip(open_, sizes, run, strict=True):
-            d = noncentrality(drafts[i], readings)
-            tried[i].append((size, d))
-            miss = abs(np.log(max(d, 1e-9) / drafts[i].item.distance))
-            if miss < best[i][0]:
-                best[i] = (miss, size, d, readings)
-    for one, (_, size, d, _readings) in zip(drafts, best, strict=True):
+def sized(item: Item, folder: Path) -> Draft:
+    """A draft that knows how large each of its causes is."""
+    one = draft(item, folder)
+    shape(one, item.forms(), lambda k: item.rng(10 + k))
+    for k, form in enumerate(item.forms()):
+        size, d = size_of(one, k, form, item.distance)
         one.sizes.append(size)
         one.distances.append(d)
-    return [b[3] for b in best]
+    return one
+
+
+def shape(one: Draft, forms: Sequence[type[Form]], rng: Callable[[int], np.random.Generator]) -> None:
+    """Draw the shape of each cause, about the angles of the motion without any."""
+    if not forms:
+        return
+    (quiet,) = run_trials([one], [()], (), COARSE)
+    angles = np.concatenate([y for y, p in zip(quiet, one.trials, strict=True) if p.kind == "motion"] or [[0.0]])
+    one.shapes = [form.draw(rng(k), angles) for k, form in enumerate(forms)]
+
+
+def size_of(one: Draft, k: int, form: type[Form], target: float) -> tuple[float, float]:
+    """Size of the k-th cause, alone, at which the nominal model misses by d = `target`, and the d that it has."""
+    tried: list[tuple[float, float]] = []
+    best = (np.inf, form.unit, 0.0)
+    for turn in range(ROUNDS):
+        size = _propose(tried, form, target, turn)
+        if size is None or best[0] <= CLOSE:
+            break
+        d = noncentrality(one, run_trials([one], [[size]], (form,), min(form.fine, 10), only=k)[0])
+        tried.append((size, d))
+        best = min(best, (abs(float(np.log(max(d, 1e-9) / target))), size, d))
+    return best[1:]
 
 
 def _propose(tried: list[tuple[float, float]], form: type[Form], target: float, turn: int) -> float | None:
@@ -135,49 +116,18 @@ def noncentrality(one: Draft, readings: list[np.ndarray]) -> float:
     return float(np.sqrt(fitted.sse))
 
 
-def noise_as_it_is(item: Item) -> dict[str, Noise] | None:
-    """The noise of a study's readings, by column; None where a random torque makes more of it."""
-    family, colour = sensor_family(item)
-    if item.noise == "process" and family == "white":
-        return None
-    return {n: Noise(*innovations(family, n, colour), level, 0.0) for n, level in LEVEL.items()}
-
-
-def felt_noncentrality(one: Draft, readings: list[np.ndarray]) -> float | None:
-    """The same, for the noise that the study has; None where it is a random torque."""
-    noise = noise_as_it_is(one.item)
-    return noise and float(np.sqrt(nominal_fit(study_of(one, readings), one.plant.true, noise=noise).sse))
-
-
-def nominal_fit(
-    study: Study, true: Mapping[str, float], model: Model | None = None, noise: Mapping[str, Noise] = WHITE
-) -> Fit:
+def nominal_fit(study: Study, true: Mapping[str, float], model: Model | None = None) -> Fit:
     """Fit a study's nominal model, or one that extends it, from the true values."""
     extended = model or nominal_model(study)
     with np.errstate(all="ignore"):
-        return fit_problem(Problem(extended, study.trials, noise), {**extended.parameters(), **true})
-
-
-def _made(one: Draft, forms: Sequence[type[Form]], readings: list[np.ndarray], quiet: list[np.ndarray] | None) -> Made:
-    count = len(one.trials)
-    noisy = with_noise(one, readings[:count])
-    fresh = [
-        as_trial(one.plant.rig, f"fresh{k}", p, y)
-        for k, (p, y) in enumerate(zip(one.fresh, readings[count:], strict=True))
-    ]
-    orthogonal = _orthogonal(one, quiet) if one.item.kind == "outside" and quiet else None
-    truth = true_values(one, forms)
-    felt = felt_noncentrality(one, quiet) if quiet and one.item.kind == "single" else None
-    return Made(
-        one.item, study_of(one, noisy), tuple(fresh), tuple(one.sizes), tuple(one.distances), felt, truth, orthogonal
-    )
+        return fit_problem(Problem(extended, study.trials, WHITE), {**extended.parameters(), **true})
 
 
 def true_values(one: Draft, forms: Sequence[type[Form]]) -> dict[str, float]:
     """Parameters by name as the engine would have them; none where its form is another."""
     out: dict[str, float] = {}
     for form, size, shape in zip(forms, one.sizes, one.shapes, strict=True):
-        own = form.truth(size, shape)
+        own = form.truth(size, shape) if form.name == "same" else {}
         if not own:
             return {}
         out |= {f"{form.cause}.{n}": v for n, v in own.items()}
@@ -185,17 +135,3 @@ def true_values(one: Draft, forms: Sequence[type[Form]]) -> dict[str, float]:
     if "force_length" in one.item.causes:  # the engine's factor is 1 at pi/2, so its gain is another one
         del nominal["gain"]
     return {**nominal, **out}
-
-
-def _orthogonal(one: Draft, quiet: list[np.ndarray]) -> float:
-    """d that the nearest single cause of the library leaves, refitted jointly."""
-    from fes_pin.models.effects import effects_for  # noqa: PLC0415
-
-    study = study_of(one, quiet)
-    rig: Rig = nominal_model(study).rig
-    left = []
-    for effect in effects_for(one.plant.rig):
-        sse = nominal_fit(study, one.plant.true, Model(rig) + effect()).sse
-        if np.isfinite(sse):
-            left.append(sse)
-    return float(np.sqrt(min(left)))

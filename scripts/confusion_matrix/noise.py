@@ -32,15 +32,6 @@ def _polynomials(family: str, colour: float) -> tuple[list[float], list[float]]:
     return [1.0], [1.0]
 
 
-def innovations(family: str, column: str, colour: float) -> tuple[float, tuple[float, ...]]:
-    """The noise as it is, as an autoregression: standard deviation of its innovation, and its coefficients."""
-    b, a = _polynomials(family, colour)
-    response = scipy.signal.lfilter(b, a, np.r_[1.0, np.zeros(2000)])
-    inverse = scipy.signal.lfilter(a, b, np.r_[1.0, np.zeros(12)])
-    last = int(np.flatnonzero(np.abs(inverse) > 1e-4)[-1])
-    return float(LEVEL[column] / np.sqrt(np.sum(response**2))), tuple(float(-x) for x in inverse[1 : last + 1])
-
-
 def _filtered(rng: np.random.Generator, count: int, b: list[float], a: list[float]) -> np.ndarray:
     """A stationary ARMA sequence of variance 1."""
     response = scipy.signal.lfilter(b, a, np.r_[1.0, np.zeros(2000)])

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from confusion_matrix.drafts import Draft, draft, run_trials, study_of, with_noise
 from confusion_matrix.form import Form
-from confusion_matrix.generator import CLOSE, ROUNDS, _propose, noncentrality
+from confusion_matrix.generator import shape, size_of
 from confusion_matrix.noise import FAMILIES
 from confusion_matrix.plan import FORMS, Item
 
@@ -55,10 +55,8 @@ def free_pair(rig: str, changes: Sequence[str], distance: float, seed: int, fold
         while one.trials[0].input is None:  # what an effort shows, a free swing may not
             item = replace(item, seed=item.seed + 1000)
             one = draft(item, folder)
-    quiet = run_trials([one], [()], (), 5)[0]
-    angles = np.concatenate([y for y, p in zip(quiet, one.trials, strict=True) if p.kind == "motion"] or [[0.0]])
-    one.shapes = [form.draw(rng, angles) for form in forms]
-    sizes = [_size(one, k, form, distance) for k, form in enumerate(forms)]
+    shape(one, forms, lambda _: rng)
+    sizes = [size_of(one, k, form, distance)[0] for k, form in enumerate(forms)]
     other = _changed(one, [n for n in changes if n in NOMINAL[rig]], rng)
     steps = max([5, *(form.fine for form in forms)])
     scattered = seed % 2 == 1
@@ -74,20 +72,6 @@ def free_pair(rig: str, changes: Sequence[str], distance: float, seed: int, fold
 def _form(cause: str) -> type[Form]:
     """The first form of a cause that the generator has."""
     return next(f for f in FORMS if f.cause == cause)
-
-
-def _size(one: Draft, k: int, form: type[Form], target: float) -> float:
-    """Size of a cause at which the nominal model misses by d = `target`."""
-    tried: list[tuple[float, float]] = []
-    best = (np.inf, form.unit)
-    for turn in range(ROUNDS):
-        size = _propose(tried, form, target, turn)
-        if size is None or best[0] < CLOSE:
-            break
-        d = noncentrality(one, run_trials([one], [[size]], (form,), min(form.fine, 10), only=k)[0])
-        tried.append((size, d))
-        best = min(best, (abs(float(np.log(max(d, 1e-9) / target))), size))
-    return best[1]
 
 
 def _changed(one: Draft, names: Sequence[str], rng: np.random.Generator) -> Draft:
@@ -107,7 +91,7 @@ def _read(
 ) -> list[np.ndarray]:
     """Noiseless readings of all trials, with a random torque where the family has one, or with trials that scatter."""
     if not scattered:
-        return run_trials([one], [sizes], forms, steps, fresh=True)[0][: len(one.trials)]
+        return run_trials([one], [sizes], forms, steps, pushed=True)[0]
     name = "damping" if one.plant.rig == "joint" else "gain"
     alone = []
     for k, trial in enumerate(one.trials):

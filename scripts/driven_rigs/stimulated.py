@@ -1,6 +1,6 @@
 """Ankles whose stimulator answers their angle: a position controller that keeps a foot on a wave by pulse widths.
 
-Rigs, forms of causes, noise and random torques are those of `scripts/confusion`, a cause as large as there: d = 40
+Rigs, forms of causes, noise and random torques are those of `scripts/accuracy free`, a cause as large as there: d = 40
 under a scripted stimulus, 100 each of two, 60 outside the library. A controller keeps a foot from where a cause would
 show, so that less of it is left. It is proportional and integral, gives a pulse width every 25 ms in whole us or in
 steps of 10, and reads the angle with its noise.
@@ -116,7 +116,7 @@ def draw_stimulated(causes: tuple[str, ...], seed: int, folder: Path) -> Drawn:
     if causes and causes[0] in OUTSIDE:
         form, distance = "outside", OUTSIDE_DISTANCE
     item = Item("ankle", tuple(sorted(causes)), form, distance, family, seed)
-    ((one,), _) = sized([item], folder)
+    one = sized(item, folder)
     study = _controlled(one, item, float(item.rng(20).choice(STEPS_US)))
     write_study(study, folder / "study")
     truth = true_values(one, item.forms())

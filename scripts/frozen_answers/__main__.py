@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
 import statistics
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from harness.generator import shared
 
 from frozen_answers.answers import answer, differences
 from frozen_answers.studies import Frozen, studies
 
 TABLE = Path(__file__).with_name("answers.jsonl")
-REPOSITORY = Path(__file__).parents[2]
 
 
 def read(table: Path) -> dict[str, dict[str, Any]]:
@@ -62,8 +61,7 @@ def main(
     table: Annotated[Path, typer.Option(help="The table.")] = TABLE,
 ) -> None:
     """Freeze the answers of some 300 studies, or show what differs from the frozen ones."""
-    shared = Path(os.environ.get("FES_PIN_DATA") or REPOSITORY.parent / "shared")
-    wanted = [one for one in studies(shared) if kind in (None, one.kind)]
+    wanted = [one for one in studies(shared()) if kind in (None, one.kind)]
     wanted = wanted if every else wanted[:count]
     if new:
         freeze(wanted, table)

@@ -2,34 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, cycle, islice
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from confusion_matrix.generator import make as make_free
-from confusion_matrix.runner import plan as free_plan
-from contrast_pairs.__main__ import plan as contrast_plan
-from contrast_pairs.driven import driven_pair
-from contrast_pairs.free import free_pair
-from driven_rigs import laboratory, stimulated, swing_up
-from driven_rigs.__main__ import items as driven_items
-from driven_rigs.draw import draw
-from imposed_rigs.__main__ import RIGS as IMPOSED
-from imposed_rigs.__main__ import items as imposed_items
-from walking_matrix.plan import KINDS, drawn
-from walking_matrix.synthetic import gait_of
-from walking_matrix.synthetic import make as make_walk
+from harness.contrast import Pairs
+from harness.driven import Driven, rows
+from harness.free import Free
+from harness.generator import Generator, Item
+from harness.imposed import RIGS, Imposed
+from harness.walking import Walks
 
-from fes_pin.body.measured_walk import data_folder
 from fes_pin.data.study import Study, read_study
 
 SEED = 9_127_000
 """Of the first study of each generator. No rule was ever made or tried on these seeds."""
 COUNTS = {"free": 120, "driven": 60, "imposed": 40, "contrast": 30, "walking": 20}
+DRIVEN = ("plain", "recorded", "laboratory", "swing-up", "stimulated")
 MEASURED = ("biceps_fes", "free_pendulum", "friction_damper", "rat_muscle", "servo_pendulum")
 """Studies of one rig each in the folder `data` of measured data."""
 PRACTICE = ("practice", "practice_loops")
@@ -66,72 +57,43 @@ def studies(shared: Path) -> list[Frozen]:
     shared
         Folder of the measured data.
     """
-    queues = [_free(), _driven(), _imposed(), _contrasts(), _walks(), _measured(shared)]
-    rows = [list(queue) for queue in queues]
+    walks = Walks(strength=False)
+    queues = {
+        "free": _of("free", Free(), Free().plan(SEED)),
+        "driven": _driven(),
+        "imposed": _of("imposed", Imposed(), _imposed()),
+        "contrast": _of("contrast", Pairs(), Pairs().plan(SEED)),
+        "walking": _of("walking", walks, walks.plan(SEED)),
+        "measured": _measured(shared),
+    }
+    rows = [list(islice(queue, COUNTS.get(kind))) for kind, queue in queues.items()]
     longest = max(len(row) for row in rows)
     spread = [((k + 0.5) / len(row) * longest, one) for row in rows for k, one in enumerate(row)]
     return [one for _, one in sorted(spread, key=lambda pair: pair[0])]
 
 
-def _free() -> Iterator[Frozen]:
-    for item in chain.from_iterable(free_plan(COUNTS["free"], SEED)):
-        yield Frozen("free", item.name, partial(_made_free, item), item.causes)
+def _of(kind: str, generator: Generator, items: Iterable[Item]) -> Iterator[Frozen]:
+    for item in items:
+        yield Frozen(kind, item.key, partial(_made, generator, item), item.hidden)
 
 
-def _made_free(item: Any, folder: Path) -> Study:
-    return make_free([item], folder)[0].study
+def _made(generator: Generator, item: Item, folder: Path) -> Study:
+    return generator.make(item, folder)[0]
 
 
 def _driven() -> Iterator[Frozen]:
-    drawing = {
-        "plain": (lambda causes, k, folder: draw(causes, 0.3, k, folder, False, None, 1), None),
-        "recorded": (lambda causes, k, folder: draw(causes, 0.3, k, folder, True, None, 1), None),
-        "laboratory": (laboratory.draw_laboratory, laboratory),
-        "swing_up": (swing_up.draw_swing_up, swing_up),
-        "stimulated": (stimulated.draw_stimulated, stimulated),
-    }
-    causes = {name: cycle(driven_items(COUNTS["driven"], module)) for name, (_, module) in drawing.items()}
-    for k, name in enumerate(islice(cycle(drawing), COUNTS["driven"])):
-        hidden = next(causes[name])
-        yield Frozen("driven", f"{name}-{SEED + k}", partial(_made_driven, drawing[name][0], hidden, SEED + k), hidden)
+    """Of five generators in turn, each with its own causes in turn."""
+    causes = {name: cycle(rows(name)) for name in DRIVEN}
+    for k, name in enumerate(cycle(DRIVEN)):
+        generator = Driven(name)
+        yield from _of("driven", generator, [generator.item(next(causes[name]), SEED + k)])
 
 
-def _made_driven(drawing: Any, causes: tuple[str, ...], seed: int, folder: Path) -> Study:
-    return read_study(drawing(causes, seed, folder).study)
-
-
-def _imposed() -> Iterator[Frozen]:
-    every = [list(imposed_items(COUNTS["imposed"], rig)) for rig in IMPOSED]
-    for k, (rig, cause) in enumerate(islice(chain.from_iterable(zip(*every, strict=True)), COUNTS["imposed"])):
-        hidden = (cause,) if cause else ()
-        yield Frozen("imposed", f"{rig}-{SEED + k}", partial(_made_imposed, rig, hidden, SEED + k), hidden)
-
-
-def _made_imposed(rig: str, causes: tuple[str, ...], seed: int, folder: Path) -> Study:
-    return IMPOSED[rig].study(causes, 0.3, np.random.default_rng(seed), folder / "study")
-
-
-def _contrasts() -> Iterator[Frozen]:
-    for seed, rig, changes in contrast_plan(COUNTS["contrast"], SEED, nulls=False):
-        yield Frozen("contrast", f"{rig}-{seed}", partial(_made_pair, rig, changes, seed), changes)
-
-
-def _made_pair(rig: str, changes: tuple[str, ...], seed: int, folder: Path) -> Study:
-    if rig == "driven":
-        return driven_pair(changes, 0.4, seed, folder)
-    return free_pair(rig, changes, 80.0, seed, folder)
-
-
-def _walks() -> Iterator[Frozen]:
-    for k in range(COUNTS["walking"]):
-        kind = "none" if k % 4 == 3 else KINDS[(k - k // 4) % len(KINDS)]
-        hidden = () if kind == "none" else (kind,)
-        yield Frozen("walking", f"{kind}-{SEED + k}", partial(_made_walk, kind, SEED + k), hidden)
-
-
-def _made_walk(kind: str, seed: int, folder: Path) -> Study:
-    make_walk(gait_of(data_folder()), folder, drawn(kind, seed), seed)
-    return read_study(folder)
+def _imposed() -> Iterator[Item]:
+    every = zip(*(cycle(Imposed().rows(rig)) for rig in RIGS), strict=False)
+    pairs = chain.from_iterable(zip(RIGS, hidden, strict=True) for hidden in every)
+    for k, (rig, hidden) in enumerate(pairs):
+        yield Imposed().item(rig, hidden, SEED + k)
 
 
 def _measured(shared: Path) -> Iterator[Frozen]:

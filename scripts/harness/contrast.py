@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
 
 import numpy as np
-from contrast_pairs import driven, free
+from contrast_pairs import driven, free, practice
 
 import fes_pin as fp
-from harness.generator import Item, Truth
+from harness.generator import Item, Truth, shared
 
 RIGS = ("ankle", "ankle", "driven", "muscle", "ankle", "joint", "driven", "ankle")
 """In turn."""
@@ -36,3 +37,20 @@ class Pairs:
         if item.part == "driven":
             return driven.driven_pair(item.hidden, SHARE, item.seed, folder), Truth()
         return free.free_pair(item.part, item.hidden, DISTANCE, item.seed, folder), Truth()
+
+
+class Halved:
+    """Every study of `practice` in the folder of measured data twice: as it is, and with a change in one half."""
+
+    ask = staticmethod(fp.contrast)
+
+    def plan(self, seed: int) -> Iterator[Item]:
+        for k, place in enumerate(sorted((shared() / "practice").glob("*/study.toml"))[seed:]):
+            rig = tomllib.loads(place.read_text())["study"]["rig"]
+            yield Item(place.parent.name, k, (), rig)
+            if exact := practice.EXACT.get(rig):
+                yield Item(f"{place.parent.name}-changed", k, (exact[k % len(exact)],), rig)
+
+    def make(self, item: Item, folder: Path) -> tuple[fp.Study, Truth]:
+        study = fp.read_study(shared() / "practice" / item.key.removesuffix("-changed"))
+        return practice.practice_pair(study, item.hidden), Truth()

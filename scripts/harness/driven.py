@@ -64,7 +64,7 @@ class Driven:
 
     def item(self, hidden: tuple[str, ...], seed: int) -> Item:
         """The study of a seed that hides these causes."""
-        return Item(f"{self.name}-{seed}", seed, hidden, outside=bool(OUTSIDE & set(hidden)))
+        return Item(f"{self.name.replace('-', '_')}-{seed}", seed, hidden, outside=bool(OUTSIDE & set(hidden)))
 
     def make(self, item: Item, folder: Path) -> tuple[fp.Study, Truth]:
         if self.name in OTHERS:

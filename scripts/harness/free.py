@@ -29,7 +29,7 @@ class Free:
         from confusion_matrix.generator import make  # noqa: PLC0415
 
         one = plan.Item.parse(item.key)
-        made = make([one], folder)[0]
+        made = make(one, folder)
         part = None
         if one.kind == "single":
             form = "the engine's form" if one.form == "same" else "another form"

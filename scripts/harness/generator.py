@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -84,9 +85,15 @@ GENERATORS = {
     "stimulated": ("driven", "Driven", "stimulated"),
     "imposed": ("imposed", "Imposed"),
     "contrast": ("contrast", "Pairs"),
+    "halved": ("contrast", "Halved"),
     "walking": ("walking", "Walks"),
 }
 """By name: module of this package, class, and what it is made with."""
+
+
+def shared() -> Path:
+    """Folder of the measured data: FES_PIN_DATA, or `shared` beside the repository."""
+    return Path(os.environ.get("FES_PIN_DATA") or Path(__file__).parents[3] / "shared")
 
 
 def generator_of(name: str) -> Generator:

@@ -125,7 +125,7 @@ def test_two_codes_are_compared_on_the_same_files_alone():
     assert "median: 1.00" in text[2] and [line.split()[:2] for line in text[3:]] == [["before", "b:"], ["now", "b:"]]
 
 
-@pytest.mark.parametrize("name", GENERATORS)
+@pytest.mark.parametrize("name", sorted(GENERATORS.keys() - {"halved"}))  # which has as many as there are studies
 def test_a_plan_holds_some_of_each_and_goes_on(name):
     items = list(islice(generator_of(name).plan(7), 120))
     assert len({item.key for item in items}) == 120

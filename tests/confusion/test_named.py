@@ -24,5 +24,5 @@ from fes_pin.diagnosis.diagnosis import diagnose_joint
 )
 def test_the_cause_alone_is_named(name, tmp_path):
     item = Item.parse(name)
-    diagnosis = diagnose_joint(generator.make([item], tmp_path)[0].study)
+    diagnosis = diagnose_joint(generator.make(item, tmp_path).study)
     assert [{c.name, *c.equivalents} for c in diagnosis.causes] == [set(item.causes)], str(diagnosis)

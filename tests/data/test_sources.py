@@ -1,6 +1,5 @@
 """Stored answers know the code that made them."""
 
-import importlib
 import shutil
 from dataclasses import replace
 
@@ -45,21 +44,3 @@ def test_a_cohort_does_not_serve_answers_of_other_code(tmp_path, monkeypatch):
     assert replace(work, command="fes-pin cohort").key() == before
     monkeypatch.setattr(one, "code_hash", lambda: "other code")
     assert work.key() != before
-
-
-def test_stored_results_of_other_code_are_not_served(tmp_path, monkeypatch):
-    """As the scripts of accuracy keep them, one line a study: a run goes on with what its own code made alone."""
-    monkeypatch.syspath_prepend(PACKAGE.parent / "scripts")
-    going_on, results, made = importlib.import_module("going_on"), tmp_path / "results.jsonl", []
-
-    def judged(piece, seed):
-        made.append(piece)
-        return {"seed": seed}
-
-    for _ in range(2):
-        assert [r["seed"] for r in going_on.results_of("ab", 5, judged, results)] == [5, 6]
-    assert made == ["a", "b"]
-    monkeypatch.setattr(going_on, "code_hash", lambda: "other code")
-    assert [r["seed"] for r in going_on.results_of("ab", 5, judged, results)] == [5, 6]
-    assert made == ["a", "b", "a", "b"]
-    assert len(going_on.rows_of(results)) == 2 and len(going_on.rows_of(results, whatever_code=True)) == 4

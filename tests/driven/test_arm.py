@@ -27,7 +27,7 @@ SEEDS = range(8)
 SECONDS = 20.0
 HORIZON_S = 0.3
 BENT = 6510001
-"""A seed whose likeliest inertia is 22 % too large (`docs/accuracy.md`)."""
+"""A seed whose likeliest inertia is 22 % too large."""
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from fes_pin.models.effects import Cogging, CoulombFriction
 from fes_pin.models.nominal import nominal_model
 
 HELD = (1810006, 1810010)
-"""Of `scripts/driven --swing-up --seed 1810000`: those that hide nothing and were told dry friction."""
+"""Of `scripts/accuracy swing-up --seed 1810000`: those that hide nothing and were told dry friction."""
 HUNTING = 2230006
 """That hides nothing, and was told friction."""
 MISLED = 2340004

@@ -30,7 +30,7 @@ class Promised(driven._Featured):
 
 @pytest.fixture(scope="module")
 def beside_a_play(tmp_path_factory):
-    """A rig of `scripts/driven --count 60 --seed 1118000 --recorded`, at `END`: no step is taken from there."""
+    """A rig of `scripts/accuracy recorded --seed 1118000`, at `END`: no step is taken from there."""
     study = read_study(draw(("backlash",), 0.3, 1118025, tmp_path_factory.mktemp("play"), recorded=True).study)
     doubts = [THERE.with_values({"std.effort": k * THERE.std["effort"]}) for k in BESIDE]
     problems = [LikelihoodProblem(nominal_model(study) + LinearPlay(), study.trials, doubt) for doubt in doubts]
