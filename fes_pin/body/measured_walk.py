@@ -14,9 +14,9 @@ from fes_pin.body.joints import JOINT_NAMES, SIDES
 from fes_pin.body.passive import Passive
 from fes_pin.data.datasets import VARIABLE, WALKING
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_text
 from fes_pin.data.named import NamedArray
-from fes_pin.data.table import check_time, parse_rows
+from fes_pin.data.recorded.text import read_csv
+from fes_pin.data.table import check_times
 
 ANGLES, TORQUES = "coords_mtpfree.csv", "reference/grf_id_mtpfree.csv"
 """The two files of the walk that are read."""
@@ -112,21 +112,12 @@ def columns_of_numbers(path: Path, wanted: Sequence[str]) -> dict[str, np.ndarra
         The file cannot be read, a column is missing, a row is ragged, a number is none, time does not rise evenly:
         with row and column.
     """
-    lines = read_text(path).rstrip("\n").split("\n")
-    names = [name.strip() for name in lines[0].split(",")]
+    table = read_csv(path, wanted)
     for name in wanted:
-        if name not in names:
-            raise InputError("missing", file=path, row=1, column=name)
-    places, kept = [names.index(name) for name in wanted], []
-    for row, line in enumerate(lines[1:], 2):
-        fields = line.split(",")
-        if len(fields) != len(names):
-            message = f"expected {len(names)} values as in the header, found {len(fields)}"
-            raise InputError(message, file=path, row=row, column=names[min(len(fields), len(names) - 1)])
-        kept.append(",".join(fields[place] for place in places))
-    table = parse_rows(path, tuple(wanted), kept, header_row=1, delimiter=",")
-    check_time(table)
-    return {name: table.column(name) for name in wanted}
+        if name not in table.names:
+            raise table.error("missing", name)
+    check_times(table.columns["time"], table.error, "time")
+    return dict(table.columns)
 
 
 def read_walk(folder: str | Path | None = None) -> MeasuredWalk:

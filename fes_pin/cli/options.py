@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -100,10 +101,4 @@ def numbers_of(option: str, values: Mapping[str, str]) -> dict[str, float]:
     InputError
         A value that is no number.
     """
-    out: dict[str, float] = {}
-    for name, text in values.items():
-        try:
-            out[name] = number_in(text)
-        except ValueError as problem:
-            raise InputError(str(problem), column=f"{option} {name}") from None
-    return out
+    return {name: number_in(text, partial(InputError, column=f"{option} {name}")) for name, text in values.items()}

@@ -10,6 +10,7 @@ import tempfile
 import tomllib
 from collections.abc import Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -195,10 +196,7 @@ def _wanted(
     from fes_pin.data.wanted import Wanted
 
     rigs = known_rigs(catalogue.schemas())
-    try:
-        schema = rigs[one_of(rig or "joint", tuple(rigs))]
-    except ValueError as problem:
-        raise InputError(str(problem), column="--rig") from None
+    schema = rigs[one_of(rig or "joint", tuple(rigs), partial(InputError, column="--rig"))]
     if schema.owner is None and (urdf is not None or given["columns"] or resample or fill or catalogue.origins()):
         raise InputError("expected no URDF, --column, --resample, --fill or --library for walking", column="--rig")
     if resample == 0.0:

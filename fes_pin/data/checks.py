@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -79,10 +80,7 @@ def checked_role(value: object, error: KeyFault) -> str:
     InputError
         Made by `error`, for any other word.
     """
-    try:
-        return one_of(value, ROLES)
-    except ValueError as problem:
-        raise error("role", str(problem)) from None
+    return one_of(value, ROLES, partial(error, "role"))
 
 
 def check_labels(name: object, role: object, group: object, error: KeyFault) -> None:

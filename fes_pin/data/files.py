@@ -63,20 +63,20 @@ def read_bytes(path: str | Path) -> bytes:
         raise InputError(f"cannot be read: {_reason(error)}", file=path) from error
 
 
-def read_text(path: str | Path) -> str:
-    """Text of a UTF-8 file, its byte-order mark removed and its line ends as "\\n".
+def read_text(path: str | Path, encoding: str = "utf-8") -> str:
+    """Text of a file, a byte-order mark of UTF-8 removed and its line ends as "\\n".
 
     Raises
     ------
     InputError
-        As `read_bytes`, and for bytes that are not UTF-8, with the row.
+        As `read_bytes`, and for bytes that are no text of this encoding, with the row.
     """
     content = read_bytes(path)
     try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        row = content[: error.start].count(b"\n") + 1
-        raise InputError("expected UTF-8 text", file=path, row=row) from error
+        text = content.decode("utf-8-sig" if encoding == "utf-8" else encoding)
+    except UnicodeError as error:
+        row = content[: getattr(error, "start", 0)].count(b"\n") + 1
+        raise InputError(f"expected {encoding.upper()} text", file=path, row=row) from error
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
-from fes_pin.data.table import read_csv
+from fes_pin.data.recorded.text import TextForm, read_csv, table_of_lines
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """What the units of a file are in metres."""
@@ -57,8 +57,7 @@ def _read_csv(path: Path) -> Markers:
         for axis in "xyz":
             if f"{name}_{axis}" not in table.names:
                 raise table.error("missing", f"{name}_{axis}")
-    places = {n: np.stack([table.column(f"{n}_{c}") for c in "xyz"], axis=1) for n in markers}
-    return Markers(table.column(table.names[0]), places)
+    return Markers(table.time, {n: np.stack([table.columns[f"{n}_{c}"] for c in "xyz"], axis=1) for n in markers})
 
 
 def _read_trc(path: Path) -> Markers:
@@ -74,40 +73,16 @@ def _read_trc(path: Path) -> Markers:
     names = [n.strip() for n in lines[3].split("\t")[2:] if n.strip()]
     if not names:
         raise InputError("expected marker names after Frame# and Time", file=path, row=4)
-    rows, time = [], []
-    for index, line in enumerate(lines[5:]):
-        if not line.strip():
-            continue
-        cells = line.split("\t")[: 2 + 3 * len(names)]
-        numbers = [_number(cell, path, 6 + index, names, k) for k, cell in enumerate(cells)]
-        numbers += [np.nan] * (2 + 3 * len(names) - len(numbers))
-        time.append(numbers[1])
-        rows.append(numbers[2:])
-    _check_rows(path, header.get("NumFrames"), len(rows), np.array(time))
-    table = METRES[unit] * np.array(rows).reshape(len(rows), len(names), 3)
-    return Markers(np.array(time), {n: table[:, k] for k, n in enumerate(names)})
-
-
-def _number(cell: str, path: Path, row: int, names: list[str], place: int) -> float:
-    label = ("Frame#", "Time")[place] if place < 2 else f"{names[(place - 2) // 3]}.{'XYZ'[(place - 2) % 3]}"
-    if not cell.strip():
-        if place < 2:
-            raise InputError("expected a number, found nothing", file=path, row=row, column=label)
-        return float("nan")
-    try:
-        return float(cell)
-    except ValueError:
-        raise InputError(f"expected a number, found {cell[:40]!r}", file=path, row=row, column=label) from None
-
-
-def _check_rows(path: Path, promised: str | None, count: int, time: np.ndarray) -> None:
-    if promised is not None and promised != str(count):
-        raise InputError(f"expected {promised[:20]} frames as NumFrames says, found {count}", file=path, row=3)
-    if count < 3:
-        raise InputError(f"expected at least 3 frames, found {count}", file=path, row=6)
-    late = np.flatnonzero(~(np.diff(time) > 0.0))
-    if len(late):
-        raise InputError("expected time to increase", file=path, row=7 + int(late[0]), column="Time")
+    cells = ("Frame#", "Time", *(f"{name}.{axis}" for name in names for axis in "XYZ"))
+    lines[5:] = ["\t".join(line.split("\t")[: len(cells)]) for line in lines[5:]]  # what is behind them is no marker
+    table = table_of_lines(path, lines, cells, TextForm("\t", header_row=4, first_row=6))
+    time = table.columns["Time"]
+    if (promised := header.get("NumFrames")) not in (None, str(len(table))):
+        raise InputError(f"expected {promised[:20]} frames as NumFrames says, found {len(table)}", file=path, row=3)
+    if len(late := np.flatnonzero(~(np.diff(time) > 0.0))):
+        raise table.error("expected time to increase", "Time", int(late[0]) + 1)
+    axes = ([table.columns[f"{name}.{axis}"] for axis in "XYZ"] for name in names)
+    return Markers(time, {name: METRES[unit] * np.stack(xyz, axis=1) for name, xyz in zip(names, axes, strict=True)})
 
 
 def _read_c3d(path: Path) -> Markers:

@@ -10,8 +10,9 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
+from fes_pin.data.recorded.text import TextForm, read_csv, read_text_recording
 from fes_pin.data.schema import is_like, unknown
-from fes_pin.data.table import Table, check_time, parse_rows, read_csv
+from fes_pin.data.table import Table, check_time
 
 TRANSLATIONS = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
 LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle", "ankle_angle")
@@ -31,6 +32,8 @@ _OPENSIM_GROUND = re.compile(
     r"_?(?:(?P<foot>[12rl]|right|left|calcn_[rl])_)?(?P<kind>[vpm]?)(?P<axis>[xyz])$",
     re.IGNORECASE,
 )
+STORAGE = (".mot", ".sto")
+"""Suffixes of OpenSim's files, whose columns have its own names."""
 BESIDE_M = 0.02
 """How far apart two plates' centres of pressure lie sideways at least, for the right foot's to be told."""
 BENT_RAD, BACK_RAD = 0.7, -0.26
@@ -53,11 +56,16 @@ def read_motion(path: str | Path) -> tuple[Table, bool | None]:
         As `read_csv` and `check_time`; a header without `endheader`, or that promises another number of rows.
     """
     path = Path(path)
-    table, in_degrees = _read_storage(path) if path.suffix.lower() in (".mot", ".sto") else (read_csv(path), False)
+    table, in_degrees = _read_storage(path) if is_storage(path) else (read_csv(path), False)
     if table.names[0] not in ("time", "time_s"):
         raise table.error(f"expected time_s or time as the first column, found {table.names[0][:40]}", "time_s")
     check_time(table)
     return table, in_degrees
+
+
+def is_storage(path: Path) -> bool:
+    """True of a file as OpenSim writes it."""
+    return path.suffix.lower() in STORAGE
 
 
 def _read_storage(path: Path) -> tuple[Table, bool | None]:
@@ -70,12 +78,12 @@ def _read_storage(path: Path) -> tuple[Table, bool | None]:
         header += 1
     if header == len(lines):
         raise InputError("expected column labels after endheader", file=path, row=header)
-    table = parse_rows(path, tuple(lines[header].split()), lines[header + 1 :], header_row=header + 1, delimiter=None)
+    table = read_text_recording(path, TextForm(" ", header_row=header + 1, first_row=header + 2, strict=True))
     keys = _storage_keys(lines[:end])
     rows = keys.get("nrows", keys.get("datarows"))
-    if rows is not None and rows != str(len(table.values)):
-        message = f"expected {rows} rows as the header says, found {len(table.values)}"
-        raise table.error(message, table.names[0], len(table.values) - 1)
+    if rows is not None and rows != str(len(table)):
+        message = f"expected {rows} rows as the header says, found {len(table)}"
+        raise table.error(message, table.names[0], len(table) - 1)
     return table, {"yes": True, "no": False}.get(keys.get("indegrees", "").lower())
 
 
@@ -104,12 +112,12 @@ def read_coordinates(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray
         whether its angles are in degrees.
     """
     table, in_degrees = read_motion(path)
-    return table.column(table.names[0]), coordinates_of(table, in_degrees)
+    return table.time, coordinates_of(table, in_degrees)
 
 
 def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarray]:
     """The coordinates that a table holds, in rad and m; see `read_coordinates`."""
-    storage = table.delimiter is None
+    storage = is_storage(table.path)
     names = {(_coordinate(name) if storage else name): name for name in table.names[1:]}
     known = [f"q_{name}" for name in (*REQUIRED, *OPTIONAL)]
     for name in known[: len(REQUIRED)]:
@@ -124,7 +132,7 @@ def coordinates_of(table: Table, in_degrees: bool | None) -> dict[str, np.ndarra
     for name, original in names.items():
         if name.startswith(("q_", "qd_", "qdd_")):
             angle = name.split("_", 1)[1] not in TRANSLATIONS
-            columns[name] = table.column(original) * (np.pi / 180.0 if in_degrees and angle else 1.0)
+            columns[name] = table.columns[original] * (np.pi / 180.0 if in_degrees and angle else 1.0)
     return _knees_as_gait2354(columns)
 
 
@@ -171,12 +179,12 @@ def read_ground_reaction(path: str | Path) -> tuple[np.ndarray, dict[str, np.nda
         As `read_motion`; a column is missing.
     """
     table, _ = read_motion(path)
-    return table.column(table.names[0]), ground_reaction_of(table)
+    return table.time, ground_reaction_of(table)
 
 
 def ground_reaction_of(table: Table) -> dict[str, np.ndarray]:
     """The ground reaction that a table holds; see `read_ground_reaction`."""
-    names = {(_ground(name) if table.delimiter is None else name): name for name in table.names[1:]}
+    names = {(_ground(name) if is_storage(table.path) else name): name for name in table.names[1:]}
     if "2_Fy" in names:
         right = _right_plate(table, names)
         names = {{right: "r", "12".replace(right, ""): "l"}.get(n[0], n[0]) + n[1:]: name for n, name in names.items()}
@@ -185,7 +193,7 @@ def ground_reaction_of(table: Table) -> dict[str, np.ndarray]:
     for name in GROUND_REACTION:
         if name not in names:
             raise _missing(table, name, table.names)
-    return {name: table.column(names[name]) for name in GROUND_REACTION}
+    return {name: table.columns[names[name]] for name in GROUND_REACTION}
 
 
 def _ground(name: str) -> str:
@@ -205,8 +213,8 @@ def _right_plate(table: Table, names: Mapping[str, str]) -> str:
     for plate in "12":
         if not {f"{plate}_Fy", f"{plate}_copz"} <= set(names):
             raise table.error("missing", next(n for n in ("Fy", "copz") if f"{plate}_{n}" not in names))
-        load = np.clip(table.column(names[f"{plate}_Fy"]), 0.0, None)
-        across[plate] = float(load @ table.column(names[f"{plate}_copz"]) / max(load.sum(), 1e-9))
+        load = np.clip(table.columns[names[f"{plate}_Fy"]], 0.0, None)
+        across[plate] = float(load @ table.columns[names[f"{plate}_copz"]] / max(load.sum(), 1e-9))
     if abs(across["1"] - across["2"]) < BESIDE_M:
         raise table.error(
             "expected columns that name the foot, r_ and l_: the plates' order does not tell it", names["1_Fy"]

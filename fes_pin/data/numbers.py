@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from numbers import Real
 from types import UnionType
 from typing import Any, TypeVar
@@ -51,18 +51,18 @@ def as_number(value: object) -> float | None:
         return math.inf
 
 
-def number_in(text: str) -> float:
+def number_in(text: str, error: Callable[[str], Exception] = ValueError) -> float:
     """The number that a text says, written as in files of numbers: without underscores.
 
     Raises
     ------
-    ValueError
-        It says none.
+    Exception
+        What `error` makes of a message, for a text that says none.
     """
     try:
         return float("" if "_" in text else text)
     except ValueError:
-        raise ValueError(f"expected a number, found {text[:40]!r}") from None
+        raise error(f"expected a number, found {text[:40]!r}") from None
 
 
 def printed(value: float | None, digits: int) -> float | None:

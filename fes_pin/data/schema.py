@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import partial
 from numbers import Real
 from typing import Any
 
@@ -53,25 +54,25 @@ class NumberKey:
     strict: bool = True
     required: bool = True
 
-    def check(self, value: object) -> float:
+    def check(self, value: object, error: Callable[[str], Exception] = ValueError) -> float:
         """The number itself.
 
         Raises
         ------
-        ValueError
-            Not a number, not finite, or out of bounds.
+        Exception
+            What `error` makes of a message, for what is not a number, not finite, or out of bounds.
         """
         if isinstance(value, bool) or not isinstance(value, Real):
-            raise ValueError(f"expected a number{self._unit()}, found {_kind_of(value)}")
+            raise error(f"expected a number{self._unit()}, found {_kind_of(value)}")
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise ValueError(f"expected a finite number{self._unit()}, found {_short(value)}")
+            raise error(f"expected a finite number{self._unit()}, found {_short(value)}")
         if number < self.lower or (self.strict and number == self.lower):
             bound = ("above" if self.strict else "of at least") + f" {self.lower:g}"
-            raise ValueError(f"expected a number {bound}{self._unit()}, found {_short(value)}")
+            raise error(f"expected a number {bound}{self._unit()}, found {_short(value)}")
         return number
 
     def _unit(self) -> str:
@@ -216,18 +217,18 @@ def known_rigs(more: Rigs | None = None) -> dict[str, RigSchema]:
     return {**found, **instance({} if more is None else more, Mapping, "rigs"), BODY.name: BODY}
 
 
-def schema_of(rig: str | RigSchema) -> RigSchema:
+def schema_of(rig: str | RigSchema, error: Callable[[str], Exception] = ValueError) -> RigSchema:
     """What a study of a rig must and may hold.
 
     Raises
     ------
-    ValueError
-        If there is no rig of that name.
+    Exception
+        What `error` makes of a message, if there is no rig of that name.
     """
     if isinstance(rig, RigSchema):
         return rig
     known = known_rigs()
-    return known[one_of(rig, tuple(known))]
+    return known[one_of(rig, tuple(known), error)]
 
 
 def check_conditions(
@@ -287,10 +288,7 @@ def checked_numbers(
     for key, value in table.items():
         if key not in known:
             raise error(key, unknown(str(key), (*known, *also)))
-        try:
-            numbers[key] = known[key].check(value)
-        except ValueError as problem:
-            raise error(key, str(problem)) from None
+        numbers[key] = known[key].check(value, partial(error, key))
     for key, number in known.items():
         if number.required and key not in numbers:
             raise error(key, f"missing; expected a number{f' in {number.unit}' if number.unit else ''}")
@@ -338,18 +336,18 @@ def without_unit(name: str) -> str:
     return name
 
 
-def one_of(value: object, known: tuple[str, ...]) -> str:
+def one_of(value: object, known: tuple[str, ...], error: Callable[[str], Exception] = ValueError) -> str:
     """The value, if it is one of these words.
 
     Raises
     ------
-    ValueError
-        If not.
+    Exception
+        What `error` makes of a message, if not.
     """
     if isinstance(value, str) and value in known:
         return value
     found = f"{value[:40]!r}" if isinstance(value, str) else _kind_of(value)
-    raise ValueError(f"expected one of {', '.join(known)}; found {found}")
+    raise error(f"expected one of {', '.join(known)}; found {found}")
 
 
 def _kind_of(value: object) -> str:

@@ -139,10 +139,7 @@ class Study(ReadOnly):
     def _schema(self) -> RigSchema:
         if self.described is not None and self.described.name in ("", self.rig):
             return self.described
-        try:
-            return schema_of(self.rig)
-        except ValueError as problem:
-            raise InputError(str(problem), column="rig") from None
+        return schema_of(self.rig, partial(InputError, column="rig"))
 
     def _check_trials(self, trials: tuple[Trial, ...], schema: RigSchema) -> None:
         if not trials:
@@ -179,10 +176,7 @@ class Study(ReadOnly):
             Something is said about a trial that is not there; or as `Trial` and `Study`.
         """
         fields = {"constants": {}, **fields}
-        try:
-            schema = fields.get("described") or schema_of(rig)
-        except ValueError as problem:
-            raise InputError(str(problem), column="rig") from None
+        schema = fields.get("described") or schema_of(rig, partial(InputError, column="rig"))
         rows = about or {} if about is None or isinstance(about, Mapping) else _rows(about, schema)
         if odd := [name for name in rows if name not in frames]:
             raise InputError(f"expected names of frames, found {odd[0]!r}", column="about")

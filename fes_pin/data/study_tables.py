@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 from fes_pin.data.as_read import HeldFile
@@ -71,10 +72,7 @@ class StudyTables:
             if key not in table:
                 raise self.error(f"study.{key}", "missing")
         name = checked_label(table["name"], lambda _, message: self.error("study.name", message), what="a name")
-        try:
-            return name, one_of(table["rig"], tuple(self.rigs))
-        except ValueError as problem:
-            raise self.error("study.rig", str(problem)) from None
+        return name, one_of(table["rig"], tuple(self.rigs), partial(self.error, "study.rig"))
 
     def rig_table(self) -> tuple[dict[str, float], dict[str, HeldFile]]:
         """Constants of the rig, and its files, by key."""

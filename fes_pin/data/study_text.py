@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from fes_pin.data.errors import InputError
@@ -51,31 +52,22 @@ def source_from_option(column: str, option: str, names: Sequence[str]) -> dict[s
     InputError
         It says something else, or names no column of the files.
     """
-    where = f"--column {column}"
+    error = partial(InputError, column=f"--column {column}")
     if option in names:  # whatever signs it has
         return {"name": option}
     first, *more = option.split(",")
     if first.startswith("rate=") and column == "time_s":
-        return {"rate_hz": _number_of(first.removeprefix("rate="), where)}
+        return {"rate_hz": number_in(first.removeprefix("rate="), error)}
     name, colon, unit = first.rpartition(":") if first not in names else (first, "", "")
     out: dict[str, Any] = {"name": name if colon else first} | ({"unit": unit} if unit and colon else {})
     if out["name"] not in names:
-        raise InputError(
-            f"expected a column of the files, one of {', '.join(names)}; found {out['name']!r}", column=where
-        )
+        raise error(f"expected a column of the files, one of {', '.join(names)}; found {out['name']!r}")
     for pair in more:
         key, equals, value = pair.partition("=")
         if not equals or key not in SOURCE_KEYS:
-            raise InputError(f"expected NAME:UNIT,zero=NUMBER,scale=NUMBER; found {option!r}", column=where)
-        out[key] = _number_of(value, where)
+            raise error(f"expected NAME:UNIT,zero=NUMBER,scale=NUMBER; found {option!r}")
+        out[key] = number_in(value, error)
     return out
-
-
-def _number_of(text: str, where: str) -> float:
-    try:
-        return number_in(text)
-    except ValueError as problem:
-        raise InputError(str(problem), column=where) from None
 
 
 def source_in_words(source: Mapping[str, Any], column: str, revolute: bool | None) -> str:

@@ -1,16 +1,15 @@
-"""Numbers by named column: CSV read fast when it is clean, and slowly to say where it is not."""
+"""Numbers by named column, with what is asked of their times."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_text
 
 MIN_ROWS = 3
 STEP_TOLERANCE = 0.01  # a step may vary by 1 %
@@ -24,146 +23,61 @@ Fault = Callable[[str, str, int | None], InputError]
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns of finite numbers, with the place that each row had in its file.
+    """Columns of numbers by name, with the place that each row has in its file.
 
     Parameters
     ----------
     path
         The file.
     names
-        Column names, time first.
-    values : ndarray, shape (n, m)
-        The numbers.
+        Names of all of its columns, in its order; the time first where it is known which that is.
+    columns
+        Numbers of those that were asked for, each of shape (n,); NaN where a sample is missing.
+    rows : ndarray of int, shape (n,)
+        Where each sample stands: its line in a text file, else its number from 1.
     header_row
-        Line number of the header; the first numbers stand in the next line.
-    delimiter
-        What separates the values of a row; None is white space.
-    rows, half_digit, called
-        Where a file is read as its study's `[columns]` says: the place of each sample, shape (n,); half of the last
-        digit that times were printed with, s; the file's own names of its columns.
+        Line number of the names; 0 where there is none.
+    units
+        Units as the file itself states them, by name, where it does.
+    half_digit
+        Half of the last digit that times were printed with, s; None: as the times themselves show.
+    half_digit_of
+        The same of any column by its name, in its unit; 0 where numbers are not printed.
+    called
+        The file's own names of columns that have other ones here.
     """
 
     path: Path
     names: tuple[str, ...]
-    values: np.ndarray
-    header_row: int
-    delimiter: str | None
-    rows: np.ndarray | None = None
+    columns: Mapping[str, np.ndarray]
+    rows: np.ndarray
+    header_row: int = 0
+    units: Mapping[str, str] = field(default_factory=dict)
     half_digit: float | None = None
+    half_digit_of: Callable[[str], float] = lambda _name: 0.0
     called: Mapping[str, str] = field(default_factory=dict)
 
-    def row(self, sample: int) -> int:
-        """Line number of a sample."""
-        return self.header_row + 1 + int(sample) if self.rows is None else int(self.rows[sample])
+    def __len__(self) -> int:
+        return len(self.rows)
 
-    def column(self, name: str) -> np.ndarray:
-        """One column, shape (n,)."""
-        return self.values[:, self.names.index(name)]
+    @property
+    def time(self) -> np.ndarray:
+        """The first column, shape (n,)."""
+        return self.columns[self.names[0]]
 
     def error(self, message: str, column: str, sample: int | None = None) -> InputError:
         """The error that names this file, a sample's row (or the header's) and a column."""
-        row = (self.header_row or None) if sample is None else self.row(sample)
+        row = (self.header_row or None) if sample is None else int(self.rows[sample])
         called = self.called.get(column, column)
         return InputError(
             message, file=self.path, row=row, column=column if called == column else f"{called} ({column})"
         )
 
 
-def read_csv(path: str | Path) -> Table:
-    """Read comma-separated numbers under one header row.
-
-    Raises
-    ------
-    InputError
-        No header, a duplicated or nameless column, fewer than 3 rows, a ragged row, text or nothing where a number
-        belongs, a number that is not finite: with its row and column.
-    """
-    path = Path(path)
-    lines = read_text(path).split("\n")
-    if not lines[0].strip():
-        raise InputError("expected a header row of column names, found nothing", file=path, row=1)
-    names = tuple(name.strip().strip('"') for name in lines[0].split(","))
-    return parse_rows(path, names, lines[1:], header_row=1, delimiter=",")
-
-
-def parse_rows(path: Path, names: tuple[str, ...], lines: list[str], header_row: int, delimiter: str | None) -> Table:
-    """Numbers of the lines beneath a header; `delimiter` None stands for white space."""
-    _check_names(path, names, header_row)
-    while lines and not lines[-1].strip():
-        lines.pop()
-    if len(lines) < MIN_ROWS:
-        found = f"expected at least {MIN_ROWS} rows of numbers, found {len(lines)}"
-        raise InputError(found, file=path, row=header_row + len(lines), column=names[0])
-    values = _parse_fast(lines, delimiter)
-    if values is None or values.shape != (len(lines), len(names)) or not np.isfinite(values).all():
-        values = _parse_slowly(path, names, lines, header_row, delimiter)
-    return Table(path, names, values, header_row, delimiter)
-
-
-def _check_names(path: Path, names: Sequence[str], header_row: int) -> None:
-    for index, name in enumerate(names):
-        if not name:
-            raise InputError("expected a column name", file=path, row=header_row, column=f"#{index + 1}")
-        if name in names[:index]:
-            raise InputError("this column is there twice", file=path, row=header_row, column=name)
-
-
-def _parse_fast(lines: list[str], delimiter: str | None) -> np.ndarray | None:
-    try:
-        return np.loadtxt(lines, dtype=float, delimiter=delimiter, comments=None, ndmin=2)
-    except ValueError:
-        return None
-
-
-def _parse_slowly(
-    path: Path, names: Sequence[str], lines: Sequence[str], header_row: int, delimiter: str | None
-) -> np.ndarray:
-    values = np.empty((len(lines), len(names)))
-    for index, line in enumerate(lines):
-        row = header_row + 1 + index
-        if not line.strip():
-            raise InputError("expected numbers, found an empty row", file=path, row=row, column=names[0])
-        fields = line.split(delimiter)
-        if len(fields) != len(names):
-            at = names[min(len(fields), len(names) - 1)]
-            message = f"expected {len(names)} values as in the header, found {len(fields)}"
-            raise InputError(message, file=path, row=row, column=at)
-        for place, (name, cell) in enumerate(zip(names, fields, strict=True)):
-            values[index, place] = _number(cell, path, row, name)
-    return values
-
-
-def _number(field: str, path: Path, row: int, column: str) -> float:
-    field = field.strip()
-    if not field:
-        raise InputError("expected a number, found nothing", file=path, row=row, column=column)
-    return number_of_cell(field, path, row, column)
-
-
-def number_of_cell(cell: str, path: Path, row: int, column: str, decimal: str = ".") -> float:
-    """The finite number that a cell says with this decimal sign.
-
-    Raises
-    ------
-    InputError
-        It says none, with row and column.
-    """
-    try:
-        if "_" in cell or (decimal == "," and "." in cell):
-            raise ValueError
-        value = float(cell.replace(decimal, "."))
-    except ValueError:
-        what = "a number with a decimal comma" if decimal == "," else "a number"
-        raise InputError(f"expected {what}, found {cell[:40]!r}", file=path, row=row, column=column) from None
-    if not math.isfinite(value):
-        raise InputError(f"expected a finite number, found {cell[:40]!r}", file=path, row=row, column=column)
-    return value
-
-
 def check_time(table: Table) -> None:
     """Require the first column to increase in equal steps; see `check_times`."""
     hint = "; resample_hz in [columns.file] has the samples interpolated"
-    check_times(table.values[:, 0], table.error, table.names[0], table.half_digit, hint)
+    check_times(table.time, table.error, table.names[0], table.half_digit, hint)
 
 
 def check_times(

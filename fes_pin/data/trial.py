@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -405,10 +405,7 @@ def read_trial(
     def error(key: str, message: str) -> InputError:
         return InputError(message, file=path, column=key)
 
-    try:
-        schema = schema_of(rig)
-    except ValueError as problem:
-        raise error("rig", str(problem)) from None
+    schema = schema_of(rig, partial(error, "rig"))
     kind = checked_kind(schema, kind, error)
     label = path.stem if name is None else name
     check_labels(label, role, group, error)
@@ -446,9 +443,9 @@ def _checked_columns(
         raise table.error(f"{told}; {NEW_STUDY}", "time_s")
     check_columns(table.names[1:], schema, kind, inputs_only, table.error)
     check_time(table)
-    columns = {name: table.column(name) for name in table.names[1:]}
+    columns = {name: table.columns[name] for name in table.names[1:]}
     check_values(columns, schema, table.error, -math.inf)  # a study with its threshold judges widths
-    return columns, table.values[:, 0]
+    return columns, table.time
 
 
 def _body_columns(path: Path, inputs_only: bool) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -456,7 +453,7 @@ def _body_columns(path: Path, inputs_only: bool) -> tuple[dict[str, np.ndarray],
     columns = coordinates_of(table, in_degrees)
     if not inputs_only or "r_Fx" in table.names:
         columns |= ground_reaction_of(table)
-    return columns, table.values[:, 0]
+    return columns, table.time
 
 
 def read_body_trial(
@@ -478,8 +475,8 @@ def read_body_trial(
         moves, in_degrees = read_motion(coordinates)
         pushes, _ = read_motion(ground_reaction)
     recordings = (
-        (moves.values[:, 0], coordinates_of(moves, in_degrees)),
-        (pushes.values[:, 0], ground_reaction_of(pushes)),
+        (moves.time, coordinates_of(moves, in_degrees)),
+        (pushes.time, ground_reaction_of(pushes)),
     )
     time, columns = on_common_time(*recordings[0], *recordings[1])
     if len(time) < MIN_ROWS:

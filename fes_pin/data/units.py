@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from fes_pin.data.schema import without_unit
 
@@ -104,13 +104,15 @@ def known_unit(unit: str, quantities: tuple[str, ...]) -> tuple[str, str] | None
     return next(((q, _KNOWN[q][plain]) for q in quantities if plain in _KNOWN[q]), None)
 
 
-def factor_of(unit: str, column: str, revolute: bool | None = None) -> float:
+def factor_of(
+    unit: str, column: str, revolute: bool | None = None, error: Callable[[str], Exception] = ValueError
+) -> float:
     """What a number in a unit is multiplied by to stand in a rig's column.
 
     Raises
     ------
-    ValueError
-        The unit is none of what this column holds.
+    Exception
+        What `error` makes of a message, for a unit that is none of what this column holds.
     """
     quantities = quantities_of(column, revolute)
     found = known_unit(unit, quantities)
@@ -118,10 +120,8 @@ def factor_of(unit: str, column: str, revolute: bool | None = None) -> float:
         return UNITS[found[0]][found[1]]
     expected = [u for q in quantities for u in UNITS[q]]
     if not expected:
-        raise ValueError(
-            f"this column holds a quantity without a table of units; expected a scale, found {unit[:40]!r}"
-        )
-    raise ValueError(f"expected a unit of {' or '.join(quantities)}: {', '.join(expected)}; found {unit[:40]!r}")
+        raise error(f"this column holds a quantity without a table of units; expected a scale, found {unit[:40]!r}")
+    raise error(f"expected a unit of {' or '.join(quantities)}: {', '.join(expected)}; found {unit[:40]!r}")
 
 
 def unit_in_name(name: str, column: str, revolute: bool | None = None) -> str:

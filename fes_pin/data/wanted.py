@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from glob import escape
 from pathlib import Path
 
@@ -71,10 +72,8 @@ def number_set(key: str, text: str, number: NumberKey) -> float:
     InputError
         The text says none, or one out of bounds.
     """
-    try:
-        return number.check(number_in(text))
-    except ValueError as problem:
-        raise InputError(str(problem), column=f"--set {key}") from None
+    error = partial(InputError, column=f"--set {key}")
+    return number.check(number_in(text, error), error)
 
 
 def of_files(files: Sequence[Path], option: str, said: Mapping[str, str]) -> dict[tuple[Path, str], str]:

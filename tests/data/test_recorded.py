@@ -61,7 +61,7 @@ def test_a_form_is_recognized_and_read(tmp_path, case):
     read = read_text_recording(path, found, ("t_ms", "Angle", "Torque"))
     assert read.names == ("t_ms", "Angle", "Torque", "state")
     assert np.allclose(read.columns["Angle"], ANGLE, atol=1e-6)
-    assert read.half_digit("Angle") == pytest.approx(0.5e-6)
+    assert read.half_digit_of("Angle") == pytest.approx(0.5e-6)
     assert len(read.rows) == len(TIME) and read.rows[0] == form.first_row
 
 
@@ -146,7 +146,9 @@ def jittered(missing=()):
 
 def test_jitter_and_missing_samples_are_filled_in_where_the_study_says_so(tmp_path):
     time, content = jittered(missing=(7, 20, 21))
-    with pytest.raises(InputError, match="row 9, column Angle: expected a number, found nothing; missing ="):
+    with pytest.raises(
+        InputError, match=r"row 9, column Angle \(position\): expected a number, found nothing; missing ="
+    ):
         read_study(study(tmp_path / "own", COLUMNS, {"a.csv": content}))
     fill = '[columns.file]\nmissing = "interpolate"\n'
     with pytest.raises(InputError, match=r"row \d+, column t_ms \(time_s\): expected a fixed step.*; resample_hz in"):
@@ -166,7 +168,7 @@ def test_gaps_are_not_filled_in(tmp_path):
         read_study(study(tmp_path / "own", COLUMNS + fill, {"a.csv": content}))
     lines = text().split("\n")
     hole = "\n".join(lines[:20] + lines[40:])
-    with pytest.raises(InputError, match="row 21, column t_ms: expected steps of at most 5 usual ones"):
+    with pytest.raises(InputError, match=r"row 21, column t_ms \(time_s\): expected steps of at most 5 usual ones"):
         read_study(study(tmp_path / "own", COLUMNS + fill, {"a.csv": hole}))
 
 

@@ -9,8 +9,8 @@ from driven_rigs.draw import draw
 
 from fes_pin.cli.main import predict
 from fes_pin.data.log import Log, advanced
+from fes_pin.data.recorded.text import read_csv
 from fes_pin.data.study import read_study
-from fes_pin.data.table import read_csv
 from fes_pin.data.trial import Trial, trial_csv
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.record import diagnosis_files
@@ -60,7 +60,7 @@ def check_that_a_prediction_knows(diagnosis, trial, folder):
     (folder / "trial.csv").write_text(trial_csv(trial))
     predict(folder / "model.toml", folder / "trial.csv", folder / "out.csv", horizon=0.1)
     table = read_csv(folder / "out.csv")
-    found = table.values[:, table.names.index("position")]
+    found = table.columns["position"]
     near, far = (
         foretell(diagnosis.model, t, diagnosis.extended.doubt, 0.1)["position"]
         for t in (diagnosis.log.applied(trial), trial)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fes_pin.data.recorded.formats import read_recording
-from fes_pin.data.recorded.recording import Recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
 from fes_pin.data.schema import RigSchema, one_of, unknown
@@ -98,25 +98,14 @@ class Columns:
         names = tuple(dict.fromkeys([s.name for s in self.sources.values() if s.name] + list(schema.columns)))
         recording = read_recording(path, self.form, names)
         taken = self._taken(recording, schema, kind, inputs_only)
-        called = {column: source.name or column for column, source in taken.items()}
+        time, half_digit = self._time(recording, taken.get("time_s"))
         columns = {c: s(recording.columns[s.name]) for c, s in taken.items() if c != "time_s"}
-        time = self._time(recording, taken.get("time_s"))
-        half = taken["time_s"] if "time_s" in taken else ColumnSource("")
-        half_digit = abs(half.scale * half.factor) * recording.half_digit(half.name) if half.name else 0.0
-        time, columns, rows, said = self._regular(recording, time, columns, schema.stimuli(kind), called)
-        table = Table(
-            path=Path(path),
-            names=("time_s", *columns),
-            values=np.column_stack([time, *columns.values()]),
-            header_row=recording.header_row or 0,
-            delimiter=",",
-            rows=rows,
-            half_digit=half_digit if self.resample_hz is None else 0.0,
-            called=called,
-        )
-        return table, said
+        called = {column: source.name or column for column, source in taken.items()}
+        table = replace(recording, called=called, names=("time_s", *columns), columns={"time_s": time, **columns})
+        table, said = self._regular(table, schema.stimuli(kind))
+        return replace(table, half_digit=half_digit if self.resample_hz is None else 0.0), said
 
-    def _taken(self, recording: Recording, schema: RigSchema, kind: str, inputs_only: bool) -> dict[str, ColumnSource]:
+    def _taken(self, recording: Table, schema: RigSchema, kind: str, inputs_only: bool) -> dict[str, ColumnSource]:
         """Sources of this file's columns; refuses what nobody has spoken for."""
         measured = () if inputs_only else (schema.outputs[kind],)
         needed = {"time_s", *schema.stimuli(kind), *schema.motion(kind)[:1], *measured}
@@ -141,45 +130,34 @@ class Columns:
             taken[name] = ColumnSource(name)
         return {c: taken[c] for c in ("time_s", *(n for n in taken if n != "time_s")) if c in taken}
 
-    def _time(self, recording: Recording, source: ColumnSource | None) -> np.ndarray:
+    def _time(self, recording: Table, source: ColumnSource | None) -> tuple[np.ndarray, float]:
+        """Times, s, and half of the last digit that they were printed with."""
         if source is None:
             raise recording.error("missing; expected [columns] to say which column it is, or its rate_hz", "time_s")
-        if not source.name:
-            assert source.rate_hz is not None
-            return np.arange(len(recording.rows)) / source.rate_hz
-        return source(recording.columns[source.name])
+        if source.rate_hz is not None:
+            return np.arange(len(recording)) / source.rate_hz, 0.0
+        half_digit = abs(source.scale * source.factor) * recording.half_digit_of(source.name)
+        return source(recording.columns[source.name]), half_digit
 
-    def _regular(
-        self,
-        recording: Recording,
-        time: np.ndarray,
-        columns: dict[str, np.ndarray],
-        held: tuple[str, ...],
-        called: Mapping[str, str],
-    ) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray, str]:
-        """Times and columns without holes, the row of each sample, and what was done, in words."""
+    def _regular(self, table: Table, held: tuple[str, ...]) -> tuple[Table, str]:
+        """Times and columns without holes, and what was done, in words."""
         said = []
+        for name, values in table.columns.items():
+            if np.isnan(values).any() and (name == "time_s" or not self.fills):
+                hint = f'a number, found nothing; missing = "{INTERPOLATE}" in [columns.file] fills in short gaps'
+                expected = "a time, found nothing" if name == "time_s" else hint
+                raise table.error(f"expected {expected}", name, int(np.argmax(np.isnan(values))))
         if self.resample_hz is not None:
-            check_steps(recording, time, called["time_s"])
-        elif np.isnan(time).any():
-            raise recording.error("expected a time, found nothing", called["time_s"], int(np.argmax(np.isnan(time))))
-        for name, values in columns.items():
-            if np.isnan(values).any() and not self.fills:
-                hint = f'missing = "{INTERPOLATE}" in [columns.file] fills in short gaps'
-                sample = int(np.argmax(np.isnan(values)))
-                raise recording.error(f"expected a number, found nothing; {hint}", called[name], sample)
+            check_steps(table)
         if self.fills:
-            columns, count = filled(recording, time, columns, held, called)
+            table, count = filled(table, held)
             said += [f"{count} missing samples are filled in"] if count else []
-        rows = recording.rows
         if self.resample_hz is not None:
-            steps = np.diff(time)
-            grid, columns = resampled(recording, time, columns, held, called, self.resample_hz)
-            rows = rows[np.searchsorted(time, grid + 1e-9, side="right") - 1]
-            time = grid
+            steps = np.diff(table.time)
+            table = resampled(table, held, self.resample_hz)
             was = f"{1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms"
             said.append(f"time steps of {was} are interpolated to {self.resample_hz:g} Hz, without a filter")
-        return time, columns, rows, "; ".join(said)
+        return table, "; ".join(said)
 
 
 def columns_of(
@@ -247,10 +225,7 @@ def _source(column: str, value: Any, revolute: bool | None, error: Callable[[str
     stated = "" if unit or "scale" in numbers else unit_in_name(name, column, revolute)
     if stated and factor_of(stated, column, revolute) != 1.0:
         raise error(f"{column}.unit", f"missing, and the name says {stated}: expected the unit of the numbers")
-    try:
-        factor = factor_of(unit, column, revolute) if unit else 1.0
-    except ValueError as problem:
-        raise error(f"{column}.unit", str(problem)) from None
+    factor = factor_of(unit, column, revolute, partial(error, f"{column}.unit")) if unit else 1.0
     return ColumnSource(name, factor, **numbers)
 
 
@@ -269,10 +244,7 @@ def _with_file(columns: Columns, about: Mapping[str, Any], error: Callable[[str,
             raise error(where, unknown(key, FILE_KEYS))
         known = {"delimiter": DELIMITERS, "decimal": DECIMALS, "encoding": ENCODINGS, "missing": (INTERPOLATE,)}
         if key in known:
-            try:
-                form[key] = one_of(value, known[key])
-            except ValueError as problem:
-                raise error(where, str(problem)) from None
+            form[key] = one_of(value, known[key], partial(error, where))
         elif key == "comment":
             if not isinstance(value, str) or not value.strip():
                 raise error(where, "expected what a comment begins with")

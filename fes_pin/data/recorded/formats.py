@@ -14,6 +14,7 @@ from __future__ import annotations
 import importlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +24,8 @@ from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes, what_is_at
 from fes_pin.data.markers import read_markers
 from fes_pin.data.motion import read_motion
-from fes_pin.data.recorded.recording import Recording, without_twins
-from fes_pin.data.recorded.text import TextForm, read_text_recording
-from fes_pin.data.table import MIN_ROWS
+from fes_pin.data.recorded.text import TextForm, read_text_recording, without_twins
+from fes_pin.data.table import MIN_ROWS, Table
 
 REFUSED = {
     **dict.fromkeys(
@@ -45,7 +45,7 @@ def is_text(path: Path) -> bool:
     return path.suffix.lower() not in {*_READERS, *REFUSED}
 
 
-def read_recording(path: str | Path, form: TextForm | None = None, wanted: Sequence[str] | None = None) -> Recording:
+def read_recording(path: str | Path, form: TextForm | None = None, wanted: Sequence[str] | None = None) -> Table:
     """Read some columns of a recording by its suffix; what is none of those above is text.
 
     Parameters
@@ -95,15 +95,15 @@ def _unreadable(path: Path, kind: str, error: BaseException) -> InputError:
     return InputError(f"cannot be read as {kind}: {' '.join(str(error).split())[:120]}", file=path)
 
 
-def _made(path: Path, columns: Mapping[str, np.ndarray], wanted: Sequence[str] | None, **more: Any) -> Recording:
+def _made(path: Path, columns: Mapping[str, np.ndarray], wanted: Sequence[str] | None, **more: Any) -> Table:
     """A recording of columns, of which only those that are wanted must be of one length; others are no part of it."""
     chosen = columns if wanted is None else {n: v for n, v in columns.items() if n in wanted}
     count = max((len(v) for v in chosen.values()), default=0)
     names = tuple(n for n, v in columns.items() if n in chosen or len(v) == count)
-    return Recording(path, names, chosen, np.arange(1, count + 1), **more)
+    return Table(path, names, chosen, np.arange(1, count + 1), **more)
 
 
-def _parquet(path: Path, wanted: Sequence[str] | None) -> Recording:
+def _parquet(path: Path, wanted: Sequence[str] | None) -> Table:
     parquet = _library("pyarrow.parquet", "parquet", path)
     types = _library("pyarrow.types", "parquet", path)
     try:
@@ -137,7 +137,7 @@ def matlab_vectors(path: Path) -> dict[str, np.ndarray]:
     return dict(_vectors(content))
 
 
-def _matlab(path: Path, wanted: Sequence[str] | None) -> Recording:
+def _matlab(path: Path, wanted: Sequence[str] | None) -> Table:
     columns = matlab_vectors(path)
     if wanted is None and columns:  # scalars and tables of other lengths are no columns of the recording
         count = Counter(len(v) for v in columns.values()).most_common(1)[0][0]
@@ -170,7 +170,7 @@ def _vectors(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
         yield f"{name}.{place}", column.astype(float)
 
 
-def _c3d(path: Path, wanted: Sequence[str] | None) -> Recording:
+def _c3d(path: Path, wanted: Sequence[str] | None) -> Table:
     """Analog channels at their rate; where only points are wanted, `<marker>_x`, `_y`, `_z` in m at theirs."""
     ezc3d = _library("ezc3d", "c3d", path)
     try:
@@ -190,8 +190,7 @@ def _c3d(path: Path, wanted: Sequence[str] | None) -> Recording:
         stated = {**dict(zip(labels, units, strict=False)), TIME: "s"}
     else:
         columns, stated = points, dict.fromkeys(points, "m") | {TIME: "s"}
-    found = _made(path, columns, wanted, units=stated, rate_hz=rate)
-    return Recording(path, names, found.columns, found.rows, None, found.units, found.rate_hz)
+    return replace(_made(path, columns, wanted, units=stated), names=names)
 
 
 def _points(path: Path) -> dict[str, np.ndarray]:
@@ -200,18 +199,17 @@ def _points(path: Path) -> dict[str, np.ndarray]:
     return {TIME: markers.time, **axes}
 
 
-def _trc(path: Path, wanted: Sequence[str] | None) -> Recording:
+def _trc(path: Path, wanted: Sequence[str] | None) -> Table:
     columns = _points(path)
     return _made(path, columns, wanted, units=dict.fromkeys(columns, "m") | {TIME: "s"})
 
 
-def _storage(path: Path, wanted: Sequence[str] | None) -> Recording:
+def _storage(path: Path, wanted: Sequence[str] | None) -> Table:
     table, _ = read_motion(path)
-    columns = {n: table.column(n) for n in table.names}
-    return _made(path, columns, wanted, units={table.names[0]: "s"})
+    return _made(path, table.columns, wanted, units={table.names[0]: "s"})
 
 
-def _xdf(path: Path, wanted: Sequence[str] | None) -> Recording:
+def _xdf(path: Path, wanted: Sequence[str] | None) -> Table:
     """Streams of numbers, `<stream>.<channel>` where there are several; each has its own times."""
     pyxdf = _library("pyxdf", "xdf", path)
     if read_bytes(path)[:4] not in (b"XDF:", b"\x1f\x8b\x08\x00", b"\x1f\x8b\x08\x08"):
@@ -246,7 +244,7 @@ def _channels(stream: Any) -> list[tuple[str, str]]:
     return list(zip(labels, units, strict=True))[:count]
 
 
-_READERS: Mapping[str, Callable[[Path, Sequence[str] | None], Recording]] = {
+_READERS: Mapping[str, Callable[[Path, Sequence[str] | None], Table]] = {
     ".parquet": _parquet,
     ".mat": _matlab,
     ".c3d": _c3d,

@@ -7,7 +7,8 @@ from pathlib import Path
 from fes_pin.data.errors import InputError
 from fes_pin.data.recorded.formats import REFUSED, is_text
 from fes_pin.data.recorded.sniff import sniff
-from fes_pin.data.table import Table, read_csv
+from fes_pin.data.recorded.text import read_csv
+from fes_pin.data.table import Table
 
 NEW_STUDY = "`fes-pin new-study` writes a [columns] table that reads it as it is"
 

@@ -7,11 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from fes_pin.data.errors import InputError
 from fes_pin.data.recorded.formats import is_text, read_recording
-from fes_pin.data.recorded.recording import Recording
 from fes_pin.data.recorded.sniff import sniff
 from fes_pin.data.recorded.text import TextForm, read_text_recording
 from fes_pin.data.schema import MEANT, RigSchema, without_unit
+from fes_pin.data.table import Table
 from fes_pin.data.units import UNITS, known_unit, quantities_of, split_header
 
 
@@ -31,7 +32,7 @@ class Proposal:
         Unit of each of the file's columns as its name or the file itself states it; "" where neither does.
     """
 
-    recording: Recording
+    recording: Table
     form: TextForm | None
     candidates: Mapping[str, tuple[str, ...]]
     units: Mapping[str, str]
@@ -60,10 +61,8 @@ def propose(path: Path, schema: RigSchema, revolute: bool | None) -> Proposal:
     return Proposal(recording, form, _without_doubles(candidates), units)
 
 
-def _numbers(path: Path, form: TextForm) -> Recording:
+def _numbers(path: Path, form: TextForm) -> Table:
     """A text file's columns of numbers; columns of words or of dates are among its names only."""
-    from fes_pin.data.errors import InputError  # noqa: PLC0415
-
     names = read_text_recording(path, form, ()).names
     for _ in names:
         try:

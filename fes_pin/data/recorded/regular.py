@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.data.recorded.recording import Recording
+from fes_pin.data.table import Table
 
 MOST_PER_SAMPLE = 100
 """Samples for each that was recorded, at most: beyond that nothing but straight lines is added."""
@@ -15,49 +16,36 @@ LONGEST_GAP = 5
 """Sample steps over which a straight line is drawn: what a rig does in longer ones nobody measured."""
 
 
-def filled(
-    recording: Recording, time: np.ndarray, columns: Mapping[str, np.ndarray], held: Collection[str], called: Mapping
-) -> tuple[dict[str, np.ndarray], int]:
-    """Columns with missing samples (NaN) filled in: an input holds its value, a reading is interpolated.
+def filled(table: Table, held: Collection[str]) -> tuple[Table, int]:
+    """A table with missing samples (NaN) filled in: an input holds its value, a reading is interpolated.
 
     Parameters
     ----------
-    recording
-        Names the place of what is wrong.
-    time
-        (n,) s.
+    table
+        Its times first.
     held
         Columns that are held.
-    called
-        The file's name of each column.
 
     Returns
     -------
-    dict of ndarray, and how many samples were filled in
+    Table, and how many samples were filled in
 
     Raises
     ------
     InputError
         A gap longer than `LONGEST_GAP` steps, or at an end of the recording.
     """
-    count = 0
-    out = {}
-    for name, values in columns.items():
+    count, out = 0, dict(table.columns)
+    for name, values in table.columns.items():
         there = ~np.isnan(values)
-        _check_gaps(recording, time, there, called[name])
-        count += int(np.count_nonzero(~there))
-        out[name] = _at(time, time[there], values[there], name in held)
-    return out, count
+        if not there.all():
+            _check_gaps(table, there, name)
+            count += int(np.count_nonzero(~there))
+            out[name] = _at(table.time, table.time[there], values[there], name in held)
+    return replace(table, columns=out), count
 
 
-def resampled(
-    recording: Recording,
-    time: np.ndarray,
-    columns: Mapping[str, np.ndarray],
-    held: Collection[str],
-    called: Mapping[str, str],
-    rate_hz: float,
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def resampled(table: Table, held: Collection[str], rate_hz: float) -> Table:
     """Columns at equally spaced times: inputs hold their value, pulses keep their number, readings are interpolated.
 
     Nothing is filtered: what the recording holds above half of the new rate folds back.
@@ -68,26 +56,29 @@ def resampled(
         Times that do not increase, a step of more than `LONGEST_GAP` usual ones, two pulses in one new sample; a rate
         that makes fewer than 3 samples, or more than `MOST_PER_SAMPLE` for each that was recorded.
     """
+    time = table.time
     count = (time[-1] - time[0]) * rate_hz + 1e-6
     if not 2.0 <= count <= MOST_PER_SAMPLE * len(time):
         low, high = (f"{n / (time[-1] - time[0]):.3g}" for n in (2.0, MOST_PER_SAMPLE * len(time)))
-        raise recording.error(f"expected to resample at {low} to {high} Hz, found {rate_hz:g} Hz", called["time_s"])
+        raise table.error(f"expected to resample at {low} to {high} Hz, found {rate_hz:g} Hz", "time_s")
     grid = time[0] + np.arange(int(count) + 1) / rate_hz
-    out = {}
-    for name, values in columns.items():
+    out = {"time_s": grid}
+    for name, values in table.columns.items():
+        if name == "time_s":
+            continue
         if name != "stim":
             out[name] = _at(grid, time, values, name in held)
             continue
         places = np.rint((time[values > 0.5] - grid[0]) * rate_hz).astype(int)
         places = np.minimum(places, len(grid) - 1)
         if len(np.unique(places)) < len(places):
-            raise recording.error(f"two pulses come within one sample of {rate_hz:g} Hz; expected more", called[name])
+            raise table.error(f"two pulses come within one sample of {rate_hz:g} Hz; expected more", name)
         out[name] = np.zeros(len(grid))
         out[name][places] = 1.0
-    return grid, out
+    return replace(table, columns=out, rows=table.rows[np.searchsorted(time, grid + 1e-9, side="right") - 1])
 
 
-def check_steps(recording: Recording, time: np.ndarray, called: str) -> None:
+def check_steps(table: Table) -> None:
     """Require times that increase, without a hole.
 
     Raises
@@ -95,28 +86,24 @@ def check_steps(recording: Recording, time: np.ndarray, called: str) -> None:
     InputError
         With the row.
     """
-    if np.isnan(time).any():
-        raise recording.error("expected a time, found nothing", called, int(np.argmax(np.isnan(time))))
-    steps = np.diff(time)
+    steps = np.diff(table.time)
     if not (steps > 0).all():
-        raise recording.error("expected time to increase", called, int(np.argmax(steps <= 0)) + 1)
+        raise table.error("expected time to increase", "time_s", int(np.argmax(steps <= 0)) + 1)
     longest, usual = int(np.argmax(steps)), float(np.median(steps))
     if steps[longest] > LONGEST_GAP * usual:
         found = f"expected steps of at most {LONGEST_GAP} usual ones of {usual:.4g} s, found {steps[longest]:.4g} s"
-        raise recording.error(f"{found}; make two trials of it", called, longest + 1)
+        raise table.error(f"{found}; make two trials of it", "time_s", longest + 1)
 
 
-def _check_gaps(recording: Recording, time: np.ndarray, there: np.ndarray, called: str) -> None:
-    if there.all():
-        return
+def _check_gaps(table: Table, there: np.ndarray, name: str) -> None:
     if not there[0] or not there[-1]:
         sample = 0 if not there[0] else int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
-        raise recording.error("a sample is missing at an end of the recording; cut it there", called, sample)
+        raise table.error("a sample is missing at an end of the recording; cut it there", name, sample)
     steps = int(np.max(np.diff(np.flatnonzero(there))))
     if steps > LONGEST_GAP:
         first = next(a for a, b in itertools.pairwise(np.flatnonzero(there)) if b - a > LONGEST_GAP)
         found = f"{steps - 1} samples in a row are missing; expected at most {LONGEST_GAP - 1}"
-        raise recording.error(f"{found}; make two trials of it", called, int(first) + 1)
+        raise table.error(f"{found}; make two trials of it", name, int(first) + 1)
 
 
 def _at(times: np.ndarray, known: np.ndarray, values: np.ndarray, held: bool) -> np.ndarray:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_bytes
-from fes_pin.data.recorded.text import DELIMITERS, MISSING, TextForm, cells_of, lines_of
+from fes_pin.data.files import read_bytes, read_text
+from fes_pin.data.recorded.text import DELIMITERS, MISSING, TextForm, cells_of
 from fes_pin.data.units import UNITS, known_unit
 
 LOOKED_AT = 400
@@ -41,7 +41,7 @@ def sniff(path: Path) -> tuple[TextForm, dict[int, str]]:
         Not a text file, or no rows of numbers in it.
     """
     encoding = _encoding(path)
-    lines = lines_of(path, encoding)[:LOOKED_AT]
+    lines = read_text(path, encoding).split("\n")[:LOOKED_AT]
     guesses = [g for d in DELIMITERS for c in (".", ",") if (g := _guess(lines, d, c)) is not None]
     if not guesses:
         raise InputError("expected rows of numbers, found none", file=path)
@@ -73,7 +73,7 @@ def _guess(lines: list[str], delimiter: str, decimal: str) -> _Guess | None:
         line = lines[place]
         if not line.strip() or line.lstrip().startswith(COMMENTS):
             continue
-        cells = cells_of(line, delimiter)
+        cells = cells_of(line, TextForm(delimiter))
         kinds = [bool(number.match(cell)) or cell.lower() in MISSING for cell in cells]
         numbers = sum(bool(number.match(cell)) for cell in cells)
         if rows and len(kinds) != len(rows[0][1]):
@@ -94,7 +94,7 @@ def _header(lines: list[str], best: _Guess, comment: str) -> tuple[int, dict[int
     nearest = 0
     for place in range(best.first - 1, -1, -1):
         line = lines[place].lstrip()
-        cells = cells_of(line.removeprefix(comment) if comment else line, best.delimiter)
+        cells = cells_of(line.removeprefix(comment), TextForm(best.delimiter))
         cells += [""] * (len(cells) == best.columns - 1)  # a last one that is empty, as of a unit of words
         if not line or len(cells) != best.columns or not any(re.search(r"[^\W\d_]", c) for c in cells):
             continue

@@ -1,8 +1,12 @@
-"""Text files of numbers in whatever form an instrument writes them: delimiter, decimal comma, units rows, comments."""
+"""Text files of numbers in whatever form an instrument writes them: delimiter, decimal comma, units rows, comments.
+
+They are read fast where they are clean, and cell by cell to say where they are not.
+"""
 
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.files import read_bytes
-from fes_pin.data.recorded.recording import Recording, without_twins
-from fes_pin.data.table import MIN_ROWS, number_of_cell
+from fes_pin.data.files import read_text
+from fes_pin.data.table import MIN_ROWS, Table
 
 DELIMITERS = (";", "\t", ",", " ")
 """Semicolon, tab, comma, and any white space."""
@@ -40,6 +43,9 @@ class TextForm:
         What a line begins with that is passed over; "" for nothing.
     encoding
         Of `ENCODINGS`.
+    strict
+        Whether each line must hold as many numbers as there are names, none of them missing and no two names alike, as
+        the study format has it.
     """
 
     delimiter: str = ","
@@ -48,6 +54,7 @@ class TextForm:
     first_row: int = 2
     comment: str = ""
     encoding: str = "utf-8"
+    strict: bool = False
 
     def in_words(self) -> str:
         """What sets this form apart from that of the study format; "" if nothing does."""
@@ -69,33 +76,50 @@ class TextForm:
         return ", ".join(said)
 
 
-def lines_of(path: Path, encoding: str) -> list[str]:
-    """Lines of a text file.
+def cells_of(line: str, form: TextForm) -> list[str]:
+    """The cells of one line, without surrounding spaces.
+
+    Unless the form is strict also without quotes, and a delimiter at the end of the line begins no cell.
+    """
+    cells = line.split(None if form.delimiter == " " else form.delimiter)
+    if form.strict:
+        return [cell.strip() for cell in cells]
+    if form.delimiter == " ":
+        return [cell.strip('"') for cell in cells]
+    if '"' in line:
+        cells = next(csv.reader([line], delimiter=form.delimiter, skipinitialspace=True), [])
+    out = [cell.strip() for cell in cells]
+    return out[:-1] if len(out) > 1 and not out[-1] else out
+
+
+def without_twins(names: list[str]) -> tuple[str, ...]:
+    """Names of which no two are the same: the second `Value` is `Value#2`; what has none is called by its place."""
+    out: list[str] = []
+    for place, name in enumerate(names, 1):
+        base = name or f"column{place}"
+        count = sum(1 for other in names[: place - 1] if other == name) + 1 if name else 1
+        out.append(base if count == 1 else f"{base}#{count}")
+    return tuple(out)
+
+
+def read_csv(path: str | Path, wanted: Sequence[str] | None = None) -> Table:
+    """Read comma-separated numbers under one header row.
+
+    Parameters
+    ----------
+    wanted
+        Names of the columns whose cells must be numbers; None for all.
 
     Raises
     ------
     InputError
-        As `read_bytes`, and for bytes that are no text of this encoding, with the row.
+        No header, a duplicated or nameless column, fewer than 3 rows, a ragged row, text or nothing where a number
+        belongs, a number that is not finite: with its row and column.
     """
-    content = read_bytes(path)
-    try:
-        text = content.decode("utf-8-sig" if encoding == "utf-8" else encoding)
-    except UnicodeError as error:
-        row = content[: getattr(error, "start", 0)].count(b"\n") + 1
-        raise InputError(f"expected {encoding} text", file=path, row=row) from None
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return read_text_recording(Path(path), TextForm(strict=True), wanted)
 
 
-def cells_of(line: str, delimiter: str) -> list[str]:
-    """The cells of one line, without quotes and surrounding spaces; a delimiter at its end begins no cell."""
-    if delimiter == " ":
-        return [cell.strip('"') for cell in line.split()]
-    cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), []) if '"' in line else None
-    out = [cell.strip() for cell in (line.split(delimiter) if cells is None else cells)]
-    return out[:-1] if len(out) > 1 and not out[-1] else out
-
-
-def read_text_recording(path: Path, form: TextForm, wanted: Sequence[str] | None = None) -> Recording:
+def read_text_recording(path: Path, form: TextForm, wanted: Sequence[str] | None = None) -> Table:
     """Read some columns of a text file, or all.
 
     Parameters
@@ -108,45 +132,64 @@ def read_text_recording(path: Path, form: TextForm, wanted: Sequence[str] | None
     InputError
         A file that is not of this form, with row and column.
     """
-    lines = lines_of(path, form.encoding)
-    names = _names(path, lines, form)
+    lines = read_text(path, form.encoding).split("\n")
+    return table_of_lines(path, lines, _names(path, lines, form), form, wanted)
+
+
+def table_of_lines(
+    path: Path, lines: list[str], names: tuple[str, ...], form: TextForm, wanted: Sequence[str] | None = None
+) -> Table:
+    """The table of a text file's lines, as `read_text_recording`; its columns have these names."""
     chosen = [n for n in names if wanted is None or n in wanted]
     body, rows = _body(lines, form)
     if len(body) < MIN_ROWS:
-        message = f"expected at least {MIN_ROWS} rows of numbers from row {form.first_row} on, found {len(body)}"
-        raise InputError(message, file=path, row=form.first_row)
+        row = int(rows[-1]) if len(rows) else form.first_row - 1
+        raise InputError(
+            f"expected at least {MIN_ROWS} rows of numbers, found {len(body)}", file=path, row=row, column=names[0]
+        )
     places = [names.index(n) for n in chosen]
     values = _fast(body, form, places, len(names))
     if values is None:
         values = _slowly(path, body, rows, form, (names, places))
-    columns = dict(zip(chosen, values.T.copy(), strict=True))
 
     def half_digit(name: str) -> float:
         place = names.index(name)
-        texts = (cells_of(line, form.delimiter) for line in body)
+        texts = (cells_of(line, form) for line in body)
         return 0.5 * 10.0 ** -max(_decimals(cells[place], form.decimal) for cells in texts if place < len(cells))
 
-    return Recording(path, names, columns, rows, form.header_row or None, {}, None, half_digit)
+    columns = dict(zip(chosen, values.T.copy(), strict=True))
+    return Table(path, names, columns, rows, form.header_row, half_digit_of=half_digit)
 
 
 def _names(path: Path, lines: list[str], form: TextForm) -> tuple[str, ...]:
-    if form.header_row:
-        if form.header_row > len(lines) or not lines[form.header_row - 1].strip():
-            raise InputError("expected column names here, found nothing", file=path, row=form.header_row)
-        line = lines[form.header_row - 1]
-        return without_twins(cells_of(line.removeprefix(form.comment) if form.comment else line, form.delimiter))
-    first = next((line for line in lines[form.first_row - 1 :] if line.strip()), "")
-    return without_twins([""] * len(cells_of(first, form.delimiter)))
+    if not form.header_row:
+        first = next((line for line in lines[form.first_row - 1 :] if line.strip()), "")
+        return without_twins([""] * len(cells_of(first, form)))
+    line = lines[form.header_row - 1] if form.header_row <= len(lines) else ""
+    if not line.strip():
+        raise InputError("expected a header row of column names, found nothing", file=path, row=form.header_row)
+    names = cells_of(line.removeprefix(form.comment), form)
+    if not form.strict:
+        return without_twins(names)
+    names = [name.strip('"') for name in names]
+    for index, name in enumerate(names):
+        if not name:
+            raise InputError("expected a column name", file=path, row=form.header_row, column=f"#{index + 1}")
+        if name in names[:index]:
+            raise InputError("this column is there twice", file=path, row=form.header_row, column=name)
+    return tuple(names)
 
 
 def _body(lines: list[str], form: TextForm) -> tuple[list[str], np.ndarray]:
-    """The lines of numbers, and where each stands."""
-    body, rows = [], []
-    for row, line in enumerate(lines[form.first_row - 1 :], form.first_row):
-        if line.strip() and not (form.comment and line.lstrip().startswith(form.comment)):
-            body.append(line)
-            rows.append(row)
-    return body, np.array(rows, dtype=int)
+    """The lines of numbers, and where each stands; where the form is strict also blank ones before the last."""
+    found = list(enumerate(lines[form.first_row - 1 :], form.first_row))
+    while found and not found[-1][1].strip():
+        found.pop()
+    if not form.strict:
+        found = [(row, line) for row, line in found if line.strip()]
+    if form.comment:
+        found = [(row, line) for row, line in found if not line.lstrip().startswith(form.comment)]
+    return [line for _, line in found], np.array([row for row, _ in found], dtype=int)
 
 
 def _fast(body: list[str], form: TextForm, places: list[int], count: int) -> np.ndarray | None:
@@ -156,7 +199,7 @@ def _fast(body: list[str], form: TextForm, places: list[int], count: int) -> np.
         return None
     if form.delimiter != " ":
         cuts = {line.count(form.delimiter) for line in body}
-        if not cuts <= {count - 1, count} or len(cuts) > 1:
+        if not cuts <= {count - 1, count - form.strict} or len(cuts) > 1:
             return None
     elif any(len(line.split()) != count for line in body):
         return None
@@ -166,7 +209,8 @@ def _fast(body: list[str], form: TextForm, places: list[int], count: int) -> np.
         values = np.loadtxt(lines, dtype=float, delimiter=delimiter, comments=None, ndmin=2, usecols=places)
     except ValueError:
         return None
-    return None if np.isinf(values).any() else values
+    whole = len(values) == len(body) and not (form.strict and np.isnan(values).any())
+    return values if whole and not np.isinf(values).any() else None
 
 
 def _slowly(
@@ -174,17 +218,35 @@ def _slowly(
 ) -> np.ndarray:
     names, places = which
     values = np.empty((len(body), len(places)))
-    for index, line in enumerate(body):
-        cells = cells_of(line, form.delimiter)
-        row = int(rows[index])
-        if len(cells) > len(names):
+    missing = {""} if form.strict else MISSING
+    for index, (line, row) in enumerate(zip(body, rows.tolist(), strict=True)):
+        cells = cells_of(line, form)
+        if not line.strip():
+            raise InputError("expected numbers, found an empty row", file=path, row=row, column=names[0])
+        if len(cells) > len(names) or (form.strict and len(cells) < len(names)):
             message = f"expected {len(names)} values as in the header, found {len(cells)}"
-            raise InputError(message, file=path, row=row, column=names[-1])
+            raise InputError(message, file=path, row=row, column=names[min(len(cells), len(names) - 1)])
         for k, place in enumerate(places):
             cell = cells[place] if place < len(cells) else ""
-            is_missing = cell.lower() in MISSING
-            values[index, k] = np.nan if is_missing else number_of_cell(cell, path, row, names[place], form.decimal)
+            is_missing = cell.lower() in missing
+            if is_missing and form.strict:
+                raise InputError("expected a number, found nothing", file=path, row=row, column=names[place])
+            values[index, k] = np.nan if is_missing else _number(cell, path, row, names[place], form.decimal)
     return values
+
+
+def _number(cell: str, path: Path, row: int, column: str, decimal: str) -> float:
+    """The finite number that a cell says with this decimal sign."""
+    try:
+        if "_" in cell or (decimal == "," and "." in cell):
+            raise ValueError
+        value = float(cell.replace(decimal, "."))
+    except ValueError:
+        what = "a number with a decimal comma" if decimal == "," else "a number"
+        raise InputError(f"expected {what}, found {cell[:40]!r}", file=path, row=row, column=column) from None
+    if not math.isfinite(value):
+        raise InputError(f"expected a finite number, found {cell[:40]!r}", file=path, row=row, column=column)
+    return value
 
 
 def _decimals(cell: str, decimal: str) -> int:
