@@ -188,9 +188,12 @@ def test_the_benchmarks_that_are_listed_are_those_that_can_be_run():
 
 def test_the_study_format_has_every_key_of_a_diagnosis():
     text = (DOCS / "study_format.md").read_text()
-    files = [ROOT / "fes_pin/diagnosis" / f"{name}.py" for name in ("result", "recorded", "cause")]
+    files = [ROOT / "fes_pin" / name for name in ("diagnosis/result.py", "diagnosis/recorded.py", "infer/result.py")]
+    files.append(ROOT / "fes_pin/data/results.py")
     every = [node for file in files for node in ast.walk(ast.parse(file.read_text()))]
-    records = [f for f in every if isinstance(f, ast.FunctionDef) and f.name.endswith("record")]
+    records = [
+        f for f in every if isinstance(f, ast.FunctionDef) and f.name.endswith(("record", "_gains", "_parameters"))
+    ]
     made = [node for record in records for node in ast.walk(record) if isinstance(node, ast.Dict)]
     keys = {key.value for node in made for key in node.keys if isinstance(key, ast.Constant)} | {RESULT, TEXT, TABLE}
     assert {"verdict", "equivalents", "ci95", "at_bound"} <= keys

@@ -33,7 +33,6 @@ def contrast(
     """Say what differs between groups of trials, by how much, and what did not change."""
     from fes_pin.contrasts.contrast import contrast as find
     from fes_pin.contrasts.record import FILE, contrast_json
-    from fes_pin.contrasts.result import contrast_text
     from fes_pin.data.outputs import Outputs
     from fes_pin.view.contrast_report import contrast_html
 
@@ -49,4 +48,4 @@ def contrast(
         )
     outputs.write(out, {FILE: contrast_json(found), "report.html": contrast_html(found)})
     say_whose_code(catalogue)
-    typer.echo(f"{contrast_text(found)}\nreport: {out / 'report.html'}")
+    typer.echo(f"{found}\nreport: {out / 'report.html'}")

@@ -149,18 +149,15 @@ def _print_verdict(diagnosis: Diagnosis) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from fes_pin.diagnosis.text import cause_columns, cause_row
-
+    title, head, rows, notes = diagnosis.as_table()
     console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=not sys.stdout.isatty(), highlight=False)
-    console.print(Text(f"{diagnosis.study.name}: {diagnosis.headline()}", style="bold"))
-    if diagnosis.causes:
-        table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
-        for title in cause_columns(diagnosis.gain_name):
-            table.add_column(title)
-        for cause in diagnosis.causes:
-            table.add_row(*(Text(cell) for cell in cause_row(cause)))
+    console.print(Text(title, style="bold"))
+    if rows:
+        table = Table(*head, box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+        for row in rows:
+            table.add_row(*map(Text, row))
         console.print(table)
-    for note in diagnosis.footnotes():
+    for note in notes:
         console.print(Text(note))
 
 

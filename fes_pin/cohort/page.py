@@ -9,8 +9,8 @@ from typing import Any
 
 from fes_pin.cohort.pool import pooled
 from fes_pin.data.provenance import today, versions
-from fes_pin.diagnosis.text import percent, probability
 from fes_pin.identify.error_measures import E_WORDS
+from fes_pin.infer.text import percent, probability
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.page import Content, Markup, element, figure, folded, html_table, joined, page, section, value_text

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import binomtest, chi2, false_discovery_control, t
 
-from fes_pin.diagnosis.recorded import LEAST_P
+from fes_pin.infer.result import LEAST_P
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,9 @@ from fes_pin.cohort.tables import (
 )
 from fes_pin.data.errors import InputError
 from fes_pin.data.outputs import Outputs
-from fes_pin.data.results import Saveable, shown
+from fes_pin.data.results import Saveable
 from fes_pin.data.tabular import SUFFIXES, table_bytes
+from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import load_library
 
 
@@ -77,7 +78,8 @@ class Cohort(Saveable):
         """The table of `to_frame`, by columns: `studies`."""
         return {n: [r[n] for r in self.studies] for n in HEADS["studies"]}
 
-    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+    def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        """Title, head, rows and notes of the table that is printed."""
         rows = [(r["cause"], str(r["studies"]), f"{r['share_percent']:.0f} %") for r in self.prevalence]
         failed = [f"failed: {r['study']}: {r['error']}" for r in self.failed]
         return repr(self), ("cause", "studies", "share"), rows, failed

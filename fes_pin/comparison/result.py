@@ -11,10 +11,11 @@ import numpy as np
 from scipy import special
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.results import Recorded, Saveable, shown
+from fes_pin.data.results import Recorded, Saveable
 from fes_pin.data.show import by_columns
 from fes_pin.data.study import Study
 from fes_pin.identify.fit import Fit
+from fes_pin.infer.result import shown
 
 LEVEL = 0.05
 """Family-wise error of calling any model worse than the best when it is not."""
@@ -171,7 +172,8 @@ class Comparison(Saveable):
         ]
         return by_columns(head, rows)
 
-    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+    def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        """Title, head, rows and notes of the table that is printed."""
         rows = [_row(self, m) for m in self.models]
         return f"{self.study.name}: {headline(self)}", _head(self), rows, notes(self)
 

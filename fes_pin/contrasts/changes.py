@@ -9,12 +9,11 @@ import numpy as np
 from fes_pin.contrasts.decide import inflation
 from fes_pin.contrasts.fits import Fits
 from fes_pin.contrasts.grouped import Grouped, Item
-from fes_pin.contrasts.result import Change
 from fes_pin.contrasts.search import ContrastFound
 from fes_pin.contrasts.words import of_cause, of_nominal
-from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.infer.distributions import normal_quantile
 from fes_pin.infer.levels import ABSORBED_BELOW, CLAIM_LEVEL, SEPARABLE
+from fes_pin.infer.result import Change, ParameterEstimate
 from fes_pin.models.catalogue import Catalogue
 
 SEEN = 0.95

@@ -10,12 +10,11 @@ import numpy as np
 
 from fes_pin.contrasts.fits import Fits
 from fes_pin.contrasts.grouped import Item
-from fes_pin.contrasts.result import Change
 from fes_pin.contrasts.search import ContrastFound
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials
 from fes_pin.infer.levels import CLAIM_LEVEL, PARAMETER_PRICE, SEPARABLE
+from fes_pin.infer.result import Change, ParameterEstimate
 from fes_pin.models.model import Model
 
 ROUNDS = 3

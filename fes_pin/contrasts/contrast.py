@@ -14,7 +14,7 @@ from fes_pin.contrasts.grouped import Grouped
 from fes_pin.contrasts.groups import BY_GROUP, grouped_study
 from fes_pin.contrasts.late import is_cheaper, late_in_groups
 from fes_pin.contrasts.left import left_in_groups
-from fes_pin.contrasts.result import STOPPED, Contrast
+from fes_pin.contrasts.result import Contrast
 from fes_pin.contrasts.search import ContrastFound, ContrastSearch
 from fes_pin.data.asked import asked
 from fes_pin.data.log import EFFORT, Log
@@ -25,11 +25,11 @@ from fes_pin.diagnosis.diagnosis import measured_study, split
 from fes_pin.diagnosis.logged import LogFaults
 from fes_pin.diagnosis.long_records import searched_part
 from fes_pin.diagnosis.plausibility import check_study
-from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.identify.effort_noise import words_of_noise
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.lasting import words_of_reading
 from fes_pin.identify.lateness import words_of_lateness
+from fes_pin.infer.result import STOPPED, Remainder
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
@@ -131,7 +131,7 @@ def _answer(
         study=study,
         groups=groups,
         verdict="changed" if changes else "unexplained" if left.unexplained else "nothing_changed",
-        changes=tuple(sorted(changes, key=lambda c: c.p_value)),
+        causes=tuple(sorted(changes, key=lambda c: c.p_value)),
         common=_common(found.best),
         unchanged=unchanged,
         excluded=excluded,

@@ -9,8 +9,9 @@ import numpy as np
 from fes_pin.contrasts.fits import Fits
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.diagnosis.remainder.driven import driven_remainder
-from fes_pin.diagnosis.remainder.open_set import Remainder, unexplained_remainder
+from fes_pin.diagnosis.remainder.open_set import unexplained_remainder
 from fes_pin.infer.levels import CLAIM_LEVEL
+from fes_pin.infer.result import Remainder
 from fes_pin.workers import in_parallel
 
 

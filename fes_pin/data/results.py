@@ -7,19 +7,20 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_json, write_text
-from fes_pin.data.numbers import printed
+from fes_pin.data.provenance import Provenance
 from fes_pin.data.read_only import ReadOnly, as_dicts
-from fes_pin.data.show import frame, table_html, table_text
+from fes_pin.data.show import by_columns, frame, table_html, table_text
+from fes_pin.data.study import Study
+from fes_pin.infer.result import STOPPED, Cause, Explained, Named, Remainder, shown
+from fes_pin.infer.text import listed
 
 if TYPE_CHECKING:
     import pandas
 
-DIGITS = 6
-"""Significant digits printed: the last that does not depend on how sums are ordered."""
 RESULT, TEXT, TABLE = "result", "text", "table"
 """Keys that every saved result has, beside those of its kind: which kind, its text by lines, its table by columns."""
 UNCOMPARED = ("wall_s", "provenance")
@@ -55,8 +56,8 @@ class Saveable(Recorded):
         """The table of `to_frame`, by columns."""
         raise NotImplementedError
 
-    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
-        """Title, head, rows and notes of the table that a notebook shows."""
+    def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        """Title, head, rows and notes of the table that is printed."""
         raise NotImplementedError
 
     def to_frame(self) -> pandas.DataFrame:
@@ -76,15 +77,110 @@ class Saveable(Recorded):
         return json.dumps(saved, indent=1, allow_nan=False) + "\n"
 
     def __str__(self) -> str:
-        return table_text(*self._notebook())
+        return table_text(*self.as_table())
 
     def _repr_html_(self) -> str:
-        return table_html(*self._notebook())
+        return table_html(*self.as_table())
 
 
-def shown(value: float | None) -> float | None:
-    """A number as printed; None for what is not finite."""
-    return printed(value, DIGITS)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Result(Saveable):
+    """What an inference says of a study: base of diagnoses and contrasts.
+
+    Attributes
+    ----------
+    verdict
+        One word; "stopped" where a limit of time ended the search, or fits did not converge. Then the causes are the
+        best set so far, and nothing is claimed of what is not among them.
+    causes
+        What is named: by gain, largest first, or changes, surest first.
+    remainder
+        Lack of fit.
+    warnings
+        What is odd about the study, and what could not be done, one line each.
+    reason
+        Why something is unexplained, where it is no test of the residuals that says so: nothing could be fitted, or an
+        error stays that is no noise.
+    provenance
+        When, by which versions, from which files it was made.
+    """
+
+    study: Study
+    verdict: str
+    causes: tuple[Named, ...]
+    remainder: Remainder
+    warnings: tuple[str, ...] = ()
+    wall_s: float = 0.0
+    reason: str | None = None
+    provenance: Provenance | None = None
+    KIND: ClassVar[type[Named]] = Cause
+    """Of what is named."""
+    MODEL: ClassVar[str] = "the model"
+    """What is diagnosed, in words."""
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the search ended before it was done."""
+        return self.verdict == STOPPED
+
+    @property
+    def explained(self) -> Explained | None:
+        """What all causes together gain, and against what that is measured."""
+        return None
+
+    def headline(self) -> str:
+        """The verdict in one sentence, with what is explained, and against what that is measured."""
+        begun = "stopped: best set so far: " if self.is_stopped else ""
+        if not self.causes:
+            said = {
+                STOPPED: "no cause, and no claim about causes that were not tried",
+                "adequate": f"{self.MODEL} is adequate: these data justify no extension of it",
+                "unexplained": f"{self.MODEL} misses something, and nothing in the library explains it",
+            }
+            return f"{begun}{said[self.verdict]}" + (f": {self.reason}." if self.reason else ".")
+        names, found = listed([one.name for one in self.causes]), self.explained
+        verb = "explains" if len(self.causes) == 1 else "explain"
+        size = "" if found is None else f" {found.of(found.nominal):.0f} % of the {found.measure}: {found}"
+        left = "; something is left unexplained" if self.remainder.unexplained else ""
+        return f"{begun}{names} {verb}{size}{left}."
+
+    def notes(self) -> list[str]:
+        """What is said below the table of what is named."""
+        raise NotImplementedError
+
+    def own_record(self) -> dict[str, Any]:
+        """What the record has that those of others have not."""
+        raise NotImplementedError
+
+    def head(self) -> tuple[str, ...]:
+        """Titles of the table of what is named."""
+        return ("cause", "where", "parameters", "gain [95 %]", "cannot be told from")
+
+    def record(self) -> dict[str, Any]:
+        """The JSON file as a dictionary, without the text and the table that a saved result has as well."""
+        return {
+            "study": self.study.name,
+            "verdict": self.verdict,
+            f"{self.KIND.__name__.lower()}s": [one.record() for one in self.causes],
+            "remainder": self.remainder.record(),
+            **({"explained": self.explained.record()} if self.explained else {}),
+            **self.own_record(),
+            "warnings": list(self.warnings),
+            "wall_s": round(self.wall_s, 2),
+            **({"provenance": self.provenance.record()} if self.provenance else {}),
+        }
+
+    def columns(self) -> dict[str, list[Any]]:
+        """The table of `to_frame`, by columns: a row an estimate of each that is named, none without one."""
+        return by_columns(self.KIND.head(), [row for one in self.causes for row in one.columns()])
+
+    def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        """Title, head, rows and notes of the table that is printed."""
+        return f"{self.study.name}: {self.headline()}", self.head(), [one.row() for one in self.causes], self.notes()
+
+    def __repr__(self) -> str:
+        names = f" ({', '.join(one.name for one in self.causes)})" if self.causes else ""
+        return f"{type(self).__name__} of {self.study.name}: {self.verdict}{names}"
 
 
 def _cell(value: Any) -> Any:

@@ -27,13 +27,14 @@ from fes_pin.diagnosis.misread import NAME as MISREAD
 from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.restate import restated_study, search_with_conditions, with_misread
-from fes_pin.diagnosis.result import STOPPED, Diagnosis
+from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import NominalFitError, SimulationSearch
 from fes_pin.diagnosis.searches import Result, Search, Searches
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
 from fes_pin.identify.recording import earns, low_pass_of
+from fes_pin.infer.result import STOPPED
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs.base import Rig

@@ -14,7 +14,6 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
 from fes_pin.diagnosis.decide.claims import FORM_SHARE
 from fes_pin.diagnosis.decide.gains_ahead import Fold, gains_of
@@ -40,14 +39,14 @@ from fes_pin.diagnosis.errors_ahead import (
 )
 from fes_pin.diagnosis.form_errors import FRESH, beside_what_is_new, judged_again
 from fes_pin.diagnosis.remainder.driven import driven_remainder
-from fes_pin.diagnosis.remainder.open_set import Remainder
-from fes_pin.diagnosis.result import CROSS_VALIDATED, NOTHING, SEPARATE, Diagnosis
+from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_reading
+from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, Cause, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.verdict import State, Verdict, Weighed, share_in, word_of
 from fes_pin.models.stage import Effect
@@ -249,9 +248,10 @@ def driven_diagnosis(
         scored=search.models.scored(found),
         floor=best.noise,
     )
-    causes = [_cause(judged, one, best) for one in best.model.effects]
-    causes.sort(key=lambda c: -c.gain_held_out.percent)
     fitted, held = judged.ahead, judged.held_out_ahead
+    on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
+    causes = [_cause(judged, one, best, on) for one in best.model.effects]
+    causes.sort(key=lambda c: -c.gain_held_out.percent)
     return Diagnosis(
         study=study,
         verdict=word_of(bool(causes), left),
@@ -265,7 +265,7 @@ def driven_diagnosis(
         ceiling_percent=_ceiling(found.best),
         next_experiment=experiment(searched, causes, study),
         ranking=ranking(searched),
-        held_out_by=SEPARATE if trials[1] else CROSS_VALIDATED if held else NOTHING,
+        held_out_by=on,
         left_out={},
         wall_s=0.0,
         warnings=_words(best, trials[0]),
@@ -296,9 +296,13 @@ def _foretelling_more(other: Judged, one: Judged) -> Judged:
     return other if other.left.unexplained else replace(other, left=one.left)
 
 
-def _cause(judged: Judged, one: Effect, best: Fit) -> Cause:
-    """What is told of one cause; `best` has intervals as wide as its scores scatter."""
-    found, name = judged.found, one.name
+def _cause(judged: Judged, one: Effect, best: Fit, on: str) -> Cause:
+    """What is reported of one cause; `best` has intervals as wide as its scores scatter.
+
+    Its gains are found `on` such data. A likelihood is no evidence where the model leaves more than noise.
+    """
+    found, name, weighed = judged.found, one.name, judged.state.weighed
+    evidence = None if weighed.lack_of_fit.unexplained else weighed.evidence.get(name)
     alike = _alike(found, name)
     return Cause(
         name=name,
@@ -307,7 +311,7 @@ def _cause(judged: Judged, one: Effect, best: Fit) -> Cause:
         equivalents=alike[1:],
         p_value=found.p_values[name],
         gain_fit=100.0 * share_in(found, name),
-        gain_held_out=judged.state.weighed.gains[name],
-        evidence=judged.state.weighed.evidence.get(name),
+        gain_held_out=replace(weighed.gains[name], on=on),
+        evidence=replace(evidence, on=on) if evidence else None,
         chosen_again=share_of(judged.chosen, alike),
     )

@@ -15,9 +15,9 @@ from fes_pin.diagnosis.search.likelihood_models import Found
 from fes_pin.identify.fit import Fit, fit_of
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.turns import maximise
-from fes_pin.infer.held_out import Evidence
 from fes_pin.infer.maximise import together
 from fes_pin.infer.problem import Unknowns, normal_equations
+from fes_pin.infer.result import Evidence
 from fes_pin.infer.scatter import at_rest
 from fes_pin.workers import in_parallel
 

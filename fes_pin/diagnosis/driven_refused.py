@@ -9,11 +9,11 @@ import numpy as np
 
 from fes_pin.diagnosis.decide.claims import FORM_SHARE
 from fes_pin.diagnosis.errors_ahead import RandomPart, are_large, random_parts
-from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.infer.levels import CERTAIN_LEVEL, NOTHING_PERCENT
 from fes_pin.infer.optimize import WORTH
+from fes_pin.infer.result import Remainder
 from fes_pin.infer.verdict import Refused
 
 UNMOVED = "the motion is as likely without the recorded input, so something else moves the rig"

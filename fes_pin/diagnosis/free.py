@@ -8,22 +8,22 @@ from dataclasses import replace
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.cause import Cause
-from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, share_of
+from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
 from fes_pin.diagnosis.decide.doubts import doubts, with_error
 from fes_pin.diagnosis.decide.held_out import HeldOut, cross_validate, errors_of, separate
 from fes_pin.diagnosis.decide.rivals import absorbed, equivalents, estimates, experiment, ranking
 from fes_pin.diagnosis.errors_ahead import free_errors
-from fes_pin.diagnosis.remainder.open_set import Remainder, unexplained_remainder
-from fes_pin.diagnosis.result import CROSS_VALIDATED, NOTHING, SEPARATE, STOPPED, Diagnosis
+from fes_pin.diagnosis.remainder.open_set import unexplained_remainder
+from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.misspecified import under_one_noise
 from fes_pin.diagnosis.search.simulation_search import Searched, SimulationSearch
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import Fit, rough_noise
 from fes_pin.identify.noise import NoiseModel
-from fes_pin.infer.held_out import held_out_gain
+from fes_pin.infer.held_out import held_out_gain, speaks_for
 from fes_pin.infer.levels import CERTAIN_LEVEL
+from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Remainder
 from fes_pin.models.model import Model
 
 OF_THE_MEAN = 100.0
@@ -41,11 +41,11 @@ def judge_free(
     left = unexplained_remainder(searched.best, seed)
     causes, held = _causes(search, searched, left, test, seed, horizon)
     refused: list[Cause] = []
-    if searched.stopped and not all(c.helps(False, True) for c in causes):
+    if searched.stopped and not all(is_supported(c, True) for c in causes):
         searched = search.stopped(())
         left = unexplained_remainder(searched.best, seed)
         causes, held = [], None
-    while not searched.stopped and (weak := [c for c in causes if not c.helps(searched.complete, len(causes) == 1)]):
+    while not searched.stopped and (weak := [c for c in causes if not is_supported(c, len(causes) == 1)]):
         weakest = min(weak, key=lambda c: c.gain_held_out.low)
         refused.append(weakest)
         searched = search.settle(tuple(sorted(c.name for c in causes if c is not weakest)))
@@ -78,7 +78,7 @@ def judge_free(
         ceiling_percent=in_sample.ceiling_percent(),
         next_experiment=experiment(searched, causes, study),
         ranking=ranking(searched),
-        held_out_by=SEPARATE if test else CROSS_VALIDATED if held else NOTHING,
+        held_out_by=_on(test, held),
         left_out={},
         wall_s=0.0,
         warnings=tuple(doubts(searched, len(causes))),
@@ -105,11 +105,24 @@ def unfitted(study: Study, nominal: Fit, reason: str, test: Sequence[Trial]) -> 
         ceiling_percent=inside.ceiling_percent(),
         next_experiment=None,
         ranking={},
-        held_out_by=SEPARATE if test else NOTHING,
+        held_out_by=HELD_OUT if test else FITTED,
         left_out={},
         wall_s=0.0,
         reason=reason,
     )
+
+
+def is_supported(cause: Cause, alone: bool) -> bool:
+    """True if trials that took no part support a cause, and it is chosen without them as well; see `speaks_for`.
+
+    By their errors alone where the model leaves more than noise: a likelihood says little there, and is no `evidence`.
+    """
+    return speaks_for(cause.evidence, cause.gain_held_out, alone) and is_chosen(cause.chosen_again)
+
+
+def _on(test: Sequence[Trial], held: HeldOut | None) -> str:
+    """What data gains are found on."""
+    return HELD_OUT if test else CROSS_VALIDATED if held else FITTED
 
 
 def with_refused(left: Remainder, refused: Sequence[Cause]) -> Remainder:
@@ -148,11 +161,13 @@ def _causes(
     inside = {n: errors_of(f.model, f.trials, searched.floor) for n, f in searched.without.items()}
     inside_nominal = errors_of(nominal.model, nominal.trials, searched.floor)
     inside_best = errors_of(best.model, best.trials, searched.floor)
-    out = []
+    measured = held or HeldOut(inside_nominal, inside_best, inside, {}, inside_best)
+    on, out = _on(test, held), []
     for one in best.model.effects:
         name = one.name
         alike = equivalents(searched, name, left)
-        measured = held or HeldOut(inside_nominal, inside_best, inside, {}, inside_best)
+        gain = held_out_gain(measured.nominal, measured.without[name], measured.extended, seed)
+        evidence = measured.evidence.get(name)
         out.append(
             Cause(
                 name=name,
@@ -161,8 +176,8 @@ def _causes(
                 equivalents=alike,
                 p_value=searched.p_values[name],
                 gain_fit=held_out_gain(inside_nominal, inside[name], inside_best, seed).percent,
-                gain_held_out=held_out_gain(measured.nominal, measured.without[name], measured.extended, seed),
-                evidence=measured.evidence.get(name),
+                gain_held_out=replace(gain, on=on),
+                evidence=replace(evidence, on=on) if evidence and searched.complete else None,
                 chosen_again=share_of(measured.folds, (name, *alike)),
             )
         )

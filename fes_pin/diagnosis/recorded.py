@@ -2,46 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fes_pin.data.results import shown
-from fes_pin.diagnosis.cause import Cause, ParameterEstimate
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.identify.fit import Fit
+from fes_pin.infer.result import ParameterEstimate, shown
 from fes_pin.models.catalogue import Catalogue
 
-LEAST_P = 1e-300
-"""What stands for a p-value that is too small for a number: it is at most this."""
 NEXT_FILE = "next_trial.csv"
-
-
-def p_shown(value: float) -> float | None:
-    """A p-value as printed: no chance is zero."""
-    return shown(max(value, LEAST_P)) if math.isfinite(value) else None
-
-
-def cause_record(cause: Cause, held_out: bool) -> dict[str, Any]:
-    """A cause; `held_out` says whether its gain is one on trials held out."""
-    held = cause.gain_held_out
-    return {
-        "name": cause.name,
-        "stage": cause.stage,
-        **({"trial": cause.trial, "words": cause.words} if cause.trial is not None else {}),
-        "parameters": {n: p.record() for n, p in cause.parameters.items()},
-        "equivalents": list(cause.equivalents),
-        "p_value": p_shown(cause.p_value),
-        **({"chosen_again": list(some)} if (some := cause.chosen_in_some) else {}),
-        "gain_percent": {
-            "fit": shown(cause.gain_fit),
-            "held_out": shown(held.percent) if held_out else None,
-            "ci95": [shown(held.low), shown(held.high)],
-            **({"ahead_s": shown(held.ahead_s)} if held.ahead_s is not None else {}),
-        },
-    }
 
 
 def left_out_record(left_out: Mapping[str, Mapping[str, Sequence[int]]]) -> dict[str, Any]:

@@ -16,7 +16,6 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.cause import Cause, ParameterEstimate
 from fes_pin.diagnosis.decide.held_out import cross_validate, errors_of, separate
 from fes_pin.diagnosis.errors_ahead import Ahead
 from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials, takes_most
@@ -30,6 +29,7 @@ from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.levels import PARAMETER_PRICE, SEPARABLE
+from fes_pin.infer.result import Cause, ParameterEstimate
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Stage
 from fes_pin.workers import OutOfTime

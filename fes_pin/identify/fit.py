@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import as_number, instance, number, whole
-from fes_pin.data.results import Saveable, shown
+from fes_pin.data.results import Saveable
 from fes_pin.data.schema import unknown
 from fes_pin.data.show import frame
 from fes_pin.data.trial import Trial
@@ -23,6 +23,7 @@ from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
 from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.profile import profile_interval
+from fes_pin.infer.result import shown
 from fes_pin.models.accepted import accepted_trials
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
@@ -160,7 +161,8 @@ class Fit(Optimum, Saveable):
     def _title(self) -> str:
         return f"{' + '.join(self.model.structure())}: {self.samples} samples, reduced chi2 {self.reduced:.3f}"
 
-    def _notebook(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+    def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
+        """Title, head, rows and notes of the table that is printed."""
         rows = [
             (n, f"{value:.5g}", f"[{low:.5g}, {high:.5g}]", unit or "-", note)
             for n, value, _, low, high, unit, note in zip(*self.columns().values(), strict=True)

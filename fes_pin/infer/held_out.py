@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT
+from fes_pin.infer.result import Evidence, Gain
 
 RESAMPLES = 2000
 """Bootstrap draws of a gain: the standard error of its 95 % bounds is 1.5 % of their distance, of a normal gain."""
@@ -49,28 +48,6 @@ def percent_of_spread(squares: ArrayLike, around: ArrayLike) -> float:
         Squared errors, and squares of the measurement about the mean of each trial, in the same unit; summed here.
     """
     return 100.0 * float(np.sum(squares)) / max(float(np.sum(around)), 1e-300)
-
-
-@dataclass(frozen=True)
-class Gain:
-    """Share, in percent, of the nominal model's squared error above the noise that an extension removes.
-
-    `ahead_s` says how far ahead, where that is further than the horizon.
-    """
-
-    percent: float
-    low: float
-    high: float
-    ahead_s: float | None = None
-
-    def __str__(self) -> str:
-        further = "" if self.ahead_s is None else f", {self.ahead_s:.2g} s ahead"
-        return f"{self.percent:.0f} % [{self.low:.0f}, {self.high:.0f}]{further}"
-
-    @property
-    def is_material(self) -> bool:
-        """Whether the low end of its interval is above `NOTHING_PERCENT`."""
-        return self.low > NOTHING_PERCENT
 
 
 @dataclass(frozen=True)
@@ -131,34 +108,7 @@ def _share(
     return np.asarray(100.0 * (without - extended) / excess)
 
 
-@dataclass(frozen=True)
-class Evidence:
-    """What a cause adds to the likelihood of trials that took no part.
-
-    The residual without it is the residual with it plus a difference Delta of predictions, all whitened:
-    |r + Delta|^2 - |r|^2 = |Delta|^2 + 2 r'Delta, which scatters by 2 |Delta| where r is noise.
-
-    Attributes
-    ----------
-    added
-        Twice the log-likelihood.
-    squares
-        |Delta|^2.
-    """
-
-    added: float
-    squares: float
-
-    @property
-    def low(self) -> float:
-        """Lower end of the 95 % interval."""
-        return self.added - 2.0 * CONFIDENCE_95 * math.sqrt(self.squares)
-
-    def __add__(self, other: Evidence) -> Evidence:
-        return Evidence(self.added + other.added, self.squares + other.squares)
-
-
-def speaks_for(evidence: Evidence | None, gain: Gain, alone: bool) -> bool:
+def speaks_for(evidence: Evidence | Gain | None, gain: Gain, alone: bool) -> bool:
     """Whether trials that took no part speak for a cause.
 
     By their likelihood where the model leaves only noise, by their errors over time where it does not; where other

@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
-from fes_pin.infer.held_out import Evidence, Gain, speaks_for
+from fes_pin.infer.held_out import speaks_for
+from fes_pin.infer.result import Evidence, Gain
 from fes_pin.infer.search import Fitted, Search, SearchResult
 
 F = TypeVar("F", bound=Fitted)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from fes_pin.contrasts.result import Change, Contrast, contrast_headline, contrast_notes
-from fes_pin.diagnosis.cause import ParameterEstimate
-from fes_pin.diagnosis.text import probability
+from fes_pin.contrasts.result import Contrast
+from fes_pin.infer.result import Change, ParameterEstimate
+from fes_pin.infer.text import probability
 from fes_pin.view.drawing import Drawing, rows_csv
 from fes_pin.view.page import Content, Markup, element, figure, html_table, page, section, unit_text
 from fes_pin.view.ranking import named_rows, rows_drawing
@@ -30,7 +30,7 @@ def contrast_html(found: Contrast) -> str:
 
 def _head(found: Contrast) -> Markup:
     counts = ", ".join(f"{g}: {sum(t.group == g for t in found.study.trials)} trials" for g in found.groups)
-    words = contrast_headline(found)
+    words = found.headline()
     style = {"nothing_changed": "adequate", "changed": "causes_found", "unexplained": "unexplained"}.get(
         found.verdict, "stopped"
     )
@@ -123,4 +123,4 @@ def _judged(found: Contrast) -> list[Markup]:
 
 
 def _said(found: Contrast) -> list[str]:
-    return [n for n in contrast_notes(found) if n.startswith(SAID)]
+    return [n for n in found.notes() if n.startswith(SAID)]

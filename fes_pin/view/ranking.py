@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.infer.levels import SEPARABLE
+from fes_pin.infer.result import Cause
 from fes_pin.models.catalogue import Catalogue
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
@@ -24,7 +24,8 @@ NAMES, WIDE, ROW = 176.0, 420.0, 24.0
 
 def gain_drawing(diagnosis: Diagnosis) -> Drawing:
     """Gain of each cause: a bar, and its 95 % interval."""
-    causes, on = diagnosis.causes, "held-out" if diagnosis.was_held_out else "fitted"
+    causes = diagnosis.causes
+    on = "held-out" if any(c.gain_held_out.is_held_out for c in causes) else "fitted"
     low = min([0.0, *(c.gain_held_out.low for c in causes)])
     high = max([100.0, *(c.gain_held_out.high for c in causes)])
     panel = named_rows([c.name for c in causes], [c.stage for c in causes], (1.03 * low, 1.03 * high))

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 from fes_pin.data.files import write_text
 from fes_pin.data.log import Log
 from fes_pin.data.numbers import instance
-from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.errors_ahead import Ahead
 from fes_pin.diagnosis.recorded import NEXT_FILE
 from fes_pin.diagnosis.replay import replayed_trials
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.diagnosis.text import left_out_text, percent, probability
+from fes_pin.diagnosis.text import left_out_text
 from fes_pin.identify.error_measures import E_WORDS, FREE, ONE_STEP
+from fes_pin.infer.result import ParameterEstimate
+from fes_pin.infer.text import percent, probability
 from fes_pin.models.describe import sentence
 from fes_pin.models.outside import origin
 from fes_pin.view.page import (

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from fes_pin.diagnosis.cause import Cause, ParameterEstimate
-from fes_pin.diagnosis.result import EACH_TRIAL, STOPPED, Diagnosis
-from fes_pin.diagnosis.text import one_sided, probability
+from fes_pin.diagnosis.result import EACH_TRIAL, Diagnosis
+from fes_pin.infer.result import STOPPED, Cause, ParameterEstimate
+from fes_pin.infer.text import probability
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.mathml import equations_mathml
 from fes_pin.view.page import Content, Markup, element, figure, html_table, unit_text, value_text
@@ -35,10 +35,11 @@ def causes_section(diagnosis: Diagnosis) -> list[Markup]:
         ]
         for c in diagnosis.causes
     ]
-    on = "held-out trials" if diagnosis.was_held_out else "the trials that were fitted, as none could be held out,"
+    held_out = any(c.gain_held_out.is_held_out for c in diagnosis.causes)
+    on = "held-out trials" if held_out else "the trials that were fitted, as none could be held out,"
     caption = f"Gain on {on} with its 95 % interval: percent of the nominal model's squared error above noise."
     return [
-        html_table(("cause", "stage", f"{diagnosis.gain_name} [95 %]", "p", "cannot be told from"), rows, (2, 3)),
+        html_table(("cause", "stage", f"{diagnosis.head()[3]} [95 %]", "p", "cannot be told from"), rows, (2, 3)),
         figure(gain_drawing(diagnosis), caption, "narrow", "gains"),
         *(_cause(diagnosis, c) for c in diagnosis.causes),
     ]
@@ -77,7 +78,7 @@ def _cause(diagnosis: Diagnosis, cause: Cause) -> Markup:
     kind = diagnosis.catalogue.effect(cause.name)
     told = told_apart(cause.equivalents, "cause")
     where = f"held-out trials ({cause.gain_fit:.0f} % on the fitted ones)"
-    if not diagnosis.was_held_out:
+    if not cause.gain_held_out.is_held_out:
         where = "the trials that were fitted: there was nothing to hold out"
     gain = f"It removes {cause.gain_held_out} of the error above the noise on {where}."
     return card(
@@ -119,7 +120,7 @@ def _estimates(cause: Cause) -> Markup:
 def value_and_interval(one: ParameterEstimate) -> tuple[str, str]:
     """Value and interval of a parameter as printed."""
     if one.at_bound:
-        return f"{one.value:.4g}", f"{one_sided(one)}, at its bound"
+        return f"{one.value:.4g}", f"{one.one_sided()}, at its bound"
     if one.std == 0.0:
         return f"{one.value:.4g}", "held"
     if not math.isfinite(one.std):

@@ -8,7 +8,7 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.replay import Replay
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.diagnosis.text import percent
+from fes_pin.infer.text import percent
 from fes_pin.models.model import Model
 from fes_pin.models.tracking import can_track
 from fes_pin.view.missing import Missing, missing_along, missing_input

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.diagnosis.text import percent, probability
+from fes_pin.infer.text import percent, probability
 from fes_pin.models.describe import sentence
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, csv_of, every
@@ -16,7 +16,7 @@ from fes_pin.view.style import thin_curve
 from fes_pin.walk.effects import EFFECTS
 from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.record import BODY_FILE
-from fes_pin.walk.result import WalkDiagnosis, walk_cause_row
+from fes_pin.walk.result import WalkDiagnosis
 
 PLAYBACK_FILE = "playback.html"
 SHOWN_S = 4.0
@@ -36,7 +36,7 @@ def walk_report_html(diagnosis: WalkDiagnosis) -> str:
         element("h1", words[0].upper() + words[1:], class_=f"verdict {diagnosis.verdict}{partly}"),
         _facts(diagnosis),
     )
-    notes = [element("p", note[0].upper() + note[1:] + ".") for note in diagnosis.footnotes()[1:]]
+    notes = [element("p", note[0].upper() + note[1:] + ".") for note in diagnosis.notes()[1:]]
     parts = [
         head,
         section("Causes", *_causes(diagnosis)),
@@ -66,7 +66,7 @@ def _causes(diagnosis: WalkDiagnosis) -> list[Markup]:
         return []
     rows: list[list[Content]] = []
     for cause in diagnosis.causes:
-        name, site, values, held, others = walk_cause_row(cause)
+        name, site, values, held, others = cause.row()
         rows.append([element("code", name), site, values, held, others, probability(cause.p_value)])
     head = ("cause", "site", "parameters", "held-out gain", "cannot be told from", "by chance")
     return [html_table(head, rows)]

@@ -6,10 +6,10 @@ import math
 import re
 from dataclasses import replace
 
-from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.recorded import NEXT_FILE
-from fes_pin.diagnosis.result import STOPPED, Diagnosis
-from fes_pin.diagnosis.text import LEAST_P, estimate_text, percent, probability
+from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.infer.result import FITTED, STOPPED, Cause
+from fes_pin.infer.text import LEAST_P, percent, probability
 from fes_pin.models.describe import sentence
 from fes_pin.models.stage import Effect
 from fes_pin.view.page import Content, Markup, element, joined, unit_text
@@ -60,7 +60,7 @@ def _found(diagnosis: Diagnosis) -> list[tuple[str, Content]]:
         lines = [(element("b", plain(c.name), ": ") if many else Markup("")) + told(diagnosis, c) for c in causes]
         return joined([element("p", line) for line in lines])
 
-    share = diagnosis.explained_percent()
+    share = diagnosis.explained.above_noise
     return [
         ("What the model gets wrong", each("what")),
         ("How large it is", each("size")),
@@ -81,7 +81,7 @@ def _size(diagnosis: Diagnosis, cause: Cause) -> Markup:
     """Values with their standard deviations; the first parameter is what gives the cause its size."""
     told = []
     for name, one in cause.parameters.items():
-        said = estimate_text(replace(one, unit=unit_text(one.unit) if one.unit else "")).replace("+-", "±")
+        said = str(replace(one, unit=unit_text(one.unit) if one.unit else "")).replace("+-", "±")
         told.append(f"{plain(_without_unit(name))} {said}")
     return _text(", ".join(told) + (" (± one standard deviation)." if any("±" in one for one in told) else "."))
 
@@ -122,10 +122,9 @@ def _round(count: float) -> str:
 def _explains(diagnosis: Diagnosis, share: float) -> str:
     what = "it" if len(diagnosis.causes) == 1 else "they"
     ends = "s" if what == "it" else ""
-    before, after, noise = diagnosis.judged_errors()
-    where = (
-        "trials that took no part in finding it" if diagnosis.is_judged_outside else "the trials that it was fitted to"
-    )
+    found = diagnosis.explained
+    before, after, noise = found.nominal, found.extended, found.noise
+    where = "trials that took no part in finding it" if found.on != FITTED else "the trials that it was fitted to"
     if diagnosis.over_horizon is not None:
         return (
             f"{share:.0f} % of what is not noise. Predicting {diagnosis.over_horizon.horizon_s:g} s ahead, the error E "
@@ -154,7 +153,7 @@ def _left(diagnosis: Diagnosis, share: float) -> str:
 
 def _nothing(diagnosis: Diagnosis) -> list[tuple[str, Content]]:
     left, count = diagnosis.remainder, len(diagnosis.catalogue.effects_for(diagnosis.model.rig))
-    error, _, noise = diagnosis.judged_errors()
+    error, noise = diagnosis.explained.nominal, diagnosis.explained.noise
     span = "" if diagnosis.over_horizon is None else f", {diagnosis.over_horizon.horizon_s:g} s ahead"
     size = f"E is {percent(error)}{span}{_noise_alone(noise)}"
     if diagnosis.verdict == "adequate":

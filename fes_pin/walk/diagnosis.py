@@ -12,8 +12,10 @@ from fes_pin.data.asked import asked
 from fes_pin.data.errors import InputError
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study
-from fes_pin.infer.held_out import Gain
+from fes_pin.infer.levels import CERTAIN_LEVEL
+from fes_pin.infer.result import FITTED, STOPPED, Cause, Evidence, Gain, ParameterEstimate, Remainder
 from fes_pin.walk.banks import Banks
+from fes_pin.walk.effect import STAGE
 from fes_pin.walk.experiment import NextWalk, next_walk
 from fes_pin.walk.fits import Set
 from fes_pin.walk.judge import (
@@ -28,7 +30,7 @@ from fes_pin.walk.judge import (
 from fes_pin.walk.likelihood import white_level
 from fes_pin.walk.nulls import LEVEL, Nulls, simulated_nulls
 from fes_pin.walk.recording import recordings_of
-from fes_pin.walk.result import STOPPED, Estimate, WalkCause, WalkDiagnosis, WalkRemainder
+from fes_pin.walk.result import WalkDiagnosis
 from fes_pin.walk.search import WalkSearch
 from fes_pin.workers import Progress, one_thread_each, time_limit
 
@@ -111,7 +113,7 @@ def _judged(study: Study, search: WalkSearch, best: Set, nulls: Nulls, seed: int
     many = banks.strides.count > 1
     refused = False
     causes = _causes(search, best, nulls, seed)
-    while weak := [c for c in causes if not c[1].helps()]:
+    while weak := [c for c in causes if not is_supported(c[1])]:
         refused = True
         gone = max(weak, key=lambda c: c[1].p_value)[0]
         best = fits.fit(tuple(i for i in best.forms if i != gone))
@@ -121,14 +123,14 @@ def _judged(study: Study, search: WalkSearch, best: Set, nulls: Nulls, seed: int
         named.append(noise)
     p_value, where = walk_remainder(banks, best)
     left = refused or p_value < LEFT_LEVEL
-    order = sorted(named, key=lambda c: -(c.gain_held_out.percent if c.gain_held_out else c.gain_fit))
+    order = sorted(named, key=lambda c: -c.gain_held_out.percent)
     none = fits.fit(())
     in_a_set = {n for c in named for n in (c.name, *c.equivalents)}  # these may be what is there
     return WalkDiagnosis(
         study=study,
         verdict="causes_found" if named else ("unexplained" if left else "adequate"),
         causes=tuple(order),
-        remainder=WalkRemainder(left, p_value, where if left else None),
+        remainder=Remainder(left, p_value, where if left else None),
         absorbed=tuple(n for n in unseen(banks, best) if n not in in_a_set),
         nominal_error=(
             walk_error_percent(banks, none, False),
@@ -145,8 +147,26 @@ def _judged(study: Study, search: WalkSearch, best: Set, nulls: Nulls, seed: int
     )
 
 
-def _causes(search: WalkSearch, best: Set, nulls: Nulls, seed: int) -> list[tuple[int, WalkCause]]:
+def is_supported(cause: Cause) -> bool:
+    """Whether what took no part supports a cause: strides held out; for what belongs to neither leg, other stances.
+
+    By likelihood: squared errors are mostly what landmarks and plates make in every session.
+
+    What chance does as well without a cause that was refused is none either.
+
+    A single stride leaves nothing out: then only what is certain is named.
+    """
+    other_leg = cause.further["other_leg"]
+    if other_leg is not None and other_leg <= 0.0:
+        return False
+    if cause.evidence is None:
+        return cause.p_value < CERTAIN_LEVEL
+    return cause.p_value < LEVEL and cause.evidence.low > 0.0
+
+
+def _causes(search: WalkSearch, best: Set, nulls: Nulls, seed: int) -> list[tuple[int, Cause]]:
     banks, fits = search.banks, search.fits
+    many = banks.strides.count > 1
     sizes = fits.sizes(best)
     spread = np.sqrt(np.diag(best.fitted.covariance))
     owners = [i for i in best.forms for _ in banks.forms[i].parameters]
@@ -161,24 +181,26 @@ def _causes(search: WalkSearch, best: Set, nulls: Nulls, seed: int) -> list[tupl
         instead = [banks.forms[k] for r in rivals[i] for k in r.forms if k not in best.forms]
         others = tuple(sorted({f.cause for f in instead} - {form.cause}))
         sites = tuple(dict.fromkeys(f.site for f in instead if f.cause == form.cause))
+        fitted = walk_gain(banks, without, best, False, seed)
         either = not form.site.startswith(("left", "right")) and not form.shifts  # a clock is of no leg
         out.append(
             (
                 i,
-                WalkCause(
+                Cause(
                     name=form.cause,
+                    stage=STAGE,
                     site=form.site,
                     parameters={
-                        n: Estimate(float(v), float(s), u)
+                        n: ParameterEstimate(float(v), float(s), u)
                         for n, v, s, u in zip(form.parameters, sizes[i], stds, form.units, strict=True)
                     },
                     equivalents=others,
                     elsewhere=sites,
                     p_value=nulls.p_value(without.price - best.price),
-                    gain_fit=walk_gain(banks, without, best, False, seed).percent,
-                    gain_held_out=walk_gain(banks, without, best, True, seed) if banks.strides.count > 1 else None,
-                    evidence=walk_evidence(banks, without, best, seed) if banks.strides.count > 1 else None,
-                    other_leg_percent=other_leg(banks, fits.fit((i,))) if either else None,
+                    gain_fit=fitted.percent,
+                    gain_held_out=walk_gain(banks, without, best, True, seed) if many else replace(fitted, on=FITTED),
+                    evidence=walk_evidence(banks, without, best, seed) if many else None,
+                    further={"other_leg": other_leg(banks, fits.fit((i,))) if either else None},
                 ),
             )
         )
@@ -200,18 +222,28 @@ def white_noise(banks: Banks) -> tuple[float, float, float] | None:
     return level, std * np.sqrt(len(y) / (len(y) - 1.0)), saved
 
 
-def _marker_noise(banks: Banks) -> WalkCause | None:
+def _marker_noise(banks: Banks) -> Cause | None:
     """White noise on the coordinates that is more than cameras' own, from what differs from stride to stride."""
     level, std, saved = white_noise(banks) or (0.0, 0.0, 0.0)
     if level - SURE * std < ORDINARY_MM or saved < SEPARABLE:
         return None
     from scipy.stats import chi2  # noqa: PLC0415
 
-    parameters = {"markers_m": Estimate(1e-3 * level, 1e-3 * std, "m")}
-    return WalkCause("marker_noise", "white", parameters, (), (), float(chi2.sf(saved, 1)), 0.0, Gain(0.0, 0.0, 0.0))
+    return Cause(
+        name="marker_noise",
+        stage=STAGE,
+        site="white",
+        parameters={"markers_m": ParameterEstimate(1e-3 * level, 1e-3 * std, "m")},
+        equivalents=(),
+        p_value=float(chi2.sf(saved, 1)),
+        gain_fit=0.0,
+        gain_held_out=Gain(0.0, 0.0, 0.0),
+        evidence=Evidence(saved, saved, FITTED),
+        further={"other_leg": None},
+    )
 
 
-def _experiment(search: WalkSearch, best: Set, causes: list[WalkCause]) -> NextWalk | None:
+def _experiment(search: WalkSearch, best: Set, causes: list[Cause]) -> NextWalk | None:
     for cause in causes:
         if cause.equivalents:
             return next_walk(search, best, cause.name, SEPARABLE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from fes_pin.infer.held_out import Gain
+from fes_pin.infer.result import DEVIANCE, Gain
 from fes_pin.walk.banks import Banks, Chosen
 from fes_pin.walk.fits import Set
 from fes_pin.walk.likelihood import FLOOR_N, by_frequency, fit_walk
@@ -90,7 +90,7 @@ def walk_evidence(banks: Banks, without: Set, with_it: Set, seed: int) -> Gain:
     drawn = np.random.default_rng(seed).integers(0, len(before), size=(BOOTSTRAP, len(before)))
     shares = 100.0 * (before - after)[drawn].sum(axis=1) / before[drawn].sum(axis=1)
     low, high = np.quantile(shares, [0.025, 0.975])
-    return Gain(float(100.0 * np.sum(before - after) / np.sum(before)), float(low), float(high))
+    return Gain(float(100.0 * np.sum(before - after) / np.sum(before)), float(low), float(high), measure=DEVIANCE)
 
 
 def walk_error_percent(banks: Banks, one: Set, held_out: bool) -> float:

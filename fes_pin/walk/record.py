@@ -15,7 +15,7 @@ walk_record = WalkDiagnosis.record
 def walk_files(diagnosis: WalkDiagnosis) -> dict[str, str | bytes]:
     """Every file of a diagnosis but the report, by name."""
     causes = [
-        {"name": c.name, "site": c.site, "parameters": {n: v for n, (v, _, _) in c.parameters.items()}}
+        {"name": c.name, "site": c.site, "parameters": {n: one.value for n, one in c.parameters.items()}}
         for c in diagnosis.causes
     ]
     model = {"model": {"rig": "body", "urdf": BODY_FILE, "cutoff_hz": diagnosis.cutoff_hz}, "effect": causes}

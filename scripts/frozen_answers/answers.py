@@ -15,6 +15,8 @@ from fes_pin.diagnosis.record import diagnosis_record
 from fes_pin.walk.record import walk_record
 from frozen_answers.studies import Frozen
 
+LATER = ("explained", "judged_by")
+"""What answers have said since the rows were frozen."""
 DIGITS = 4
 SHARE_OF_STD = 0.3
 """How far a value may move, in its deviations, where the likelihood that is maximised is another."""
@@ -92,7 +94,7 @@ def differences(frozen: dict[str, Any], now: dict[str, Any], loosely: bool = Fal
 
 def _leaves(old: Any, new: Any, where: str) -> Iterator[tuple[str, Any, Any]]:
     if isinstance(old, dict) and isinstance(new, dict):
-        for name in dict.fromkeys([*old, *new]):
+        for name in dict.fromkeys([*old, *(n for n in new if n not in LATER)]):
             yield from _leaves(old.get(name), new.get(name), f"{where}.{name}".lstrip("."))
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         for k, (one, other) in enumerate(zip(old, new, strict=True)):

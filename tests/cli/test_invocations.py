@@ -164,7 +164,7 @@ def stubs(monkeypatch, inputs):
     for chapter, texts in (
         (
             "contrasts.contrast.contrast",
-            ("contrasts.record.contrast_json", "view.contrast_report.contrast_html", "contrasts.result.contrast_text"),
+            ("contrasts.record.contrast_json", "view.contrast_report.contrast_html"),
         ),
         ("comparison.compare.compare", ("comparison.record.comparison_json",)),
     ):

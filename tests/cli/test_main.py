@@ -115,11 +115,11 @@ def test_the_seed_changes_only_what_is_simulated(made):
 def test_the_record_is_as_the_contract_says(made):
     found = json.loads((made / "one/diagnosis.json").read_text())
     assert list(found) == [
-        *("study", "verdict", "causes", "remainder", "absorbed", "nominal", "extended", "noise"),
+        *("study", "verdict", "causes", "remainder", "explained", "absorbed", "nominal", "extended", "noise"),
         *("ceiling_percent", "next_experiment", "horizon_s", "warnings", "wall_s", "provenance", *SAVED),
     ]
     (cause,) = found["causes"]
-    assert list(cause) == ["name", "stage", "parameters", "equivalents", "p_value", "gain_percent"]
+    assert list(cause) == ["name", "stage", "parameters", "equivalents", "p_value", "gain_percent", "judged_by"]
     assert cause["name"] == "coulomb_friction" and cause["stage"] == "joint"
     assert set(cause["parameters"]["torque_nm"]) == {"value", "std"}
     assert set(cause["gain_percent"]) == {"fit", "held_out", "ci95"}

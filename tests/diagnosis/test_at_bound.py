@@ -8,10 +8,8 @@ import pytest
 from view.reported import ankle_diagnosis, ankle_study, measured
 
 import fes_pin as fp
-from fes_pin.contrasts.result import Change, change_row
-from fes_pin.diagnosis.cause import ParameterEstimate
 from fes_pin.diagnosis.decide.rivals import estimates
-from fes_pin.diagnosis.text import estimate_text
+from fes_pin.infer.result import Change, ParameterEstimate
 from fes_pin.models.nominal import nominal_model
 from fes_pin.view.contrast_report import _change
 from fes_pin.view.report import report_html
@@ -30,9 +28,9 @@ def diagnosis():
 
 
 def test_the_text_says_so(diagnosis):
-    assert estimate_text(AT_ITS_BOUND) == "0 N m (at its bound, at most 0.0123)"
-    assert estimate_text(replace(AT_ITS_BOUND, value=9.0, ends=(4.5, 9.0))) == "9 N m (at its bound, at least 4.5)"
-    assert estimate_text(replace(AT_ITS_BOUND, ends=(0.0, math.inf))) == "0 N m (at its bound, not identified)"
+    assert str(AT_ITS_BOUND) == "0 N m (at its bound, at most 0.0123)"
+    assert str(replace(AT_ITS_BOUND, value=9.0, ends=(4.5, 9.0))) == "9 N m (at its bound, at least 4.5)"
+    assert str(replace(AT_ITS_BOUND, ends=(0.0, math.inf))) == "0 N m (at its bound, not identified)"
     assert "torque_nm 0 N m (at its bound, at most 0.0123)" in str(diagnosis)
     assert "at its bound" in diagnosis._repr_html_()
 
@@ -60,8 +58,16 @@ def test_the_report_says_so(diagnosis):
 
 def test_a_change_says_so():
     one = {"before": AT_ITS_BOUND, "after": ParameterEstimate(0.05, 0.002, "N m")}
-    change = Change("coulomb_friction", "effect", "after", "new", {"torque_nm": one}, (), 1e-9)
-    assert "before 0 N m (at its bound, at most 0.0123)" in change_row(change)[2]
+    change = Change(
+        name="coulomb_friction",
+        kind="effect",
+        group="after",
+        words="new",
+        parameters={"torque_nm": one},
+        equivalents=(),
+        p_value=1e-9,
+    )
+    assert "before 0 N m (at its bound, at most 0.0123)" in change.row()[2]
     assert change.record()["parameters"]["torque_nm"]["before"]["at_bound"]
     page = _change(change, ("before", "after")).text
     assert "0 (at most 0.0123, at its bound)" in page and "none" not in page

@@ -6,12 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fes_pin.diagnosis.cause import Cause
 from fes_pin.diagnosis.decide.claims import Claims
-from fes_pin.diagnosis.free import with_refused
-from fes_pin.diagnosis.remainder.open_set import Remainder
-from fes_pin.infer.held_out import Evidence, Gain, added_likelihood, speaks_for
+from fes_pin.diagnosis.free import is_supported, with_refused
+from fes_pin.infer.held_out import added_likelihood, speaks_for
 from fes_pin.infer.levels import CERTAIN_LEVEL
+from fes_pin.infer.result import Cause, Evidence, Gain, Remainder
 
 
 def test_evidence_covers_what_the_difference_is_worth():
@@ -42,20 +41,28 @@ def test_evidence_adds_up_over_folds():
 
 
 def cause(p_value=1e-3, evidence=None, percent=50.0, low=10.0, stage="joint"):
-    return Cause("one", stage, {}, (), p_value, 50.0, Gain(percent, low, 90.0), evidence)
+    return Cause(
+        name="one",
+        stage=stage,
+        parameters={},
+        equivalents=(),
+        p_value=p_value,
+        gain_fit=50.0,
+        gain_held_out=Gain(percent, low, 90.0),
+        evidence=evidence,
+    )
 
 
 def test_held_out_trials_speak_by_likelihood_only_where_noise_is_all_that_is_left():
     sure, unsure = Evidence(100.0, 100.0), Evidence(10.0, 100.0)
-    assert cause(evidence=sure, low=-5.0).helps(complete=True, alone=True)
-    assert not cause(evidence=sure, low=-5.0).helps(complete=True, alone=False)
-    assert cause(evidence=sure, low=5.0).helps(complete=True, alone=False)
-    assert not cause(evidence=unsure, low=5.0).helps(complete=True, alone=True)
-    assert not cause(evidence=sure, low=-5.0).helps(complete=False, alone=True)
-    assert cause(evidence=unsure, low=5.0).helps(complete=False, alone=False)
-    assert cause(evidence=sure, percent=-1.0, low=-5.0).helps(complete=True, alone=True)
-    assert not cause(evidence=unsure, percent=-1.0, low=-5.0).helps(complete=True, alone=True)
-    assert cause(low=5.0).helps(complete=True, alone=True) and not cause(low=-5.0).helps(complete=True, alone=True)
+    assert is_supported(cause(evidence=sure, low=-5.0), alone=True)
+    assert not is_supported(cause(evidence=sure, low=-5.0), alone=False)
+    assert is_supported(cause(evidence=sure, low=5.0), alone=False)
+    assert not is_supported(cause(evidence=unsure, low=5.0), alone=True)
+    assert is_supported(cause(evidence=sure, percent=-1.0, low=-5.0), alone=True)
+    assert not is_supported(cause(evidence=unsure, percent=-1.0, low=-5.0), alone=True)
+    assert is_supported(cause(low=5.0), alone=True) and not is_supported(cause(low=-5.0), alone=True)
+    assert is_supported(cause(low=5.0), alone=False)
 
 
 def test_no_cause_is_named_that_is_sure_to_do_harm():

@@ -9,9 +9,9 @@ from fes_pin.data.study import read_study
 from fes_pin.diagnosis.decide.doubts import with_error
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.record import diagnosis_files, diagnosis_record
-from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.identify.fit import fit
+from fes_pin.infer.result import Remainder
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.nominal import nominal_model
 from fes_pin.view.report import report_html

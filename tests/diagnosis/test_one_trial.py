@@ -10,6 +10,7 @@ from fes_pin.data.study import Study, read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.record import diagnosis_record
+from fes_pin.infer.result import FITTED
 from fes_pin.view.report import report_html
 
 INERTIA, WEIGHT, DAMPING, DT = 0.02, 1.0, 0.002, 0.004
@@ -54,8 +55,8 @@ def test_friction_is_found_beneath_a_random_torque(tmp_path):
     assert len(cause.equivalents) <= 1, cause.equivalents
     estimate = cause.parameters["torque_nm"]
     assert abs(estimate.value - 0.02) < 4.0 * estimate.std < 0.02
-    assert not found.was_held_out  # and nobody is told that it was
-    assert "fitted gain" in str(found) and "held-out" not in str(found)
+    assert not found.causes[0].gain_held_out.is_held_out and found.explained.on == FITTED
+    assert "fitted gain" in str(found) and "held" not in str(found)
     gains = diagnosis_record(found)["causes"][0]["gain_percent"]
     assert gains["held_out"] is None and gains["ci95"][0] <= gains["ci95"][1]
     page = report_html(found)

@@ -7,7 +7,8 @@ import pytest
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
-from fes_pin.diagnosis.text import ahead_notes, left_out_text, quantity
+from fes_pin.diagnosis.text import ahead_notes, left_out_text
+from fes_pin.infer.text import quantity
 
 
 @pytest.mark.parametrize(

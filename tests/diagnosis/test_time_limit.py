@@ -48,6 +48,6 @@ def test_what_has_earned_its_place_is_told(study, monkeypatch):
     monkeypatch.setattr(SimulationSearch, "_extend_beam", out_of_time)
     stopped = diagnose_joint(study, limit=1e3)
     assert [c.name for c in stopped.causes] == ["coulomb_friction"] and stopped.verdict == "stopped"
-    assert "stopped: best set so far: one cause explains" in stopped.headline()
+    assert "stopped: best set so far: coulomb_friction explains" in stopped.headline()
     assert stopped.nominal_error[1] is None and any("limit of 1000 s" in w for w in stopped.warnings)
     assert report_html(stopped) and diagnosis_files(stopped)

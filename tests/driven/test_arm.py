@@ -12,11 +12,11 @@ from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.driven import Judged, _foretelling_more
 from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
 from fes_pin.diagnosis.form_errors import beside_what_is_new
-from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts, fresh
 from fes_pin.infer.levels import CONFIDENCE_95
+from fes_pin.infer.result import Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, with_honest_intervals
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.model import Model

@@ -14,8 +14,7 @@ from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.driven import DrivenVerdict, DrivenWeighed
 from fes_pin.diagnosis.driven_refused import with_refused_causes
 from fes_pin.diagnosis.errors_ahead import RandomPart
-from fes_pin.diagnosis.remainder.open_set import Remainder
-from fes_pin.infer.held_out import Evidence, Gain
+from fes_pin.infer.result import Evidence, Gain, Remainder
 from fes_pin.infer.verdict import Refused, State
 
 NOTHING = Remainder(False, 0.5, None)

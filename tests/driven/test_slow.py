@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from fes_pin.diagnosis.decide import gains_ahead
-from fes_pin.infer.held_out import Gain
+from fes_pin.infer.result import Gain
 
 SHORT, LONG = 0.3, 1.16
 

@@ -12,8 +12,9 @@ import numpy as np
 from fes_pin.infer.distributions import chi2_tail, f_tail
 from fes_pin.infer.family import Family
 from fes_pin.infer.fits import Candidate, FittedSets
-from fes_pin.infer.held_out import Errors, Evidence, added_likelihood, deal, held_out_gain
+from fes_pin.infer.held_out import Errors, added_likelihood, deal, held_out_gain
 from fes_pin.infer.levels import PARAMETER_PRICE, SEPARABLE
+from fes_pin.infer.result import Evidence
 from fes_pin.infer.search import Names, SearchResult
 from fes_pin.infer.verdict import Verdict, Weighed
 

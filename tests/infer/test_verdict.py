@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from infer.regression import COUNT, Regression, RegressionVerdict
 
-from fes_pin.infer.held_out import Evidence, Gain, deal
+from fes_pin.infer.held_out import deal
+from fes_pin.infer.result import Evidence, Gain
 from fes_pin.infer.search import Search
 from fes_pin.infer.verdict import State, Verdict, Weighed, word_of
 

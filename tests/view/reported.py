@@ -7,12 +7,10 @@ import numpy as np
 
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.cause import Cause, ParameterEstimate, Ranked
 from fes_pin.diagnosis.experiment import NextExperiment
-from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.fit import fit
-from fes_pin.infer.held_out import Gain
+from fes_pin.infer.result import CROSS_VALIDATED, Cause, Gain, ParameterEstimate, Ranked, Remainder
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
@@ -102,7 +100,7 @@ def diagnosed(
         ceiling_percent=1.7,
         next_experiment=plan,
         ranking={n: tuple(Ranked(tuple({*names} - {n} | {r}), 0.5 + k) for k, r in enumerate(rivals)) for n in names},
-        held_out_by="cross-validation over trials",
+        held_out_by=CROSS_VALIDATED,
         left_out={},
         wall_s=1.0,
     )
@@ -116,7 +114,15 @@ def _cause(extended, name: str, rivals: tuple[str, ...]) -> Cause:
         for n, one in kind.parameters().items()
         if not one.optional
     }
-    return Cause(name, str(kind.stage), estimates, rivals, 1e-9, 80.0, Gain(79.5, 74.0, 84.1))
+    return Cause(
+        name=name,
+        stage=str(kind.stage),
+        parameters=estimates,
+        equivalents=rivals,
+        p_value=1e-9,
+        gain_fit=80.0,
+        gain_held_out=Gain(79.5, 74.0, 84.1),
+    )
 
 
 @cache

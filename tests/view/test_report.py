@@ -20,7 +20,7 @@ from view.reported import NASTY, ankle_diagnosis, ankle_study, diagnosed, joint_
 import fes_pin as fp
 from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
 from fes_pin.diagnosis.record import diagnosis_record
-from fes_pin.diagnosis.result import STOPPED
+from fes_pin.infer.result import STOPPED
 from fes_pin.models.describe import equation
 from fes_pin.models.effects import effect_named
 from fes_pin.models.predictor import Doubt

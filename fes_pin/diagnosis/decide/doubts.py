@@ -6,11 +6,11 @@ from dataclasses import replace
 
 from fes_pin.diagnosis.decide.claims import slow_misfit, slowness
 from fes_pin.diagnosis.decide.held_out import errors_of
-from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.identify.fit import rough_noise
 from fes_pin.infer.held_out import FOLDS
 from fes_pin.infer.levels import SMALL_PERCENT
+from fes_pin.infer.result import Remainder
 from fes_pin.models.model import Model
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import errors_over_horizon
 from fes_pin.identify.fit import Fit
-from fes_pin.infer.held_out import Errors, Gain, held_out_gain
+from fes_pin.infer.held_out import Errors, held_out_gain
+from fes_pin.infer.result import Gain
 
 
 @dataclass(frozen=True)

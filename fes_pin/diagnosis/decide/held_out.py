@@ -13,8 +13,9 @@ from fes_pin.identify.fit import Fit, fit_problem, go_on
 from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.held_out import Errors, Evidence, added_likelihood, deal, joined_errors, within
+from fes_pin.infer.held_out import Errors, added_likelihood, deal, joined_errors, within
 from fes_pin.infer.levels import RUNAWAY
+from fes_pin.infer.result import Evidence
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 

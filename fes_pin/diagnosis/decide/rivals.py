@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fes_pin.data.study import Study
-from fes_pin.diagnosis.cause import Cause, ParameterEstimate, Ranked
 from fes_pin.diagnosis.experiment import NextExperiment, next_experiment
-from fes_pin.diagnosis.remainder.open_set import Remainder
 from fes_pin.diagnosis.search.score import best_by_effect
 from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.per_trial import amplitude
 from fes_pin.infer.levels import ABSORBED_BELOW, SEPARABLE
+from fes_pin.infer.result import Cause, ParameterEstimate, Ranked, Remainder
 from fes_pin.infer.scatter import least_apart
 
 

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from fes_pin.diagnosis.decide.significance import level_of
-from fes_pin.diagnosis.remainder.open_set import Remainder, beside_smooth, inflation_by_signs, trial_shares
+from fes_pin.diagnosis.remainder.open_set import beside_smooth, inflation_by_signs, trial_shares
 from fes_pin.diagnosis.search.score import Projection
 from fes_pin.identify.fit import Fit, fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import limits_of
 from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.result import Remainder
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
 from fes_pin.models.stage import Effect
 

@@ -28,6 +28,7 @@ from fes_pin.identify.fit import Fit
 from fes_pin.identify.noise import Noise, NoiseModel, first_order_low_pass
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL
+from fes_pin.infer.result import Remainder
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator
 from fes_pin.workers import in_parallel
@@ -57,17 +58,6 @@ class MotionFeatures:
 
     names: tuple[str, ...]
     columns: np.ndarray
-
-
-@dataclass(frozen=True)
-class Remainder:
-    """What is left beside the model."""
-
-    unexplained: bool
-    p_value: float
-    where: str | None
-    excess: float = 0.0
-    """By how much the statistic exceeds its 97.5 % quantile."""
 
 
 def features(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> MotionFeatures:

@@ -1,0 +1,492 @@
+"""What an inference found, whatever was measured: estimates, gains, causes and changes, lack of fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol, TypeVar
+
+from fes_pin.infer.levels import CONFIDENCE_95, NOTHING_PERCENT
+from fes_pin.infer.text import percent, probability, quantity
+
+CELLS = ("value", "std", "unit", "low", "high", "at_bound")
+"""Columns of tables of estimates; `low` and `high` are the ends of the 95 % interval."""
+DIGITS = 6
+"""Significant digits printed: the last that does not depend on how sums are ordered."""
+LEAST_P = 1e-300
+"""Replaces a p-value that is too small for a number: it is at most this."""
+
+
+def shown(value: float | None) -> float | None:
+    """A number as printed; None for what is not finite."""
+    return None if value is None or not math.isfinite(value) else float(f"{value:.{DIGITS}g}")
+
+
+def p_shown(value: float) -> float | None:
+    """A p-value as printed: none is zero."""
+    return shown(max(value, LEAST_P)) if math.isfinite(value) else None
+
+
+class EstimatedFit(Protocol):
+    """What an estimate needs of a fit."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Every parameter by name."""
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the fitted parameters."""
+
+    @property
+    def at_bound(self) -> tuple[str, ...]:
+        """Names of those that ended at a bound."""
+
+    def std(self, name: str) -> float:
+        """Standard deviation of a fitted parameter."""
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """95 % interval of a fitted parameter."""
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """A value with its standard deviation and unit.
+
+    Attributes
+    ----------
+    std
+        Infinite of a value that is not identified, 0 of one that is held; NaN of one at its bound.
+    at_bound
+        True of a value at a bound of what the parameter can be. Then its 95 % interval is one-sided: from the bound to
+        the other end.
+    ends
+        Of its 95 % interval, where that is not 1.96 deviations to either side.
+    """
+
+    value: float
+    std: float
+    unit: str = ""
+    at_bound: bool = False
+    ends: tuple[float, float] | None = None
+
+    @classmethod
+    def of(cls, fitted: EstimatedFit, name: str, unit: str, wider: float = 1.0) -> ParameterEstimate:
+        """A parameter of a fit by name, with its deviation so many times."""
+        value = fitted.values[name]
+        if name not in fitted.free:
+            return cls(value, 0.0, unit)
+        if name in fitted.at_bound:
+            low, high = (value + wider * (end - value) for end in fitted.interval(name))
+            return cls(value, math.nan, unit, True, (low, high))
+        return cls(value, wider * fitted.std(name), unit, ends=fitted.interval(name) if wider == 1.0 else None)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval."""
+        half = CONFIDENCE_95 * self.std
+        return self.ends or (self.value - half, self.value + half)
+
+    def one_sided(self) -> str:
+        """The end of the interval of a value at its bound that is not the bound, in words."""
+        low, high = self.interval
+        word, end = ("most", high) if high - self.value >= self.value - low else ("least", low)
+        return f"at {word} {end:.3g}" if math.isfinite(end) else "not identified"
+
+    def __str__(self) -> str:
+        if not self.at_bound:
+            return quantity(self.value, self.std, self.unit)
+        return f"{self.value:.4g} {self.unit} (at its bound, {self.one_sided()})".replace("  ", " ")
+
+    def cells(self) -> tuple[Any, ...]:
+        """What tables hold of it, by `CELLS`."""
+        return self.value, self.std, self.unit, *self.interval, self.at_bound
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it: `at_bound` stands only where it is true, with the interval."""
+        low, high = (shown(end) for end in self.interval)
+        own = {"at_bound": True, "low": low, "high": high} if self.at_bound else {}
+        return {"value": shown(self.value), "std": shown(self.std), **own}
+
+
+HELD_OUT, CROSS_VALIDATED, FITTED, STOPPED = "held_out", "cross_validated", "fitted", "stopped"
+"""What data a gain is found on: a part that was held out from the start, each part by fits without it, the data that
+were fitted, or those because a limit ended the search before any part could be held out."""
+ON = {
+    HELD_OUT: "held out",
+    CROSS_VALIDATED: "cross-validated",
+    FITTED: "on what was fitted",
+    STOPPED: "on what was fitted, as the search was stopped",
+}
+"""The same in words."""
+ERROR, DEVIANCE, LIKELIHOOD = "squared error above the noise", "deviance", "twice the log-likelihood"
+"""Measures of the gain of a cause: what the nominal model errs by, less what noise alone makes; minus twice the
+log-likelihood without the cause; or by how much twice the log-likelihood grows with it."""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What a cause gains: the share of what the model gets wrong without it, percent, with its 95 % interval.
+
+    Attributes
+    ----------
+    ahead_s
+        How far ahead, where that is further than the horizon; s.
+    measure
+        `ERROR` or `DEVIANCE`, of which it is a share.
+    on
+        What data it is found on: a key of `ON`.
+    """
+
+    percent: float
+    low: float
+    high: float
+    ahead_s: float | None = None
+    measure: str = ERROR
+    on: str = CROSS_VALIDATED
+
+    def __str__(self) -> str:
+        further = "" if self.ahead_s is None else f", {self.ahead_s:.2g} s ahead"
+        return f"{self.percent:.0f} % [{self.low:.0f}, {self.high:.0f}]{further}"
+
+    @property
+    def is_material(self) -> bool:
+        """Whether the low end of its interval is above `NOTHING_PERCENT`."""
+        return self.low > NOTHING_PERCENT
+
+    @property
+    def is_held_out(self) -> bool:
+        """Whether it is found on data that took no part."""
+        return self.on in (HELD_OUT, CROSS_VALIDATED)
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it."""
+        size = {"percent": shown(self.percent), "low": shown(self.low), "high": shown(self.high)}
+        return {"measure": self.measure, "on": self.on, **size}
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a cause adds to the likelihood of data that took no part.
+
+    The residual without it is the residual with it plus a difference Delta of predictions, all whitened:
+    |r + Delta|^2 - |r|^2 = |Delta|^2 + 2 r'Delta, which scatters by 2 |Delta| where r is noise.
+
+    Attributes
+    ----------
+    added
+        Twice the log-likelihood.
+    squares
+        |Delta|^2.
+    on
+        As in `Gain`.
+    """
+
+    added: float
+    squares: float
+    on: str = CROSS_VALIDATED
+
+    @property
+    def low(self) -> float:
+        """Lower end of the 95 % interval."""
+        return self.added - 2.0 * CONFIDENCE_95 * math.sqrt(self.squares)
+
+    def __add__(self, other: Evidence) -> Evidence:
+        return Evidence(self.added + other.added, self.squares + other.squares, self.on)
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it."""
+        size = {"added": shown(self.added), "low": shown(self.low), "high": shown(2.0 * self.added - self.low)}
+        return {"measure": LIKELIHOOD, "on": self.on, **size}
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Lack of fit: whether residuals of the model are more than noise, its p-value, and where they are largest.
+
+    Attributes
+    ----------
+    excess
+        By how much the statistic exceeds its 97.5 % quantile.
+    """
+
+    unexplained: bool
+    p_value: float
+    where: str | None
+    excess: float = 0.0
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it."""
+        return {"unexplained": self.unexplained, "p_value": p_shown(self.p_value), "where": self.where}
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What all causes together gain: errors of a constant, of the fitted nominal and of the extended model.
+
+    Errors are E: squares in percent of those of the measurement about its mean. So a constant has 100.
+
+    Attributes
+    ----------
+    measure
+        What is predicted, in words.
+    on
+        What data: a key of `ON`.
+    noise
+        What noise alone leaves; None where that is not known.
+    """
+
+    measure: str
+    on: str
+    nominal: float
+    extended: float
+    noise: float | None = None
+    constant: float = 100.0
+
+    def of(self, reference: float) -> float:
+        """Share of a model's error that the extended model does not make, percent; below 0 where it makes more."""
+        return 100.0 * (reference - self.extended) / max(reference, 1e-300)
+
+    @property
+    def above_noise(self) -> float:
+        """Share of the nominal model's error above the noise that the extended model does not make, percent."""
+        gone = self.nominal - self.extended
+        return 100.0 * gone / max(self.nominal - (self.noise or 0.0), gone, 1e-300)
+
+    def __str__(self) -> str:
+        alone = "" if self.noise is None else f"; noise alone leaves {percent(self.noise)}"
+        return f"E {percent(self.nominal)} -> {percent(self.extended)}, {ON[self.on]}{alone}"
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it."""
+        errors = {n: shown(getattr(self, n)) for n in ("constant", "nominal", "extended", "noise")}
+        gains = {"constant": self.of(self.constant), "nominal": self.of(self.nominal), "above_noise": self.above_noise}
+        told = {"measure": self.measure, "on": self.on, "error_percent": errors}
+        return {**told, "gain_percent": {n: shown(value) for n, value in gains.items()}}
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A rival set: its names, and the loss of twice the log-likelihood with it in the place of the chosen set."""
+
+    names: tuple[str, ...]
+    shortfall: float
+
+
+V_co = TypeVar("V_co", covariant=True)
+
+
+class Held(Mapping[str, V_co]):
+    """A mapping that cannot be changed, also after it was copied or pickled."""
+
+    def __init__(self, values: Mapping[str, V_co]) -> None:
+        self._values = dict(values)
+
+    def __getitem__(self, name: str) -> V_co:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        return repr(self._values)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Named:
+    """What is named: a cause, or a change. Two are equal if their records are.
+
+    Attributes
+    ----------
+    parameters
+        By name.
+    equivalents
+        What these data cannot tell from it: to be read as one set with it.
+    p_value
+        Of such a gain where nothing is there, over all candidates (family-wise).
+    site
+        Where it acts, of what has several places; empty where there is one.
+    trial
+        The only trial that it concerns, if it is not the rig's.
+    words
+        What happened, in plain words, where the name alone does not say it.
+    """
+
+    name: str
+    parameters: Mapping[str, object]
+    equivalents: tuple[str, ...]
+    p_value: float
+    site: str = ""
+    trial: str | None = None
+    words: str = ""
+    PLACE: ClassVar[tuple[str, ...]] = ("stage", "site")
+    """What says where it acts."""
+    CELL: ClassVar[tuple[str, ...]] = ("parameter",)
+    """What says which of its values one is."""
+    GAIN: ClassVar[tuple[str, ...]] = ()
+    """Columns of its gain."""
+
+    def __post_init__(self) -> None:
+        own = {n: Held(v) if isinstance(v, Mapping) else v for n, v in self.parameters.items()}
+        object.__setattr__(self, "parameters", Held(own))
+
+    def estimates(self) -> list[tuple[tuple[str, ...], ParameterEstimate]]:
+        """Every estimate of it, with what `CELL` says of it."""
+        raise NotImplementedError
+
+    def row(self) -> tuple[str, ...]:
+        """Cells of a table to be read."""
+        raise NotImplementedError
+
+    def columns(self) -> list[tuple[Any, ...]]:
+        """Rows of a table to be computed with, one an estimate."""
+        place = [getattr(self, n) for n in self.PLACE if n not in self.CELL]
+        last = (self.p_value, *self._gain_cells(), ", ".join(self.equivalents))
+        return [(self.name, *place, *cell, *one.cells(), *last) for cell, one in self.estimates()]
+
+    @classmethod
+    def head(cls) -> tuple[str, ...]:
+        """Names of `columns`."""
+        place = [n for n in cls.PLACE if n not in cls.CELL]
+        return (cls.__name__.lower(), *place, *cls.CELL, *CELLS, "p_value", *cls.GAIN, "equivalents")
+
+    def _gain_cells(self) -> tuple[float, ...]:
+        return ()
+
+    def _parameters(self) -> dict[str, Any]:
+        raise NotImplementedError
+
+    def _gains(self) -> dict[str, Any]:
+        return {}
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it."""
+        place = {n: value for n in (*self.PLACE, "trial", "words") if (value := getattr(self, n))}
+        own = {"parameters": self._parameters(), "equivalents": list(self.equivalents)}
+        return {"name": self.name, **place, **own, "p_value": p_shown(self.p_value), **self._gains()}
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Named) and type(other) is type(self) and other.record() == self.record()
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.site, self.trial, self.p_value))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Cause(Named):
+    """One named cause.
+
+    Attributes
+    ----------
+    stage
+        Of the signal path.
+    gain_fit
+        In percent, on the data that were fitted.
+    gain_held_out
+        On data that took no part; on those that were fitted where nothing could be held out.
+    evidence
+        By how much the likelihood of held-out data grows with it.
+    chosen_again
+        In how many folds it, or an equivalent, was chosen without the data that were held out there, and of how many.
+    elsewhere
+        Other sites of the same cause that would do as well.
+    further
+        Other gains by name, percent: of walking "other_leg", that on one leg's single supports of sizes fitted to the
+        other's, of what is of neither leg.
+    """
+
+    parameters: Mapping[str, ParameterEstimate]
+    stage: str
+    gain_fit: float
+    gain_held_out: Gain
+    evidence: Gain | Evidence | None = None
+    chosen_again: tuple[int, int] | None = None
+    elsewhere: tuple[str, ...] = ()
+    further: Mapping[str, float | None] = field(default_factory=dict)
+    GAIN: ClassVar[tuple[str, ...]] = ("gain_percent", "gain_low", "gain_high")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "further", Held(self.further))
+
+    @property
+    def judged(self) -> Gain | Evidence:
+        """The gain that it is named by: of the likelihood, or of the errors where a likelihood says little."""
+        return self.evidence or self.gain_held_out
+
+    @property
+    def chosen_in_some(self) -> tuple[int, int] | None:
+        """`chosen_again` where some folds choose something else; None where none does."""
+        again = self.chosen_again
+        return again if again is not None and again[0] < again[1] else None
+
+    def estimates(self) -> list[tuple[tuple[str, ...], ParameterEstimate]]:
+        """Every parameter by name."""
+        return [((n,), one) for n, one in self.parameters.items()]
+
+    def row(self) -> tuple[str, ...]:
+        """Name, where it acts, values, gain, what it cannot be told from."""
+        values = "\n".join(f"{n} {one}" for n, one in self.parameters.items())
+        where = f"trial {self.trial}" if self.trial is not None else self.site or self.stage
+        return self.name, where, values, str(self.gain_held_out), ", ".join(self.equivalents) or "-"
+
+    def _gain_cells(self) -> tuple[float, ...]:
+        return self.gain_held_out.percent, self.gain_held_out.low, self.gain_held_out.high
+
+    def _parameters(self) -> dict[str, Any]:
+        known = {n: {"unit": one.unit} if self.site else {} for n, one in self.parameters.items()}  # names have units
+        return {n: one.record() | known[n] for n, one in self.parameters.items()}
+
+    def _gains(self) -> dict[str, Any]:
+        gain, some = self.gain_held_out, self.chosen_in_some
+        return {
+            **({"chosen_again": list(some)} if some else {}),
+            "gain_percent": {
+                "fit": shown(self.gain_fit),
+                "held_out": shown(gain.percent) if gain.is_held_out else None,
+                "ci95": [shown(gain.low), shown(gain.high)],
+                **({"ahead_s": shown(gain.ahead_s)} if gain.ahead_s is not None else {}),
+                **{n: shown(value) for n, value in self.further.items()},
+            },
+            "judged_by": self.judged.record(),
+        }
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Change(Named):
+    """One thing that differs between groups.
+
+    Attributes
+    ----------
+    kind
+        "nominal", a parameter of the nominal model; "effect", a cause; or "condition", a trial that was misread.
+    group
+        The group that has a value of its own.
+    parameters
+        By name and group: of a group that does not have the cause its null, without deviation.
+    """
+
+    parameters: Mapping[str, Mapping[str, ParameterEstimate]]
+    kind: str
+    group: str
+    PLACE: ClassVar[tuple[str, ...]] = ("kind", "group", "site")
+    CELL: ClassVar[tuple[str, ...]] = ("parameter", "group")
+
+    def estimates(self) -> list[tuple[tuple[str, ...], ParameterEstimate]]:
+        """Every parameter by name and group."""
+        return [((n, g), one) for n, groups in self.parameters.items() for g, one in groups.items()]
+
+    def _parameters(self) -> dict[str, Any]:
+        return {n: {g: one.record() for g, one in groups.items()} for n, groups in self.parameters.items()}
+
+    def row(self) -> tuple[str, ...]:
+        """Name, what happened, values by group, p, what it cannot be told from."""
+        lines = [
+            f"{name}: " + ", ".join(f"{g} {one if one.std else 'none'}" for g, one in groups.items())
+            for name, groups in self.parameters.items()
+        ]
+        return self.name, self.words, "\n".join(lines), probability(self.p_value), ", ".join(self.equivalents) or "-"

@@ -1,0 +1,41 @@
+"""Numbers in words: what a p-value, a percentage and an estimate look like wherever they are printed."""
+
+from __future__ import annotations
+
+import math
+
+LEAST_P, LEAST_PERCENT = 1e-12, 1e-3
+"""Below these a p-value and a percentage are printed as smaller than that."""
+
+
+def probability(value: float) -> str:
+    """A p-value as printed; never zero."""
+    if math.isnan(value):
+        return "not tested"
+    return f"p < {LEAST_P:g}" if value < LEAST_P else f"p = {value:.2g}"
+
+
+def percent(value: float | None) -> str:
+    """A percentage as printed, "-" for none."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if 0.0 <= value < LEAST_PERCENT:
+        return f"below {LEAST_PERCENT:g} %"
+    return f"{value:.3g} %" if value >= 1.0 else f"{value:.2g} %"
+
+
+def quantity(value: float, std: float, unit: str) -> str:
+    """A value with its standard deviation, rounded to what it means."""
+    if not math.isfinite(std):
+        return f"{value:.3g} {unit} (not identified)".replace("  ", " ")
+    if std <= 0.0:
+        return f"{value:.4g} {unit} (held)".replace("  ", " ")
+    digits = max(0, 1 - math.floor(math.log10(std)))
+    if digits > 6 or abs(value) >= 1e5:
+        return f"{value:.3g} +- {std:.2g} {unit}".strip()
+    return f"{value:.{digits}f} +- {std:.{digits}f} {unit}".strip()
+
+
+def listed(names: list[str], last: str = "and") -> str:
+    """Words in a row: a, b and c; "-" for none."""
+    return f" {last} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names) or "-"
