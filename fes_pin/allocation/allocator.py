@@ -122,7 +122,9 @@ class Allocator(OfProblem):
         lower, upper = p.limits(before)
         f = wanted @ self.pull
         if p.lexicographic:
-            r, note = error_then_effort(self.squares, f, p.prices, p.change, before, lower, upper)
+            total, root = p.prices + p.change, np.sqrt(p.weights / p.scale)
+            target = p.change * before / total
+            r, note = error_then_effort(root[:, None] * p.matrix, root * wanted, total, target, lower, upper)
             return self.result(r, wanted, lower, upper, before, note)
         if p.change:
             f -= p.change * before

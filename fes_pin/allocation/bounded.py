@@ -36,11 +36,13 @@ def held(r: np.ndarray, multipliers: np.ndarray, lower: np.ndarray, upper: np.nd
     return np.where(multipliers > 0.0, upper, np.where(multipliers < 0.0, lower, inside))
 
 
-def new_model(H: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> daqp.Model:
-    """A workspace of DAQP; it belongs to one thread at a time."""
+def new_model(
+    H: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray, rows: np.ndarray | None = None
+) -> daqp.Model:
+    """A workspace of DAQP, with limits of the variables or of rows of them; it belongs to one thread at a time."""
     model = daqp.Model()
     model.settings = {**model.settings, "primal_tol": TOLERANCE}
-    model.setup(H.copy(), f.copy(), np.zeros((0, len(f))), upper.copy(), lower.copy())
+    model.setup(H.copy(), f.copy(), np.zeros((0, len(f))) if rows is None else rows.copy(), upper.copy(), lower.copy())
     return model
 
 

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
-from scipy.optimize import nnls
+from scipy.linalg import null_space
+from scipy.optimize import lsq_linear
 
-from fes_pin.allocation.bounded import BoundedProgram, lone_steps, solve_once
+from fes_pin.allocation.bounded import lone_steps, new_model, solve_once
 from fes_pin.allocation.problem import EPSILON
 
 STEPS = 100
 FLATTEST = 1e-9
 """Least curvature, of a channel's own at full recruitment, on the way to cubes, which are flat where it is off."""
-SHARES = (1e-6, 1e-8, 1e-10, 1e-4)
-"""Weights of effort, of the torque error's, with which the limits of the lexicographic answer are guessed."""
 LEAST_SHARE = 1e-10
-"""Weight of a channel's effort, of the strongest's torque error, below which equal channels are one to rounding."""
-PRESSED = 1e-10
-"""A limit that the torque error presses on by less than this holds for the sake of effort."""
+"""Price of a channel's effort, of the dearest, below which prices are one to rounding."""
 
 
 def least_cubes(
@@ -56,81 +51,32 @@ def least_cubes(
 
 
 def error_then_effort(
-    squares: np.ndarray,
-    f: np.ndarray,
-    prices: np.ndarray,
-    change: float,
-    previous: np.ndarray,
+    rows: np.ndarray,
+    wanted: np.ndarray,
+    total: np.ndarray,
+    target: np.ndarray,
     lower: np.ndarray,
     upper: np.ndarray,
 ) -> tuple[np.ndarray, str]:
-    """Least `1/2 r'Sr + f'r`, S possibly singular; among its minimisers the least effort and change.
+    """Least `|rows r - wanted|` within limits; among its minimisers the least `total (r - target)^2`.
 
-        prices r^2 / 2 + change / 2 (r - previous)^2
+    The first is a bounded least-squares problem; what leaves its torque as it is, the null space of the rows, is then
+    moved along to the least of the second, a quadratic program within the limits.
 
-    Effort with a small weight says which limits hold (the answer moves on straight lines as the weight goes to 0, so
-    that a small enough one has the limits of the end: Tikhonov's path). With them the answer is a weighed least-norm
-    solution, which is checked against the conditions of both stages.
-
-    Returns the recruitment and a note with how well it meets them.
+    Returns the recruitment and a note with the slope of the second cost along the null space that no limit explains.
     """
-    total = prices + change
-    target = change * previous / total
-    best, least = np.clip(target, lower, upper), np.inf
-    for floor, share in product((0.0, LEAST_SHARE), SHARES):
-        weight = np.maximum(share * total / total.max(), floor)
-        guess = BoundedProgram(squares + np.diag(weight)).solve(f - weight * target, lower, upper)
-        for _ in range(len(f)):
-            r = least_norm(squares, f, total, target, guess, (guess > lower) & (guess < upper))
-            outside = (r < lower) | (r > upper)
-            missed = max(
-                float(lone_steps(squares @ r + f, r, lower, upper, np.ones(len(f)))),
-                effort_unexplained(squares, f, total, target, r, lower, upper),
-            )
-            if missed < least:
-                best, least = np.clip(r, lower, upper), missed
-            if not outside.any():
-                break
-            guess = np.clip(r, lower, upper)
-        if least <= PRESSED:
-            break
-    return best, f"least effort among equals, to {least:.0e}"
-
-
-def least_norm(
-    squares: np.ndarray, f: np.ndarray, total: np.ndarray, target: np.ndarray, guess: np.ndarray, free: np.ndarray
-) -> np.ndarray:
-    """The least-error recruitments nearest to `target` in the metric of `total`, the held ones as in the guess."""
-    r = guess.copy()
-    if free.any():
-        root = np.sqrt(total[free])
-        slope = squares[free][:, ~free] @ r[~free] + squares[np.ix_(free, free)] @ target[free] + f[free]
-        scaled = squares[np.ix_(free, free)] / np.outer(root, root)
-        values, vectors = np.linalg.eigh(scaled)
-        kept = values > len(f) * EPSILON * max(values[-1], 1e-300)
-        along = vectors[:, kept]
-        r[free] = target[free] - along @ (along.T @ (slope / root) / values[kept]) / root
-    return r
-
-
-def effort_unexplained(
-    squares: np.ndarray,
-    f: np.ndarray,
-    total: np.ndarray,
-    target: np.ndarray,
-    r: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
-) -> float:
-    """Greatest slope of effort and change at equal torque error that neither a price of torque nor a limit explains.
-
-    The best prices are those of least squares, limits' not negative; what the error holds at a limit is not asked.
-    """
-    slope = total / total.max() * (r - target)
-    loose = np.abs(squares @ r + f) <= PRESSED
-    if not loose.any():
-        return 0.0
-    at = np.eye(len(f))
-    explains = np.hstack([squares, -squares, at[:, r <= lower], -at[:, r >= upper]])[loose]
-    prices, _ = nnls(explains, slope[loose])
-    return float(np.abs(explains @ prices - slope[loose]).max())
+    r, open_ = lower.copy(), lower < upper
+    if open_.any():
+        room = np.zeros(open_.sum()), (upper - lower)[open_]
+        r[open_] += lsq_linear(rows[:, open_], wanted - rows @ lower, room, "bvls", 1e-15, max_iter=10 * len(r)).x
+    root = np.sqrt(np.maximum(total / total.max(), LEAST_SHARE))
+    along = null_space(rows / root, rcond=len(r) * EPSILON) / root[:, None]
+    if not along.shape[1]:
+        return r, "one choice alone has the least error, to 0"
+    slope = root**2 * (r - target)
+    model = new_model(np.eye(along.shape[1]), along.T @ slope, lower - r, upper - r, along)
+    moved, _, flag, info = model.solve()
+    if flag != 1:
+        return r, "least error; the least effort among its choices was not found"
+    unexplained = along.T @ (slope + root**2 * (along @ moved) + info["lam"])
+    return np.clip(r + along @ moved, lower, upper), f"least effort among equals, to {np.abs(unexplained).max():.0e}"
