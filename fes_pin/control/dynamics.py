@@ -26,6 +26,8 @@ own lie well within."""
 LONGEST_STRETCH = 3.0
 """Angle in rad beyond theta_r from which eq. (1) is as there, so that no state overflows: far beyond any ankle."""
 
+_ONE = np.eye(5)
+
 
 @dataclass(frozen=True, eq=False)
 class AnkleDynamics(Tabulated):
@@ -180,33 +182,13 @@ class PulseToPulse:
             act = end
         return act, q, v
 
-    def transition(self, q: float, activation: float, share: float) -> tuple[list[float], list[float]]:
-        """Rows of angle and rate of the state's transition over a pulse, linear about a state; five numbers each.
+    def transition(self, q: float, activation: float, share: float) -> np.ndarray:
+        """The state's transition over a pulse, linear about a state, shape (5, 5).
 
         exp(f t) by its series to the third power and by squaring; to 1e-4.
         """
-        d = self.dynamics
-        inverse, s = 1.0 / d.inertia, math.sin(q)
-        k = (d.pull_nm * share * activation * math.cos(q) + d.passive(q)[1]) * inverse
-        c, g, w = -d.damping * inverse, d.pull_nm * s * inverse, -1.0 / d.time_constant
-        h = PULSE_S / (1 << self.halvings)
-        h2, h3 = 0.5 * h * h, h * h * h / 6.0
-        # exp([[0, 1], [k, c]] h), and what it makes of 1 in activation and of a steady 1 of acceleration
-        m21, m22 = k * c, k + c * c
-        e11, e12 = 1.0 + h2 * k + h3 * m21, h + h2 * c + h3 * m22
-        e21, e22 = h * k + h2 * m21 + h3 * k * m22, 1.0 + h * c + h2 * m22 + h3 * (m21 + c * m22)
-        a1, a2 = g * (h2 + h3 * (c + w)), g * (h + h2 * (c + w) + h3 * (m22 + w * c + w * w))
-        u1, u2 = h2 + h3 * c, h + h2 * c + h3 * m22
-        fade = 1.0 + h * w + h2 * w * w + h3 * w * w * w
+        f = self.dynamics.linear(q, activation, share) * (PULSE_S / (1 << self.halvings))
+        a = _ONE + f @ (_ONE + f @ (_ONE + f / 3.0) / 2.0)
         for _ in range(self.halvings):
-            a1, a2 = e11 * a1 + e12 * a2 + a1 * fade, e21 * a1 + e22 * a2 + a2 * fade
-            u1, u2 = e11 * u1 + e12 * u2 + u1, e21 * u1 + e22 * u2 + u2
-            e11, e12, e21, e22 = (
-                e11 * e11 + e12 * e21,
-                e12 * (e11 + e22),
-                e21 * (e11 + e22),
-                e21 * e12 + e22 * e22,
-            )
-            fade *= fade
-        tired = g * activation
-        return [share * a1, e11, e12, u1 * inverse, tired * u1], [share * a2, e21, e22, u2 * inverse, tired * u2]
+            a = a @ a
+        return a

@@ -4,8 +4,6 @@ State: activation, angle, rate, a torque that the model does not know, and the s
 muscle has. The torque wanders (it takes up what is wrong in passive curve, load and damping), the gain's share wanders
 more slowly (it takes up fatigue). What is fed in is the recruitment that the nerve really got, after every limit: a
 limit that holds the stimulus back leaves nothing to wind up.
-
-Five states in plain numbers: arrays this small cost more to call than to compute.
 """
 
 from __future__ import annotations
@@ -24,6 +22,8 @@ GATE = 5.0
 readings come here at all: `fes_pin.control.faults`."""
 LEAST_SHARE, MOST_SHARE = 0.1, 2.0
 """Bounds of the gain's share."""
+MOST_SHARE_STD = 0.3
+"""What is never used is never seen: the share's standard deviation grows no farther than this."""
 RECRUITMENT_STD = 0.025
 """What a pulse recruits is known to this share of the muscle: a third of what a play of 60 us hides. With a tenth of
 it the filter believes its activation so firmly that it answers a swinging frame with a torque, and takes the readings
@@ -53,8 +53,8 @@ class JointObserver:
     ----------
     x
         Mean: five numbers.
-    upper
-        Upper triangle of the covariance, by rows: fifteen numbers.
+    covariance
+        Of the state, shape (5, 5).
     """
 
     def __init__(
@@ -74,8 +74,7 @@ class JointObserver:
         self.dynamics, self.variance = dynamics, angle_std_rad**2
         self.angle_std_rad = angle_std_rad
         self.pulse = PulseToPulse(dynamics)
-        self.fade = math.exp(-PULSE_S / dynamics.time_constant)
-        activation = (1.0 - self.fade) * RECRUITMENT_STD / math.sqrt(PULSE_S)
+        activation = -math.expm1(-PULSE_S / dynamics.time_constant) * RECRUITMENT_STD / math.sqrt(PULSE_S)
         wander = [activation, 0.0, RATE_WANDER, torque_wander, share_wander]
         self.noise = [float(w * w * PULSE_S) for w in wander]
         self.start = [0.0, dynamics.rest_angle(), 0.0, 0.0, 1.0]
@@ -87,45 +86,24 @@ class JointObserver:
         self.x = list(self.start)
         if angle_rad is not None:
             self.x[1] = angle_rad
-        variances = [std * std for std in self.start_std]
-        self.upper = [variances[i] if i == k else 0.0 for i in range(5) for k in range(i, 5)]
-
-    @property
-    def covariance(self) -> np.ndarray:
-        """Of the state, shape (5, 5)."""
-        p = np.zeros((5, 5))
-        p[np.triu_indices(5)] = self.upper
-        return p + np.triu(p, 1).T
+        self.covariance = np.diag(np.square(self.start_std))
 
     def expects(self, angle_rad: float) -> tuple[float, float]:
         """The innovation of a reading, and the standard deviation that it should have, rad."""
-        return angle_rad - self.x[1], math.sqrt(self.upper[5] + self.variance)
+        return angle_rad - self.x[1], math.sqrt(self.covariance[1, 1] + self.variance)
 
     def correct(self, angle_rad: float) -> None:
         """Take in a reading: an angle that was judged before."""
-        size = self.upper[5] + self.variance
-        far = GATE * math.sqrt(size)
-        innovation = min(max(angle_rad - self.x[1], -far), far)
-        p00, c0, p02, p03, p04, c1, c2, c3, c4, p22, p23, p24, p33, p34, p44 = self.upper
-        g0, g1, g2, g3, g4 = c0 / size, c1 / size, c2 / size, c3 / size, c4 / size
-        x0, x1, x2, x3, x4 = self.x
-        x0, x4 = x0 + g0 * innovation, x4 + g4 * innovation
-        self.x = [
-            min(max(x0, 0.0), 1.0),
-            x1 + g1 * innovation,
-            x2 + g2 * innovation,
-            x3 + g3 * innovation,
-            min(max(x4, LEAST_SHARE), MOST_SHARE),
-        ]
-        p44 -= g4 * c4
-        # what is never used is never seen: its doubt stays at 30 %
-        s = 0.3 / math.sqrt(p44) if p44 > 0.09 else 1.0
-        self.upper = [
-            *(p00 - g0 * c0, c0 - g0 * c1, p02 - g0 * c2, p03 - g0 * c3, s * (p04 - g0 * c4)),
-            *(c1 - g1 * c1, c2 - g1 * c2, c3 - g1 * c3, s * (c4 - g1 * c4)),
-            *(p22 - g2 * c2, p23 - g2 * c3, s * (p24 - g2 * c4)),
-            *(p33 - g3 * c3, s * (p34 - g3 * c4), s * s * p44),
-        ]
+        seen, (innovation, std) = self.covariance[1], self.expects(angle_rad)
+        gain = seen / std**2
+        x = self.x + gain * min(max(innovation, -GATE * std), GATE * std)
+        x[0], x[4] = min(max(x[0], 0.0), 1.0), min(max(x[4], LEAST_SHARE), MOST_SHARE)
+        self.x = x.tolist()
+        self.covariance = self.covariance - np.outer(gain, seen)
+        if self.covariance[4, 4] > MOST_SHARE_STD**2:
+            shrink = MOST_SHARE_STD / math.sqrt(self.covariance[4, 4])
+            self.covariance[4] *= shrink
+            self.covariance[:, 4] *= shrink
 
     @property
     def torque_wander(self) -> float:
@@ -139,35 +117,13 @@ class JointObserver:
     def predict(self, recruitment: float) -> None:
         """Go on by one pulse with this recruitment in the nerve."""
         act, q, v, torque, share = self.x
-        change = self.pulse.transition(q, act, share)
-        act, q, v = self.pulse.moved(act, q, v, torque, share, recruitment)
-        self.x = [act, q, v, torque, share]
-        self.upper = self._spread(*change)
-        if not (math.isfinite(act + v + sum(self.upper)) and 0.0 < q < math.pi):
+        a = self.pulse.transition(q, act, share)
+        self.x = [*self.pulse.moved(act, q, v, torque, share, recruitment), torque, share]
+        spread = a @ self.covariance @ a.T
+        self.covariance = 0.5 * (spread + spread.T)
+        self.covariance.flat[::6] += self.noise  # its diagonal
+        if not (math.isfinite(self.covariance.sum() + sum(self.x)) and 0.0 < self.x[1] < math.pi):
             self.reset()
-
-    def _spread(self, a: list[float], b: list[float]) -> list[float]:
-        """A P A' + noise, its upper triangle; rows a and b of A lead to angle and rate, the others are diagonal."""
-        p00, p01, p02, p03, p04, p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = self.upper
-        (a0, a1, a2, a3, a4), (b0, b1, b2, b3, b4) = a, b
-        f, (n0, n1, n2, n3, n4) = self.fade, self.noise
-        s0 = a0 * p00 + a1 * p01 + a2 * p02 + a3 * p03 + a4 * p04
-        s1 = a0 * p01 + a1 * p11 + a2 * p12 + a3 * p13 + a4 * p14
-        s2 = a0 * p02 + a1 * p12 + a2 * p22 + a3 * p23 + a4 * p24
-        s3 = a0 * p03 + a1 * p13 + a2 * p23 + a3 * p33 + a4 * p34
-        s4 = a0 * p04 + a1 * p14 + a2 * p24 + a3 * p34 + a4 * p44
-        t0 = b0 * p00 + b1 * p01 + b2 * p02 + b3 * p03 + b4 * p04
-        t1 = b0 * p01 + b1 * p11 + b2 * p12 + b3 * p13 + b4 * p14
-        t2 = b0 * p02 + b1 * p12 + b2 * p22 + b3 * p23 + b4 * p24
-        t3 = b0 * p03 + b1 * p13 + b2 * p23 + b3 * p33 + b4 * p34
-        t4 = b0 * p04 + b1 * p14 + b2 * p24 + b3 * p34 + b4 * p44
-        aa = a0 * s0 + a1 * s1 + a2 * s2 + a3 * s3 + a4 * s4
-        ab = b0 * s0 + b1 * s1 + b2 * s2 + b3 * s3 + b4 * s4
-        bb = b0 * t0 + b1 * t1 + b2 * t2 + b3 * t3 + b4 * t4
-        return [
-            *(f * f * p00 + n0, f * s0, f * t0, f * p03, f * p04),
-            *(aa + n1, ab, s3, s4, bb + n2, t3, t4, p33 + n3, p34, p44 + n4),
-        ]
 
     def steady_gain(self, transition: np.ndarray) -> np.ndarray:
         """What of an innovation goes to activation, angle, rate and torque in the long run, shape (4,).

@@ -72,8 +72,6 @@ class Gains(Tabulated):
         super().__post_init__()
         if self.table.shape[1:] != (3,) or len(self.angles) < 2 or not (np.diff(self.angles) > 0.0).all():
             raise InputError("expected two or more rising angles, and three gains for each", column="table")
-        rows, ends = tuple(map(tuple, self.table.tolist())), (float(self.angles[0]), float(self.angles[-1]))
-        vars(self).update(_rows=rows, _ends=ends)
 
     def to_frame(self) -> pandas.DataFrame:
         """The gains by angle as a frame of pandas, a row an angle."""
@@ -83,12 +81,7 @@ class Gains(Tabulated):
 
     def at(self, angle: float) -> list[float]:
         """The three gains at an angle, between the table's by straight lines."""
-        rows, (first, last) = vars(self)["_rows"], vars(self)["_ends"]
-        place = min(max((angle - first) / (last - first), 0.0), 1.0) * (len(rows) - 1)
-        k = min(int(place), len(rows) - 2)
-        part = place - k
-        (a, b, c), (d, e, f) = rows[k], rows[k + 1]
-        return [a + part * (d - a), b + part * (e - b), c + part * (f - c)]
+        return [float(np.interp(angle, self.angles, gains)) for gains in self.table.T]
 
 
 def plant(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray, float]:
