@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fes_pin.data.schema import rigs_from
 
-if TYPE_CHECKING:  # the same names for type checkers; a test holds the two together
+if TYPE_CHECKING:  # every public name with its module: it is imported from there when it is first asked for
     from fes_pin.allocation.allocate import allocate as allocate
     from fes_pin.allocation.allocator import Allocator as Allocator
     from fes_pin.allocation.attainable_torques import AttainableTorques as AttainableTorques
@@ -84,80 +86,16 @@ if TYPE_CHECKING:  # the same names for type checkers; a test holds the two toge
 
 __version__ = "0.2.0"
 
-_WHERE = {
-    "read_study": "fes_pin.data.study",
-    "write_study": "fes_pin.data.study",
-    "Study": "fes_pin.data.study",
-    "read_trial": "fes_pin.data.trial",
-    "write_trial": "fes_pin.data.trial",
-    "Trial": "fes_pin.data.trial",
-    "InputError": "fes_pin.data.errors",
-    "Model": "fes_pin.models.model",
-    "nominal_model": "fes_pin.models.nominal",
-    "Catalogue": "fes_pin.models.catalogue",
-    "load_library": "fes_pin.models.catalogue",
-    "load_model": "fes_pin.models.store",
-    "save_model": "fes_pin.models.store",
-    "simulate": "fes_pin.models.simulate",
-    "predict": "fes_pin.models.predict",
-    "fit": "fes_pin.identify.fit",
-    "Fit": "fes_pin.identify.fit",
-    "check": "fes_pin.diagnosis.checked",
-    "diagnose": "fes_pin.verdict.ask",
-    "Diagnosis": "fes_pin.diagnosis.result",
-    "compare": "fes_pin.comparison.compare",
-    "Comparison": "fes_pin.comparison.result",
-    "contrast": "fes_pin.contrasts.contrast",
-    "Contrast": "fes_pin.contrasts.result",
-    "diagnose_walk": "fes_pin.walk.diagnosis",
-    "report": "fes_pin.view.report",
-    "save_result": "fes_pin.data.results",
-    "load_result": "fes_pin.data.results",
-    "Body": "fes_pin.body.build",
-    "linearize": "fes_pin.body.linearize",
-    "minimal_sets": "fes_pin.body.minimal_sets",
-    "NamedArray": "fes_pin.data.named",
-    "posture_angles": "fes_pin.body.gait",
-    "Inputs": "fes_pin.body.inputs",
-    "PassiveLegs": "fes_pin.body.passive",
-    "ElasticJoints": "fes_pin.body.passive",
-    "attainable": "fes_pin.body.attainable",
-    "catchable": "fes_pin.body.catchable",
-    "close_the_loop": "fes_pin.body.closed_loop",
-    "fewest_goniometers": "fes_pin.body.observability",
-    "subject_nerves": "fes_pin.muscles.nerve_inputs",
-    "show_mode": "fes_pin.view.viewer",
-    "show_posture": "fes_pin.view.viewer",
-    "show_influence": "fes_pin.view.viewer",
-    "controllability": "fes_pin.muscles.nerve_inputs",
-    "allocate": "fes_pin.allocation.allocate",
-    "Nerves": "fes_pin.muscles.nerves",
-    "Allocator": "fes_pin.allocation.allocator",
-    "AttainableTorques": "fes_pin.allocation.attainable_torques",
-    "Horizon": "fes_pin.allocation.horizon",
-    "StrengthFatigue": "fes_pin.allocation.horizon",
-    "invert_lag": "fes_pin.allocation.horizon",
-    "allocate_walk": "fes_pin.allocation.walk",
-    "LinearRecruitment": "fes_pin.muscles.recruitment",
-    "SaturatingRecruitment": "fes_pin.muscles.recruitment",
-    "SigmoidRecruitment": "fes_pin.muscles.recruitment",
-    "GompertzRecruitment": "fes_pin.muscles.recruitment",
-    "HillRecruitment": "fes_pin.muscles.recruitment",
-    "MeasuredRecruitment": "fes_pin.muscles.recruitment",
-    "Hysteresis": "fes_pin.muscles.recruitment",
-    "AnkleDynamics": "fes_pin.control.dynamics",
-    "JointObserver": "fes_pin.control.observer",
-    "PositionController": "fes_pin.control.control",
-    "StimulationLimits": "fes_pin.control.limits",
-    "delay_margin": "fes_pin.control.margins",
-    "least_rest": "fes_pin.control.endurance",
-    "muscle_budget": "fes_pin.control.endurance",
-    "track": "fes_pin.control.loop",
-    "GainFilter": "fes_pin.paper.kalman",
-    "track_gain": "fes_pin.paper.kalman",
-    "fit_antagonist": "fes_pin.paper.antagonist",
-}
-_CHAPTERS = {"effects": "fes_pin.models.effects", "rigs": "fes_pin.models.rigs"}
+
+def _written_above() -> dict[str, str]:
+    """The module of each public name, as the imports above have it, which only type checkers run."""
+    (block,) = (node for node in ast.parse(Path(__file__).read_text("utf-8")).body if isinstance(node, ast.If))
+    imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
+    return {each.name: str(node.module) for node in imports for each in node.names}
+
+
+_CHAPTERS = {name: f"{module}.{name}" for name, module in _written_above().items() if module == "fes_pin.models"}
+_WHERE = {name: module for name, module in _written_above().items() if name not in _CHAPTERS}
 
 
 def _rigs() -> Any:
