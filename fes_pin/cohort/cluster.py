@@ -15,6 +15,7 @@ from typing import Any
 from fes_pin.cohort.local import DIED, Task
 from fes_pin.cohort.one import Answer, Work, diagnose_one
 from fes_pin.data.errors import InputError
+from fes_pin.data.libraries import optional_library
 
 AHEAD = 2
 """Studies that wait at each worker: what bounds the answers that are held."""
@@ -36,14 +37,11 @@ def on_cluster(
         raise InputError(
             f"expected the address of a Dask scheduler, as tcp://host:8786, found {address!r}", column="scheduler"
         )
-    try:
-        from distributed import Client, as_completed  # noqa: PLC0415
-    except ImportError:
-        raise InputError("a cluster needs dask.distributed: pip install 'fes-pin[cohort]'") from None
+    distributed = optional_library("distributed", "cohort", "a cluster needs dask.distributed")
     try:
         if host[1]:
             socket.getaddrinfo(host[1], None)  # a name that is none is said at once
-        client = Client(address, timeout=PATIENCE_S, set_as_default=False)
+        client = distributed.Client(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as problem:
         raise InputError(f"no Dask scheduler answers at {address}: {type(problem).__name__}") from None
     session, left = uuid.uuid4().hex[:8], iter(tasks)
@@ -56,7 +54,7 @@ def on_cluster(
     known: dict[str, Task] = {}
     with client:
         slots = max(1, sum(client.nthreads().values())) + AHEAD
-        coming = as_completed([submitted(task) for task in islice(left, slots)], loop=client.loop)
+        coming = distributed.as_completed([submitted(task) for task in islice(left, slots)], loop=client.loop)
         for future in coming:
             work, key = known.pop(future.key)
             yield _answer(future, work, key)

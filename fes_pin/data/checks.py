@@ -13,13 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import KeyFault
 from fes_pin.data.motion import GROUND_REACTION, OPTIONAL, REQUIRED, TRANSLATIONS, knees_bend_positively
 from fes_pin.data.schema import ROLES, NumberKey, RigSchema, is_like, one_of, unknown, unread
 from fes_pin.data.table import Fault
 
-KeyFault = Callable[[str, str], InputError]
-"""Makes the error of a key and a message."""
 TURN = 2.0 * math.pi
 LONGEST_MUSCLE_M = 1.0
 """Length in m that no muscle with its tendon has: the longest, sartorius, comes to about half a metre."""

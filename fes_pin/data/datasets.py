@@ -17,9 +17,10 @@ from pathlib import Path
 from urllib.parse import quote
 
 from fes_pin.data.conversions import CONVERTERS, Files
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, fault
+from fes_pin.data.libraries import optional_library
 from fes_pin.data.outputs import Outputs
-from fes_pin.data.schema import unknown
+from fes_pin.data.schema import check_known
 
 VARIABLE = "FES_PIN_DATA"
 REGISTRY = Path(__file__).with_name("datasets.json")
@@ -94,8 +95,7 @@ def _cache() -> Path:
 
 
 def _known(name: str) -> Dataset:
-    if name not in DATASETS:
-        raise InputError(unknown(name, DATASETS), column=name)
+    check_known([name], DATASETS, fault())
     return DATASETS[name]
 
 
@@ -194,10 +194,7 @@ def _fetched(name: str, target: Path, unverified: bool, outputs: Outputs) -> Fil
 
 def _retrieve(dataset: Dataset, scratch: Path) -> None:
     """Fetch every upstream file into a folder."""
-    try:
-        import pooch  # noqa: PLC0415
-    except ImportError:
-        raise InputError("fetching needs pooch: pip install 'fes-pin[datasets]'", column=dataset.name) from None
+    pooch = optional_library("pooch", "datasets", "fetching needs pooch", column=dataset.name)
     pooch.get_logger().setLevel(logging.ERROR)
     fetcher = pooch.HTTPDownloader(timeout=TIMEOUT_S)
     for place, known in dataset.upstream.items():

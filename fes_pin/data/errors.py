@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 
@@ -32,6 +33,23 @@ class InputError(ValueError):
             place.append(f"column {column}" if self.row is not None else column)
         line = f"{', '.join(place)}: {self.message}" if place else self.message
         return line if line.isprintable() else "".join(each if each.isprintable() else " " for each in line)
+
+
+KeyFault = Callable[[str, str], InputError]
+"""Makes the error of a key and a message."""
+
+
+def fault(column: str = "{}", file: str | Path | None = None) -> KeyFault:
+    """What makes the error of a key and a message.
+
+    Parameters
+    ----------
+    column
+        How the place of a key is written: `"--set {}"`.
+    file
+        Where it stands.
+    """
+    return lambda key, message: InputError(message, file=file, column=column.format(key))
 
 
 def _short(name: str, most: int = 500) -> str:

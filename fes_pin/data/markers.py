@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_text
+from fes_pin.data.libraries import optional_library
 from fes_pin.data.recorded.text import TextForm, read_csv, table_of_lines
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
@@ -85,18 +87,26 @@ def _read_trc(path: Path) -> Markers:
     return Markers(time, {name: METRES[unit] * np.stack(xyz, axis=1) for name, xyz in zip(names, axes, strict=True)})
 
 
-def _read_c3d(path: Path) -> Markers:
-    """Points of a C3D file, in m; points that were not seen are NaN."""
-    try:
-        import ezc3d  # noqa: PLC0415
-    except ImportError:
-        raise InputError("C3D files need ezc3d: pip install 'fes-pin[c3d]'", file=path) from None
+def read_c3d(path: Path) -> Any:
+    """A C3D file as ezc3d reads it.
+
+    Raises
+    ------
+    InputError
+        The file is missing or is none, or ezc3d is not installed.
+    """
+    ezc3d = optional_library("ezc3d", "c3d", ".c3d files need ezc3d", file=path)
     if not path.is_file():
         raise InputError("no such file", file=path)
     try:
-        recording = ezc3d.c3d(str(path))
+        return ezc3d.c3d(str(path))
     except Exception as error:
         raise InputError(f"cannot be read as C3D: {str(error)[:80]}", file=path) from None
+
+
+def _read_c3d(path: Path) -> Markers:
+    """Points of a C3D file, in m; points that were not seen are NaN."""
+    recording = read_c3d(path)
     point = recording["parameters"]["POINT"]
     labels = list(point["LABELS"]["value"])
     units = [str(u).lower() for u in point.get("UNITS", {}).get("value", [])]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, fault
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, read_motion
 from fes_pin.data.new_study import NewStudy, placed
-from fes_pin.data.schema import BODY, unknown
+from fes_pin.data.schema import BODY, check_known
 from fes_pin.data.study_text import HEADER, quoted
 from fes_pin.data.wanted import Wanted, label_lines, number_set
 
@@ -31,9 +31,7 @@ def new_body_study(wanted: Wanted) -> NewStudy:
     if len(moves) != len(pushes) or not moves:
         found = f"{len(moves)} of coordinates and {len(pushes)} of ground reaction"
         raise InputError(f"expected as many files of joint coordinates as of ground reaction, found {found}")
-    for key in settings:
-        if key not in (known := (*BODY.constants, *BODY.conditions)):
-            raise InputError(unknown(key, known), column=f"--set {key}")
+    check_known(settings, (*BODY.constants, *BODY.conditions), fault("--set {}"))
     missing = [f"--set {key}=NUMBER ({BODY.constants[key].unit})" for key in BODY.either if key not in settings]
     if missing:
         raise InputError(f"the files do not say everything; please add {', '.join(missing)}")

@@ -6,18 +6,19 @@ What the files do not say is taken from options, or asked of a person at a termi
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, fault
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.propose import Proposal, propose
 from fes_pin.data.recorded.text import TextForm
-from fes_pin.data.schema import unknown
+from fes_pin.data.schema import NumberKey, check_known, one_of, unknown
 from fes_pin.data.study_text import (
     HEADER,
     form_in_words,
@@ -80,15 +81,12 @@ class _Making:
         self.proposals = [propose(path, self.schema, wanted.revolute) for path in wanted.files]
         self.form = self._one_form()
         self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
-        for key in wanted.columns:
-            if key not in self.schema.columns:
-                raise InputError(unknown(key, self.schema.columns), column="--column")
+        check_known(wanted.columns, self.schema.columns, fault("--column"))
 
     def made(self, guess: Callable[[Mapping[str, float]], Mapping[str, float]]) -> NewStudy:
         kinds = [self._kind(p) for p in self.proposals]
         sources = self._sources(set(kinds))
-        rig = self._numbers("rig", self.schema.constants)
-        passive = self._numbers("rig.passive", self.schema.passive)
+        rig, passive = self._numbers(self.schema.constants), self._numbers(self.schema.passive)
         trials = [self._trial(p, kind) for p, kind in zip(self.proposals, kinds, strict=True)]
         known, start = self._start({**rig, **passive}, guess)
         self._check_settings(sorted(set(kinds)))
@@ -130,19 +128,12 @@ class _Making:
     def _kind(self, proposal: Proposal) -> str:
         """The kind of trial that a file's columns make."""
         path, outputs = proposal.recording.path, self.schema.outputs
-        given = self._own(path, "kind") or self.wanted.kind
-        if given is not None:
-            if given not in outputs:
-                raise InputError(f"expected one of {', '.join(outputs)}, found {given!r}", column="--set kind")
-            return given
+        if (given := self.own.get((path, "kind"), self.wanted.kind)) is not None:
+            return one_of(given, tuple(outputs), partial(InputError, column="--set kind"))
         fits = [k for k, c in outputs.items() if c in self.wanted.columns or proposal.candidates[c]]
         default = self.schema.default_kind
         read = {k: sum(bool(proposal.candidates[c]) for c in self.schema.columns_of(k)) for k in fits}
         return max(fits, key=lambda k: (read[k], k == default), default=default)
-
-    def _own(self, path: Path, key: str) -> str | None:
-        """What was set for one file alone."""
-        return self.own.get((path, key))
 
     def _sources(self, kinds: set[str]) -> dict[str, dict[str, Any]]:
         """For each of the rig's columns what `[columns]` says of it."""
@@ -220,28 +211,26 @@ class _Making:
         """The unit of a column as the files state it; "" where none does."""
         return next((u for p in self.proposals if (u := p.units.get(name))), "")
 
-    def _number(self, key: str, unit: str, number: Any, path: Path | None = None) -> float | None:
-        """A number that somebody gave; None, and it is missing, if nobody has."""
-        text = (self._own(path, key) if path else None) or self.wanted.settings.get(key)
+    def _number(self, key: str, number: NumberKey, path: Path | None = None) -> dict[str, float]:
+        """A number that somebody gave, by its key in the study; empty, and it is missing, if nobody has."""
+        text = (self.own.get((path, key)) if path else None) or self.wanted.settings.get(key)
         place = f"{path.name}:" if path and len(self.proposals) > 1 else ""
         if text is None and self.wanted.ask is not None:
-            text = self.wanted.ask(f"{place}{key}{f' in {unit}' if unit else ''}").strip()
+            text = self.wanted.ask(f"{place}{key}{f' in {number.unit}' if number.unit else ''}").strip()
         if not text:
-            self.missing.append(f"--set {place}{key}=NUMBER{f' ({unit})' if unit else ''}")
-            return None
-        return number_set(key, text, number)
+            self.missing.append(f"--set {place}{key}=NUMBER{f' ({number.unit})' if number.unit else ''}")
+            return {}
+        return {key.removeprefix("rig."): number_set(key, text, number)}
 
-    def _numbers(self, where: str, table: Mapping[str, Any]) -> dict[str, float]:
+    def _numbers(self, table: Mapping[str, NumberKey]) -> dict[str, float]:
         """Numbers of a table: those that it must have, and those that were given."""
-        threshold = "pulse_width_us" in (*self.wanted.columns, *(c for c in table)) or bool(
-            "pulse_width_us" in self.schema.inputs and self._candidates("pulse_width_us")
-        )
+        width = "pulse_width_us"
+        recruits = width in self.wanted.columns or bool(width in self.schema.inputs and self._candidates(width))
         out: dict[str, float] = {}
         for key, number in table.items():
-            needed = number.required or (threshold and key in ("threshold_us", "saturation_us"))
+            needed = number.required or (recruits and key in ("threshold_us", "saturation_us"))
             if needed or key in self.wanted.settings:
-                value = self._number(key, number.unit, number)
-                out |= {} if value is None else {key: value}
+                out |= self._number(key, number)
         return out
 
     def _trial(self, proposal: Proposal, kind: str) -> dict[str, float]:
@@ -250,13 +239,12 @@ class _Making:
         out: dict[str, float] = {}
         needed = self.schema.needed.get(kind, {})
         for key, number in self.schema.conditions.items():
+            its_own = (path, key) in self.own
             if self.schema.only.get(key, kind) != kind:
-                if self._own(path, key) is not None:
+                if its_own:
                     raise InputError(f"{path.name} makes a {kind} trial, which has none", column=f"--set {key}")
-                continue
-            if key in needed or key in self.wanted.settings or self._own(path, key) is not None:
-                value = self._number(key, number.unit, number, path)
-                out |= {} if value is None else {key: value}
+            elif key in needed or key in self.wanted.settings or its_own:
+                out |= self._number(key, number, path)
         return out
 
     def _start(
@@ -268,9 +256,9 @@ class _Making:
         guessed = {} if self.missing else guess(rig)
         for key, number in self.schema.start.items():
             if f"rig.{key}" in self.wanted.settings and self.schema.start_may_be_known:
-                known[key] = self._number(f"rig.{key}", number.unit, number) or 0.0
+                known |= self._number(f"rig.{key}", number)
             elif key in self.wanted.settings:
-                start[key] = self._number(key, number.unit, number) or 0.0
+                start |= self._number(key, number)
             elif key in guessed and number.required:
                 start[key] = float(f"{guessed[key]:.3g}")
         return known, start
@@ -303,20 +291,15 @@ class _Making:
         """The table `[columns]`; empty where the files are as the study format has them."""
         used = {s["name"] for s in sources.values() if "name" in s}
         ignored = [n for n in self.names if n not in used]
-        form = self.form if self.form != TextForm() else None
         options = {"resample_hz": self.wanted.resample_hz, "missing": INTERPOLATE if self.wanted.fill else None}
         plain = all(s == {"name": c} for c, s in sources.items()) and self.names[:1] == ("time_s",)
-        if plain and form is None and self.form is not None and not ignored and not any(options.values()):
+        if plain and self.form == TextForm() and not ignored and not any(options.values()):
             return []
         out = ["", "[columns]  # the rig's columns, as the recordings call them, and their units there"]
         out += [f"{column} = {inline_table(source)}" for column, source in sources.items()]
         out += [f"ignored = [{', '.join(map(quoted, ignored))}]"] if ignored else []
         about: dict[str, Any] = {k: v for k, v in options.items() if v is not None}
-        if form is not None:
-            plain_form = TextForm()
-            for key in ("delimiter", "decimal", "header_row", "first_row", "comment", "encoding"):
-                if getattr(form, key) != getattr(plain_form, key):
-                    about[key] = getattr(form, key)
+        about |= {k: v for k, v in asdict(self.form or TextForm()).items() if v != getattr(TextForm(), k)}
         return out + toml_table("columns.file", about, "how the recordings are written")
 
     def _units(self) -> dict[str, str]:

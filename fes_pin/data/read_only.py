@@ -33,7 +33,7 @@ class ReadOnly:
         self._freeze()
 
     def __eq__(self, other: object) -> bool:
-        return key_of(self) == key_of(other) if type(other) is type(self) else NotImplemented
+        return self is other or (key_of(self) == key_of(other) if type(other) is type(self) else NotImplemented)
 
     def __hash__(self) -> int:
         return hash(key_of(self))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import partial
 from numbers import Real
 from typing import Any
 
+from fes_pin.data.errors import KeyFault
 from fes_pin.data.numbers import instance
 from fes_pin.data.read_only import ReadOnly
 
@@ -232,7 +233,7 @@ def schema_of(rig: str | RigSchema, error: Callable[[str], Exception] = ValueErr
 
 
 def check_conditions(
-    schema: RigSchema, kind: str, conditions: Mapping[str, object], error: Callable[[str, str], Exception]
+    schema: RigSchema, kind: str, conditions: Mapping[str, object], error: KeyFault
 ) -> dict[str, float]:
     """Conditions of one trial as numbers.
 
@@ -247,7 +248,7 @@ def check_conditions(
 
     Raises
     ------
-    Exception
+    InputError
         What `error` makes, for an unknown key, a key that is missing, or a value that is not the number it must be.
     """
     numbers = checked_numbers(conditions, schema.conditions, error, ALSO_OF_A_TRIAL)
@@ -261,10 +262,7 @@ def check_conditions(
 
 
 def checked_numbers(
-    table: Mapping[str, Any],
-    known: Mapping[str, NumberKey],
-    error: Callable[[str, str], Exception],
-    also: tuple[str, ...] = (),
+    table: Mapping[str, Any], known: Mapping[str, NumberKey], error: KeyFault, also: tuple[str, ...] = ()
 ) -> dict[str, float]:
     """Numbers of a table by key.
 
@@ -281,18 +279,37 @@ def checked_numbers(
 
     Raises
     ------
-    Exception
+    InputError
         What `error` makes, for an unknown key, a missing one, or a value that is not the number it must be.
     """
     numbers = {}
     for key, value in table.items():
-        if key not in known:
-            raise error(key, unknown(str(key), (*known, *also)))
+        check_known([key], known, error, also)
         numbers[key] = known[key].check(value, partial(error, key))
     for key, number in known.items():
         if number.required and key not in numbers:
             raise error(key, f"missing; expected a number{f' in {number.unit}' if number.unit else ''}")
     return numbers
+
+
+def check_known(names: Iterable[str], known: Collection[str], error: KeyFault, also: Iterable[str] = ()) -> None:
+    """Refuse a name that is none of those known.
+
+    Parameters
+    ----------
+    error
+        Makes the exception for a name and a message.
+    also
+        Names that are not among them here, and may have been meant.
+
+    Raises
+    ------
+    InputError
+        What `error` makes.
+    """
+    for name in names:
+        if name not in known:
+            raise error(name, unknown(str(name), (*known, *also)))
 
 
 def unknown(name: str, known: Iterable[str]) -> str:

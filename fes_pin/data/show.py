@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.libraries import optional_library
 
 if TYPE_CHECKING:
     import pandas
@@ -47,11 +47,7 @@ def frame(columns: Mapping[str, Any], index: str | None = None) -> pandas.DataFr
     InputError
         pandas is not installed.
     """
-    try:
-        import pandas  # noqa: PLC0415
-    except ImportError:
-        raise InputError("frames need pandas: pip install 'fes-pin[pandas]'") from None
-    made = pandas.DataFrame(dict(columns))
+    made = optional_library("pandas", "pandas", "frames need pandas").DataFrame(dict(columns))
     return made.set_index(index) if index is not None else made
 
 

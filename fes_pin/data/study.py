@@ -25,7 +25,7 @@ from fes_pin.data.checks import (
     checked_remarks,
     known_constants,
 )
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, fault
 from fes_pin.data.files import as_path, hold, write_files
 from fes_pin.data.motion import GROUND_REACTION
 from fes_pin.data.numbers import instance
@@ -36,10 +36,10 @@ from fes_pin.data.schema import (
     Rigs,
     RigSchema,
     check_conditions,
+    check_known,
     checked_numbers,
     known_rigs,
     schema_of,
-    unknown,
 )
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.study_tables import HORIZON, StudyTables, check_files
@@ -103,27 +103,24 @@ class Study(ReadOnly):
     as_read: AsRead | None = None
 
     def __post_init__(self) -> None:
-        checked_label(self.name, lambda _, message: InputError(message, column="name"), what="a name")
+        checked_label(self.name, fault(), "name", "a name")
         for key, kind in (("described", RigSchema), ("as_read", AsRead)):
             if getattr(self, key) is not None:
                 instance(getattr(self, key), kind, key)
         schema = self._schema()
-        given = {
-            n: checked_mapping(getattr(self, n), partial(_fault, "Study"), n) for n in ("constants", "start", "files")
-        }
+        given = {n: checked_mapping(getattr(self, n), fault("Study.{}"), n) for n in ("constants", "start", "files")}
         twice = set(schema.start) & set(given["constants"])
         if odd := sorted(twice & set(given["start"])):
-            raise _fault("start", odd[0], "is also among the constants; expected it in one of them")
+            raise fault("start.{}")(odd[0], "is also among the constants; expected it in one of them")
         known = {"constants": {**known_constants(schema), **schema.passive}}
         known["start"] = {key: number for key, number in schema.start.items() if key not in twice}
-        numbers = {n: checked_numbers(given[n], keys, partial(_fault, n)) for n, keys in known.items()}
+        numbers = {n: checked_numbers(given[n], keys, fault(f"{n}.{{}}")) for n, keys in known.items()}
 
         def of_rig(key: str, message: str) -> InputError:
-            return _fault("files" if key in schema.files else "constants", key, message)
+            return fault("files.{}" if key in schema.files else "constants.{}")(key, message)
 
         check_constants(schema, numbers["constants"], given["files"], of_rig)
-        if odd := [key for key in given["files"] if key not in schema.files]:
-            raise _fault("files", odd[0], unknown(str(odd[0]), schema.files))
+        check_known(given["files"], schema.files, fault("files.{}"))
         files = {key: hold(path) for key, path in given["files"].items()}
         if any(files[key] is not path for key, path in given["files"].items()):
             check_files(schema, files)
@@ -132,7 +129,7 @@ class Study(ReadOnly):
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
         horizon = {HORIZON: self.horizon_s} if self.horizon_s is not None else {}
-        checked_numbers(horizon, {HORIZON: NumberKey("s", 0.0, required=False)}, partial(_fault, "Study"))
+        checked_numbers(horizon, {HORIZON: NumberKey("s", 0.0, required=False)}, fault("Study.{}"))
         vars(self).update(numbers, files=files, folder=as_path(self.folder, "folder"), trials=trials, described=schema)
         self._freeze()
 
@@ -304,13 +301,9 @@ def _fault_of(trials: Sequence[Trial]) -> Callable[[int | None, str, str], Input
     """Makes the error of a trial's place, or of the rig's constants."""
 
     def error(place: int | None, key: str, message: str) -> InputError:
-        return _fault("constants", key, message) if place is None else trials[place].error(message, "columns")
+        return fault("constants.{}")(key, message) if place is None else trials[place].error(message, "columns")
 
     return error
-
-
-def _fault(where: str, key: str, message: str) -> InputError:
-    return InputError(message, column=f"{where}.{key}")
 
 
 def read_study(path: str | Path, *, rigs: Rigs | None = None) -> Study:
@@ -402,10 +395,7 @@ class _Reader(StudyTables):
         return [table.get("name", name) for table, name in zip(self._trial_tables(), names, strict=True)]
 
     def _trial(self, where: str, table: Mapping[str, Any], name: str) -> Trial:
-        def error(key: str, message: str) -> InputError:
-            return self.error(f"{where}.{key}", message)
-
-        named = self.schema.recordings
+        named, error = self.schema.recordings, self.document.under(where)
         kind, role, group = checked_kind(self.schema, table.get("kind"), error), table.get("role"), table.get("group")
         check_labels(name, role, group, error)
         remarks = checked_remarks(table.get("remarks", ()), error)

@@ -11,7 +11,7 @@ from fes_pin.data.checks import check_constants, checked_label, known_constants
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import hold, read_json
 from fes_pin.data.recorded.columns import Columns, columns_of
-from fes_pin.data.schema import NumberKey, Rigs, RigSchema, one_of, unknown
+from fes_pin.data.schema import NumberKey, Rigs, RigSchema, check_known, one_of
 from fes_pin.data.toml import Document
 from fes_pin.data.urdf import is_revolute, moving_joints
 
@@ -49,9 +49,7 @@ class StudyTables:
         self.document, self.rigs = document, rigs
         self.folder = document.path.parent
         self.error = document.error
-        for key in document.data:
-            if key not in (known := ("study", "rig", "start", "columns", "trial")):
-                raise self.error(key, unknown(key, known))
+        check_known(document.data, ("study", "rig", "start", "columns", "trial"), self.error)
         self.name, self.rig = self._study_table()
         self.schema = rigs[self.rig]
 
@@ -65,14 +63,13 @@ class StudyTables:
         if "study" not in self.document.data:
             raise self.error("study", "missing; expected a table [study] with name and rig")
         table = self.document.table("study")
-        for key in table:
-            if key not in ("name", "rig", HORIZON, *NOTES):
-                raise self.error(f"study.{key}", unknown(key, ("name", "rig", HORIZON, *NOTES)))
+        error = self.document.under("study")
+        check_known(table, ("name", "rig", HORIZON, *NOTES), error)
         for key in ("name", "rig"):
             if key not in table:
-                raise self.error(f"study.{key}", "missing")
-        name = checked_label(table["name"], lambda _, message: self.error("study.name", message), what="a name")
-        return name, one_of(table["rig"], tuple(self.rigs), partial(self.error, "study.rig"))
+                raise error(key, "missing")
+        name = checked_label(table["name"], error, "name", "a name")
+        return name, one_of(table["rig"], tuple(self.rigs), partial(error, "rig"))
 
     def rig_table(self) -> tuple[dict[str, float], dict[str, HeldFile]]:
         """Constants of the rig, and its files, by key."""
@@ -84,7 +81,7 @@ class StudyTables:
         known = known_constants(self.schema)
         constants = self.document.numbers("rig", table, known, also=(*self.schema.files,))
         constants |= self.document.numbers("rig.passive", passive, self.schema.passive)
-        check_constants(self.schema, constants, paths, lambda key, message: self.error(f"rig.{key}", message))
+        check_constants(self.schema, constants, paths, self.document.under("rig"))
         files = {key: hold(self.document.path_of(f"rig.{key}", value)) for key, value in paths.items()}
         check_files(self.schema, files)
         return constants, files

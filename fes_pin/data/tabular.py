@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.libraries import optional_library
 
 SUFFIXES = (".csv", ".parquet")
 
@@ -25,10 +25,7 @@ def check_table(path: str | Path) -> None:
         Parquet without pyarrow.
     """
     if Path(path).suffix.lower() == ".parquet":
-        try:
-            import pyarrow.parquet  # noqa: F401, PLC0415
-        except ImportError:
-            raise InputError("Parquet needs pyarrow: pip install 'fes-pin[parquet]'", file=path) from None
+        optional_library("pyarrow.parquet", "parquet", "Parquet needs pyarrow", file=path)
 
 
 def table_bytes(columns: Mapping[str, Sequence[Any] | np.ndarray], path: str | Path) -> bytes:

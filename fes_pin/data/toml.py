@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, KeyFault
 from fes_pin.data.files import as_path, inside, read_text, what_is_at
 from fes_pin.data.schema import NumberKey, checked_numbers
 
@@ -32,6 +32,10 @@ class Document:
         while place and place not in self.rows:
             place = place.rpartition(".")[0]
         return InputError(message, file=self.path, row=self.rows.get(place), column=key)
+
+    def under(self, table: str) -> KeyFault:
+        """What makes the error of a key of a table and a message."""
+        return lambda key, message: self.error(f"{table}.{key}", message)
 
     def table(self, key: str, data: dict[str, Any] | None = None) -> dict[str, Any]:
         """A table by its key, empty if it is missing.
@@ -67,7 +71,7 @@ class Document:
         InputError
             An unknown key, a missing one, or a value that is not the number it must be.
         """
-        return checked_numbers(table, known, lambda key, message: self.error(f"{where}.{key}", message), also)
+        return checked_numbers(table, known, self.under(where), also)
 
     def path_of(self, key: str, value: object) -> Path:
         """Path of a file that a key names relative to this one.

@@ -21,7 +21,7 @@ from fes_pin.data.checks import (
     checked_mapping,
     checked_remarks,
 )
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, fault
 from fes_pin.data.files import as_path, write_text
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
 from fes_pin.data.numbers import instance
@@ -95,12 +95,10 @@ class Trial(ReadOnly):
     group: str | None = None
     remarks: tuple[str, ...] = ()
     low_pass_hz: float | None = None
-    as_read: AsRead | None = None
+    as_read: AsRead | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        def error(key: str, message: str) -> InputError:
-            return self.error(message, key)
-
+        error = self.key_error
         check_labels(self.name, self.role, self.group, error)
         checked_label(self.kind, error, "kind", "a kind")
         remarks = checked_remarks(self.remarks, error)
@@ -130,16 +128,9 @@ class Trial(ReadOnly):
         place = f"trial {self.name}" + ("" if sample is None else f", sample {sample}")
         return InputError(f"{message} ({place})", column=column)
 
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Trial) or self is other:
-            return self is other
-        labels = ("name", "kind", "conditions", "role", "group", "remarks", "low_pass_hz")
-        return (
-            all(getattr(self, label) == getattr(other, label) for label in labels)
-            and self.columns.keys() == other.columns.keys()
-            and np.array_equal(self.time, other.time)
-            and all(np.array_equal(self[name], other[name], equal_nan=True) for name in self.columns)
-        )
+    def key_error(self, key: str, message: str) -> InputError:
+        """The error that names a key, or a column, and this trial."""
+        return self.error(message, key)
 
     def __hash__(self) -> int:
         return hash(
@@ -349,15 +340,13 @@ def check_trial(
     InputError
         Names the column or the condition and the trial.
     """
-
-    def error(key: str, message: str) -> InputError:
-        return trial.error(message, key)
-
-    kind = checked_kind(schema, trial.kind, error)
-    check_conditions(schema, kind, trial.conditions, error)
+    kind = checked_kind(schema, trial.kind, trial.key_error)
+    check_conditions(schema, kind, trial.conditions, trial.key_error)
     check_columns([n for n in trial.columns if n not in also], schema, kind, inputs_only, trial.error)
     if "angle_rad" in trial.conditions:
-        check_values({"angle_rad": np.array([trial.conditions["angle_rad"]])}, schema, lambda m, c, _: error(c, m))
+        check_values(
+            {"angle_rad": np.array([trial.conditions["angle_rad"]])}, schema, lambda m, c, _: trial.error(m, c)
+        )
     check_values(trial.columns, schema, trial.error, threshold_us)
 
 
@@ -401,10 +390,7 @@ def read_trial(
         For anything that is not as the study format says: with file, row and column.
     """
     path = as_path(path)
-
-    def error(key: str, message: str) -> InputError:
-        return InputError(message, file=path, column=key)
-
+    error = fault(file=path)
     schema = schema_of(rig, partial(error, "rig"))
     kind = checked_kind(schema, kind, error)
     label = path.stem if name is None else name

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number_in
-from fes_pin.data.schema import ROLES, NumberKey, RigSchema
+from fes_pin.data.schema import ROLES, NumberKey, RigSchema, one_of
 from fes_pin.data.study_text import quoted
 
 Ask = Callable[[str], str]
@@ -117,7 +117,7 @@ def label_lines(wanted: Wanted, *files: Path) -> list[str]:
     for key, said in wanted.labels.items():
         found = of_files(wanted.files, f"--{key}", said)
         for label in [found[path, ""] for path in files if (path, "") in found][:1]:
-            if key == "role" and label not in ROLES:
-                raise InputError(f"expected one of {', '.join(ROLES)}; found {label!r}", column=f"--{key}")
+            if key == "role":
+                one_of(label, ROLES, partial(InputError, column="--role"))
             lines.append(f"{key} = {quoted(label)}")
     return lines

@@ -5,9 +5,9 @@ import struct
 import numpy as np
 import pytest
 
+from fes_pin.data import libraries
 from fes_pin.data.errors import InputError
 from fes_pin.data.new_study import new_study
-from fes_pin.data.recorded import formats
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.schema import known_rigs
 from fes_pin.data.study import read_study
@@ -145,7 +145,7 @@ def test_what_is_not_installed_is_said(tmp_path, monkeypatch, suffix, extra):
     def missing(module):
         raise ImportError(module)
 
-    monkeypatch.setattr(formats.importlib, "import_module", missing)
+    monkeypatch.setattr(libraries.importlib, "import_module", missing)
     with pytest.raises(InputError, match=rf"pip install 'fes-pin\[{extra}\]'"):
         read_recording(path)
 

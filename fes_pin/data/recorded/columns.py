@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from fes_pin.data.errors import KeyFault
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
-from fes_pin.data.schema import RigSchema, one_of, unknown
+from fes_pin.data.schema import RigSchema, check_known, one_of, unknown
 from fes_pin.data.table import Table
 from fes_pin.data.units import factor_of, unit_in_name
 
@@ -160,9 +161,7 @@ class Columns:
         return table, "; ".join(said)
 
 
-def columns_of(
-    table: Mapping[str, Any], schema: RigSchema, revolute: bool | None, error: Callable[[str, str], Exception]
-) -> Columns:
+def columns_of(table: Mapping[str, Any], schema: RigSchema, revolute: bool | None, error: KeyFault) -> Columns:
     """The table `[columns]` of a study, checked.
 
     Parameters
@@ -202,13 +201,11 @@ def columns_of(
     return _with_file(Columns(sources, ignored), about, error)
 
 
-def _source(column: str, value: Any, revolute: bool | None, error: Callable[[str, str], Exception]) -> ColumnSource:
+def _source(column: str, value: Any, revolute: bool | None, error: KeyFault) -> ColumnSource:
     given = {"name": value} if isinstance(value, str) else value
     if not isinstance(given, dict):
         raise error(column, 'expected the name of a column, or a table like { name = "Angle", unit = "deg" }')
-    for key in given:
-        if key not in SOURCE_KEYS:
-            raise error(f"{column}.{key}", unknown(key, SOURCE_KEYS))
+    check_known(given, SOURCE_KEYS, lambda key, message: error(f"{column}.{key}", message))
     numbers = {k: _number(f"{column}.{k}", given[k], error) for k in ("scale", "zero", "edge", "rate_hz") if k in given}
     rate = numbers.get("rate_hz")
     if rate is not None and (column != "time_s" or not rate > 0.0 or len(given) > 1):
@@ -229,19 +226,18 @@ def _source(column: str, value: Any, revolute: bool | None, error: Callable[[str
     return ColumnSource(name, factor, **numbers)
 
 
-def _number(key: str, value: Any, error: Callable[[str, str], Exception]) -> float:
+def _number(key: str, value: Any, error: KeyFault) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise error(key, "expected a finite number")
     return float(value)
 
 
-def _with_file(columns: Columns, about: Mapping[str, Any], error: Callable[[str, str], Exception]) -> Columns:
+def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> Columns:
     """With what `[columns.file]` says of how the files are written."""
     form: dict[str, Any] = {}
+    check_known(about, FILE_KEYS, lambda key, message: error(f"file.{key}", message))
     for key, value in about.items():
         where = f"file.{key}"
-        if key not in FILE_KEYS:
-            raise error(where, unknown(key, FILE_KEYS))
         known = {"delimiter": DELIMITERS, "decimal": DECIMALS, "encoding": ENCODINGS, "missing": (INTERPOLATE,)}
         if key in known:
             form[key] = one_of(value, known[key], partial(error, where))

@@ -11,7 +11,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -22,7 +21,8 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes, what_is_at
-from fes_pin.data.markers import read_markers
+from fes_pin.data.libraries import optional_library
+from fes_pin.data.markers import read_c3d, read_markers
 from fes_pin.data.motion import read_motion
 from fes_pin.data.recorded.text import TextForm, read_text_recording, without_twins
 from fes_pin.data.table import MIN_ROWS, Table
@@ -84,11 +84,8 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
 
 
 def _library(module: str, extra: str, path: Path) -> Any:
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        message = f"{path.suffix} files need {module.split('.', maxsplit=1)[0]}: pip install 'fes-pin[{extra}]'"
-        raise InputError(message, file=path) from None
+    needed = f"{path.suffix} files need {module.split('.', maxsplit=1)[0]}"
+    return optional_library(module, extra, needed, file=path)
 
 
 def _unreadable(path: Path, kind: str, error: BaseException) -> InputError:
@@ -172,9 +169,8 @@ def _vectors(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
 
 def _c3d(path: Path, wanted: Sequence[str] | None) -> Table:
     """Analog channels at their rate; where only points are wanted, `<marker>_x`, `_y`, `_z` in m at theirs."""
-    ezc3d = _library("ezc3d", "c3d", path)
+    content = read_c3d(path)
     try:
-        content = ezc3d.c3d(str(path))
         about = content["parameters"]["ANALOG"]
         labels = without_twins([str(n).strip() for n in about.get("LABELS", {}).get("value", [])])
         units = [str(u).strip() for u in about.get("UNITS", {}).get("value", [])]
