@@ -17,7 +17,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from fes_pin.data.conversions import CONVERTERS, Files
-from fes_pin.data.errors import InputError, fault
+from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.libraries import optional_library
 from fes_pin.data.outputs import Outputs
 from fes_pin.data.schema import check_known
@@ -95,7 +95,7 @@ def _cache() -> Path:
 
 
 def _known(name: str) -> Dataset:
-    check_known([name], DATASETS, fault())
+    check_known([name], DATASETS, fault_at())
     return DATASETS[name]
 
 

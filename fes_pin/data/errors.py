@@ -39,7 +39,7 @@ KeyFault = Callable[[str, str], InputError]
 """Makes the error of a key and a message."""
 
 
-def fault(column: str = "{}", file: str | Path | None = None) -> KeyFault:
+def fault_at(column: str = "{}", file: str | Path | None = None) -> KeyFault:
     """What makes the error of a key and a message.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fes_pin.data.errors import InputError, fault
+from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, read_motion
 from fes_pin.data.new_study import NewStudy, placed
 from fes_pin.data.schema import BODY, check_known
@@ -31,7 +31,7 @@ def new_body_study(wanted: Wanted) -> NewStudy:
     if len(moves) != len(pushes) or not moves:
         found = f"{len(moves)} of coordinates and {len(pushes)} of ground reaction"
         raise InputError(f"expected as many files of joint coordinates as of ground reaction, found {found}")
-    check_known(settings, (*BODY.constants, *BODY.conditions), fault("--set {}"))
+    check_known(settings, (*BODY.constants, *BODY.conditions), fault_at("--set {}"))
     missing = [f"--set {key}=NUMBER ({BODY.constants[key].unit})" for key in BODY.either if key not in settings]
     if missing:
         raise InputError(f"the files do not say everything; please add {', '.join(missing)}")

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.data.errors import InputError, fault
+from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import inside, read_bytes
 from fes_pin.data.recorded.columns import INTERPOLATE
 from fes_pin.data.recorded.propose import Proposal, propose
@@ -81,7 +81,7 @@ class _Making:
         self.proposals = [propose(path, self.schema, wanted.revolute) for path in wanted.files]
         self.form = self._one_form()
         self.names = tuple(dict.fromkeys(n for p in self.proposals for n in p.recording.names))
-        check_known(wanted.columns, self.schema.columns, fault("--column"))
+        check_known(wanted.columns, self.schema.columns, fault_at("--column"))
 
     def made(self, guess: Callable[[Mapping[str, float]], Mapping[str, float]]) -> NewStudy:
         kinds = [self._kind(p) for p in self.proposals]

@@ -25,7 +25,7 @@ from fes_pin.data.checks import (
     checked_remarks,
     known_constants,
 )
-from fes_pin.data.errors import InputError, fault
+from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import as_path, hold, write_files
 from fes_pin.data.motion import GROUND_REACTION
 from fes_pin.data.numbers import instance
@@ -103,24 +103,24 @@ class Study(ReadOnly):
     as_read: AsRead | None = None
 
     def __post_init__(self) -> None:
-        checked_label(self.name, fault(), "name", "a name")
+        checked_label(self.name, fault_at(), "name", "a name")
         for key, kind in (("described", RigSchema), ("as_read", AsRead)):
             if getattr(self, key) is not None:
                 instance(getattr(self, key), kind, key)
         schema = self._schema()
-        given = {n: checked_mapping(getattr(self, n), fault("Study.{}"), n) for n in ("constants", "start", "files")}
+        given = {n: checked_mapping(getattr(self, n), fault_at("Study.{}"), n) for n in ("constants", "start", "files")}
         twice = set(schema.start) & set(given["constants"])
         if odd := sorted(twice & set(given["start"])):
-            raise fault("start.{}")(odd[0], "is also among the constants; expected it in one of them")
+            raise fault_at("start.{}")(odd[0], "is also among the constants; expected it in one of them")
         known = {"constants": {**known_constants(schema), **schema.passive}}
         known["start"] = {key: number for key, number in schema.start.items() if key not in twice}
-        numbers = {n: checked_numbers(given[n], keys, fault(f"{n}.{{}}")) for n, keys in known.items()}
+        numbers = {n: checked_numbers(given[n], keys, fault_at(f"{n}.{{}}")) for n, keys in known.items()}
 
         def of_rig(key: str, message: str) -> InputError:
-            return fault("files.{}" if key in schema.files else "constants.{}")(key, message)
+            return fault_at("files.{}" if key in schema.files else "constants.{}")(key, message)
 
         check_constants(schema, numbers["constants"], given["files"], of_rig)
-        check_known(given["files"], schema.files, fault("files.{}"))
+        check_known(given["files"], schema.files, fault_at("files.{}"))
         files = {key: hold(path) for key, path in given["files"].items()}
         if any(files[key] is not path for key, path in given["files"].items()):
             check_files(schema, files)
@@ -129,7 +129,7 @@ class Study(ReadOnly):
         if schema.inputs_required:  # else a trial without an input is one that nothing drives
             check_same_inputs([(t.kind, t.columns) for t in trials], schema, numbers["constants"], _fault_of(trials))
         horizon = {HORIZON: self.horizon_s} if self.horizon_s is not None else {}
-        checked_numbers(horizon, {HORIZON: NumberKey("s", 0.0, required=False)}, fault("Study.{}"))
+        checked_numbers(horizon, {HORIZON: NumberKey("s", 0.0, required=False)}, fault_at("Study.{}"))
         vars(self).update(numbers, files=files, folder=as_path(self.folder, "folder"), trials=trials, described=schema)
         self._freeze()
 
@@ -301,7 +301,7 @@ def _fault_of(trials: Sequence[Trial]) -> Callable[[int | None, str, str], Input
     """Makes the error of a trial's place, or of the rig's constants."""
 
     def error(place: int | None, key: str, message: str) -> InputError:
-        return fault("constants.{}")(key, message) if place is None else trials[place].error(message, "columns")
+        return fault_at("constants.{}")(key, message) if place is None else trials[place].error(message, "columns")
 
     return error
 

@@ -21,7 +21,7 @@ from fes_pin.data.checks import (
     checked_mapping,
     checked_remarks,
 )
-from fes_pin.data.errors import InputError, fault
+from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.files import as_path, write_text
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, on_common_time, read_motion
 from fes_pin.data.numbers import instance
@@ -390,7 +390,7 @@ def read_trial(
         For anything that is not as the study format says: with file, row and column.
     """
     path = as_path(path)
-    error = fault(file=path)
+    error = fault_at(file=path)
     schema = schema_of(rig, partial(error, "rig"))
     kind = checked_kind(schema, kind, error)
     label = path.stem if name is None else name
