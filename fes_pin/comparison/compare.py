@@ -22,9 +22,9 @@ from fes_pin.diagnosis.diagnosis import measured_study, split
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import fit_multistart, rough_noise
-from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import percent_of_spread
+from fes_pin.infer.noise import Noise, NoiseModel
 from fes_pin.models.catalogue import Source
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model

@@ -13,11 +13,11 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.identify.ahead import forecast, own_noise
 from fes_pin.identify.fit import Fit, fit_multistart
-from fes_pin.identify.noise import Noise
 from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import within
 from fes_pin.infer.levels import RUNAWAY
+from fes_pin.infer.noise import Noise
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
 

@@ -18,11 +18,11 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import thin
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.noise import thin
 
 STEP_S = 4e-3
-"""Samples are averaged to this time step, s, as the noise's are: `identify.noise.FASTEST_S`."""
+"""Samples are averaged to this time step, s, as the noise's are: `infer.noise.FASTEST_S`."""
 WORTH = (1.0, 3.0, 10.0, 30.0, 100.0)
 """How many samples may weigh as one: what a model gets wrong is the same for some tenths of a second."""
 TURNS = 40

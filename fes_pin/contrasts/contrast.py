@@ -10,7 +10,7 @@ from dataclasses import replace
 from fes_pin.contrasts.changes import change_of, not_changed
 from fes_pin.contrasts.conditions import ContrastSearched, Trials, contrast_with_conditions, misread_change
 from fes_pin.contrasts.fits import Fits
-from fes_pin.contrasts.grouped import Grouped
+from fes_pin.contrasts.grouped import Grouped, noise_in
 from fes_pin.contrasts.groups import BY_GROUP, grouped_study
 from fes_pin.contrasts.late import is_cheaper, late_in_groups
 from fes_pin.contrasts.left import left_in_groups
@@ -33,7 +33,6 @@ from fes_pin.infer.result import STOPPED, Remainder
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
-from fes_pin.models.predictor import Doubt
 from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
 
 
@@ -180,8 +179,8 @@ def _quieted(study: Study, names: Sequence[str], nominal: Model, end: float) -> 
 
 def _smoothed(best: Grouped, trials: Trials) -> tuple[str, ...]:
     """What is to be said of readings of a driven rig that were smoothed: their noise lasts as long in all groups."""
-    group, doubt = next(iter(best.weights.items()))
-    return words_of_reading(doubt if isinstance(doubt, Doubt) else None, best.model.rig, trials[group])
+    group, noise = next(iter(best.weights.items()))
+    return words_of_reading(noise_in(noise), best.model.rig, trials[group])
 
 
 def _common(best: Grouped) -> tuple[str, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,16 +16,17 @@ from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.score import Scores
 from fes_pin.diagnosis.search.starts import STARTS, forms_beside, refinements
 from fes_pin.identify.doubts import first_guess
-from fes_pin.identify.fit import Fit, fit_multistart, fit_of, fit_problem, noise_of, rough_noise
+from fes_pin.identify.fit import Fit, ended, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.noise import Noise, NoiseModel, as_white
+from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.identify.noise_floor import rich_noise
 from fes_pin.identify.problem import Problem
-from fes_pin.identify.turns import maximise
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.levels import DRIVEN_LEVEL
 from fes_pin.infer.maximise import alternate
+from fes_pin.infer.noise import Noise, NoiseModel, as_white
+from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
 from fes_pin.infer.problem import Linearized
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
@@ -81,7 +81,7 @@ class Fits:
         model = GroupedModel(dict.fromkeys(self.trials, self.nominal))
         if self.driven:
             alone = self._alone()
-            doubts = {g: f.doubt for g, f in alone.items() if f.doubt is not None}
+            doubts = {g: f.noise for g, f in alone.items()}
             little = {g: first_guess(self.nominal, t, doubts[g].lasts_s) for g, t in self.trials.items()}
             self.first_weights = [dict(little), dict(doubts)]
             begun = model.with_parameters(next(iter(alone.values())).values)
@@ -91,17 +91,17 @@ class Fits:
         fitted = [self.converged(model.with_parameters(v), (), weights, None) for v, _ in each.values()]
         return min(fitted, key=lambda f: f.fit.sse)
 
-    def _alone(self) -> dict[str, Fit]:
+    def _alone(self) -> dict[str, LikelihoodFit]:
         """The nominal fit of each group of a driven rig by itself; noise of a reading lasts as long in all of them."""
 
-        def fitted(group: str, lasts_s: float) -> Fit:
+        def fitted(group: str, lasts_s: float) -> LikelihoodFit:
             trials = self.trials[group]
             problem = LikelihoodProblem(self.nominal, trials, first_guess(self.nominal, trials, lasts_s))
             return maximise(problem, self.nominal.parameters())
 
         each = {g: with_new_noise(t, partial(fitted, g)) for g, t in self.trials.items()}
-        lasts = max(f.doubt.lasts_s for f in each.values() if f.doubt is not None)
-        return {g: f if f.doubt and f.doubt.lasts_s == lasts else fitted(g, lasts) for g, f in each.items()}
+        lasts = max(f.noise.lasts_s for f in each.values())
+        return {g: f if f.noise.lasts_s == lasts else fitted(g, lasts) for g, f in each.items()}
 
     def _rich(self, group: str) -> tuple[dict[str, float], Weight]:
         """A group's own nominal values, and its noise beside everything that the library could explain in it alone."""
@@ -119,10 +119,10 @@ class Fits:
         """Fit a grouped model until it converges; of driven rigs with everything that is random."""
         problem = GroupedProblem(model, self.trials, weights)
         if not self.driven:
-            fitted = fit_problem(problem, model.parameters(), unknowns)  # type: ignore[arg-type]
+            fitted = _fitted(problem, model.parameters(), unknowns)
             return self._scattered(Grouped(tuple(items), fitted, weights))
-        fitted = fit_of(problem, alternate(problem, model.parameters(), unknowns, ROUNDS, LOOK_DRIVEN))
-        return Grouped(tuple(items), fitted, {g: p.doubt for g, p in problem.parts.items()})
+        fitted = _fit_of(problem, alternate(problem, model.parameters(), unknowns, ROUNDS, LOOK_DRIVEN))
+        return Grouped(tuple(items), fitted, {g: p.noise for g, p in problem.parts.items()})
 
     def _scattered(self, one: Grouped) -> Grouped:
         """The set again, with the scatter of repeats that is most likely beside it."""
@@ -131,7 +131,7 @@ class Fits:
             if _alike(weights, one.weights):
                 break
             problem = GroupedProblem(one.model, self.trials, weights)
-            one = Grouped(one.items, fit_problem(problem, one.fit.values, one.fit.unknowns), weights)  # type: ignore[arg-type]
+            one = Grouped(one.items, _fitted(problem, one.fit.values, one.fit.unknowns), weights)
         return one
 
     def _repeats(self, one: Grouped) -> dict[str, Weight]:
@@ -165,7 +165,7 @@ class Fits:
             model = base.model.with_item(one.item, one.effect).with_parameters(one.start)
             problem = GroupedProblem(model, self.trials, base.weights)
             steps = LOOK_DRIVEN if self.driven else FIRST_LOOK
-            fitted = fit_problem(problem, model.parameters(), base.fit.unknowns, steps)  # type: ignore[arg-type]
+            fitted = _fitted(problem, model.parameters(), base.fit.unknowns, steps)
             out.append(Grouped((*base.items, one.item), fitted, base.weights))
         return min(out, key=lambda f: f.price)
 
@@ -199,7 +199,7 @@ class Fits:
     def _looked(self, start: GroupedModel, one: Grouped) -> Grouped:
         """A few steps from another form of a set."""
         problem = GroupedProblem(start, self.trials, one.weights)
-        fitted = fit_problem(problem, start.parameters(), one.fit.unknowns, LOOK_DRIVEN)  # type: ignore[arg-type]
+        fitted = _fitted(problem, start.parameters(), one.fit.unknowns, LOOK_DRIVEN)
         return Grouped(one.items, fitted, one.weights)
 
     def in_common(self, one: Grouped) -> Grouped:
@@ -237,7 +237,7 @@ class Fits:
         if one.weights == other.weights:
             return one
         problem = GroupedProblem(one.model, self.trials, other.weights)
-        fitted = fit_problem(problem, one.fit.values, one.fit.unknowns, LOOK_DRIVEN)  # type: ignore[arg-type]
+        fitted = _fitted(problem, one.fit.values, one.fit.unknowns, LOOK_DRIVEN)
         return Grouped(one.items, fitted, other.weights)
 
     def part(self, one: Grouped, group: str, alone: int | None = None) -> Fit:
@@ -247,8 +247,8 @@ class Fits:
         trials = self.trials[group][rows]
         unknowns = GroupedProblem(one.model, self.trials, one.weights).by_group(one.fit.unknowns)[group][rows]
         if isinstance(weight, Doubt):
-            problem: Any = LikelihoodProblem(model, trials, weight)
-            return replace(fit_problem(problem, model.parameters(), unknowns, LOOK_DRIVEN), doubt=weight)
+            problem = LikelihoodProblem(model, trials, weight)
+            return fit_of(problem, minimise(problem, model.parameters(), unknowns, LOOK_DRIVEN))
         return fit_problem(Problem(model, trials, noise_in(weight)), model.parameters(), unknowns)
 
     def promises(self, base: Grouped) -> tuple[list[Promise], Scores]:
@@ -256,6 +256,16 @@ class Fits:
         if id(base) not in self._promised:
             self._promised[id(base)] = (base, *promises(Bench(self.nominal, self.trials, self.library), base))
         return self._promised[id(base)][1:]
+
+
+def _fit_of(problem: GroupedProblem, found: Optimum) -> Fit:
+    """The fit of a grouped problem that has ended."""
+    return Fit(**ended(problem.model, found), trials=problem.trials, noise=problem.noise)  # type: ignore[arg-type]
+
+
+def _fitted(problem: GroupedProblem, start: Mapping[str, float], unknowns: Any, steps: int = MAX_ITERATIONS) -> Fit:
+    """The fit of a grouped problem from a start."""
+    return _fit_of(problem, minimise(problem, start, unknowns, steps))
 
 
 def _reformed(model: GroupedModel, group: str, own: Model) -> GroupedModel:

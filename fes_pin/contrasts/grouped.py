@@ -14,9 +14,9 @@ from fes_pin.contrasts.repeats import RepeatedProblem, Repeats
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Problem, products_of
 from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.noise import Noise, NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point
 from fes_pin.models.model import Model
@@ -40,7 +40,6 @@ def group_problem(model: Model, trials: Sequence[Trial], weight: Weight, free: t
 
 def noise_in(weight: Weight) -> NoiseModel:
     """The noise alone."""
-    assert not isinstance(weight, Doubt)
     return weight.noise if isinstance(weight, Repeats) else weight
 
 

@@ -9,7 +9,7 @@ from fes_pin.contrasts.fits import Fits
 from fes_pin.contrasts.grouped import Grouped
 from fes_pin.identify.lateness import lateness_of
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximise
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import in_parallel
 
@@ -40,8 +40,9 @@ def _late_beside(fits: Fits, one: Grouped) -> float | None:
 def _late_in(fits: Fits, best: Grouped, group: str) -> float | None:
     """How late the efforts of one group are beside what was found, with nominal values of its own."""
     part = fits.part(best, group)
-    assert part.doubt is not None
-    own = maximise(LikelihoodProblem(part.model, part.trials, part.doubt), part.values, part.unknowns)
+    if not isinstance(part, LikelihoodFit):
+        return None
+    own = maximise(LikelihoodProblem(part.model, part.trials, part.noise), part.values, part.unknowns)
     late = lateness_of(own, min(t.dt for t in part.trials))
     return late.log.effort_late_s if late is not None else None
 

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.noise_floor import span
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.models.model import Model
 

@@ -44,14 +44,14 @@ def _held(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         value.setflags(write=False)
         return value
-    if isinstance(value, Mapping):
+    if isinstance(value, Mapping) and not isinstance(value, ReadOnly):
         return MappingProxyType({n: _held(v) for n, v in value.items()})
     return tuple(map(_held, value)) if type(value) in (list, tuple) else value
 
 
 def as_dicts(value: Any) -> Any:
     """A value with dictionaries for its mappings, all the way down: as pickle and JSON need it."""
-    if isinstance(value, Mapping):
+    if isinstance(value, Mapping) and not isinstance(value, ReadOnly):
         return {n: as_dicts(v) for n, v in value.items()}
     return tuple(map(as_dicts, value)) if type(value) is tuple else value
 

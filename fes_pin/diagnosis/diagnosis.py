@@ -33,6 +33,7 @@ from fes_pin.diagnosis.search.simulation_search import NominalFitError, Simulati
 from fes_pin.diagnosis.searches import Result, Search, Searches
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.recording import earns, low_pass_of
 from fes_pin.infer.result import STOPPED
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
@@ -125,7 +126,7 @@ class _Work:
         found = self._logged(study, log)
         if not self.stops and (passed := _low_passed(found, self.end)) is not None:
             found = _likelier(self.diagnosis(passed), found)
-        if found.extended.doubt is None or not logged:
+        if not isinstance(found.extended, LikelihoodFit) or not logged:
             return found
         if not self.stops and (noise := faults.noise_beside(found)) != found.log.effort_noise:
             found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
@@ -194,7 +195,7 @@ def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
     how long noise lasts instead.
     """
     restated = any(c.name == MISREAD for c in diagnosis.causes)
-    if not diagnosis.remainder.unexplained or diagnosis.extended.doubt is not None or restated:
+    if not diagnosis.remainder.unexplained or isinstance(diagnosis.extended, LikelihoodFit) or restated:
         return None
     nominal, study = diagnosis.nominal, diagnosis.study
     try:
@@ -209,7 +210,7 @@ def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
 def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:
     """The diagnosis of readings as low-passed, if what it leaves is the likelier noise by what a low pass must earn."""
     fits = passed.extended, recorded.extended
-    if passed.extended.doubt is not None or not earns(*fits):
+    if isinstance(passed.extended, LikelihoodFit) or not earns(*fits):
         return recorded
     trials = passed.extended.trials
     names = " and ".join(dict.fromkeys(n for t in trials for n in passed.extended.model.rig.outputs(t.kind) if n in t))

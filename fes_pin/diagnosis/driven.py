@@ -44,8 +44,8 @@ from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.identify.ahead import falls
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.lasting import words_of_reading
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, Cause, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.verdict import State, Verdict, Weighed, share_in, word_of
@@ -69,10 +69,10 @@ class DrivenWeighed(Weighed):
     random: tuple[RandomPart, ...]
 
 
-Judgement = State[Fit, DrivenWeighed]
+Judgement = State[LikelihoodFit, DrivenWeighed]
 
 
-class DrivenVerdict(Verdict[Fit, DrivenWeighed]):
+class DrivenVerdict(Verdict[LikelihoodFit, DrivenWeighed]):
     """How it is judged what a search by the likelihood found.
 
     Trials that took no part speak for a cause, or not, by `speaks_for`, with errors over the horizon: several forms
@@ -93,7 +93,7 @@ class DrivenVerdict(Verdict[Fit, DrivenWeighed]):
         self.models, self.test, self.seed = search.models, tuple(test), seed
         self.horizon_s = self.models.horizon_s
         self.again, self._alike = Again(afresh), Again(as_random_as_in_all)
-        self._chosen: dict[int, tuple[Found, list[Fit]]] = {}
+        self._chosen: dict[int, tuple[Found, list[LikelihoodFit]]] = {}
 
     def weigh(self, found: Found) -> DrivenWeighed:
         """What held-out trials, and the tests of lack of fit, say of a set."""
@@ -126,7 +126,7 @@ class DrivenVerdict(Verdict[Fit, DrivenWeighed]):
         """Whether most folds choose neither a cause nor what cannot be told from it."""
         return not is_chosen(share_of(self.chosen(state), _alike(state.found, name)))
 
-    def chosen(self, state: Judgement) -> list[Fit]:
+    def chosen(self, state: Judgement) -> list[LikelihoodFit]:
         """For each fold, the fit to all trials of the set that is chosen without its own; none where none are made."""
         found, folds = state.found, state.weighed.folds
         if not folds or not folds[0].within:
@@ -163,7 +163,7 @@ class Judged:
     ahead: tuple[Ahead, Ahead]
     held_out_ahead: tuple[Ahead, Ahead] | None
     horizon_s: float
-    chosen: tuple[Fit, ...]
+    chosen: tuple[LikelihoodFit, ...]
     reason: str | None
 
     @property
@@ -172,7 +172,7 @@ class Judged:
         return self.state.found
 
     @property
-    def again(self) -> tuple[Fit, ...]:
+    def again(self) -> tuple[LikelihoodFit, ...]:
         """The extended model fitted again without each part of the trials that is held out."""
         return tuple(f.best for f in self.state.weighed.folds if f.within)
 
@@ -215,11 +215,10 @@ def _alike(found: Found, name: str) -> tuple[str, ...]:
     return (name, *alternatives(found.best, found.rivals[name], name))
 
 
-def _ceiling(fitted: Fit) -> float:
+def _ceiling(fitted: LikelihoodFit) -> float:
     """E of the reading noise alone, percent."""
-    assert fitted.doubt is not None
     rig = fitted.model.rig
-    columns = [(t[rig.output(t.kind)], fitted.doubt.white[rig.output(t.kind)] ** 2) for t in fitted.trials]
+    columns = [(t[rig.output(t.kind)], fitted.noise.white[rig.output(t.kind)] ** 2) for t in fitted.trials]
     noise = sum(float(np.isfinite(y).sum()) * variance for y, variance in columns)
     return 100.0 * noise / max(sum(float(np.nansum((y - np.nanmean(y)) ** 2)) for y, _ in columns), 1e-300)
 
@@ -275,11 +274,10 @@ def driven_diagnosis(
     )
 
 
-def _words(fitted: Fit, trials: Sequence[Trial]) -> tuple[str, ...]:
+def _words(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[str, ...]:
     """What is to be said of what is random in a fit."""
-    assert fitted.doubt is not None
-    said = words_of_reading(fitted.doubt, fitted.model.rig, trials)
-    return (*said, FRESH) if fitted.doubt.timed else said
+    said = words_of_reading(fitted.noise, fitted.model.rig, trials)
+    return (*said, FRESH) if fitted.noise.timed else said
 
 
 def _foretelling_more(other: Judged, one: Judged) -> Judged:
@@ -296,7 +294,7 @@ def _foretelling_more(other: Judged, one: Judged) -> Judged:
     return other if other.left.unexplained else replace(other, left=one.left)
 
 
-def _cause(judged: Judged, one: Effect, best: Fit, on: str) -> Cause:
+def _cause(judged: Judged, one: Effect, best: LikelihoodFit, on: str) -> Cause:
     """What is reported of one cause; `best` has intervals as wide as its scores scatter.
 
     Its gains are found `on` such data. A likelihood is no evidence where the model leaves more than noise.

@@ -12,9 +12,8 @@ from fes_pin.diagnosis.decide.gains_ahead import Fold
 from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
 from fes_pin.diagnosis.search.likelihood_models import Found
-from fes_pin.identify.fit import Fit, fit_of
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.infer.maximise import together
 from fes_pin.infer.problem import Unknowns, normal_equations
 from fes_pin.infer.result import Evidence
@@ -35,11 +34,11 @@ class Again:
         Makes a fit to other trials from one.
     """
 
-    def __init__(self, refitted: Callable[[Fit, Sequence[Trial]], Fit]) -> None:
+    def __init__(self, refitted: Callable[[LikelihoodFit, Sequence[Trial]], LikelihoodFit]) -> None:
         self._refitted = refitted
-        self._kept: dict[tuple[int, tuple[int, ...]], tuple[Fit, Fit]] = {}
+        self._kept: dict[tuple[int, tuple[int, ...]], tuple[LikelihoodFit, LikelihoodFit]] = {}
 
-    def __call__(self, wanted: Sequence[tuple[Fit, Sequence[Trial]]]) -> list[Fit]:
+    def __call__(self, wanted: Sequence[tuple[LikelihoodFit, Sequence[Trial]]]) -> list[LikelihoodFit]:
         keys = [(id(fitted), tuple(map(id, trials))) for fitted, trials in wanted]
         missing = {k: w for k, w in zip(keys, wanted, strict=True) if k not in self._kept}
         made = in_parallel(lambda w: self._refitted(*w), list(missing.values()))
@@ -64,7 +63,7 @@ def make_folds(found: Found, train: Sequence[Trial], test: Sequence[Trial], refi
     ]
 
 
-def with_choices(folds: Sequence[Fold], chosen: Sequence[Fit], refitted: Again) -> list[Fold]:
+def with_choices(folds: Sequence[Fold], chosen: Sequence[LikelihoodFit], refitted: Again) -> list[Fold]:
     """The folds with what each chooses anew.
 
     Parameters
@@ -76,24 +75,23 @@ def with_choices(folds: Sequence[Fold], chosen: Sequence[Fit], refitted: Again) 
     return [replace(fold, chosen=one) for fold, one in zip(folds, again, strict=True)]
 
 
-def afresh(fitted: Fit, trials: Sequence[Trial]) -> Fit:
+def afresh(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
     """A fit again, to other trials, with what is random in these."""
     problem, unknowns = _problem(fitted, trials)
     return maximise(problem, fitted.values, unknowns, near=True)
 
 
-def as_random_as_in_all(fitted: Fit, trials: Sequence[Trial]) -> Fit:
+def as_random_as_in_all(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
     """A fit again, to other trials, at what was random in its own."""
     problem, unknowns = _problem(fitted, trials)
     found = together(problem, fitted.values, unknowns, with_noise=False)
-    return replace(fit_of(problem, found), doubt=fitted.doubt)
+    return fit_of(problem, found)
 
 
-def _problem(fitted: Fit, trials: Sequence[Trial]) -> tuple[LikelihoodProblem, Unknowns]:
+def _problem(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[LikelihoodProblem, Unknowns]:
     """The problem of a fit on other trials, and where their unknowns begin."""
-    assert fitted.doubt is not None
     known = {id(t): u for t, u in zip(fitted.trials, fitted.unknowns, strict=True)}
-    problem = LikelihoodProblem(fitted.model, trials, fitted.doubt)
+    problem = LikelihoodProblem(fitted.model, trials, fitted.noise)
     return problem, [known.get(id(t), u) for t, u in zip(trials, problem.start_unknowns(), strict=True)]
 
 
@@ -122,7 +120,7 @@ def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, 
 
 
 @np.errstate(all="ignore")
-def _weight(fitted: Fit) -> float:
+def _weight(fitted: LikelihoodFit) -> float:
     """Twice the negative log of the probability of a fit's trials; see `evidence_of`."""
     system = normal_equations(at_rest(fitted.parts))
     info = fitted.model.parameter_info()

@@ -9,8 +9,8 @@ import numpy as np
 
 from fes_pin.diagnosis.decide.claims import FORM_SHARE
 from fes_pin.diagnosis.errors_ahead import RandomPart, are_large, random_parts
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.levels import CERTAIN_LEVEL, NOTHING_PERCENT
 from fes_pin.infer.optimize import WORTH
 from fes_pin.infer.result import Remainder
@@ -20,7 +20,7 @@ UNMOVED = "the motion is as likely without the recorded input, so something else
 """Why no cause is named where `is_moved_by_what_is_recorded` is False."""
 
 
-def is_moved_by_what_is_recorded(fitted: Fit) -> bool:
+def is_moved_by_what_is_recorded(fitted: LikelihoodFit) -> bool:
     """False where most of what moves a rig acts at random, and the motion is as likely without what was recorded.
 
     A column of another joint, or of another trial, is not what drove the rig; a spring or a friction beside it would
@@ -29,9 +29,8 @@ def is_moved_by_what_is_recorded(fitted: Fit) -> bool:
     inputs = {id(t): [n for n in fitted.model.driven_by(t) if n in t] for t in fitted.trials}
     if not any(inputs.values()) or not are_large(random_parts(fitted)):
         return True
-    assert fitted.doubt is not None
     still = [t.with_columns(**{n: np.zeros(len(t)) for n in inputs[id(t)]}) for t in fitted.trials]
-    (without,) = LikelihoodProblem(fitted.model, still, fitted.doubt).costs([(fitted.values, fitted.unknowns)])
+    (without,) = LikelihoodProblem(fitted.model, still, fitted.noise).costs([(fitted.values, fitted.unknowns)])
     return without > fitted.sse + WORTH
 
 

@@ -12,10 +12,11 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import SquaredErrors, forecast_errors, forecasts, one_step, own_noise, reach_of
 from fes_pin.identify.doubts import driving_size
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import predictions
 from fes_pin.infer.held_out import Errors, percent_of_spread
 from fes_pin.infer.levels import SMALL_SHARE
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import in_parallel
 
@@ -77,11 +78,10 @@ class AheadErrors:
     extended_held_out: Ahead | None
 
 
-def random_parts(fitted: Fit) -> tuple[RandomPart, ...]:
+def random_parts(fitted: LikelihoodFit) -> tuple[RandomPart, ...]:
     """The random efforts that act in a fit, with their share of what drives the rig."""
-    assert fitted.doubt is not None
-    sizes, still = driving_size(fitted.model, fitted.trials), fitted.doubt.still
-    parts = ((n, std, fitted.doubt.time[n]) for n, std in fitted.doubt.std.items() if n in sizes and n not in still)
+    sizes, still = driving_size(fitted.model, fitted.trials), fitted.noise.still
+    parts = ((n, std, fitted.noise.time[n]) for n, std in fitted.noise.std.items() if n in sizes and n not in still)
     return tuple(RandomPart(n, std, time, _averaged(std, time) / sizes[n]) for n, std, time in parts)
 
 
@@ -120,7 +120,9 @@ def free_errors(
     return AheadErrors(horizon_s, inside[0], inside[1], outside[0], outside[1])
 
 
-def errors_over_horizon(pairs: Sequence[tuple[Fit, Fit, Sequence[Trial]]], horizon_s: float) -> Errors:
+def errors_over_horizon(
+    pairs: Sequence[tuple[LikelihoodFit, LikelihoodFit, Sequence[Trial]]], horizon_s: float
+) -> Errors:
     """Squared errors over the horizon, by seconds of each trial.
 
     Parameters
@@ -133,13 +135,12 @@ def errors_over_horizon(pairs: Sequence[tuple[Fit, Fit, Sequence[Trial]]], horiz
     return Errors(*np.concatenate(found, axis=1))
 
 
-def _squares(fitted: Fit, floor: Fit, trial: Trial, horizon_s: float) -> np.ndarray:
+def _squares(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
     """`Errors` of a trial by its seconds, shape (4, seconds); errors of as long as the horizon have one origin."""
-    assert floor.doubt is not None
     told, noise = _told(fitted, trial, horizon_s)
     lines = np.zeros((4, len(trial)))
     for name, values in told.items():
-        variance, measured = floor.doubt.white[name] ** 2, trial[name]
+        variance, measured = floor.noise.white[name] ** 2, trial[name]
         squares = noise[name] / variance
         lines[0] += np.nan_to_num(measured - values, posinf=0.0, neginf=0.0) ** 2 / variance
         lines[1] += np.nan_to_num(measured - np.nanmean(measured)) ** 2 / variance
@@ -150,10 +151,10 @@ def _squares(fitted: Fit, floor: Fit, trial: Trial, horizon_s: float) -> np.ndar
     return np.array([p.sum(axis=1) for p in pieces]).T
 
 
-_TOLD: WeakKeyDictionary[Fit, dict[tuple[int, float], tuple[Trial, _Told]]] = WeakKeyDictionary()
+_TOLD: WeakKeyDictionary[LikelihoodFit, dict[tuple[int, float], tuple[Trial, _Told]]] = WeakKeyDictionary()
 
 
-def _told(fitted: Fit, trial: Trial, horizon_s: float) -> _Told:
+def _told(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Told:
     """What is foretold over the horizon, and the variance of its errors by noise alone, shape (n,) by output.
 
     The same is asked where causes are judged and where errors are told: it is kept as long as the fit is.
@@ -164,35 +165,33 @@ def _told(fitted: Fit, trial: Trial, horizon_s: float) -> _Told:
     return known[key][1]
 
 
-def _foretold(fitted: Fit, trial: Trial, horizon_s: float) -> _Told:
-    assert fitted.doubt is not None
+def _foretold(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Told:
     calm = noise_that_is_small(fitted)
-    told = forecasts(fitted.model, trial, fitted.doubt, horizon_s)
-    alone = told if calm is fitted.doubt else forecasts(fitted.model, trial, calm, horizon_s)
+    told = forecasts(fitted.model, trial, fitted.noise, horizon_s)
+    alone = told if calm is fitted.noise else forecasts(fitted.model, trial, calm, horizon_s)
     noise = {n: np.where(np.isfinite(trial[n]), np.nan_to_num(one.variances), 0.0) for n, one in alone.items()}
     return {n: one.values for n, one in told.items()}, noise
 
 
-def _first(fitted: Fit, trial: Trial, horizon_s: float) -> int:
+def _first(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> int:
     """The first sample that is foretold from more than the first; 0 where the trial ends before, or where nothing of
     its start is unknown."""
     first = sum(reach_of(trial, horizon_s)) if fitted.model.rig.unknowns(trial.kind) else 0
     return first if first < len(trial) else 0
 
 
-def noise_that_is_small(fitted: Fit) -> Doubt:
+def noise_that_is_small(fitted: LikelihoodFit) -> Doubt:
     """What is random about a rig and its readings that is noise.
 
     A random effort as far as it is small beside what drives the rig: what is more than `SMALL_SHARE` of that, is
     something that the model misses.
     """
-    assert fitted.doubt is not None
     less = {r.name: SMALL_SHARE / r.share for r in random_parts(fitted) if r.share > SMALL_SHARE}
-    std = {n: value * less.get(n, 1.0) for n, value in fitted.doubt.std.items()}
-    return replace(fitted.doubt, std=std) if less else fitted.doubt
+    std = {n: value * less.get(n, 1.0) for n, value in fitted.noise.std.items()}
+    return replace(fitted.noise, std=std) if less else fitted.noise
 
 
-def errors_ahead(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float, falling: bool) -> Ahead:
+def errors_ahead(pairs: Sequence[tuple[LikelihoodFit, Sequence[Trial]]], horizon_s: float, falling: bool) -> Ahead:
     """E of the first output one sample ahead, over the horizon, and free."""
     work = [(fitted, trial) for fitted, trials in pairs for trial in trials]
     missed, around = np.sum(in_parallel(lambda one: _sums(*one, horizon_s), work), axis=0)
@@ -200,17 +199,16 @@ def errors_ahead(pairs: Sequence[tuple[Fit, Sequence[Trial]]], horizon_s: float,
     return Ahead(one_step, horizon, None if falling else free, noise)
 
 
-def _sums(fitted: Fit, trial: Trial, horizon_s: float) -> np.ndarray:
+def _sums(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
     """Squared errors of the first output of a trial, and what it varies where they are judged, shape (2, 4).
 
     One sample ahead, over the horizon, free, and over the horizon by noise alone.
     """
-    assert fitted.doubt is not None
     name = fitted.model.rig.output(trial.kind)
     measured, (told, noise) = trial[name], _told(fitted, trial, horizon_s)
     begun = np.arange(len(trial)) < _first(fitted, trial, horizon_s)
     errors = (
-        one_step(fitted.model, trial, fitted.doubt)[name],
+        one_step(fitted.model, trial, fitted.noise)[name],
         np.where(begun, np.nan, measured - told[name]),
         measured - predictions(fitted.model, [trial], fitted.noise)[0][:, 0],
         np.where(begun, np.nan, np.sqrt(noise[name])),

@@ -12,6 +12,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import Problem, measured_columns
 from fes_pin.infer.levels import SEPARABLE, SURE
 from fes_pin.infer.problem import Linearized, NormalEquations, normal_equations
@@ -120,7 +121,7 @@ def next_experiment(best: Fit, rivals: Mapping[str, Fit], name: str, study: Stud
     study
         What the rig is and has been run under.
     """
-    if best.doubt is not None and falls(best.model, best.trials):
+    if isinstance(best, LikelihoodFit) and falls(best.model, best.trials):
         pair = (name, next(iter(rivals)))
         why = f"{' and '.join(pair)}: the rig falls unless its controller holds it, and no effort is proposed"
         return NextExperiment(f"{why}; move it further, or another way, and diagnose again", pair, None)
@@ -153,10 +154,10 @@ def discriminations(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study
     """What each trial tells of the two; None for one that leaves what the study has measured, or is not finite."""
     own = {n: v for n, v in best.unknowns[0].items() if n in best.model.own_unknowns()}
     begin = [{**best.model.initial_unknowns(t), **own} for t in trials]
-    measured = []
+    measured, driven = [], isinstance(best, LikelihoodFit)
     for trial, one in zip(trials, Simulator(best.model, trials).run(best.values, begin), strict=True):
         names = best.model.rig.outputs(trial.kind)
-        read = {n: one.readings[:, k] for k, n in enumerate(names) if best.doubt is None or n in best.doubt.white}
+        read = {n: one.readings[:, k] for k, n in enumerate(names) if not driven or n in best.noise}
         measured.append(trial.with_columns(**read))
     ranges = _ranges(measured_columns(best.model, study.trials))
     kept = [all(_inside(t[n], r) for n, r in ranges.items() if n in t) for t in measured]
@@ -175,8 +176,8 @@ def discriminations(best: Fit, rival: Fit, trials: Sequence[Trial], study: Study
 
 def _problem(fitted: Fit, trials: Sequence[Trial], judge: Fit) -> Problem | LikelihoodProblem:
     """A fit's model on other trials, under the noise, or all that is random, of the fit that judges."""
-    if judge.doubt is not None:
-        return LikelihoodProblem(fitted.model, trials, judge.doubt, fitted.free)
+    if isinstance(judge, LikelihoodFit):
+        return LikelihoodProblem(fitted.model, trials, judge.noise, fitted.free)
     return Problem(fitted.model, trials, judge.noise, fitted.free)
 
 

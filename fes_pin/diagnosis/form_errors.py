@@ -12,8 +12,8 @@ from fes_pin.diagnosis.errors_ahead import errors_over_horizon
 from fes_pin.diagnosis.search.cause_sets import Names, names_of
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import NominalFitError
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts, step_s
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
@@ -29,7 +29,7 @@ class FreshSearch(LikelihoodSearch):
     causes apart that it should not.
     """
 
-    def __init__(self, search: LikelihoodSearch, fits: Sequence[Fit]) -> None:
+    def __init__(self, search: LikelihoodSearch, fits: Sequence[LikelihoodFit]) -> None:
         super().__init__(search.models.begun_with(fits), search.progress)
         self._names = names_of(fits[0])
 
@@ -42,7 +42,7 @@ class FreshSearch(LikelihoodSearch):
         return self.result(names)
 
 
-def beside_what_is_new(search: LikelihoodSearch, found: Found) -> Fit | None:
+def beside_what_is_new(search: LikelihoodSearch, found: Found) -> LikelihoodFit | None:
     """What was found, beside random efforts that are new in every sample; None where none that lasts acts."""
     if search.was_stopped or not _may_last(found.best):
         return None
@@ -53,7 +53,7 @@ def beside_what_is_new(search: LikelihoodSearch, found: Found) -> Fit | None:
         return None
 
 
-def judged_again(search: LikelihoodSearch, found: Found, fresh: Fit) -> tuple[LikelihoodSearch, Found] | None:
+def judged_again(search: LikelihoodSearch, found: Found, fresh: LikelihoodFit) -> tuple[LikelihoodSearch, Found] | None:
     """What was found beside random efforts that are new in every sample; None where it gains nothing there.
 
     It gains where its errors over the horizon are less, by a thousandth of what the nominal model gets wrong: a random
@@ -76,14 +76,14 @@ def judged_again(search: LikelihoodSearch, found: Found, fresh: Fit) -> tuple[Li
     return None if again.was_stopped else (again, other)
 
 
-def _foretells_more(fresh: Fit, search: LikelihoodSearch, found: Found) -> bool:
+def _foretells_more(fresh: LikelihoodFit, search: LikelihoodSearch, found: Found) -> bool:
     """Whether errors over the horizon are less beside efforts that are new."""
     many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, fresh)]
     nominal, lasting, new = (errors_over_horizon(one, search.models.horizon_s) for one in many)
     return held_out_gain(nominal, lasting, new, search.models.seed).percent > NOTHING_PERCENT
 
 
-def _beside(found: Found) -> list[Fit]:
+def _beside(found: Found) -> list[LikelihoodFit]:
     """The parts of what was found, and what cannot be told from it, beside efforts that are new."""
     parts = {names_of(f): f for f in (*found.without.values(), found.nominal)}
     parts |= {names_of(f): f for many in found.rivals.values() for f in not_excluded(found.best, many)}
@@ -91,14 +91,13 @@ def _beside(found: Found) -> list[Fit]:
     return in_parallel(beside_fresh_efforts, list(parts.values()))
 
 
-def _may_last(fitted: Fit) -> bool:
+def _may_last(fitted: LikelihoodFit) -> bool:
     """Whether something acts at random on a rig whose starts are unknown, and lasts longer than a reading.
 
     Where the motion is imposed effort itself is read, and a reading of it lasts as it does; where a rig begins at rest
     noise that foretells itself is told from a random effort (`LikelihoodFits.nominal`).
     """
-    assert fitted.doubt is not None
-    lasts = any(fitted.doubt.time[n] > step_s(fitted.doubt, fitted.trials) for n in fitted.doubt.acting)
+    lasts = any(fitted.noise.time[n] > step_s(fitted.noise, fitted.trials) for n in fitted.noise.acting)
     return lasts and all(t.kind != IMPOSED and fitted.model.rig.unknowns(t.kind) for t in fitted.trials)
 
 

@@ -20,9 +20,9 @@ from fes_pin.diagnosis.search.misspecified import under_one_noise
 from fes_pin.diagnosis.search.simulation_search import Searched, SimulationSearch
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.fit import Fit, rough_noise
-from fes_pin.identify.noise import NoiseModel
 from fes_pin.infer.held_out import held_out_gain, speaks_for
 from fes_pin.infer.levels import CERTAIN_LEVEL
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, STOPPED, Cause, Remainder
 from fes_pin.models.model import Model
 

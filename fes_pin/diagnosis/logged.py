@@ -20,8 +20,8 @@ from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_no
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import beside_fresh_efforts
 from fes_pin.identify.lateness import Lateness, lateness_of, words_of_lateness
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.identify.timing import with_doubt_of_lateness, with_doubt_of_timing
-from fes_pin.identify.turns import maximum_from
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
@@ -57,15 +57,17 @@ class LogFaults:
     def noise_beside(self, diagnosis: Diagnosis) -> float:
         """The same beside a diagnosis; what was taken out for it is put back where efforts are likelier with it."""
         fitted, known = diagnosis.extended, diagnosis.log.effort_noise
+        if not isinstance(fitted, LikelihoodFit):
+            return known
         if known:
             return known * self._told(lambda: float(fitted.sse < self._as_recorded(fitted).sse), 1.0)
         return self._told(lambda: self._noise(fitted), 0.0) if diagnosis.verdict != "adequate" else 0.0
 
-    def _as_recorded(self, fitted: Fit) -> Fit:
+    def _as_recorded(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """The same model on trials with all the noise that their efforts were recorded with."""
         return maximum_from(fitted, self.prepared(self.trials))
 
-    def _noise(self, fitted: Fit) -> float:
+    def _noise(self, fitted: LikelihoodFit) -> float:
         return effort_noise_of(fitted, self.trials, self.answers, self.prepared)
 
     def lateness(self, diagnosis: Diagnosis) -> Lateness | None:
@@ -78,6 +80,8 @@ class LogFaults:
 
     def _lateness(self, diagnosis: Diagnosis) -> Lateness | None:
         nominal, extended = diagnosis.nominal, diagnosis.extended
+        if not (isinstance(nominal, LikelihoodFit) and isinstance(extended, LikelihoodFit)):
+            return None
         row_s = min(t.dt for t in extended.trials)
         as_logged = row_s < 1.5 * min(t.dt for t in self.trials)
         late = lateness_of(extended, row_s, as_logged)
@@ -97,8 +101,10 @@ class LogFaults:
             How late the efforts are, if they were moved.
         """
         row_s, fitted = min(t.dt for t in self.trials), diagnosis.extended
+        if not isinstance(fitted, LikelihoodFit):
+            return diagnosis
 
-        def doubted(wide: Fit, timed: Log) -> Fit:
+        def doubted(wide: LikelihoodFit, timed: Log) -> LikelihoodFit:
             log = with_timing_of(diagnosis.log, timed)
             moved = self.prepared([log.applied(t) for t in self.trials])
             return with_doubt_of_lateness(wide, maximum_from(fitted, moved))
@@ -143,7 +149,7 @@ def _is_likelier(one: Fit, other: Fit) -> bool:
 
     Beside random efforts that are new in every sample where those of one are.
     """
-    both = [f.doubt for f in (one, other) if f.doubt is not None]
+    both = [f.noise for f in (one, other) if isinstance(f, LikelihoodFit)]
     lasts_s, timed = max(d.lasts_s for d in both), any(d.timed for d in both)
     first, second = (_as_random(f, lasts_s, timed) for f in (one, other))
     return first.price < second.price
@@ -151,9 +157,8 @@ def _is_likelier(one: Fit, other: Fit) -> bool:
 
 def _as_random(fitted: Fit, lasts_s: float, timed: bool) -> Fit:
     """The fit to readings so far apart, and beside random efforts that are new in every one if these are to be."""
-    if fitted.doubt is None:
+    if not isinstance(fitted, LikelihoodFit):
         return fitted
-    if fitted.doubt.lasts_s != lasts_s:
-        fitted = maximum_from(fitted, fitted.trials, replace(fitted.doubt, lasts_s=lasts_s))
-    assert fitted.doubt is not None
-    return beside_fresh_efforts(fitted) if timed and not fitted.doubt.timed else fitted
+    if fitted.noise.lasts_s != lasts_s:
+        fitted = maximum_from(fitted, fitted.trials, replace(fitted.noise, lasts_s=lasts_s))
+    return beside_fresh_efforts(fitted) if timed and not fitted.noise.timed else fitted

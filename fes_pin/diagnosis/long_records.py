@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.data.schema import RigSchema
 from fes_pin.data.trial import Trial, derived_trial
-from fes_pin.identify.noise import noise_step, thin, thinning
+from fes_pin.infer.noise import noise_step, thin, thinning
 
 MOST_SAMPLES = 120_000
 """Samples of all trials together that a search takes: sensitivities to every cause of the library take about 10 kB a

@@ -20,10 +20,10 @@ from scipy import special
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
-from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import CLAIM_LEVEL
+from fes_pin.infer.noise import NoiseModel, as_white
 from fes_pin.infer.problem import Linearized, normal_equations
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import simulated_trial

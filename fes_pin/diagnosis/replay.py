@@ -12,10 +12,11 @@ from fes_pin.diagnosis.errors_ahead import AheadErrors
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.identify.ahead import over_horizon
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import NoiseModel
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import predictions
 from fes_pin.infer.held_out import percent_of_spread, within
 from fes_pin.infer.levels import RUNAWAY
+from fes_pin.infer.noise import NoiseModel
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,8 @@ def _predicted(fitted: Fit, trials: Sequence[Trial], noise: NoiseModel, ahead: A
     A free simulation of such a rig integrates its errors, or falls: it says little of the model, or nothing.
     """
     model, out = fitted.model, []
-    if ahead is not None:
-        assert fitted.doubt is not None
-        moves = [over_horizon(model, t, fitted.doubt, ahead.horizon_s) for t in trials]
+    if ahead is not None and isinstance(fitted, LikelihoodFit):
+        moves = [over_horizon(model, t, fitted.noise, ahead.horizon_s) for t in trials]
         return [derived_trial(t, columns={**t.columns, **m}) for t, m in zip(trials, moves, strict=True)]
     for trial, readings in zip(trials, predictions(model, trials, noise), strict=True):
         names = model.rig.outputs(trial.kind)

@@ -25,6 +25,7 @@ from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.diagnosis.searches import Result, Search
 from fes_pin.identify.ahead import forecast_errors, own_noise
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import Errors, held_out_gain
@@ -123,7 +124,7 @@ def _saved(one: Fit, trials: Sequence[Trial], other: Fit, restated_trials: Seque
 
     Simulations are compared under one noise, that of the latter; likelihoods hold their own.
     """
-    if one.doubt is not None and other.doubt is not None:
+    if isinstance(one, LikelihoodFit) and isinstance(other, LikelihoodFit):
         return one.price - other.price
     noise = noise_of(other)
     pairs = ((one, trials), (other, restated_trials))
@@ -154,7 +155,7 @@ def with_misread(
     pair = (errors_of(before.model, trials, floor), errors_of(diagnosis.nominal.model, made.trials, floor))
     cause = _cause(made, held_out_gain(pair[0], *pair, seed).percent, trials, seed)
     told = replace(diagnosis, causes=(cause, *diagnosis.causes), verdict="causes_found")
-    if before.doubt is not None or diagnosis.ahead is None:
+    if isinstance(before, LikelihoodFit) or diagnosis.ahead is None:
         return told
     horizon = diagnosis.ahead.horizon_s
     held = (

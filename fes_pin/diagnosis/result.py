@@ -15,6 +15,7 @@ from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
 from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.diagnosis.text import ahead_notes, left_out_text
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.stored import log_table
 from fes_pin.infer.result import FITTED, STOPPED, Cause, Explained, Ranked, shown
 from fes_pin.infer.text import percent, probability
@@ -73,7 +74,7 @@ class Diagnosis(Result):
     @property
     def is_driven(self) -> bool:
         """True of a rig whose effort answers what is read: it is judged by predictions one sample ahead."""
-        return self.extended.doubt is not None
+        return isinstance(self.extended, LikelihoodFit)
 
     @property
     def over_horizon(self) -> AheadErrors | None:

@@ -22,9 +22,9 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.noise import Noise, NoiseModel, thin, thinning
 from fes_pin.identify.per_trial import foretold_unknowns, predictions
 from fes_pin.infer.levels import RUNAWAY
+from fes_pin.infer.noise import Noise, NoiseModel, thin, thinning
 from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.foretold import ForetoldOutput
 from fes_pin.models.model import Model

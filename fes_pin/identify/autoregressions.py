@@ -22,7 +22,7 @@ from fes_pin.models.foretold import ForetoldTrial
 
 MOST = 8
 """Highest order. A sensor's noise is white beside a few coefficients; the tens that a random torque's would need
-(`identify.noise.ORDERS`) stand for a random effort, which is known by itself here. They would learn a hum, too, whose
+(`infer.noise.ORDERS`) stand for a random effort, which is known by itself here. They would learn a hum, too, whose
 phase is each trial's own, before it is looked for; beside these few it is found (`tests/driven/test_stimulated.py`)."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.fit import rough_noise
-from fes_pin.identify.noise import Noise
+from fes_pin.infer.noise import Noise
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 

@@ -14,8 +14,7 @@ import numpy as np
 from fes_pin.data.answered import ControllerAnswer
 from fes_pin.data.log import quiet
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import Fit
-from fes_pin.identify.turns import maximum_from
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.infer.levels import CERTAIN_GAIN
 from fes_pin.workers import in_parallel
 
@@ -31,7 +30,7 @@ Prepared = Callable[[Sequence[Trial]], Sequence[Trial]]
 
 
 def effort_noise_of(
-    fitted: Fit, trials: Sequence[Trial], answers: Sequence[ControllerAnswer], prepared: Prepared
+    fitted: LikelihoodFit, trials: Sequence[Trial], answers: Sequence[ControllerAnswer], prepared: Prepared
 ) -> float:
     """Standard deviation of the noise of an effort, in its unit; 0 where nothing speaks for one.
 
@@ -51,10 +50,9 @@ def effort_noise_of(
     return tried[best] if costs[best] < costs[0] - CERTAIN_GAIN else 0.0
 
 
-def _least(fitted: Fit, trials: Sequence[Trial]) -> float:
+def _least(fitted: LikelihoodFit, trials: Sequence[Trial]) -> float:
     """The least noise that is anything beside the random effort of a fit, in the effort's unit."""
-    assert fitted.doubt is not None
-    std, time = (part.get("effort", 0.0) for part in (fitted.doubt.std, fitted.doubt.time))
+    std, time = (part.get("effort", 0.0) for part in (fitted.noise.std, fitted.noise.time))
     return float(np.sqrt(LEAST_SHARE * 2.0 * std**2 * time / min(t.dt for t in trials)))
 
 

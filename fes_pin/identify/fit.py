@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,9 +18,8 @@ from fes_pin.data.results import Saveable
 from fes_pin.data.schema import unknown
 from fes_pin.data.show import frame
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.identify.problem import Problem
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
 from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.profile import profile_interval
@@ -51,20 +51,17 @@ class Fit(Optimum, Saveable):
     trials
         What it was fitted to.
     noise
-        By output column, as assumed in the fit.
+        By output column, as assumed in the fit; of a fit by the likelihood its process noise as well.
     bounds
         By name, where somebody asked for narrower ones than the parameters have.
     free, parameters, covariance, at_bound, sse, converged, gradient_norm, unknowns, parts, together
         Of every `Optimum`; read-only.
-    doubt
-        What is random, of a fit by the likelihood: its `sse` holds the log-determinant.
     """
 
     model: Model
     trials: tuple[Trial, ...]
     noise: NoiseModel
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    doubt: Doubt | None = None
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -104,16 +101,18 @@ class Fit(Optimum, Saveable):
         InputError
             If the parameter was not fitted, the method is another, or the fit has no profile.
         """
-        is_plain = isinstance(self.model, Model) and self.doubt is None
         self.place(name)
         if method not in ("wald", "profile"):
             raise InputError(f"expected wald or profile, found {method!r}", column="method")
-        if method == "profile" and not is_plain:
+        if method == "profile" and not self._has_profile():
             raise InputError("expected wald: this fit is of random processes or of groups", column="method")
-        if is_plain and (method == "profile" or name in self.at_bound):
+        if self._has_profile() and (method == "profile" or name in self.at_bound):
             return self._one_sided[name] if name in self.at_bound else self._profile(name)
         info = self.model.parameter_info()[name]
         return self.within(name, *self.bounds.get(name, (info.lower, info.upper)))
+
+    def _has_profile(self) -> bool:
+        return isinstance(self.model, Model)
 
     @cached_property
     def _one_sided(self) -> dict[str, tuple[float, float]]:
@@ -230,10 +229,13 @@ class Fit(Optimum, Saveable):
         )
 
     @property
-    def price(self) -> float:
-        """Twice the negative log-likelihood, with what its degrees of freedom and random processes must earn."""
-        acting = 2 * len(self.doubt.acting) if self.doubt else 0
-        return self.sse + PARAMETER_PRICE * (self.degrees + acting)
+    def doubt(self) -> Doubt | None:
+        """The noise of a fit by the likelihood, by its old name; None of others. Deprecated: use `noise`."""
+        warnings.warn("Fit.doubt is Fit.noise now; it ends with version 0.3", DeprecationWarning, stacklevel=2)
+        return self.noise if isinstance(self.noise, Doubt) else None
+
+    def _kind(self) -> str:
+        return "Fit"
 
 
 def fit_problem(
@@ -245,7 +247,7 @@ def fit_problem(
 ) -> Fit:
     """Fit a problem from a start value of every parameter; see `infer.optimum.minimise`."""
     found = minimise(problem, start, unknowns, max_iterations, parts)
-    return fit_of(problem, found)
+    return Fit(**ended(problem.model, found), trials=problem.trials, noise=problem.noise)
 
 
 def fit_growing(problem: Problem, start: Mapping[str, float], max_iterations: int = MAX_ITERATIONS) -> Fit:
@@ -289,11 +291,10 @@ def go_on(problem: Problem, fitted: Fit, max_iterations: int = MAX_ITERATIONS) -
     return fit_problem(problem, fitted.values, [fitted.unknowns[i] for i in rows], max_iterations, known)
 
 
-def fit_of(problem: Any, found: Optimum) -> Fit:
-    """The fit of a problem that has ended."""
-    model = problem.model.with_parameters(found.values)
-    own = {"model": model, "parameters": model.parameters(), "trials": problem.trials, "noise": problem.noise}
-    return Fit(**{**vars(found), **own})
+def ended(model: Model, found: Optimum) -> dict[str, Any]:
+    """What a fit holds of a model's problem that has ended, but for trials and noise."""
+    fitted = model.with_parameters(found.values)
+    return {**vars(found), "model": fitted, "parameters": fitted.parameters()}
 
 
 def fit(

@@ -17,32 +17,30 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximise
 from fes_pin.models.predictor import Doubt
 
 
-def step_s(doubt: Doubt, trials: Sequence[Trial]) -> float:
+def step_s(noise: Doubt, trials: Sequence[Trial]) -> float:
     """From one reading to the next, s."""
-    return max(doubt.lasts_s, *(t.dt for t in trials))
+    return max(noise.lasts_s, *(t.dt for t in trials))
 
 
-def fresh(doubt: Doubt, trials: Sequence[Trial]) -> Doubt:
+def fresh(noise: Doubt, trials: Sequence[Trial]) -> Doubt:
     """The same with random efforts that are new in every reading, of the power that they have at rest: 2 std^2 time."""
-    step = step_s(doubt, trials)
-    std = {n: v * (doubt.time[n] / step) ** 0.5 for n, v in doubt.std.items()}
-    return replace(doubt, std=std, time=dict.fromkeys(doubt.time, step), timed=doubt.processes)
+    step = step_s(noise, trials)
+    std = {n: v * (noise.time[n] / step) ** 0.5 for n, v in noise.std.items()}
+    return replace(noise, std=std, time=dict.fromkeys(noise.time, step), timed=noise.processes)
 
 
-def beside_fresh_efforts(fitted: Fit) -> Fit:
+def beside_fresh_efforts(fitted: LikelihoodFit) -> LikelihoodFit:
     """A fit of the same model to the same trials, with random efforts that are new in every reading.
 
     How large they are is found before anything moves: too small, parameters would go after every error, and too large,
     inertia would be what noise of the reading makes of it.
     """
-    assert fitted.doubt is not None
-    problem = LikelihoodProblem(fitted.model, fitted.trials, fresh(fitted.doubt, fitted.trials))
+    problem = LikelihoodProblem(fitted.model, fitted.trials, fresh(fitted.noise, fitted.trials))
     problem.noise_step(fitted.values, fitted.unknowns)
     return maximise(problem, fitted.values, fitted.unknowns)
 

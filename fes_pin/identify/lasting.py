@@ -18,9 +18,10 @@ from dataclasses import replace
 
 from fes_pin.data.counts import count_of, hunts
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.levels import SMALL_SHARE
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs.base import Rig
 
@@ -28,7 +29,7 @@ FEWEST = 30
 """Readings that every trial keeps."""
 
 
-def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], Fit]) -> Fit:
+def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], LikelihoodFit]) -> LikelihoodFit:
     """The nominal fit with readings as near to each other as their noise is new.
 
     Parameters
@@ -39,7 +40,7 @@ def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], Fit]) -> 
     Returns
     -------
     Fit
-        Its `doubt.lasts_s` says how long; 0 where noise is new in every sample. Where it is nowhere new, the fit whose
+        Its `noise.lasts_s` says how long; 0 where noise is new in every sample. Where it is nowhere new, the fit whose
         innovations have least in common with the next.
     """
     now = nominal(0.0)
@@ -56,7 +57,7 @@ def with_new_noise(trials: Sequence[Trial], nominal: Callable[[float], Fit]) -> 
     return min(tried, key=lambda one: one[0])[1]
 
 
-def _shared(fitted: Fit) -> float:
+def _shared(fitted: LikelihoodFit) -> float:
     """The larger correlation of an innovation with one of the next two; trials weigh as they are long."""
     residuals = [p.residual for p in fitted.parts]
     power = sum(float(r @ r) for r in residuals)
@@ -64,12 +65,10 @@ def _shared(fitted: Fit) -> float:
     return max(along) / max(power, 1e-300)
 
 
-def _other(fitted: Fit, sparser: Fit) -> float:
+def _other(fitted: LikelihoodFit, sparser: LikelihoodFit) -> float:
     """By how much less likely sparser readings are, each, under a fit than under their own."""
-    assert fitted.doubt is not None
-    assert sparser.doubt is not None
-    problem = LikelihoodProblem(sparser.model, sparser.trials, sparser.doubt)
-    as_it_was = replace(fitted.doubt, lasts_s=sparser.doubt.lasts_s)
+    problem = LikelihoodProblem(sparser.model, sparser.trials, sparser.noise)
+    as_it_was = replace(fitted.noise, lasts_s=sparser.noise.lasts_s)
     lost = problem.cost(fitted.values, fitted.unknowns, as_it_was) - sparser.sse
     return lost / max(sum(len(p.residual) for p in sparser.parts), 1)
 
@@ -77,7 +76,7 @@ def _other(fitted: Fit, sparser: Fit) -> float:
 __all__ = ["with_new_noise"]
 
 
-def words_of_reading(doubt: Doubt | None, rig: Rig, trials: Sequence[Trial]) -> tuple[str, ...]:
+def words_of_reading(noise: NoiseModel, rig: Rig, trials: Sequence[Trial]) -> tuple[str, ...]:
     """What is to be said of a reading that hunts, or whose noise lasts over samples.
 
     Neighbours that stand on one count err alike; else a record was smoothed. Readings that hunt are followed, and not
@@ -91,9 +90,9 @@ def words_of_reading(doubt: Doubt | None, rig: Rig, trials: Sequence[Trial]) -> 
     if hunting > SMALL_SHARE:
         share = f"{100 * hunting:.0f} % of its samples"
         said.append(f"{name} goes to and fro between two counts in {share}: these are followed, and judge nothing")
-    if doubt is not None and doubt.lasts_s:
-        step = round(doubt.lasts_s / trials[0].dt)
+    if isinstance(noise, Doubt) and noise.lasts_s:
+        step = round(noise.lasts_s / trials[0].dt)
         read = f"is read in counts of {count:.2g}" if count else "was smoothed or interpolated before it was stored"
-        lasts = f"its noise lasts {doubt.lasts_s:.2g} s, and one sample in {step} counts as a reading"
+        lasts = f"its noise lasts {noise.lasts_s:.2g} s, and one sample in {step} counts as a reading"
         said.append(f"{name} {read}: {lasts}")
     return tuple(said)

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from scipy.optimize import minimize_scalar
 
 from fes_pin.data.log import Log
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.identify.simultaneous import cost_of_answers
-from fes_pin.identify.turns import maximum_from
 from fes_pin.infer.levels import CERTAIN_GAIN
 from fes_pin.workers import in_parallel
 
@@ -49,7 +48,7 @@ class Lateness:
     at_most: Log
 
 
-def lateness_of(fitted: Fit, row_s: float, as_logged: bool = False) -> Lateness | None:
+def lateness_of(fitted: LikelihoodFit, row_s: float, as_logged: bool = False) -> Lateness | None:
     """How late the efforts of a fit's trials are; None where they are in time.
 
     Parameters
@@ -62,9 +61,9 @@ def lateness_of(fitted: Fit, row_s: float, as_logged: bool = False) -> Lateness 
         Whether rows are as they were logged, and no averages: then efforts may also act later than written, or between
         rows.
     """
-    tried: dict[Log, Fit] = {}
+    tried: dict[Log, LikelihoodFit] = {}
 
-    def moved(log: Log) -> Fit:
+    def moved(log: Log) -> LikelihoodFit:
         if log not in tried:
             tried[log] = maximum_from(fitted, [log.applied(t) for t in fitted.trials])
         return tried[log]

@@ -13,7 +13,6 @@ Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic gre
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -24,11 +23,10 @@ from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.autoregressions import autoregressions, with_autoregressions
 from fes_pin.identify.doubts import doubt_limits, first_doubt
-from fes_pin.identify.noise import ORDERS, Noise
 from fes_pin.identify.problem import limits_of, products_of
+from fes_pin.infer.noise import ORDERS
 from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point, fisher_scoring
-from fes_pin.models.autoregression import stationary_variance
 from fes_pin.models.compile.layout import WIDE
 from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial
 from fes_pin.models.model import Model
@@ -50,8 +48,8 @@ class LikelihoodProblem(NoisyProblem):
         Its structure; values are given to the methods.
     trials
         What was measured; NaN where nothing was.
-    doubt
-        What is random.
+    noise
+        Of the process and of the measurements.
     free
         The parameters that move; the model's fitted ones by default.
     starts
@@ -62,11 +60,11 @@ class LikelihoodProblem(NoisyProblem):
         self,
         model: Model,
         trials: Sequence[Trial],
-        doubt: Doubt,
+        noise: Doubt,
         free: tuple[str, ...] | None = None,
         starts: Sequence[Trial] | None = None,
     ) -> None:
-        self.model, self.trials, self.doubt = model, tuple(trials), doubt
+        self.model, self.trials, self.noise = model, tuple(trials), noise
         self.free = model.fitted_parameters() if free is None else free
         self.limits = limits_of(model, self.trials)
         self.unknown_names = model.own_unknowns()
@@ -76,19 +74,11 @@ class LikelihoodProblem(NoisyProblem):
         self._batched: Predictor | None = None
 
     @property
-    def noise(self) -> dict[str, Noise]:
-        """The noise of the readings, by column."""
-        return {
-            n: Noise(std, ar := self.doubt.ar.get(n, ()), std * math.sqrt(stationary_variance(ar)))
-            for n, std in self.doubt.white.items()
-        }
-
-    @property
     def predictor(self) -> Predictor:
         """The compiled predictor, with sensitivities to `free` and to the effects' unknowns."""
         if self._predictor is None:
             columns = (*self.free, *self.unknown_names)
-            own = (self.doubt.processes, self.priors, self.doubt.lasts_s)
+            own = (self.noise.processes, self.priors, self.noise.lasts_s)
             self._predictor = Predictor(self.model, self.trials, columns, *own)
         return self._predictor
 
@@ -102,33 +92,33 @@ class LikelihoodProblem(NoisyProblem):
         return [self.model.own_nulls() for _ in self.trials]
 
     def innovations(
-        self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None
+        self, values: Mapping[str, float], unknowns: Unknowns, noise: Doubt | None = None
     ) -> list[ForetoldTrial]:
         """Every trial as foretold, with sensitivities to `free` and to the effects' unknowns; see `linearize`."""
         check_limit()
         own = [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)]
         with np.errstate(all="ignore"):
-            return self.predictor.run(values, doubt or self.doubt, own)
+            return self.predictor.run(values, noise or self.noise, own)
 
     @property
     def noise_parameters(self) -> dict[str, float]:
         """Those of the noise that may change, by name: not the noise of a reading that none of the trials has."""
-        known, given = self.noise_limits, [f"time.{n}" for n in self.doubt.timed]
-        given += [f"{part}.{n}" for part in ("std", "time") for n in self.doubt.still]
-        return {n: v for n, v in self.doubt.values().items() if n in known and n not in given}
+        known, given = self.noise_limits, [f"time.{n}" for n in self.noise.timed]
+        given += [f"{part}.{n}" for part in ("std", "time") for n in self.noise.still]
+        return {n: v for n, v in self.noise.parameters().items() if n in known and n not in given}
 
     @property
     def noise_limits(self) -> dict[str, tuple[float, float]]:
         """How small and how large those may become."""
-        return doubt_limits(self.model, self.trials, self.doubt.lasts_s)
+        return doubt_limits(self.model, self.trials, self.noise.lasts_s)
 
     def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
         """One-step predictions of all trials at each of several points."""
-        return self._evaluated([(values, unknowns, self.doubt.with_values(own)) for values, unknowns, own in points])
+        return self._evaluated([(values, unknowns, self.noise.with_values(own)) for values, unknowns, own in points])
 
     def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
         """The cost at several parameter values, without sensitivities: less work than linearizing at one of them."""
-        return [one.cost for one in self._evaluated([(*point, self.doubt) for point in points])]
+        return [one.cost for one in self._evaluated([(*point, self.noise) for point in points])]
 
     def _evaluated(self, points: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[Evaluation]:
         with np.errstate(all="ignore"):
@@ -138,7 +128,7 @@ class LikelihoodProblem(NoisyProblem):
         """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
         count, trials = self.batch, len(self.trials)
         if self._batched is None:
-            own = (self.doubt.processes, self.priors * count, self.doubt.lasts_s)
+            own = (self.noise.processes, self.priors * count, self.noise.lasts_s)
             self._batched = Predictor(self.model, self.trials * count, (), *own)
         predictor = self._batched
 
@@ -166,7 +156,7 @@ class LikelihoodProblem(NoisyProblem):
         given = self.start_unknowns() if unknowns is None else unknowns
         own = [{**begin, **u} for begin, u in zip(self.begins, given, strict=True)]
         with np.errstate(all="ignore"):
-            return self.predictor.foretell(values, self.doubt, own)
+            return self.predictor.foretell(values, self.noise, own)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Innovations over their deviations, and sensitivities, at a parameter value; see `check_limit`."""
@@ -189,26 +179,26 @@ class LikelihoodProblem(NoisyProblem):
 
     def renew(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
         """Find again, in place, what noise foretells of itself; returns by how much that lowers the cost."""
-        if not any(self.doubt.ar.values()):
+        if not any(self.noise.ar.values()):
             return 0.0
-        run = self._runs([(values, unknowns, self.doubt)])[0]
-        orders = {n: (len(ar),) for n, ar in self.doubt.ar.items()}
-        found = {**self.doubt.ar, **autoregressions(run, orders)}
+        run = self._runs([(values, unknowns, self.noise)])[0]
+        orders = {n: (len(ar),) for n, ar in self.noise.ar.items()}
+        found = {**self.noise.ar, **autoregressions(run, orders)}
         before, after = (
             sum(one.cost() for one in some) for some in (run, [with_autoregressions(one, found) for one in run])
         )
         if after < before:
-            self.doubt = replace(self.doubt, ar=found)
+            self.noise = replace(self.noise, ar=found)
         return max(before - after, 0.0)
 
     def with_orders(self, values: Mapping[str, float], unknowns: Unknowns) -> Doubt:
         """What is random, with autoregressions of the orders that what the filter leaves shows."""
-        (run,) = self._runs([(values, unknowns, self.doubt)])
-        return replace(self.doubt, ar=autoregressions(run, dict.fromkeys(self.doubt.white, ORDERS)))
+        (run,) = self._runs([(values, unknowns, self.noise)])
+        return replace(self.noise, ar=autoregressions(run, dict.fromkeys(self.noise.white, ORDERS)))
 
     def set_noise(self, parameters: Mapping[str, float]) -> None:
         """Change parameters of the noise, in place."""
-        self.doubt = self.doubt.with_values(parameters)
+        self.noise = self.noise.with_values(parameters)
 
     @cached_property
     def _scales(self) -> tuple[str, ...]:
@@ -252,9 +242,9 @@ class LikelihoodProblem(NoisyProblem):
         split = len(self.free)
         return Linearized(residual, moved[:, :split], moved[:, split:], float(np.sum(logs)))
 
-    def cost(self, values: Mapping[str, float], unknowns: Unknowns, doubt: Doubt | None = None) -> float:
+    def cost(self, values: Mapping[str, float], unknowns: Unknowns, noise: Doubt | None = None) -> float:
         """Twice the negative log-likelihood."""
-        return sum(one.cost() for one in self.innovations(values, unknowns, doubt))
+        return sum(one.cost() for one in self.innovations(values, unknowns, noise))
 
 
 def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Linearized:

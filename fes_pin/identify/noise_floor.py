@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import Noise, estimate_noise, thinning
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.noise import Noise, estimate_noise, thinning
 
 
 def rich_noise(

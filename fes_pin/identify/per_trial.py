@@ -16,8 +16,8 @@ from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.doubts import first_doubt
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.noise import Noise, NoiseModel
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.noise import Noise, NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns, normal_equations
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model
@@ -136,7 +136,7 @@ def amplitude(fitted: Fit, effect: Effect) -> tuple[float, float]:
     The mean is over the trials of the kind that comes first among those that feel the effect, as a motion and a force
     have no unit in common; what the uncertainty of the single values adds to their squares is taken off.
     """
-    initial = fitted.model.rig.unknowns(fitted.trials[0].kind) if fitted.doubt is None else ()
+    initial = fitted.model.rig.unknowns(fitted.trials[0].kind) if not isinstance(fitted.noise, Doubt) else ()
     names = (*initial, *fitted.model.own_unknowns())
     own = np.array([names.index(f"{effect.name}.{n}") for n in effect.unknowns()])
     slopes = [slope for _, slope in normal_equations(fitted.parts).eliminated]

@@ -10,8 +10,8 @@ import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import NoiseModel, thinning
 from fes_pin.infer import problem as infer
+from fes_pin.infer.noise import NoiseModel, thinning
 from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.model import Model

@@ -27,8 +27,8 @@ import numpy as np
 from fes_pin.data.answered import answer_of
 from fes_pin.data.log import EFFORT, Log
 from fes_pin.data.trial import Trial, derived_trial
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.models.predictor import are_news
 
 SPACING = 40
@@ -37,7 +37,7 @@ PULSE = 1e-3
 """Of an effort's deviation: a pulse so small moves a rig in proportion."""
 
 
-def cost_of_answers(fitted: Fit, logged: Sequence[Trial], log: Log) -> float:
+def cost_of_answers(fitted: LikelihoodFit, logged: Sequence[Trial], log: Log) -> float:
     """What is to be added to a fit's cost because its efforts answer what is foretold from them; 0 of those in time.
 
     Parameters
@@ -51,12 +51,11 @@ def cost_of_answers(fitted: Fit, logged: Sequence[Trial], log: Log) -> float:
     """
     if log.effort_late_s <= 0.0 and log.effort_over_s <= 0.0:
         return 0.0
-    assert fitted.doubt is not None
-    rows = [_rows(t, fitted.doubt.lasts_s) for t in logged]
+    rows = [_rows(t, fitted.noise.lasts_s) for t in logged]
     sizes = [PULSE * float(np.std(t[EFFORT])) for t in logged]
     pulsed = [_pulsed(t, at, size) for t, at, size in zip(logged, rows, sizes, strict=True)]
     plain, moved = (
-        LikelihoodProblem(fitted.model, [log.applied(t) for t in some], fitted.doubt).foretold(fitted.values)
+        LikelihoodProblem(fitted.model, [log.applied(t) for t in some], fitted.noise).foretold(fitted.values)
         for some in (logged, pulsed)
     )
     total = 0.0
@@ -65,7 +64,7 @@ def cost_of_answers(fitted: Fit, logged: Sequence[Trial], log: Log) -> float:
             continue
         gains = answer_of(trial[EFFORT], [trial[n] for n in before]).gains[at]
         loop = sum(_felt((after[n].values - before[n].values) / size, at, gains[:, k]) for k, n in enumerate(before))
-        counted = int(np.sum(are_news(trial, fitted.doubt.lasts_s)))
+        counted = int(np.sum(are_news(trial, fitted.noise.lasts_s)))
         with np.errstate(divide="ignore"):
             total -= 2.0 * counted * float(np.mean(np.log(np.abs(1.0 - loop))))
     return total

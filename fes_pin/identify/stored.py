@@ -15,7 +15,7 @@ from fes_pin.data.schema import NumberKey
 from fes_pin.data.toml import Document, read_toml
 from fes_pin.identify.ahead import Random
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import Noise
+from fes_pin.infer.noise import Noise
 from fes_pin.models.predictor import Doubt
 
 KEY = "random"
@@ -54,10 +54,10 @@ def load_log(path: str | Path) -> Log:
 
 
 def _random_table(fitted: Fit) -> dict[str, Any]:
-    if fitted.doubt is not None:
-        lasts_s = float(fitted.doubt.lasts_s)
-        parts = {part: {n: float(v) for n, v in getattr(fitted.doubt, part).items()} for part in _PARTS}
-        ar = {n: [float(a) for a in own] for n, own in fitted.doubt.ar.items() if own}
+    if isinstance(fitted.noise, Doubt):
+        lasts_s = float(fitted.noise.lasts_s)
+        parts = {part: {n: float(v) for n, v in getattr(fitted.noise, part).items()} for part in _PARTS}
+        ar = {n: [float(a) for a in own] for n, own in fitted.noise.ar.items() if own}
         return {**({"lasts_s": lasts_s} if lasts_s else {}), **parts, **({"ar": ar} if ar else {})}
     return {"noise": {n: _noise_table(one) for n, one in fitted.noise.items()}}
 

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.covariance import covariance_of, widened
 from fes_pin.infer.problem import Linearized, normal_equations, whitened_sse
 from fes_pin.infer.scatter import at_rest, scores_of, with_honest_intervals
@@ -45,7 +45,7 @@ class EarlyReading(Effect):
 EARLY = "early_reading.early_s"
 
 
-def with_doubt_of_timing(fitted: Fit, row_s: float) -> Fit:
+def with_doubt_of_timing(fitted: LikelihoodFit, row_s: float) -> LikelihoodFit:
     """A fit by the likelihood, of a joint that an effort drives, with intervals that hold when a reading was taken.
 
     What those of the fit hold beyond how its scores scatter they go on to hold.
@@ -74,7 +74,7 @@ def with_doubt_of_timing(fitted: Fit, row_s: float) -> Fit:
     return replace(fitted, covariance=wide + _beyond_scatter(fitted))
 
 
-def _beyond_scatter(fitted: Fit) -> np.ndarray:
+def _beyond_scatter(fitted: LikelihoodFit) -> np.ndarray:
     """What the covariance of a fit has more than how its scores scatter, shape (free, free); 0 of parameters that have
     less."""
     with np.errstate(invalid="ignore"):  # what the data do not tell
@@ -83,15 +83,14 @@ def _beyond_scatter(fitted: Fit) -> np.ndarray:
     return np.where(np.isfinite(more) & np.outer(kept, kept), more, 0.0)
 
 
-def _linearized(fitted: Fit, early_s: float) -> Sequence[Linearized]:
+def _linearized(fitted: LikelihoodFit, early_s: float) -> Sequence[Linearized]:
     """The trials of a fit, with readings that are so early, and sensitivities to that behind those of the fit."""
-    assert fitted.doubt is not None
     free = (*fitted.free, EARLY)
-    problem = LikelihoodProblem(fitted.model + EarlyReading(), fitted.trials, fitted.doubt, free)
+    problem = LikelihoodProblem(fitted.model + EarlyReading(), fitted.trials, fitted.noise, free)
     return problem.linearize({**fitted.values, EARLY: early_s}, fitted.unknowns)
 
 
-def with_doubt_of_lateness(fitted: Fit, at_most: Fit) -> Fit:
+def with_doubt_of_lateness(fitted: LikelihoodFit, at_most: LikelihoodFit) -> LikelihoodFit:
     """A fit with intervals that hold by how much its efforts may be later or earlier: up to what another fit has.
 
     Anything between has the same chance, and the mean square of what an estimate is off by is a third of the most.

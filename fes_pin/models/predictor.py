@@ -12,7 +12,8 @@ import numpy as np
 from fes_pin.data.counts import SAME, begins_of_runs, count_of, hunts, lengths_of_runs
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.trial import Trial, derived_trial
-from fes_pin.models.autoregression import noise_ahead
+from fes_pin.infer.noise import Noise
+from fes_pin.models.autoregression import noise_ahead, stationary_variance
 from fes_pin.models.compile.layout import doubt_constants, width_of
 from fes_pin.models.compile.program import compiled_program
 from fes_pin.models.disturbance import disturbed
@@ -31,9 +32,11 @@ from fes_pin.models.simulate import (
 )
 
 
-@dataclass(frozen=True)
-class Doubt(ReadOnly):
-    """What is random about a rig and its readings.
+@dataclass(frozen=True, eq=False)
+class Doubt(ReadOnly, Mapping[str, Noise]):
+    """Process noise of a rig, and measurement noise of its readings.
+
+    By output column it holds the noise of a reading.
 
     Attributes
     ----------
@@ -73,14 +76,24 @@ class Doubt(ReadOnly):
         return tuple(n for n in self.std if n not in self.still)
 
     def with_values(self, values: Mapping[str, float]) -> Doubt:
-        """The same with other values, by name as in `values`."""
+        """The same with other values, by name as in `parameters`."""
         parts = {part: dict(getattr(self, part)) for part in ("white", "std", "time")}
         for name, value in values.items():
             part, _, which = name.partition(".")
             parts[part][which] = value
-        return replace(self, **parts)  # type: ignore[arg-type]
+        return replace(self, white=parts["white"], std=parts["std"], time=parts["time"])
 
-    def values(self) -> dict[str, float]:
+    def __getitem__(self, column: str) -> Noise:
+        ar = self.ar.get(column, ())
+        return Noise(self.white[column], ar, self.white[column] * math.sqrt(stationary_variance(ar)))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.white)
+
+    def __len__(self) -> int:
+        return len(self.white)
+
+    def parameters(self) -> dict[str, float]:
         """Every value by name: white.position, std.effort, time.effort."""
         return {f"{part}.{n}": v for part in ("white", "std", "time") for n, v in getattr(self, part).items()}
 
@@ -145,7 +158,7 @@ class Predictor:
         doubts = [doubt] * len(self.trials) if isinstance(doubt, Doubt) else list(doubt)
         each = [values] * len(self.trials) if isinstance(values, Mapping) else values
         for block in self._blocks:
-            y, s = block.run(each, [one.values() for one in doubts], unknowns, self._delays(each))
+            y, s = block.run(each, [one.parameters() for one in doubts], unknowns, self._delays(each))
             told = block.innovations(y, s, len(self.columns), [doubts[i] for i in block.lanes])
             out.update(zip(block.lanes, told, strict=True))
         return [out[i] for i in range(len(self.trials))]
@@ -157,7 +170,7 @@ class Predictor:
         out: dict[int, dict[str, ForetoldOutput]] = {}
         each = [values] * len(self.trials)
         for block in self._blocks:
-            y, _ = block.run(each, [doubt.values()] * len(self.trials), unknowns, self._delays(each))
+            y, _ = block.run(each, [doubt.parameters()] * len(self.trials), unknowns, self._delays(each))
             out.update(zip(block.lanes, block.foretold(y, doubt), strict=True))
         return [out[i] for i in range(len(self.trials))]
 

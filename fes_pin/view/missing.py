@@ -24,7 +24,7 @@ import scipy.linalg
 from fes_pin.data.imposed import imposed_motion
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise import first_order_low_pass, thin
+from fes_pin.infer.noise import first_order_low_pass, thin
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Signals

@@ -11,7 +11,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.replay import Replay
-from fes_pin.identify.noise import NoiseModel
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.text import percent
 from fes_pin.view.chart import Panel, svg, tick_text
 from fes_pin.view.drawing import Drawing, csv_of, every, rows_csv

@@ -14,8 +14,8 @@ from confusion_matrix.noise import LEVEL
 from confusion_matrix.plan import Item
 from fes_pin.data.study import Study
 from fes_pin.identify.fit import Fit, fit_problem
-from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.noise import Noise
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 

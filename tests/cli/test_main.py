@@ -19,8 +19,8 @@ from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import read_trial, write_trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.record import NEXT_FILE, diagnosis_files, diagnosis_record
-from fes_pin.identify.noise import estimate_noise
 from fes_pin.identify.stored import load_random
+from fes_pin.infer.noise import estimate_noise
 from fes_pin.models.effects import EFFECTS
 from fes_pin.models.parameters import ROTARY
 from fes_pin.models.simulate import simulate

@@ -66,11 +66,11 @@ def test_it_foretells_more(fitted):
 
 def test_what_is_new_in_every_sample_has_the_same_power_and_stays_so(fitted):
     _, likeliest, new = fitted[0]
-    doubt, step = likeliest.doubt, likeliest.trials[0].dt
+    doubt, step = likeliest.noise, likeliest.trials[0].dt
     begun = fresh(doubt, likeliest.trials)
     assert begun.std["effort"] ** 2 * step == pytest.approx(doubt.std["effort"] ** 2 * doubt.time["effort"])
-    assert new.doubt.time == {"effort": step}
-    assert new.doubt.timed == ("effort",)
+    assert new.noise.time == {"effort": step}
+    assert new.noise.timed == ("effort",)
     apart = Doubt(doubt.white, doubt.std, doubt.time, lasts_s=8.0 * step)
     assert fresh(apart, likeliest.trials).time == {"effort": 8.0 * step}
 

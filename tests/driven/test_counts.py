@@ -51,7 +51,7 @@ def test_a_count_that_is_read_again_and_again_is_one_reading_of_the_noise(tmp_pa
     study = read_study(draw_swing_up((), HELD[0], tmp_path).study)
     count = count_of(study.trials[0]["position"])
     sets = LikelihoodModels(nominal_model(study), study.trials, [])
-    assert sets.nominal().doubt.white["position"] == pytest.approx(count / 12.0**0.5, rel=0.05)
+    assert sets.nominal().noise.white["position"] == pytest.approx(count / 12.0**0.5, rel=0.05)
 
 
 def test_friction_that_is_there_is_found_in_counts(tmp_path):
@@ -73,5 +73,5 @@ def test_counts_that_hunt_hide_no_cogging(tmp_path):
     assert [e.name for e in best.model.effects] == ["cogging"]
     assert abs(best.values["inertia_scale"] - 1.0) < 3.0 * best.std("inertia_scale")
     assert best.std("inertia_scale") < 2e-3
-    (said,) = words_of_reading(best.doubt, best.model.rig, best.trials)
+    (said,) = words_of_reading(best.noise, best.model.rig, best.trials)
     assert "between two counts" in said

@@ -6,7 +6,7 @@ from driven_rigs.draw import draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.models.effects import CoulombFriction, QuadraticDamping, SensorLag
 from fes_pin.models.nominal import nominal_model
 
@@ -17,7 +17,7 @@ def test_friction_that_grew_with_the_load_is_plain_beside_another_damping(tmp_pa
     study = read_study(draw(PAIR, 0.3, 1108031, tmp_path).study)
     sets = LikelihoodFits(nominal_model(study), study.trials)
     model = sets.nominal().model + CoulombFriction(0.1, load_exponent=1.5) + QuadraticDamping(0.05)
-    problem = LikelihoodProblem(model, study.trials, sets.fits[()].doubt)
+    problem = LikelihoodProblem(model, study.trials, sets.fits[()].noise)
     sets.fits[PAIR] = stood = maximise(problem, model.parameters())
     simpler = sets.forms.simplified(sets.fits[PAIR])
     assert simpler.price < stood.price - 100.0
@@ -33,7 +33,7 @@ def test_forms_that_bent_one_to_the_other_are_begun_anew(tmp_path):
     sets = LikelihoodFits(nominal_model(study), study.trials)
     friction = CoulombFriction(0.387, stiction=3.13, stribeck_speed=0.0747, creep_speed=0.132)
     model = sets.nominal().model + friction + SensorLag(0.0094)
-    problem = LikelihoodProblem(model, study.trials, sets.fits[()].doubt)
+    problem = LikelihoodProblem(model, study.trials, sets.fits[()].noise)
     sets.fits[names] = bent = maximise(problem, model.parameters())
     anew = sets.forms.reformed(sets.fits[names])
     assert anew.price < bent.price - 50.0
@@ -49,7 +49,7 @@ def test_a_form_that_led_nowhere_is_grown_again_without_what_it_began_with(tmp_p
     friction = CoulombFriction(0.0269, stiction=0.962, stribeck_speed=0.3787, creep_speed=0.0008)
     nominal = sets.nominal()
     led = nominal.model.with_parameters({"inertia_scale": 1.0071, "damping": 0.0879, "gravity_scale": 0.9945})
-    doubt = nominal.doubt.with_values({"white.position": 2.9e-4, "std.effort": 1.9e-3, "time.effort": 0.084})
+    doubt = nominal.noise.with_values({"white.position": 2.9e-4, "std.effort": 1.9e-3, "time.effort": 0.084})
     model = led + friction + QuadraticDamping(0.3269)
     stuck = maximise(LikelihoodProblem(model, study.trials, doubt), model.parameters())
     assert stuck.values["coulomb_friction.stiction"] > 0.5

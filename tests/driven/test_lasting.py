@@ -33,7 +33,7 @@ CAUSES = ["coulomb_friction", "backlash", "cogging", "sensor_lag", "quadratic_da
 @pytest.mark.parametrize("causes", [(), *((c,) for c in CAUSES)], ids=str)
 def test_noise_of_every_sample_is_its_own_whatever_the_model_misses(causes, tmp_path):
     study = read_study(draw(causes, 0.3, 21, tmp_path, recorded=True).study)
-    assert nominal(study).doubt.lasts_s == 0.0
+    assert nominal(study).noise.lasts_s == 0.0
 
 
 @pytest.mark.parametrize(
@@ -51,9 +51,9 @@ def test_noise_that_was_averaged_lasts_and_is_no_motion(made, least, most, tmp_p
     drawn = draw((), 0.3, 22, tmp_path)
     study = read_study(drawn.study)
     recorded, found = nominal(study), nominal(study, made)
-    assert least <= found.doubt.lasts_s / study.trials[0].dt <= most
+    assert least <= found.noise.lasts_s / study.trials[0].dt <= most
     assert found.values["inertia_scale"] == pytest.approx(1.0, abs=0.02)
-    size, now = (f.doubt.std["effort"] * np.sqrt(f.doubt.time["effort"]) for f in (recorded, found))
+    size, now = (f.noise.std["effort"] * np.sqrt(f.noise.time["effort"]) for f in (recorded, found))
     assert now == pytest.approx(size, rel=0.35)
 
 
@@ -67,7 +67,7 @@ def test_it_is_kept_with_a_model(tmp_path):
     study = read_study(draw((), 0.3, 22, tmp_path).study)
     found = nominal(study, lambda x: uniform_filter1d(x, 5))
     (tmp_path / "model.toml").write_text(model_toml(found.model, stored_tables(found, Log())))
-    assert load_random(tmp_path / "model.toml").lasts_s == pytest.approx(found.doubt.lasts_s, rel=1e-5)
+    assert load_random(tmp_path / "model.toml").lasts_s == pytest.approx(found.noise.lasts_s, rel=1e-5)
 
 
 @pytest.mark.parametrize("lasts_s", [0.0, 0.008])
@@ -77,7 +77,7 @@ def test_what_is_random_is_kept_with_a_model(lasts_s, tmp_path):
     model = nominal_model(study)
     doubt = replace(first_guess(model, study.trials), lasts_s=lasts_s)
     path = tmp_path / "model.toml"
-    path.write_text(model_toml(model, stored_tables(SimpleNamespace(doubt=doubt), Log())))
+    path.write_text(model_toml(model, stored_tables(SimpleNamespace(noise=doubt), Log())))
     assert load_random(path) == doubt
     assert ("lasts_s" in path.read_text()) == bool(lasts_s)
 

@@ -17,8 +17,8 @@ from fes_pin.diagnosis.record import diagnosis_files
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.ahead import foretell
 from fes_pin.identify.lateness import lateness_of
+from fes_pin.identify.likelihood_fit import maximum_from
 from fes_pin.identify.stored import load_log, log_table
-from fes_pin.identify.turns import maximum_from
 from fes_pin.models.nominal import nominal_model
 
 ROWS = (2, 3, 4)
@@ -62,7 +62,7 @@ def check_that_a_prediction_knows(diagnosis, trial, folder):
     table = read_csv(folder / "out.csv")
     found = table.columns["position"]
     near, far = (
-        foretell(diagnosis.model, t, diagnosis.extended.doubt, 0.1)["position"]
+        foretell(diagnosis.model, t, diagnosis.extended.noise, 0.1)["position"]
         for t in (diagnosis.log.applied(trial), trial)
     )
     assert np.allclose(found, near, atol=1e-5)

@@ -10,7 +10,7 @@ from fes_pin.diagnosis.driven_refused import is_moved_by_what_is_recorded
 from fes_pin.diagnosis.errors_ahead import errors_ahead, errors_over_horizon, noise_that_is_small, random_parts
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.infer.levels import SMALL_SHARE
 
 
@@ -36,9 +36,9 @@ def test_errors_of_a_right_model_are_those_of_noise(horizon_s, fitted):
 
 
 def test_a_random_effort_that_is_large_is_no_noise(fitted):
-    assert noise_that_is_small(fitted) is fitted.doubt
-    large = replace(fitted, doubt=fitted.doubt.with_values({"std.effort": 3.0 * TRUE["weight"]}))
-    (part,) = random_parts(replace(fitted, doubt=noise_that_is_small(large)))
+    assert noise_that_is_small(fitted) is fitted.noise
+    large = replace(fitted, noise=fitted.noise.with_values({"std.effort": 3.0 * TRUE["weight"]}))
+    (part,) = random_parts(replace(fitted, noise=noise_that_is_small(large)))
     assert part.share == pytest.approx(SMALL_SHARE)
 
 

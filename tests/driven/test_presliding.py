@@ -65,7 +65,7 @@ def refined(trials):
     """The nominal fit, that of friction in its plainest form, and that in the form that the data demand."""
     sets = LikelihoodFits(believed(), trials, [CoulombFriction])
     nominal = sets.nominal()
-    plain = LikelihoodMaxima(trials).from_start(nominal.model + CoulombFriction(), nominal.doubt)
+    plain = LikelihoodMaxima(trials).from_start(nominal.model + CoulombFriction(), nominal.noise)
     sets.extend(())
     while better := sets.forms.refined(sets.fits[NAMES]):
         sets.fits[NAMES] = better
@@ -79,7 +79,7 @@ def test_bristles_are_read_as_friction_with_a_stretch():
     assert "stretch" in friction.refined()
     assert nominal.sse - plain.sse > 100.0
     assert plain.sse - found.sse > nominal.sse - plain.sse
-    assert found.doubt.std["effort"] < 0.6 * plain.doubt.std["effort"]
+    assert found.noise.std["effort"] < 0.6 * plain.noise.std["effort"]
     assert friction.torque_nm == pytest.approx(FRICTION, rel=0.1)
     assert found.values["damping"] == pytest.approx(DAMPING, rel=0.1)
     assert found.values["inertia_scale"] == pytest.approx(1.0, abs=0.03)
@@ -95,7 +95,7 @@ def test_a_contact_that_stretches_far_and_rings_is_no_friction_that_falls_off():
     assert friction.stretch == pytest.approx(1e-3, rel=0.3)
     assert friction.torque_nm == pytest.approx(FRICTION, rel=0.05)
     assert found.values["inertia_scale"] == pytest.approx(1.0, abs=0.02)
-    assert found.doubt.std["effort"] < 0.6 * plain.doubt.std["effort"]
+    assert found.noise.std["effort"] < 0.6 * plain.noise.std["effort"]
 
 
 def test_the_shortest_stretch_that_a_fit_may_come_to_is_still_one():
@@ -104,12 +104,12 @@ def test_the_shortest_stretch_that_a_fit_may_come_to_is_still_one():
     model = believed() + CoulombFriction(FRICTION, softness=0.5, stretch=STRETCH)
     problem = LikelihoodProblem(model, read, first_guess(model, read))
     shortest = {**model.parameters(), name: problem.limits[name][0]}
-    again = LikelihoodProblem(model.with_parameters(shortest), read, problem.doubt)
+    again = LikelihoodProblem(model.with_parameters(shortest), read, problem.noise)
     unknowns = problem.start_unknowns()
     assert again.free == problem.free
     assert again.cost(shortest, unknowns) == pytest.approx(problem.cost(shortest, unknowns), abs=1e-6)
     none = model.with_parameters({name: 0.0})
-    without = LikelihoodProblem(none, read, problem.doubt)
+    without = LikelihoodProblem(none, read, problem.noise)
     assert name not in without.free
     assert abs(without.cost(none.parameters(), unknowns) - problem.cost(shortest, unknowns)) > 10.0
 

@@ -1,15 +1,14 @@
 """What is left beside a cause that bends sharply: slopes of the filter promise what its likelihood does not keep."""
 
-from dataclasses import replace
-
 import pytest
 from driven.linear_play import LinearPlay
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.remainder import driven
-from fes_pin.identify.fit import fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import fit_of
+from fes_pin.infer.optimum import minimise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predictor import Doubt
 
@@ -34,7 +33,7 @@ def beside_a_play(tmp_path_factory):
     study = read_study(draw(("backlash",), 0.3, 1118025, tmp_path_factory.mktemp("play"), recorded=True).study)
     doubts = [THERE.with_values({"std.effort": k * THERE.std["effort"]}) for k in BESIDE]
     problems = [LikelihoodProblem(nominal_model(study) + LinearPlay(), study.trials, doubt) for doubt in doubts]
-    fits = [replace(fit_problem(p, END, max_iterations=0), doubt=p.doubt) for p in problems]
+    fits = [fit_of(p, minimise(p, END, max_iterations=0)) for p in problems]
     return min(fits, key=lambda fitted: fitted.sse)
 
 

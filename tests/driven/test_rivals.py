@@ -16,7 +16,7 @@ def test_a_set_is_fitted_again_beside_a_cause_whose_form_has_changed():
     sets = LikelihoodFits(believed(), [trial(1), trial(2)], [CoulombFriction, EffortOffset])
     sets.nominal()
     plain = sets.nominal().model + CoulombFriction()
-    sets.fits[FRICTION] = sets._maxima.from_start(plain, sets.nominal().doubt)
+    sets.fits[FRICTION] = sets._maxima.from_start(plain, sets.nominal().noise)
     sets.extend(FRICTION)
     first = sets.fits[BOTH]
     sets.extend(FRICTION)

@@ -11,7 +11,7 @@ from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.driven_held_out import as_random_as_in_all
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels, LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.effects import CoulombFriction, PeriodicTorque
@@ -25,7 +25,7 @@ def friction_fitted(folder):
     sets.nominal()
     sets.extend(())
     ended = sets.fits["coulomb_friction",]
-    problem = LikelihoodProblem(ended.model, study.trials, ended.doubt)
+    problem = LikelihoodProblem(ended.model, study.trials, ended.noise)
     return maximise(problem, ended.values, ended.unknowns, near=True)
 
 
@@ -33,7 +33,7 @@ def test_what_has_moved_together_is_where_no_single_step_leads_down(tmp_path):
     """Slopes for gains as they are end above it beside this rig's friction; the maximum is the cost's own."""
     fitted = friction_fitted(tmp_path)
     assert fitted.together
-    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt)
+    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.noise)
     points = [
         ({**fitted.values, n: fitted.values[n] + side * 0.3 * fitted.std(n)}, fitted.unknowns)
         for n in fitted.free

@@ -23,7 +23,7 @@ def test_a_cause_may_show_as_far_ahead_as_what_stands_for_it_lasts(short, long, 
         return dict.fromkeys(names, Gain(low + 1.0, low, low + 2.0))
 
     monkeypatch.setattr(gains_ahead, "_gains_over", gains_over)
-    without = SimpleNamespace(doubt=SimpleNamespace(time={"effort": lasts_s}))
+    without = SimpleNamespace(noise=SimpleNamespace(time={"effort": lasts_s}))
     found = SimpleNamespace(without={"parallel_stiffness": without})
     folds = [SimpleNamespace(test=[SimpleNamespace(duration=11.0)])]
     gain = gains_ahead.gains_of(folds, found.without, SHORT, seed=0)["parallel_stiffness"]

@@ -15,7 +15,7 @@ WIDTH = "backlash.half_width"
 
 def missed_by_a_parabola(model, fitted):
     """What the cost differs by from one, a deviation of the width to either side of where a fit ended."""
-    problem, steps = LikelihoodProblem(model, fitted.trials, fitted.doubt), np.linspace(-1.0, 1.0, 21)
+    problem, steps = LikelihoodProblem(model, fitted.trials, fitted.noise), np.linspace(-1.0, 1.0, 21)
     widths = fitted.values[WIDTH] + steps * fitted.std(WIDTH)
     costs = problem.costs([({**fitted.values, WIDTH: float(w)}, fitted.unknowns) for w in widths])
     return float(np.abs(costs - np.polynomial.Polynomial.fit(steps, costs, 2)(steps)).max())

@@ -23,7 +23,7 @@ def study(tmp_path):
 
 def test_a_fit_ends_at_its_limit(study):
     nominal = LikelihoodFits(nominal_model(study), study.trials, []).nominal()
-    problem = LikelihoodProblem(nominal.model, study.trials, nominal.doubt)
+    problem = LikelihoodProblem(nominal.model, study.trials, nominal.noise)
     with time_limit(0.0):
         time.sleep(0.01)
         for work in (problem.linearize, lambda values, unknowns: problem.costs([(values, unknowns)])):

@@ -1,10 +1,14 @@
 """Trials of small rigs with known parameters, and least squares by scipy on the whole system of unknowns."""
 
+from dataclasses import fields
+
 import numpy as np
 from models.cases import RIGS, trial
 from scipy.optimize import least_squares
 
-from fes_pin.identify.noise import Noise
+from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.infer.noise import Noise
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import simulate
 
@@ -59,3 +63,8 @@ def by_scipy(problem, start):
     jacobian = found.jac[:, inside]
     covariance[np.ix_(inside, inside)] = np.linalg.inv(jacobian.T @ jacobian)
     return found.x[:size], covariance[:size, :size], 2.0 * found.cost
+
+
+def as_likely(fitted, noise):
+    """A fit as if the likelihood had judged it, with such noise."""
+    return LikelihoodFit(**{f.name: getattr(fitted, f.name) for f in fields(Fit)} | {"noise": noise})

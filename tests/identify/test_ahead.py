@@ -5,7 +5,7 @@ import pytest
 import scipy.signal
 
 from fes_pin.identify.ahead import forecast
-from fes_pin.identify.noise import Noise
+from fes_pin.infer.noise import Noise
 
 AR = (1.5, -0.7)
 DT = 0.01

@@ -13,9 +13,9 @@ from fes_pin.data.log import Log
 from fes_pin.identify.autoregressions import autoregressions, with_autoregressions
 from fes_pin.identify.doubts import first_guess, stilled
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.noise import ORDERS, Noise
 from fes_pin.identify.problem import Problem
 from fes_pin.identify.stored import load_random, stored_tables
+from fes_pin.infer.noise import ORDERS, Noise
 from fes_pin.models.autoregression import unforetold
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import model_toml
@@ -83,7 +83,7 @@ def test_noise_of_much_power_at_low_frequencies_is_white_beside_what_is_found(st
 def test_what_noise_foretells_of_itself_is_stored_and_read_back(study, tmp_path):
     model, trials = nominal_model(study), moved(study)
     doubt = replace(first_guess(model, trials), ar={"angle_rad": AR})
-    fitted = SimpleNamespace(model=model, doubt=doubt)
+    fitted = SimpleNamespace(model=model, noise=doubt)
     path = tmp_path / "model.toml"
     path.write_text(model_toml(model, stored_tables(fitted, Log())), encoding="utf-8")
     assert load_random(path) == doubt

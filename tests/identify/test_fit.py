@@ -11,8 +11,8 @@ from models.cases import JOINT, RIGS, trial
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import GROSS, fit, fit_multistart, fit_problem, noise_of
-from fes_pin.identify.noise import Noise, thinning
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.noise import Noise, thinning
 from fes_pin.infer.optimize import TOLERANCE
 from fes_pin.infer.problem import normal_equations
 from fes_pin.models.effects import effect_named

@@ -6,7 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
-from identify.rigs import WHITE, measured, off, trials_of
+from identify.rigs import WHITE, as_likely, measured, off, trials_of
 from models.cases import RIGS, trial
 
 import fes_pin as fp
@@ -14,6 +14,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import fit
 from fes_pin.models.effects import CoulombFriction, SensorOffset
 from fes_pin.models.model import Model
+from fes_pin.models.predictor import Doubt
 
 RISE, RISE_AT_A_BOUND = 3.8414588, 2.7055435
 COPIES = [lambda x: x, copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]
@@ -214,3 +215,18 @@ def test_a_fit_is_saved_and_loaded(at_its_bound, plain, tmp_path):
     fp.save_result(at_its_bound, tmp_path / "fit.json")
     kept = fp.load_result(tmp_path / "fit.json").found["parameters"]["coulomb_friction.torque_nm"]
     assert kept["std"] is None and kept["note"] == "at its bound" and kept["low"] == 0.0 < kept["high"]
+
+
+def test_a_fit_has_its_noise_and_its_old_name_says_that_it_ends(at_its_bound):
+    """Of a fit by the likelihood: the process noise, and by column the noise of a reading."""
+    noise = Doubt({"position": 0.2}, {"effort": 1.0}, {"effort": 0.1}, ar={"position": (0.5,)})
+    likely = as_likely(at_its_bound, noise)
+    assert likely.noise is noise and likely.noise["position"].innovation_std == 0.2
+    assert likely.noise["position"].std == pytest.approx(0.2 / 0.75**0.5)
+    for one, old in ((likely, noise), (at_its_bound, None)):
+        with pytest.warns(DeprecationWarning, match="Fit.noise"):
+            assert one.doubt is old
+    assert pickle.loads(pickle.dumps(likely)).noise == noise
+    assert likely.to_json() != "" and likely._kind() == "Fit"
+    with pytest.raises(fp.InputError, match="expected wald"):
+        likely.interval("damping", method="profile")

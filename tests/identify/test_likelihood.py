@@ -7,7 +7,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls, one_step, over_horizon
 from fes_pin.identify.doubts import driving_size, first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.infer.problem import whitened_sse
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.effects.sensor_gain import SensorGain
@@ -64,14 +64,14 @@ def test_the_rig_and_what_is_random_are_found(fitted):
     for name, value in truth.items():
         assert abs(fitted.values[name] - value) < 4.0 * fitted.std(name), name
     assert fitted.std("inertia_scale") < 0.02
-    assert fitted.doubt.std["effort"] == pytest.approx(0.06, rel=0.25)
-    assert fitted.doubt.time["effort"] == pytest.approx(0.1, rel=0.5)
-    assert fitted.doubt.white["position"] == pytest.approx(4e-4, rel=0.05)
+    assert fitted.noise.std["effort"] == pytest.approx(0.06, rel=0.25)
+    assert fitted.noise.time["effort"] == pytest.approx(0.1, rel=0.5)
+    assert fitted.noise.white["position"] == pytest.approx(4e-4, rel=0.05)
 
 
 def test_gains_as_they_are_lead_to_the_maximum_of_the_whole_likelihood(fitted):
     """Differences of the cost itself, gains moving: no parameter's step would gain more than a tenth of a deviation."""
-    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt)
+    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.noise)
     for name in fitted.free:
         step = 0.5 * fitted.std(name)
         up, down = (
@@ -91,7 +91,7 @@ def test_the_maximum_of_a_model_that_is_wrong_is_found_from_anywhere():
         begun = {**believed().parameters(), "inertia_scale": scale, "damping": damping}
         ends.append(maximise(problem, begun))
     assert ends[0].sse == pytest.approx(ends[1].sse, abs=0.2)
-    problem = LikelihoodProblem(believed(), trials, ends[0].doubt)
+    problem = LikelihoodProblem(believed(), trials, ends[0].noise)
     for name in ends[0].free:
         step = ends[0].std(name)
         sides = [
@@ -106,7 +106,7 @@ def read_in_counts(trial: Trial, count: float) -> Trial:
 
 
 def test_innovations_are_white_at_the_maximum(fitted):
-    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.doubt)
+    problem = LikelihoodProblem(fitted.model, fitted.trials, fitted.noise)
     for part in problem.linearize(fitted.values, fitted.unknowns):
         r = part.residual[20:]
         assert np.std(r) == pytest.approx(1.0, abs=0.06)
@@ -124,7 +124,7 @@ def rubbing():
 
 def test_the_likelihood_of_dry_friction_is_smooth(rubbing):
     """Steps of a hundredth of a deviation find the slope that a whole one does: no sign flips between."""
-    problem = LikelihoodProblem(rubbing.model, rubbing.trials, rubbing.doubt)
+    problem = LikelihoodProblem(rubbing.model, rubbing.trials, rubbing.noise)
     name = "coulomb_friction.torque_nm"
 
     def slope(step: float) -> float:
@@ -145,7 +145,7 @@ def test_friction_that_is_felt_near_standstill_is_not_underestimated(rubbing):
 def test_without_a_random_torque_none_is_found():
     trials = [held(k, 0.0) for k in range(2)]
     found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)), believed().parameters())
-    assert found.doubt.std["effort"] < 0.01 * driving_size(believed(), trials)["effort"]
+    assert found.noise.std["effort"] < 0.01 * driving_size(believed(), trials)["effort"]
 
 
 def test_three_errors_of_a_rig_that_falls():
@@ -154,8 +154,8 @@ def test_three_errors_of_a_rig_that_falls():
     model = believed(-TRUE["weight"])
     found = maximise(LikelihoodProblem(model, trials, first_guess(model, trials)), model.parameters())
     assert falls(found.model, trials)
-    near = one_step(found.model, trials[0], found.doubt)["position"]
-    missed = trials[0]["position"] - over_horizon(found.model, trials[0], found.doubt, 0.1)["position"]
+    near = one_step(found.model, trials[0], found.noise)["position"]
+    missed = trials[0]["position"] - over_horizon(found.model, trials[0], found.noise, 0.1)["position"]
     assert np.std(near[5:]) < 1.3 * 4e-4
     assert 2.0 * np.std(near[5:]) < np.std(missed) < 0.05
 
@@ -164,10 +164,10 @@ def test_a_horizon_uses_all_that_is_older():
     """As a run to which nothing was shown from there on; runs that share a trial's predictions hide parts of it."""
     (trial,) = trials = [held(7, 0.03)]
     found = maximise(LikelihoodProblem(believed(), trials, first_guess(believed(), trials)), believed().parameters())
-    shared = over_horizon(found.model, trial, found.doubt, 0.1)["position"]
+    shared = over_horizon(found.model, trial, found.noise, 0.1)["position"]
     for last in range(900, 930, 6):  # the newest that a prediction uses, every quarter of 25 samples
         older = masked(trial, ["position"], [range(last + 1, len(trial))])
-        alone = LikelihoodProblem(found.model, [older], found.doubt, ())
+        alone = LikelihoodProblem(found.model, [older], found.noise, ())
         rows = slice(last + 25, last + 31)
         told = alone.foretold(found.model.parameters())[0]["position"].values[rows]
         assert np.abs(shared[rows] - told).max() < 1e-4 * np.ptp(trial["position"])
@@ -180,7 +180,7 @@ def test_a_horizon_uses_nothing_younger():
     column = np.array(trials[0]["position"])
     column[1000 - 24 : 1000] += 0.05  # 0.1 s are 25 samples
     changed = trials[0].with_columns(position=column)
-    before, after = (over_horizon(found.model, t, found.doubt, 0.1)["position"] for t in (trials[0], changed))
+    before, after = (over_horizon(found.model, t, found.noise, 0.1)["position"] for t in (trials[0], changed))
     assert after[1000] == before[1000]
     assert after[1060] != before[1060]
 
@@ -203,7 +203,7 @@ def test_another_scale_of_the_reading_is_another_inertia_and_nothing_more(error)
 
 
 def test_costs_of_points_side_by_side_are_those_of_each_linearized(fitted):
-    problem = LikelihoodProblem(fitted.model, fitted.trials[:2], fitted.doubt)
+    problem = LikelihoodProblem(fitted.model, fitted.trials[:2], fitted.noise)
     points = [
         ({**fitted.values, "inertia_scale": k * fitted.values["inertia_scale"]}, fitted.unknowns[:2])
         for k in (1.0, 1.1, 0.8)

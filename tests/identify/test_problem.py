@@ -5,8 +5,8 @@ import pytest
 from identify.rigs import measured
 from models.cases import RIGS, trial
 
-from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.noise import Noise
 from fes_pin.models.effects import effect_named
 from fes_pin.models.model import Model
 

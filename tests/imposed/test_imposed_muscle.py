@@ -14,7 +14,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.turns import maximise
+from fes_pin.identify.likelihood_fit import maximise
 from fes_pin.models.catalogue import Catalogue, shipped
 from fes_pin.models.effects import ForceLength, ForceVelocity, ParallelStiffness, PulseSummation, SeriesElasticity
 from fes_pin.models.model import Model
@@ -157,7 +157,7 @@ def test_a_random_force_acts_on_a_muscle_on_a_lever():
     study = study_of()
     trial = study.trials[0].with_columns(force_n=12.0 * activation() + wandering(len(TIME), DT, 0.1, 0.05, RNG))
     problem = LikelihoodProblem(Model(MUSCLE), [trial], first_guess(Model(MUSCLE), [trial]))
-    found = maximise(problem, Model(MUSCLE).parameters()).doubt
+    found = maximise(problem, Model(MUSCLE).parameters()).noise
     assert found.std["force"] == pytest.approx(0.1, rel=0.4) and found.white["force_n"] < 0.02
 
 

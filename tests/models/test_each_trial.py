@@ -7,9 +7,9 @@ from models.cases import CASES, RIGS, name_of, trial
 from fes_pin.data.errors import InputError
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import fit_problem
-from fes_pin.identify.noise import Noise
 from fes_pin.identify.per_trial import amplitude, predictions
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.noise import Noise
 from fes_pin.models.effects import EFFECTS
 from fes_pin.models.model import Model
 from fes_pin.models.predict import predict

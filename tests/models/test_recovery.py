@@ -9,8 +9,8 @@ import pytest
 from models.cases import FELT, KINDS, RIGS, name_of, trial
 
 from fes_pin.identify.fit import fit_problem
-from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Problem, measured_columns
+from fes_pin.infer.noise import Noise
 from fes_pin.infer.optimize import TOLERANCE
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import simulate

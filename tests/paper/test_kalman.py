@@ -8,7 +8,7 @@ from paper_ankle.twin import record
 
 from fes_pin.data.errors import InputError
 from fes_pin.identify.fit import fit
-from fes_pin.identify.noise import Noise
+from fes_pin.infer.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.paper.kalman import GainFilter, RegressionFilter, StraightRecruitment, track_gain
 

@@ -15,6 +15,7 @@ from html.parser import HTMLParser
 from urllib.parse import unquote
 
 import pytest
+from identify.rigs import as_likely
 from view.reported import NASTY, ankle_diagnosis, ankle_study, diagnosed, joint_study, muscle_study
 
 import fes_pin as fp
@@ -232,12 +233,12 @@ def driven_diagnosis(folder, free):
     """A joint whose effort answers the reading, as if judged so; `free` is its free error."""
     made = diagnosed(joint_study(folder), ("coulomb_friction",))
     white = dict.fromkeys(("position", "velocity"), 1e-3)
-    doubt = Doubt(white, {"effort": 1e-3}, {"effort": 0.1})
+    noise = Doubt(white, {"effort": 1e-3}, {"effort": 0.1})
     before, after = Ahead(2e-4, 9.5, free, 0.3), Ahead(1e-4, 0.4, free, 0.2)
     return replace(
         made,
-        nominal=replace(made.nominal, doubt=doubt),
-        extended=replace(made.extended, doubt=doubt),
+        nominal=as_likely(made.nominal, noise),
+        extended=as_likely(made.extended, noise),
         ahead=AheadErrors(0.3, before, after, before, after),
         random=(RandomPart("effort", 1e-3, 0.1, 0.02),),
         nominal_error=(free, None),

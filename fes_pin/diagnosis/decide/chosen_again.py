@@ -20,19 +20,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.scatter import at_rest
 from fes_pin.infer.scoring import LITTLE
 
-Worthwhile = Callable[[Fit, Fit, float, float], bool]
-"""Whether a set is worth more than a smaller one where it gains so much in twice the log-likelihood, and all its causes
-together so much."""
+F = TypeVar("F", bound=Fit)
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class _Trial:
     curvature: np.ndarray
 
 
-class ChosenAgain:
+class ChosenAgain(Generic[F]):
     """Sets to choose among, each fitted to the same trials.
 
     Parameters
@@ -53,15 +53,16 @@ class ChosenAgain:
     fits
         By names; the nominal model by none.
     earns
-        The rule of the search.
+        The rule of the search: whether a set is worth more than a smaller one where it gains so much in twice the
+        log-likelihood, and all its causes together so much.
     """
 
-    def __init__(self, fits: Mapping[Names, Fit], earns: Worthwhile) -> None:
+    def __init__(self, fits: Mapping[Names, F], earns: Callable[[F, F, float, float], bool]) -> None:
         self._fits = {n: f for n, f in fits.items() if math.isfinite(f.sse)}
         self._earns = earns
         self._trials = {n: _by_trial(f) for n, f in self._fits.items()}
 
-    def without(self, held: Sequence[int]) -> Fit:
+    def without(self, held: Sequence[int]) -> F:
         """The fit, to all trials, of the set that is chosen without some of them."""
         costs = {n: self._cost(n, held) for n in self._fits}
         best: Names = ()
@@ -81,7 +82,7 @@ class ChosenAgain:
         many = sum(t.readings for t in every) / sum(t.readings for t in others)
         slope, curvature, step = _step(others)
         gained = float(slope @ step)
-        if self._fits[names].doubt is not None:  # what all promise together no step has kept
+        if isinstance(self._fits[names], LikelihoodFit):  # what all promise together no step has kept
             _, _, kept = _step(every)
             gained -= float(2.0 * slope @ kept - kept @ curvature @ kept)
         return many * (sum(t.cost for t in others) - gained)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.errors_ahead import errors_over_horizon
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.result import Gain
 
@@ -16,17 +16,19 @@ from fes_pin.infer.result import Gain
 class Fold:
     """Fits without some trials, and those trials."""
 
-    nominal: Fit
-    best: Fit
-    without: dict[str, Fit]
+    nominal: LikelihoodFit
+    best: LikelihoodFit
+    without: dict[str, LikelihoodFit]
     test: tuple[Trial, ...]
     within: bool = True
     """False if the trials were held out by the study itself, and are in no fit."""
-    chosen: Fit | None = None
+    chosen: LikelihoodFit | None = None
     """What is chosen anew without the trials, fitted to the others; None where `best` is not to be doubted."""
 
 
-def gains_of(folds: Sequence[Fold], without: Mapping[str, Fit], horizon_s: float, seed: int) -> dict[str, Gain]:
+def gains_of(
+    folds: Sequence[Fold], without: Mapping[str, LikelihoodFit], horizon_s: float, seed: int
+) -> dict[str, Gain]:
     """What each cause gains over the horizon.
 
     Where that is nothing, over as long as the random effort lasts that stands for the cause in the fit without it: a
@@ -44,9 +46,7 @@ def gains_of(folds: Sequence[Fold], without: Mapping[str, Fit], horizon_s: float
     found_over = _gains_over(folds, tuple(without), horizon_s, seed)
     shortest = min(t.duration for f in folds for t in f.test)
     for name, gain in found_over.items():
-        doubt = without[name].doubt
-        assert doubt is not None
-        lasts = min(max(doubt.time.values(), default=0.0), shortest)
+        lasts = min(max(without[name].noise.time.values(), default=0.0), shortest)
         if not gain.is_material and lasts > horizon_s:
             longer = _gains_over(folds, (name,), lasts, seed)[name]
             found_over[name] = replace(longer, ahead_s=lasts) if longer.is_material else gain
@@ -56,7 +56,7 @@ def gains_of(folds: Sequence[Fold], without: Mapping[str, Fit], horizon_s: float
 def _gains_over(folds: Sequence[Fold], names: Sequence[str], horizon_s: float, seed: int) -> dict[str, Gain]:
     """What causes gain on the trials of the folds, so far ahead."""
 
-    def errors(of: Callable[[Fold], Fit]) -> Errors:
+    def errors(of: Callable[[Fold], LikelihoodFit]) -> Errors:
         return errors_over_horizon([(of(f), f.best, f.test) for f in folds], horizon_s)
 
     if not names:

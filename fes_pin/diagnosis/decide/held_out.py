@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,11 +10,11 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import SquaredErrors, default_horizon, forecast_errors, own_noise
 from fes_pin.identify.fit import Fit, fit_problem, go_on
-from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.per_trial import predictions
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import Errors, added_likelihood, deal, joined_errors, within
 from fes_pin.infer.levels import RUNAWAY
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.result import Evidence
 from fes_pin.models.model import Model
 from fes_pin.workers import in_parallel
@@ -72,7 +72,7 @@ class HeldOut:
 def cross_validate(
     nominal: Fit,
     best: Fit,
-    without: dict[str, Fit],
+    without: Mapping[str, Fit],
     choose: Callable[[Sequence[int]], Fit],
     floor: NoiseModel,
     horizon_s: float | None = None,
@@ -133,7 +133,7 @@ def _fold(
 def separate(
     nominal: Fit,
     best: Fit,
-    without: dict[str, Fit],
+    without: Mapping[str, Fit],
     test: Sequence[Trial],
     floor: NoiseModel,
     horizon_s: float | None = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 from fes_pin.data.study import Study
 from fes_pin.diagnosis.experiment import NextExperiment, next_experiment
@@ -13,6 +14,8 @@ from fes_pin.identify.per_trial import amplitude
 from fes_pin.infer.levels import ABSORBED_BELOW, SEPARABLE
 from fes_pin.infer.result import Cause, ParameterEstimate, Ranked, Remainder
 from fes_pin.infer.scatter import least_apart
+
+F = TypeVar("F", bound=Fit)
 
 
 def estimates(fitted: Fit, name: str) -> dict[str, ParameterEstimate]:
@@ -56,7 +59,7 @@ def alternatives(best: Fit, rivals: Sequence[Fit], name: str) -> tuple[str, ...]
     return tuple(sorted({e.name for f in not_excluded(best, rivals) for e in f.model.effects} - others - {name}))
 
 
-def not_excluded(best: Fit, rivals: Sequence[Fit]) -> list[Fit]:
+def not_excluded(best: Fit, rivals: Sequence[F]) -> list[F]:
     """The rivals that are as cheap, or as likely, as far as data tell."""
     return [f for f in rivals if min(f.price - best.price, f.sse - best.sse) < least_apart(best, f)]
 

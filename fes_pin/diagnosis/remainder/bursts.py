@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from fes_pin.diagnosis.remainder.innovations import autocorrelation, convolved, normal_scores
-from fes_pin.identify.noise import Noise
 from fes_pin.infer.distributions import pearson3_tail
+from fes_pin.infer.noise import Noise
 
 HUMPS_S = (0.06, 0.12, 0.25, 0.5, 1.0)
 """Lengths of a passing deviation, s: from a twitch to a slow pull."""

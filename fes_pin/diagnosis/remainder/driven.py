@@ -16,8 +16,9 @@ import numpy as np
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.remainder.open_set import beside_smooth, inflation_by_signs, trial_shares
 from fes_pin.diagnosis.search.score import Projection
-from fes_pin.identify.fit import Fit, fit
+from fes_pin.identify.fit import fit
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.result import Remainder
@@ -30,7 +31,7 @@ KEPT = 1e-3
 """Share of a feature's norm that what was fitted must leave for it to be judged."""
 
 
-def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
+def driven_remainder(fitted: LikelihoodFit, seed: int = 0) -> Remainder:
     """Test whether a fit by the likelihood leaves anything but noise.
 
     A rig that begins at rest can be simulated freely as well: what the same causes leave then is tested as elsewhere,
@@ -38,8 +39,7 @@ def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     significant of the tests, times their number.
     """
     featured = _features_left(fitted, seed)
-    assert fitted.doubt is not None
-    free = fit(fitted.model, fitted.trials) if fitted.doubt.ar else None
+    free = fit(fitted.model, fitted.trials) if fitted.noise.ar else None
     others = beside_smooth(free, seed) if free is not None and math.isfinite(free.sse) else []
     found = [(featured.p_value, featured.where), *others]
     p_value, where = min(found, key=lambda f: f[0])
@@ -48,7 +48,7 @@ def driven_remainder(fitted: Fit, seed: int = 0) -> Remainder:
     return Remainder(unexplained, p_value, where if unexplained else None)
 
 
-def _features_left(fitted: Fit, seed: int) -> Remainder:
+def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
     """Test whether any feature stands out of what a fit leaves.
 
     A remainder is claimed at the level that a cause is. Half of it goes to the largest single feature, half to all
@@ -100,8 +100,7 @@ class _Featured:
         False where fits followed slopes for gains as they are to the end.
     """
 
-    def __init__(self, fitted: Fit) -> None:
-        assert fitted.doubt is not None
+    def __init__(self, fitted: LikelihoodFit) -> None:
         signals = {s for t in fitted.trials for s in fitted.model.rig.signals(t.kind)}
         kinds = [EffortFeatures if "torque" in signals else ForceFeatures]
         kinds += [ReadingFeatures] if "reading" in signals else []
@@ -110,7 +109,7 @@ class _Featured:
             self._model = self._model + _scaled(kind(), fitted)
         self.names = [n for kind in kinds for n in kind.functions]
         free = tuple(f"{kind.name}.a{k:02d}" for kind in kinds for k in range(len(kind.functions)))
-        self._problem = LikelihoodProblem(self._model, fitted.trials, fitted.doubt, free)
+        self._problem = LikelihoodProblem(self._model, fitted.trials, fitted.noise, free)
         self.can_keep = not self._problem.is_final
         run = self._problem.innovations(self._model.parameters(), fitted.unknowns)
         columns = [-i.over_deviations(i.sensitivities[..., : len(free)]) for i in run]
@@ -135,7 +134,7 @@ class _Featured:
         return max(0.0, now - min(costs))
 
 
-def _scaled(effect: Effect, fitted: Fit) -> Effect:
+def _scaled(effect: Effect, fitted: LikelihoodFit) -> Effect:
     """Features whose variables run from about -1 to 1 in these trials."""
     rig, trials = fitted.model.rig, fitted.trials
     moved = [t[(*rig.schema.motion(t.kind), rig.output(t.kind))[0]] for t in trials]

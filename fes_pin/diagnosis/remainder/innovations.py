@@ -11,8 +11,8 @@ import scipy.special
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, noise_of
-from fes_pin.identify.noise import ORDERS, Noise, first_order_low_pass, thin, thinning
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.noise import ORDERS, Noise, first_order_low_pass, thin, thinning
 
 CLIP = 4.0
 """Innovations beyond this, in standard deviations, count as this."""

@@ -12,8 +12,8 @@ import numpy as np
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import near_null
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.problem import Problem, answered_columns, measured_columns
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.models.catalogue import installed
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect

@@ -19,10 +19,10 @@ from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, started
 from fes_pin.identify.doubts import first_guess, stilled
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.fresh_efforts import fresh
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets
 from fes_pin.infer.optimize import WORTH
@@ -47,7 +47,7 @@ Starts = list[tuple[Scored, ...]]
 """Causes that a set is extended by, with their linear estimates; of one cause several shapes, best first."""
 
 
-class LikelihoodFits(FittedSets[Fit, Starts]):
+class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     """Fits of sets of causes to one set of trials, by the names of the causes; `()` is the nominal model.
 
     Parameters
@@ -82,19 +82,19 @@ class LikelihoodFits(FittedSets[Fit, Starts]):
         self.model, self.trials = Model(model.rig), tuple(trials)
         self.library = Library(self.model, trials, effects, answered)
         self._calm: Doubt | None = None
-        self._compared: dict[tuple[Names, str], Fit] = {}
+        self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
         self._maxima = LikelihoodMaxima(trials)
         self.screen = LikelihoodScreen(self.library)
         self.forms = LikelihoodForms(self._maxima, self.library.measured)
 
-    def begun_with(self, fits: Sequence[Fit]) -> Self:
+    def begun_with(self, fits: Sequence[LikelihoodFit]) -> Self:
         """The same trials and causes, with some fits to begin with; what is random is timed as in them."""
         other = copy.copy(self)
         other.fits = {names_of(f): f for f in fits}
         other._converged, other._begun, other._compared = set(), set(), {}
         return other
 
-    def nominal(self) -> Fit:
+    def nominal(self) -> LikelihoodFit:
         """Fit the nominal model, from several sizes of what is random; as it is where the fits began with one."""
         if () in self.fits:
             return self.fits[()]
@@ -102,28 +102,26 @@ class LikelihoodFits(FittedSets[Fit, Starts]):
         self.fits[()] = self._from_rest() if from_rest else with_new_noise(self.trials, self._nominal)
         return self.fits[()]
 
-    def _from_rest(self) -> Fit:
+    def _from_rest(self) -> LikelihoodFit:
         """The nominal fit under noise that foretells itself; with a random effort besides, if that earns its price."""
         guess = first_guess(self.model, self.trials)
         calm = self._with_orders(self._maxima.from_start(self.model, stilled(self.model, self.trials, guess)))
-        assert calm.doubt is not None
-        self._calm = calm.doubt
+        self._calm = calm.noise
         if not guess.std:
             return calm
-        white = {n: (0.0,) * len(own) for n, own in calm.doubt.ar.items()}
-        begun = [replace(calm.doubt, std=guess.std, still=())]
+        white = {n: (0.0,) * len(own) for n, own in calm.noise.ar.items()}
+        begun = [replace(calm.noise, std=guess.std, still=())]
         begun += [replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in FIRST_DOUBTS]
         found = in_parallel(lambda d: self._maxima.from_start(calm.model, d), begun)
         return min(calm, self._with_orders(min(found, key=lambda f: f.sse)), key=lambda f: f.price)
 
-    def _with_orders(self, fitted: Fit) -> Fit:
+    def _with_orders(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """A fit again, with autoregressions of the orders that what its filter leaves shows."""
-        assert fitted.doubt is not None
-        problem = LikelihoodProblem(fitted.model, self.trials, fitted.doubt)
-        doubt = problem.with_orders(fitted.values, fitted.unknowns)
-        return self._maxima.from_start(fitted.model, doubt, fitted.unknowns)
+        problem = LikelihoodProblem(fitted.model, self.trials, fitted.noise)
+        noise = problem.with_orders(fitted.values, fitted.unknowns)
+        return self._maxima.from_start(fitted.model, noise, fitted.unknowns)
 
-    def _nominal(self, lasts_s: float) -> Fit:
+    def _nominal(self, lasts_s: float) -> LikelihoodFit:
         """The nominal fit where the noise of a reading lasts so long."""
         guess = first_guess(self.model, self.trials, lasts_s)
         starts = [replace(guess, std={n: k * v for n, v in guess.std.items()}) for k in FIRST_DOUBTS]
@@ -133,11 +131,11 @@ class LikelihoodFits(FittedSets[Fit, Starts]):
         """Little that is random, or nothing where noise foretells itself, with noise that lasts as it does."""
         if self._calm is not None:
             return self._calm
-        known = self.fits[()].doubt
+        known = self.fits[()].noise
         guess = first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
         return fresh(guess, self.trials) if known and known.timed else guess
 
-    def candidates(self, base: Fit) -> dict[str, Candidate[Starts]]:
+    def candidates(self, base: LikelihoodFit) -> dict[str, Candidate[Starts]]:
         """Causes that a fit does not have, each with its shapes of largest score."""
         by_effect = best_by_effect(self.screen.scores(base).scored)
         return {n: Candidate(many[0].gain, [(s,) for s in _of_much(many)]) for n, many in by_effect.items()}
@@ -147,7 +145,7 @@ class LikelihoodFits(FittedSets[Fit, Starts]):
         found = best_pairs(self.screen.scores(self.fits[()]), most)
         return {tuple(sorted((a.probe.name, b.probe.name))): [(a, b)] for a, b in found}
 
-    def begin(self, base: Fit, starts: Mapping[Names, Starts]) -> dict[Names, Fit]:
+    def begin(self, base: LikelihoodFit, starts: Mapping[Names, Starts]) -> dict[Names, LikelihoodFit]:
         """The best of several first fits of each set: at what is random in the base, with little of that, from afar."""
         begun = {k: [_extended(base.model, one) for one in many] for k, many in starts.items()}
         looks = in_parallel(lambda k: self._first_fits(base, starts[k], begun[k]), list(starts))
@@ -155,12 +153,12 @@ class LikelihoodFits(FittedSets[Fit, Starts]):
         each = zip(begun, looks, strict=True)
         return {names: min((*fits, *afresh.get(names, ())), key=lambda f: f.price) for names, fits in each}
 
-    def _first_fits(self, base: Fit, starts: Starts, models: Sequence[Model]) -> list[Fit]:
+    def _first_fits(self, base: LikelihoodFit, starts: Starts, models: Sequence[Model]) -> list[LikelihoodFit]:
         alone = not base.model.effects and len(starts[0]) == 1
         others = self._elsewhere(starts[0][0].probe.effect) if alone else []
         return [*(self._maxima.look(one, base) for one in models), *others]
 
-    def _elsewhere(self, effect: Effect) -> list[Fit]:
+    def _elsewhere(self, effect: Effect) -> list[LikelihoodFit]:
         """Fits from sizes of a cause that no line from its null leads to, beside the rig as it was believed.
 
         Beside nothing alone: an effort with the wrong sign shows there, or nowhere.
@@ -169,42 +167,40 @@ class LikelihoodFits(FittedSets[Fit, Starts]):
         begun = [self.model + one for one in from_afar(effect, self.library.measured)]
         return [self._maxima.from_start(one, guess, rounds=AFRESH_ROUNDS) for one in begun]
 
-    def _afresh(self, starts: Mapping[Names, Model], base: Fit) -> dict[Names, list[Fit]]:
+    def _afresh(self, starts: Mapping[Names, Model], base: LikelihoodFit) -> dict[Names, list[LikelihoodFit]]:
         """Fits that begin with little that is random, where another's random effort takes what a model should.
 
         All take a turn there; those that explain most then go on.
         """
-        assert base.doubt is not None
         guess = self._guess()
-        if all(n in base.doubt.still or base.doubt.std[n] <= FIRST_DOUBTS[-1] * v for n, v in guess.std.items()):
+        if all(n in base.noise.still or base.noise.std[n] <= FIRST_DOUBTS[-1] * v for n, v in guess.std.items()):
             return {}
         first = in_parallel(lambda start: self._maxima.from_start(start, guess, rounds=1), list(starts.values()))
         lowest = sorted(zip(starts, first, strict=True), key=lambda one: one[1].price)[:AFRESH_SETS]
         gone_on = in_parallel(lambda one: self._maxima.go_on(one[1], AFRESH_ROUNDS - 1), lowest)
         return {names: [fitted] for (names, _), fitted in zip(lowest, gone_on, strict=True)}
 
-    def converged(self, fits: Sequence[Fit]) -> list[Fit]:
+    def converged(self, fits: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
         """Fits once they have converged."""
         return in_parallel(self._maxima.go_on, fits)
 
-    def step_gain(self, fitted: Fit) -> float:
+    def step_gain(self, fitted: LikelihoodFit) -> float:
         """What a further step of a fit gains, by its slope and curvature; 0 where it has converged."""
         if fitted.gradient_norm < LITTLE or not math.isfinite(fitted.sse):
             return 0.0
         return step_gain(normal_equations(fitted.parts), [n not in fitted.at_bound for n in fitted.free])
 
-    def form_of(self, fitted: Fit) -> frozenset[tuple[str, tuple[str, ...]]]:
+    def form_of(self, fitted: LikelihoodFit) -> frozenset[tuple[str, tuple[str, ...]]]:
         """Of each cause of a fit its name, and which refinements it has."""
         return frozenset((e.name, e.refined()) for e in fitted.model.effects)
 
-    def without(self, names: Names, name: str) -> Fit:
+    def without(self, names: Names, name: str) -> LikelihoodFit:
         """The fit of a set less one cause, from the set's own values where that is better."""
         rest, whole = tuple(n for n in names if n != name), self.fits[names]
         if self._compared.get((names, name)) is not whole:
-            assert whole.doubt is not None
             effect = next(e for e in whole.model.effects if e.name == name)
             begun = self._maxima.less(whole, effect.amplitudes(), effect)
-            own = self._maxima.from_start(begun, whole.doubt, whole.unknowns)
+            own = self._maxima.from_start(begun, whole.noise, whole.unknowns)
             if any(own.sse > f.sse + WORTH for f in self._parts(rest)):  # it ran away, or a part of it explains more
                 own = self._grown(rest, begun.effects)
             if rest not in self.fits or own.price < self.fits[rest].price:
@@ -212,11 +208,11 @@ class LikelihoodFits(FittedSets[Fit, Starts]):
             self._compared[names, name] = whole
         return self.fits[rest]
 
-    def _parts(self, names: Names) -> list[Fit]:
+    def _parts(self, names: Names) -> list[LikelihoodFit]:
         """The fits of a set and of its parts, best first."""
         return sorted((f for k, f in self.fits.items() if set(k) <= set(names)), key=lambda f: f.sse)
 
-    def _grown(self, names: Names, effects: Sequence[Effect]) -> Fit:
+    def _grown(self, names: Names, effects: Sequence[Effect]) -> LikelihoodFit:
         """The fit of a set from the best fit of a part of it, with one more of its effects after another.
 
         Each begins at nothing, in its own form.
@@ -224,12 +220,11 @@ class LikelihoodFits(FittedSets[Fit, Starts]):
         fitted = self._parts(names)[0]
         for one in effects:
             if one.name not in names_of(fitted):
-                assert fitted.doubt is not None
                 nothing = {n: float(one.parameters()[n].null) for n in one.amplitudes()}  # type: ignore[arg-type]
-                fitted = self._maxima.from_start(fitted.model + started(one, nothing), fitted.doubt, fitted.unknowns)
+                fitted = self._maxima.from_start(fitted.model + started(one, nothing), fitted.noise, fitted.unknowns)
         return fitted
 
-    def is_possible(self, fitted: Fit) -> bool:
+    def is_possible(self, fitted: LikelihoodFit) -> bool:
         """False if the size of a cause is nothing that it can be; see `possible.is_possible`."""
         return is_possible(fitted, self.library.measured)
 

@@ -10,7 +10,7 @@ from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnosis.search.refined_forms import is_identified
 from fes_pin.diagnosis.search.starts import STARTS, begun_anew, forms_beside, refinements
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.optimize import WORTH
 from fes_pin.models.stage import Effect
@@ -31,7 +31,7 @@ class LikelihoodForms:
     def __init__(self, maxima: LikelihoodMaxima, measured: Mapping[str, np.ndarray]) -> None:
         self._maxima, self._measured = maxima, measured
 
-    def refined(self, base: Fit, barred: str | None = None) -> Fit | None:
+    def refined(self, base: LikelihoodFit, barred: str | None = None) -> LikelihoodFit | None:
         """The best fit of a set with the form of one of its effects refined; None where the data demand no form.
 
         What is not half way to what is demanded once its parameters were fitted, beside randomness as it was, is not
@@ -51,7 +51,7 @@ class LikelihoodForms:
         best = min(found, key=lambda f: f.price, default=None)
         return best if best is not None and _is_demanded(best, base) else None
 
-    def otherwise(self, base: Fit) -> Fit | None:
+    def otherwise(self, base: LikelihoodFit) -> LikelihoodFit | None:
         """The best fit of a set whose form lacks one of several refinements, grown from none; None if none is cheaper.
 
         Refinements are adopted one after another, the one that explains most first; two others may explain more.
@@ -61,7 +61,7 @@ class LikelihoodForms:
         best = min(found, key=lambda f: f.price, default=base)
         return best if best.price < base.price - WORTH else None
 
-    def _grown(self, base: Fit, effect: Effect, barred: str) -> Fit:
+    def _grown(self, base: LikelihoodFit, effect: Effect, barred: str) -> LikelihoodFit:
         """A set with one of its effects in the form that the data demand if one refinement of it is barred."""
         adopted = [n for n, *_ in effect.refinements() if n in effect.refined()]
         fitted = self._maxima.go_on(self._maxima.look(self._maxima.less(base, adopted, effect), base))
@@ -69,7 +69,7 @@ class LikelihoodForms:
             fitted = better
         return fitted
 
-    def simplified(self, base: Fit) -> Fit | None:
+    def simplified(self, base: LikelihoodFit) -> LikelihoodFit | None:
         """The best fit of a set with one refinement of a form fewer; None where none is cheaper.
 
         A form that was demanded beside fewer causes may have stood for one that has been found since.
@@ -78,7 +78,7 @@ class LikelihoodForms:
         starts = in_parallel(lambda one: self._maxima.less(base, one[1:], one[0]), list(both))
         return self._maxima.cheaper(starts, base, base.price)
 
-    def reformed(self, base: Fit) -> Fit | None:
+    def reformed(self, base: LikelihoodFit) -> LikelihoodFit | None:
         """A set with several refinements of a form, all begun anew at once; None where that is no better.
 
         They were adopted one after another, and the first may have bent to what a later one says.
@@ -87,7 +87,7 @@ class LikelihoodForms:
         return self._maxima.cheaper(starts, base, base.price - WORTH)
 
 
-def _is_demanded(refined: Fit, base: Fit) -> bool:
+def _is_demanded(refined: LikelihoodFit, base: LikelihoodFit) -> bool:
     degrees = max(refined.degrees - base.degrees, 1)
     p_value = float(chi2_tail(max(base.sse - refined.sse, 0.0), degrees))
     return p_value * forms_beside(base.model, base.model.effects) < level_of(base)

@@ -9,13 +9,13 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import STARTS
-from fes_pin.identify.fit import Fit, fit_problem
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.identify.problem import limits_of
-from fes_pin.identify.turns import maximise
 from fes_pin.infer.covariance import moved_with
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.maximise import ROUNDS
+from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import completed
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
@@ -35,27 +35,25 @@ class LikelihoodMaxima:
     def from_start(
         self,
         model: Model,
-        doubt: Doubt,
+        noise: Doubt,
         unknowns: list[dict[str, float]] | None = None,
         rounds: int = ROUNDS,
         near: bool = False,
-    ) -> Fit:
+    ) -> LikelihoodFit:
         """The maximum from a model's own values and from what is taken for random; see `maximise`."""
-        return maximise(LikelihoodProblem(model, self.trials, doubt), model.parameters(), unknowns, rounds, near)
+        return maximise(LikelihoodProblem(model, self.trials, noise), model.parameters(), unknowns, rounds, near)
 
-    def go_on(self, fitted: Fit, rounds: int = ROUNDS) -> Fit:
+    def go_on(self, fitted: LikelihoodFit, rounds: int = ROUNDS) -> LikelihoodFit:
         """The maximum from where a fit has come to."""
-        assert fitted.doubt is not None
-        return self.from_start(fitted.model, fitted.doubt, fitted.unknowns, rounds, fitted.together)
+        return self.from_start(fitted.model, fitted.noise, fitted.unknowns, rounds, fitted.together)
 
-    def look(self, start: Model, base: Fit) -> Fit:
+    def look(self, start: Model, base: LikelihoodFit) -> LikelihoodFit:
         """A few steps from a start, at what is random in another fit."""
-        assert base.doubt is not None
-        problem = LikelihoodProblem(start, self.trials, base.doubt)
-        found = fit_problem(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)  # type: ignore[arg-type]
-        return replace(found, doubt=base.doubt, together=base.together)
+        problem = LikelihoodProblem(start, self.trials, base.noise)
+        found = minimise(problem, start.parameters(), base.unknowns, SCREEN_ITERATIONS)
+        return replace(fit_of(problem, found), together=base.together)
 
-    def cheaper(self, starts: Sequence[Model], base: Fit, price: float) -> Fit | None:
+    def cheaper(self, starts: Sequence[Model], base: LikelihoodFit, price: float) -> LikelihoodFit | None:
         """The best fit from some starts; None where none is below a price.
 
         Those that look best go on, if what they cost beside randomness as it was is within a parameter's price.
@@ -65,7 +63,7 @@ class LikelihoodMaxima:
         best = min(in_parallel(self.go_on, worth), key=lambda f: f.price, default=None)
         return best if best is not None and best.price < price else None
 
-    def less(self, whole: Fit, gone: Sequence[str], effect: Effect) -> Model:
+    def less(self, whole: LikelihoodFit, gone: Sequence[str], effect: Effect) -> Model:
         """The model of a fit with some parameters of an effect at their nulls; without the effect if these are all.
 
         The others are where the fit's covariance takes them, or where they were: whichever is likelier. An effort's
@@ -81,8 +79,7 @@ class LikelihoodMaxima:
         values = {n: float(np.clip(v, *limits[n])) for n, v in zip(whole.free, there, strict=True)}
         off = whole.model.with_parameters(nulls)
         left = off - effect.name if set(gone) >= set(effect.amplitudes()) else off
-        assert whole.doubt is not None
-        problem = LikelihoodProblem(left, self.trials, whole.doubt)
+        problem = LikelihoodProblem(left, self.trials, whole.noise)
         unknowns = completed(problem.start_unknowns(), whole.unknowns)
         moved = left.with_parameters({n: v for n, v in values.items() if n in left.parameters()})
         costs = problem.costs([(one.parameters(), unknowns) for one in (left, moved)])

@@ -17,14 +17,14 @@ from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnosis.search.score import Scored
 from fes_pin.diagnosis.search.simulation_search import NominalFitError
 from fes_pin.identify.ahead import default_horizon
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Search, SearchResult
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 
-Found = SearchResult[Fit]
+Found = SearchResult[LikelihoodFit]
 """What a search among causes found."""
 
 
@@ -60,7 +60,7 @@ class LikelihoodModels(LikelihoodFits):
         """How far ahead errors over a horizon look, s."""
         return self._horizon_s or default_horizon(self.trials)
 
-    def nominal(self) -> Fit:
+    def nominal(self) -> LikelihoodFit:
         """Fit the nominal model, and simulate the family of score tests of all causes in it.
 
         Raises
@@ -74,7 +74,7 @@ class LikelihoodModels(LikelihoodFits):
         self.family = self.screen.scores(fitted).family(self.seed)
         return fitted
 
-    def extension_p_value(self, fitted: Fit) -> float:
+    def extension_p_value(self, fitted: LikelihoodFit) -> float:
         """Family-wise p-value of the largest score of a further cause."""
         scored = [s for s in self.screen.scores(fitted).scored if s.gain > 0.0]
         single = min((float(chi2_tail(s.gain, max(len(s.amplitudes), 1))) for s in scored), default=1.0)
@@ -85,38 +85,37 @@ class LikelihoodModels(LikelihoodFits):
         more = self.screen.scores(found.best).scored if found.best.model.effects else []
         return self.screen.scores(found.nominal).scored + more
 
-    def excess_scatter(self, larger: Fit, smaller: Fit) -> float:
+    def excess_scatter(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> float:
         """See `infer.scatter.excess_scatter`."""
         return excess_scatter(larger, smaller)
 
-    def level(self, fitted: Fit) -> float:
+    def level(self, fitted: LikelihoodFit) -> float:
         """See `level_of`."""
         return level_of(fitted)
 
-    def is_error_of_form(self, larger: Fit, gain: float, explained: float) -> bool:
+    def is_error_of_form(self, larger: LikelihoodFit, gain: float, explained: float) -> bool:
         """Whether a gain is no more than errors of form leave, and no random effort takes these up."""
-        assert larger.doubt is not None
-        return not larger.doubt.acting and gain < FORM_SHARE * explained
+        return not larger.noise.acting and gain < FORM_SHARE * explained
 
-    def predicts_better(self, larger: Fit, smaller: Fit) -> bool:
+    def predicts_better(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> bool:
         """Whether what a set adds lessens the errors over the horizon, of the very trials that it was fitted to."""
         fold = Fold(self.fits[()], larger, {"": smaller}, self.trials)
         return gains_of([fold], fold.without, self.horizon_s, self.seed)[""].is_material
 
-    def leaves_noise(self, fitted: Fit) -> bool:
+    def leaves_noise(self, fitted: LikelihoodFit) -> bool:
         """Whether a fit has no lack of fit, and its random effort is small."""
         return not (are_large(random_parts(fitted)) or driven_remainder(fitted, self.seed).unexplained)
 
-    def better_form(self, fitted: Fit) -> Fit | None:
+    def better_form(self, fitted: LikelihoodFit) -> LikelihoodFit | None:
         """A set with one refinement of a form fewer, one more, or all begun again, where that is better."""
         return self.forms.simplified(fitted) or self.forms.refined(fitted) or self.forms.reformed(fitted)
 
-    def other_form(self, fitted: Fit) -> Fit | None:
+    def other_form(self, fitted: LikelihoodFit) -> LikelihoodFit | None:
         """See `LikelihoodForms.otherwise`."""
         return self.forms.otherwise(fitted)
 
 
-class LikelihoodSearch(Search[Fit]):
+class LikelihoodSearch(Search[LikelihoodFit]):
     """The search over sets of causes of one study by the likelihood."""
 
     models: LikelihoodModels

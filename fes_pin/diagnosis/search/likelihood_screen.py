@@ -9,8 +9,8 @@ import numpy as np
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.library import Library, Probe
 from fes_pin.diagnosis.search.score import Projection, Scores
-from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
@@ -21,10 +21,10 @@ class LikelihoodScreen:
 
     def __init__(self, library: Library) -> None:
         self._library = library
-        self._scores: dict[int, tuple[Fit, Scores]] = {}
+        self._scores: dict[int, tuple[LikelihoodFit, Scores]] = {}
         self._probing: dict[tuple, LikelihoodProblem] = {}
 
-    def scores(self, base: Fit) -> Scores:
+    def scores(self, base: LikelihoodFit) -> Scores:
         """Promise of every effect that a fit does not have, at what is random in it; none beside one that runs away."""
         if not math.isfinite(base.sse):
             return Scores([], np.zeros((0, 0)), np.zeros(0), [])
@@ -34,22 +34,21 @@ class LikelihoodScreen:
             self._scores[id(base)] = (base, Projection(base.parts).score([p for g in groups for p in g]))
         return self._scores[id(base)][1]
 
-    def _probes(self, effect: type[Effect], base: Fit) -> list[Probe]:
+    def _probes(self, effect: type[Effect], base: LikelihoodFit) -> list[Probe]:
         """The effect with every choice of its shapes beside the nominal parameters of a fit.
 
         Causes that the fit has are left out, but those that the effect shows beside: the predictor follows what was
         measured with them or without.
         """
         nominal = Model(base.model.rig, tuple(e for e in base.model.effects if e.name in effect.beside))
-        assert base.doubt is not None
         out = []
         for one in self._library.grid(effect):
             key = (*(nominal + one).structure(), *(nominal + one).unused_parameters().items())
             if key not in self._probing:  # its columns are those of a fit, which shares the program
-                self._probing[key] = LikelihoodProblem(nominal + one, self._library.trials, base.doubt)
+                self._probing[key] = LikelihoodProblem(nominal + one, self._library.trials, base.noise)
             problem = self._probing[key]
             places = [problem.free.index(f"{effect.name}.{n}") for n in effect.amplitudes()]
-            problem.doubt = base.doubt
+            problem.noise = base.noise
             parts = problem.linearize((nominal + one).parameters(), problem.start_unknowns())
             out.append(Probe(one, np.nan_to_num(np.concatenate([p.jacobian[:, places] for p in parts]))))
         return out

@@ -14,8 +14,8 @@ from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.diagnosis.search.model_fitter import FIRST_ITERATIONS
 from fes_pin.diagnosis.search.simulation_fits import SimulationFits
 from fes_pin.identify.fit import Fit, fit_problem, go_on, noise_of
-from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.noise import NoiseModel, as_white
 from fes_pin.workers import in_parallel
 
 REFINED = 3

@@ -11,8 +11,8 @@ from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.diagnosis.search.score import Scored
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, started
 from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, go_on
-from fes_pin.identify.noise import NoiseModel
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect

@@ -11,7 +11,7 @@ from fes_pin.diagnosis.search.cause_sets import Names
 from fes_pin.diagnosis.search.simulation_fits import SimulationFits
 from fes_pin.diagnosis.search.starts import near_null
 from fes_pin.identify.fit import GROSS, Fit, rough_noise
-from fes_pin.identify.noise import NoiseModel, as_white
+from fes_pin.infer.noise import NoiseModel, as_white
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel

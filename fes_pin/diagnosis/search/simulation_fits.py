@@ -14,8 +14,8 @@ from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.refined_forms import RefinedForms
 from fes_pin.diagnosis.search.score import Projection, Scores
 from fes_pin.identify.fit import Fit, noise_of
-from fes_pin.identify.noise import NoiseModel, as_white
 from fes_pin.identify.noise_floor import rich_noise
+from fes_pin.infer.noise import NoiseModel, as_white
 from fes_pin.infer.optimum import MAX_ITERATIONS
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect

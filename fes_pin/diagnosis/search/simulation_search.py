@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
@@ -15,7 +15,7 @@ from fes_pin.diagnosis.search.restarts import at_null, restart, restart_beside, 
 from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
 from fes_pin.diagnosis.search.simulation_fits import CONVERGED_SETS, SimulationFits
 from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
-from fes_pin.identify.noise import NoiseModel
+from fes_pin.infer.noise import NoiseModel
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import OutOfTime, Progress, time_limit
@@ -83,9 +83,9 @@ class Searched:
     nominal: Fit
     best: Fit
     p_values: dict[str, float]
-    rivals: dict[str, list[Fit]]
+    rivals: Mapping[str, Sequence[Fit]]
     judged: Fit
-    without: dict[str, Fit]
+    without: Mapping[str, Fit]
     scored: list[Scored]
     floor: NoiseModel
     complete: bool = True

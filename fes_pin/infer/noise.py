@@ -11,7 +11,6 @@ import numpy as np
 import scipy.linalg
 from numpy.lib.stride_tricks import as_strided
 
-from fes_pin.data.read_only import ReadOnly
 from fes_pin.infer.levels import PARAMETER_PRICE
 
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
@@ -25,7 +24,7 @@ sinusoid still leaves a deep notch."""
 
 
 @dataclass(frozen=True)
-class Noise(ReadOnly):
+class Noise:
     """Autoregressive noise e_t = ar_1 e_(t-1) + ... + ar_p e_(t-p) + innovation, Gaussian.
 
     Attributes
@@ -44,6 +43,12 @@ class Noise(ReadOnly):
     ar: tuple[float, ...] = ()
     std: float = 0.0
     step_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ar", tuple(self.ar))
+
+    def __reduce__(self) -> tuple[type[Noise], tuple[object, ...]]:
+        return Noise, (self.innovation_std, self.ar, self.std, self.step_s)
 
     def whiten(self, values: np.ndarray, dt: float) -> np.ndarray:
         """Innovations in units of their standard deviation.
@@ -107,37 +112,42 @@ def estimate_noise(
     FloatingPointError
         For residuals whose squares are not finite.
     """
-    total = sum(len(r) for r in residuals)
-    shortest = min(len(r) for r in residuals)
-    possible = [p for p in ORDERS if p <= min(longest, shortest // 10)]
-    orders = [p for p in possible if p >= least] or possible[-1:]
-    order_limit = orders[-1]
-    lagged = [_lags(r, order_limit) for r in residuals if len(r) > 2 * order_limit + 2]
-    if not lagged:  # trials so short have no other order than 0
-        lagged = [_lags(r, 0) for r in residuals]
-    gram = np.sum([m.T @ m for m in lagged], axis=0)
-    count = max(sum(len(m) for m in lagged), 1)
+    orders = _orders(min(len(r) for r in residuals), longest, least)
+    gram, count = _gram(residuals, orders[-1])
     if not np.isfinite(gram).all():
         raise FloatingPointError("residuals whose squares are not finite")
     if not gram[0, 0] > 0.0:  # a channel that is met exactly
         orders = [0]
-    best: tuple[float, int, np.ndarray, float] | None = None
-    for p in orders:
-        ar = (
-            scipy.linalg.solve(gram[1 : p + 1, 1 : p + 1] + _ridge(gram, p), gram[1 : p + 1, 0], assume_a="pos")
-            if p
-            else np.zeros(0)
-        )
-        around = gram[1 : p + 1, 1 : p + 1] + _ridge(gram, p)
-        power = (1.0 + WHITE_SHARE) * gram[0, 0]
-        rss = max(float(power - 2.0 * gram[0, 1 : p + 1] @ ar + ar @ around @ ar), 1e-300)
-        criterion = count * np.log(rss / count) + PARAMETER_PRICE * p
-        if best is None or criterion < best[0]:
-            best = (criterion, p, ar, rss)
-    assert best is not None
-    innovation = float(np.sqrt(best[3] / max(count - best[1] - used, 1)))
+    fits = {p: _autoregression(gram, p) for p in orders}
+    best = min(orders, key=lambda p: count * np.log(fits[p][1] / count) + PARAMETER_PRICE * p)
+    ar, rss = fits[best]
+    innovation = float(np.sqrt(rss / max(count - best - used, 1)))
+    total = sum(len(r) for r in residuals)
     own = float(np.sqrt(sum(float(r @ r) for r in residuals) / max(total - used, 1)))
-    return Noise(max(innovation, 1e-12), tuple(float(a) for a in best[2]), own if std is None else std, step_s)
+    return Noise(max(innovation, 1e-12), tuple(float(a) for a in ar), own if std is None else std, step_s)
+
+
+def _orders(shortest: int, longest: int, least: int) -> list[int]:
+    """Orders that are tried for trials of at least so many samples."""
+    possible = [p for p in ORDERS if p <= min(longest, shortest // 10)]
+    return [p for p in possible if p >= least] or possible[-1:]
+
+
+def _gram(residuals: Sequence[np.ndarray], order: int) -> tuple[np.ndarray, int]:
+    """Inner products of the residual and its past, shape (order + 1, order + 1), and how many samples they hold.
+
+    Of trials too short for the order alone, those of the residual with itself.
+    """
+    lagged = [_lags(r, order) for r in residuals if len(r) > 2 * order + 2] or [_lags(r, 0) for r in residuals]
+    return np.asarray(np.sum([m.T @ m for m in lagged], axis=0)), max(sum(len(m) for m in lagged), 1)
+
+
+def _autoregression(gram: np.ndarray, p: int) -> tuple[np.ndarray, float]:
+    """Coefficients of an order, and the sum of squares that they leave; with a little white noise: `WHITE_SHARE`."""
+    around = gram[1 : p + 1, 1 : p + 1] + WHITE_SHARE * gram[0, 0] * np.eye(p)
+    ar = scipy.linalg.solve(around, gram[1 : p + 1, 0], assume_a="pos") if p else np.zeros(0)
+    power = (1.0 + WHITE_SHARE) * gram[0, 0]
+    return ar, max(float(power - 2.0 * gram[0, 1 : p + 1] @ ar + ar @ around @ ar), 1e-300)
 
 
 BLOCK = 16
@@ -161,7 +171,7 @@ def first_order_low_pass(values: np.ndarray, pole: float) -> np.ndarray:
     """First-order low pass y_t = pole y_(t-1) + (1 - pole) x_t from rest, along an axis of shape (n,)."""
     bands = np.ones((2, len(values)))
     bands[1] = -pole
-    return scipy.linalg.solve_banded((1, 0), bands, (1.0 - pole) * values)
+    return np.asarray(scipy.linalg.solve_banded((1, 0), bands, (1.0 - pole) * values))
 
 
 def thin(values: np.ndarray, count: int) -> np.ndarray:
@@ -180,11 +190,6 @@ def _lags(residual: np.ndarray, order: int) -> np.ndarray:
     """Shape (n - order, order + 1): the residual and its past."""
     n = len(residual)
     return np.stack([residual[order - k : n - k] for k in range(order + 1)], axis=1)
-
-
-def _ridge(gram: np.ndarray, p: int) -> np.ndarray:
-    """A little white noise beside the residual: see `WHITE_SHARE`."""
-    return WHITE_SHARE * gram[0, 0] * np.eye(p)
 
 
 def _correlated(values: np.ndarray, stretch: np.ndarray) -> np.ndarray:

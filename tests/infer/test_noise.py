@@ -7,7 +7,7 @@ import pytest
 import scipy.signal
 import scipy.stats
 
-from fes_pin.identify.noise import (
+from fes_pin.infer.noise import (
     ORDERS,
     WHITE_SHARE,
     Noise,

@@ -1,0 +1,66 @@
+"""Fits by the likelihood of one-step predictions: parameters, with process and measurement noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from fes_pin.data.trial import Trial
+from fes_pin.identify.fit import Fit, ended
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.maximise import ROUNDS, alternate, together
+from fes_pin.infer.optimum import Optimum
+from fes_pin.infer.problem import Unknowns
+from fes_pin.models.predictor import Doubt
+
+
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
+class LikelihoodFit(Fit):
+    """A model with parameters and noise fitted by the likelihood of one-step predictions.
+
+    Attributes
+    ----------
+    noise
+        Process noise and, by output column, measurement noise. `sse` holds the log-determinant.
+    """
+
+    noise: Doubt
+
+    @property
+    def price(self) -> float:
+        """Twice the negative log-likelihood, with a penalty for each degree of freedom and for process noise."""
+        return self.sse + PARAMETER_PRICE * (self.degrees + 2 * len(self.noise.acting))
+
+    def _has_profile(self) -> bool:
+        return False
+
+
+def fit_of(problem: LikelihoodProblem, found: Optimum) -> LikelihoodFit:
+    """The fit of a problem that has ended, with the noise that the problem has come to."""
+    return LikelihoodFit(**ended(problem.model, found), trials=problem.trials, noise=problem.noise)
+
+
+def maximise(
+    problem: LikelihoodProblem,
+    start: Mapping[str, float],
+    unknowns: Unknowns | None = None,
+    rounds: int = ROUNDS,
+    near: bool = False,
+) -> LikelihoodFit:
+    """The likelihood's maximum: by `infer.maximise.alternate`, or by `together` alone if it is near."""
+    if near and not problem.is_final:
+        return fit_of(problem, together(problem, start, unknowns))
+    return fit_of(problem, alternate(problem, start, unknowns, rounds))
+
+
+def maximum_from(fitted: LikelihoodFit, trials: Sequence[Trial], noise: Doubt | None = None) -> LikelihoodFit:
+    """The likelihood's maximum of a fit's model on trials much like its own, from where it ended.
+
+    Parameters
+    ----------
+    noise
+        That the fit begins with; by default that of the fit.
+    """
+    problem = LikelihoodProblem(fitted.model, trials, noise or fitted.noise)
+    return maximise(problem, fitted.values, fitted.unknowns, near=fitted.together)
