@@ -14,7 +14,7 @@ from paper_ankle.twin import record, staircase
 
 import fes_pin as fp
 from fes_pin.identify.fit import fit
-from fes_pin.identify.noise import Noise
+from fes_pin.infer.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
 from fes_pin.paper.kalman import StraightRecruitment

@@ -23,8 +23,8 @@ import fes_pin as fp
 from fes_pin.data.datasets import fetch
 from fes_pin.data.errors import InputError
 from fes_pin.identify.fit import fit_problem
-from fes_pin.identify.noise import Noise
 from fes_pin.identify.problem import Problem
+from fes_pin.infer.noise import Noise
 from fes_pin.models import effects
 from fes_pin.models.store import load_model
 
