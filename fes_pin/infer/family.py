@@ -6,6 +6,7 @@ for the distribution of the largest of correlated statistics by simulation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -52,6 +53,29 @@ class Family:
     def adjusted(self, single: float) -> float:
         """Family-wise p-value of the smallest of the family's p-values."""
         return max(float(-np.expm1(self.tests * np.log1p(-min(single, 1 - 1e-16)))), SMALLEST_P)
+
+
+class SimulatedFamily:
+    """Family-wise p-values of the largest gain of a library, from its gains in data that are simulated without a cause.
+
+    The largest of many gains follows a Gumbel distribution; place and scale are taken from mean and standard deviation.
+    Source: Gumbel, Statistics of Extremes, 1958.
+
+    Parameters
+    ----------
+    largest
+        Shape (draws,): the largest gain of each simulation.
+    """
+
+    def __init__(self, largest: np.ndarray) -> None:
+        self.scale = max(float(np.std(largest)) * math.sqrt(6.0) / math.pi, 1e-6)
+        self.place = float(np.mean(largest)) - float(np.euler_gamma) * self.scale
+
+    def p_value(self, gain: float) -> float:
+        """Chance of at least this gain, 1 where nothing is gained."""
+        if gain <= 0.0:
+            return 1.0
+        return max(float(-np.expm1(-np.exp(-(gain - self.place) / self.scale))), SMALLEST_P)
 
 
 def coherence_p_value(few: Sequence[np.ndarray], many: Sequence[np.ndarray], gain: float, degrees: int) -> float:

@@ -120,9 +120,9 @@ ON = {
     STOPPED: "on what was fitted, as the search was stopped",
 }
 """The same in words."""
-ERROR, DEVIANCE, LIKELIHOOD = "squared error above the noise", "deviance", "twice the log-likelihood"
-"""Measures of the gain of a cause: what the nominal model errs by, less what noise alone makes; minus twice the
-log-likelihood without the cause; or by how much twice the log-likelihood grows with it."""
+ERROR, LIKELIHOOD = "squared error above the noise", "twice the log-likelihood"
+"""Measures of the gain of a cause: what the nominal model errs by, less what noise alone makes; or by how much twice the
+log-likelihood grows with it."""
 
 
 @dataclass(frozen=True)
@@ -133,8 +133,6 @@ class Gain:
     ----------
     ahead_s
         How far ahead, where that is further than the horizon; s.
-    measure
-        `ERROR` or `DEVIANCE`, of which it is a share.
     on
         What data it is found on: a key of `ON`.
     """
@@ -143,12 +141,18 @@ class Gain:
     low: float
     high: float
     ahead_s: float | None = None
-    measure: str = ERROR
     on: str = CROSS_VALIDATED
 
     def __str__(self) -> str:
+        if self.is_none:
+            return "none computed"
         further = "" if self.ahead_s is None else f", {self.ahead_s:.2g} s ahead"
         return f"{self.percent:.0f} % [{self.low:.0f}, {self.high:.0f}]{further}"
+
+    @property
+    def is_none(self) -> bool:
+        """Whether none was computed."""
+        return math.isnan(self.percent)
 
     @property
     def is_material(self) -> bool:
@@ -163,7 +167,11 @@ class Gain:
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
         size = {"percent": shown(self.percent), "low": shown(self.low), "high": shown(self.high)}
-        return {"measure": self.measure, "on": self.on, **size}
+        return {"measure": ERROR, "on": self.on, **size}
+
+
+NO_GAIN = Gain(math.nan, math.nan, math.nan)
+"""Of a cause that no error is computed of."""
 
 
 @dataclass(frozen=True)
@@ -403,7 +411,7 @@ class Cause(Named):
     stage: str
     gain_fit: float
     gain_held_out: Gain
-    evidence: Gain | Evidence | None = None
+    evidence: Evidence | None = None
     chosen_again: tuple[int, int] | None = None
     elsewhere: tuple[str, ...] = ()
     further: Mapping[str, float | None] = field(default_factory=dict)
@@ -448,7 +456,7 @@ class Cause(Named):
             "gain_percent": {
                 "fit": shown(self.gain_fit),
                 "held_out": shown(gain.percent) if gain.is_held_out else None,
-                "ci95": [shown(gain.low), shown(gain.high)],
+                "ci95": None if gain.is_none else [shown(gain.low), shown(gain.high)],
                 **({"ahead_s": shown(gain.ahead_s)} if gain.ahead_s is not None else {}),
                 **{n: shown(value) for n, value in self.further.items()},
             },

@@ -119,13 +119,14 @@ class Policy:
     beam
         Sets of a size that are extended. Greedy search (1) names fewer pairs exactly.
     fitted
-        Candidates that are fitted together with a set, those of largest score; with the nominal model all are.
+        Candidates that are fitted together with a set, those of largest score; None for all. With the nominal model
+        all are.
     pairs
         Pairs that the score test proposes, for candidates that show nothing alone.
     """
 
     beam: int = 3
-    fitted: int = 8
+    fitted: int | None = 8
     pairs: int = 4
 
 

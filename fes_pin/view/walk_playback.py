@@ -25,7 +25,7 @@ LONGEST_S = 4.0
 def walk_answer_files(diagnosis: WalkDiagnosis) -> dict[str, str | bytes]:
     """Every file of a diagnosis of walking by name: its record, model and body, its report, and the first trial as a
     playback."""
-    first = diagnosis.search.banks.recordings[0]
+    first = diagnosis.models.banks.recordings[0]
     scene = show_reactions(first.motion, first.plates, f"{diagnosis.study.name}, {first.name}")
     return {**walk_files(diagnosis), "report.html": walk_report_html(diagnosis), PLAYBACK_FILE: scene.html()}
 

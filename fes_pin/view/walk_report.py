@@ -28,7 +28,7 @@ WIDE, ROW, AXIS = 420.0, 160.0, 66.0
 def walk_report_html(diagnosis: WalkDiagnosis) -> str:
     """The report as one HTML page that needs nothing else: no network, no script."""
     words = diagnosis.headline()
-    strides = diagnosis.search.banks.strides.count
+    strides = diagnosis.models.banks.strides.count
     partly = " partly" if diagnosis.causes and diagnosis.remainder.unexplained else ""
     head = element(
         "header",
@@ -95,15 +95,14 @@ def _use(diagnosis: WalkDiagnosis) -> list[Markup]:
 
 
 def _trials(diagnosis: WalkDiagnosis) -> list[Markup]:
-    banks, best = diagnosis.search.banks, diagnosis.best
+    banks, best = diagnosis.models.banks, diagnosis.best
     legend = key(("measured", "measured"), ("nominal", "required"), ("extended", "required by the extended model"))
     out = [legend]
     for number, scene in enumerate(banks.as_read.scenes):
         made = None
-        if best.forms:
-            with_it = banks.bank(best.forms).scenes[number]
-            columns = np.concatenate([banks.forms[i].columns(with_it) for i in best.forms], axis=2)
-            made = scene.measured - (with_it.residual - columns @ best.fitted.values)
+        if best.names:
+            with_it = banks.bank(best.names).scenes[number]
+            made = scene.measured - (with_it.residual - banks.signals(best.names, with_it) @ best.fitted.values)
         curves = {"measured": scene.measured, "nominal": scene.needed} | ({} if made is None else {"extended": made})
         single = scene.plates.loaded["left"] ^ scene.plates.loaded["right"]
         drawn = _drawing(scene.name, scene.motion.time, curves, single)

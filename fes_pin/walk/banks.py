@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -10,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from fes_pin.body.build import GRAVITY
+from fes_pin.infer.search import Names
 from fes_pin.walk.disturb import compressed, disturbed_waves, misplaced, tissue, white
+from fes_pin.walk.effect import Form
 from fes_pin.walk.effects import walk_library
 from fes_pin.walk.likelihood import MEAN_ARM_M, MEAN_FORCE, MEAN_TWIST_NM, WalkNoise, fit_walk, rotation
 from fes_pin.walk.recording import WalkRecording
@@ -24,16 +27,14 @@ moves by 10 mm and more where a trunk moves by 20 to 40 (A. Leardini et al., Gai
 SHIFT_ROUNDS = 4
 """Of following a shift of the clock."""
 
-Chosen = tuple[int, ...]
-
 
 @dataclass(frozen=True)
 class Bank:
-    """Residual and columns of every form, (1, 6, k, ...) in the mean stride, for plates read `later_s` late."""
+    """Residual and columns of every form by name, (1, 6, k, ...) in the mean stride, for plates read `later_s` late."""
 
     scenes: list[Scene] = field(repr=False)
     y: np.ndarray = field(repr=False)
-    x: list[np.ndarray] = field(repr=False)
+    x: dict[str, np.ndarray] = field(repr=False)
     later_s: float = 0.0
 
 
@@ -45,9 +46,9 @@ class Banks:
     recordings, cutoff_hz, seed
         As given.
     forms
-        The library; a set of forms is their numbers in it.
+        The library, by names.
     shift
-        The number of the form that shifts the plates' clock.
+        The name of the form that shifts the plates' clock.
     strides
         What signals are taken apart into.
     as_read, shifted
@@ -60,27 +61,32 @@ class Banks:
 
     def __init__(self, recordings: Sequence[WalkRecording], cutoff_hz: float, seed: int = 0) -> None:
         self.recordings, self.cutoff_hz, self.seed = list(recordings), cutoff_hz, seed
-        self.forms = walk_library()
-        self.shift = next(i for i, f in enumerate(self.forms) if f.shifts)
+        self.forms = _by_name()
+        self.shift = next(n for n, f in self.forms.items() if f.shifts)
         scenes = [scene_of(r, cutoff_hz) for r in self.recordings]
         self.strides: Strides = strides_of(scenes, cutoff_hz)
         self._first = self.recordings[self.strides.windows[0][0]]
         self.as_read = self._bank(scenes, 0.0)
-        self.turn(self.as_read.y)
+        self._turn(self.as_read.y)
         self.shifted = self._shifted()
 
     def __getstate__(self) -> dict[str, Any]:
         return {n: v for n, v in vars(self).items() if n != "forms"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, forms=walk_library())  # forms hold functions, which are the library's own
+        vars(self).update(state, forms=_by_name())  # forms hold functions, which are the library's own
 
     def _bank(self, scenes: list[Scene], later_s: float) -> Bank:
-        x = [self.strides.mean([form.columns(s) for s in scenes]) for form in self.forms]
+        x = {n: self.strides.mean([form.columns(s) for s in scenes]) for n, form in self.forms.items()}
         return Bank(scenes, self._residual(scenes), x, later_s)
 
     def _residual(self, scenes: list[Scene]) -> np.ndarray:
         return self.strides.mean([s.residual[:, :, None] for s in scenes])[..., 0]
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        """The measured reaction in every stride: (n, 6, k)."""
+        return self.strides.coefficients([s.measured[:, :, None] for s in self.as_read.scenes])[..., 0]
 
     @cached_property
     def landmarks(self) -> np.ndarray:
@@ -97,8 +103,13 @@ class Banks:
         """Residuals that white noise of one unit leaves in a stride: (draws, 6, k)."""
         return disturbed_waves(self._first, self.strides, white, WHITE_DRAWS, self.seed)
 
-    def turn(self, left: np.ndarray) -> None:
-        """Rotate the channels for what is left, (1, 6, k)."""
+    def turned(self, residual: np.ndarray) -> Banks:
+        """The same with channels rotated for the residual of a set, (1, 6, k)."""
+        other = copy.copy(self)
+        other._turn(residual)
+        return other
+
+    def _turn(self, left: np.ndarray) -> None:
         turn = rotation(left, self.strides.harmonics)
         weight = GRAVITY * sum(p[0] for p in self.as_read.scenes[0].parameters.values())
         means = np.r_[np.full(3, MEAN_FORCE * weight), np.full(2, MEAN_ARM_M * weight), MEAN_TWIST_NM] ** 2
@@ -111,7 +122,7 @@ class Banks:
 
     def _in_every_session(self) -> np.ndarray:
         """What ordinary errors of landmarks and plates leave, in units of their standard deviations: (1, 6, k, m)."""
-        forms = [(self.as_read.x[i], f.ordinary) for i, f in enumerate(self.forms) if f.ordinary > 0.0]
+        forms = [(self.as_read.x[n], f.ordinary) for n, f in self.forms.items() if f.ordinary > 0.0]
         landmarks = np.moveaxis(self.landmarks, 0, 2)[None]
         return np.concatenate([landmarks, *(size * columns for columns, size in forms)], axis=3)
 
@@ -129,21 +140,42 @@ class Banks:
                 break
         return self._bank(scenes, later)
 
-    def bank(self, chosen: Chosen) -> Bank:
+    def bank(self, names: Names) -> Bank:
         """The bank in which a set is fitted: with the clock moved if it holds a shift."""
-        return self.shifted if self.shift in chosen else self.as_read
+        return self.shifted if self.shift in names else self.as_read
 
-    def columns(self, chosen: Chosen) -> np.ndarray:
-        """Rotated columns of a set, one form after the other: (n, 6, k, p)."""
-        bank = self.bank(chosen)
-        return self.noise.rotated(np.concatenate([bank.x[i] for i in chosen], axis=3)) if chosen else self._none()
+    def columns(self, names: Names) -> np.ndarray:
+        """Rotated columns of a set in the mean stride, one form after the other: (n, 6, k, p)."""
+        return self.noise.rotated(self._columns(names))
+
+    def residual(self, names: Names, values: np.ndarray) -> np.ndarray:
+        """What a set leaves of the mean stride, (1, 6, k)."""
+        return self.bank(names).y - self._columns(names) @ values
+
+    def by_stride(self, names: Names) -> tuple[np.ndarray, np.ndarray]:
+        """Residual (n, 6, k) and columns (n, 6, k, p) of a set, stride by stride."""
+        scenes = self.bank(names).scenes
+        y = self.strides.coefficients([s.residual[:, :, None] for s in scenes])[..., 0]
+        return y, self.strides.coefficients([self.signals(names, s) for s in scenes])
+
+    def signals(self, names: Names, scene: Scene) -> np.ndarray:
+        """Columns of a set along a trial: (n, 6, p)."""
+        empty = np.zeros((len(scene.centre), 6, 0))
+        return np.concatenate([empty, *(self.forms[n].columns(scene) for n in names)], axis=2)
+
+    def plausible(self, names: Names) -> np.ndarray:
+        """Plausible size of every parameter of a set, (p,)."""
+        return np.array([size for n in names for size in self.forms[n].plausible])
+
+    def _columns(self, names: Names) -> np.ndarray:
+        return np.concatenate([self._none(), *(self.bank(names).x[n] for n in names)], axis=3)
 
     def _none(self) -> np.ndarray:
         return np.zeros((*self.as_read.y.shape, 0))
 
-    def causes(self, chosen: Chosen) -> list[str]:
-        """Names of a set's causes."""
-        return [self.forms[i].cause for i in chosen]
+
+def _by_name() -> dict[str, Form]:
+    return {form.label: form for form in walk_library()}
 
 
 def _taken(scenes: list[Scene], strides: Strides) -> np.ndarray:

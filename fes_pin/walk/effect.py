@@ -62,8 +62,13 @@ class Form:
 
     @property
     def label(self) -> str:
-        """Cause and site."""
+        """Cause and site: its name among all forms."""
         return f"{self.cause} ({self.site})"
+
+    @property
+    def place(self) -> tuple[str, str]:
+        """Cause and site without the form that it has there."""
+        return self.cause, self.site.split(",")[0]
 
 
 class WalkEffect:

@@ -8,18 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from fes_pin.data.read_only import ReadOnly
+from fes_pin.infer.search import SearchResult
 from fes_pin.walk.banks import Banks
 from fes_pin.walk.dynamics import about, centre_of_mass, required
-from fes_pin.walk.fits import Set
+from fes_pin.walk.models import STRONG_EVIDENCE, WalkFit, WalkModels
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import Plates
 from fes_pin.walk.scene import Scene
-from fes_pin.walk.search import WalkSearch
 
 CARRIED_KG = 10.0
 SLOWER = 0.6
-ENOUGH = 6.0
-"""Twice the log-likelihood that separates, as in the diagnosis."""
 
 
 @dataclass(frozen=True)
@@ -44,26 +42,24 @@ class NextWalk(ReadOnly):
     coordinates: dict[str, np.ndarray] | None
 
 
-def next_walk(search: WalkSearch, best: Set, cause: str, within: float) -> NextWalk | None:
+def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> NextWalk | None:
     """The trial that separates a cause from its nearest rival of another name; None if it has none."""
-    banks, rivals = search.banks, []
-    for gone, other in search.swaps(best):
-        (new,) = set(other.forms) - set(best.forms) or {gone}
-        form = banks.forms[new]
-        if banks.forms[gone].cause == cause and form.cause != cause and other.price - best.price < within:
-            rivals.append((other.price, gone, new, other))
+    banks, best = models.banks, found.best
+    own = {n for n in best.names if banks.forms[n].cause == cause}
+    near = [(r.price, set(r.names) - set(best.names), n) for n in own for r in models.near_rivals(found, n)]
+    rivals = [(price, new, gone) for price, (new,), gone in near if banks.forms[new].cause != cause]
     if not rivals:
         return None
-    _, gone, new, other = min(rivals, key=lambda r: (r[0], r[2]))
+    _, new, gone = min(rivals)
     pair = (cause, banks.forms[new].cause)
-    signal = search.fits.sizes(best)[gone]
+    signal = models.sizes(best)[gone]
     scores = {}
     for name, make in _TRIALS.items():
         scene = make(banks.as_read.scenes[0])
-        mine, its = (banks.forms[i].columns(scene) for i in (gone, new))
-        scores[name] = _separation(banks, mine @ signal, its, np.array(banks.forms[new].plausible), best)
+        mine, its = (banks.forms[n].columns(scene) for n in (gone, new))
+        scores[name] = _separation(banks, mine @ signal, its, banks.plausible((new,)), best)
     name = max(scores, key=lambda n: scores[n])
-    if scores[name] < ENOUGH:
+    if scores[name] < STRONG_EVIDENCE:
         why = (
             f"{pair[0]} and {pair[1]} look alike in standing, in slower walking and under a known weight: "
             "weigh the plates with known masses, or measure the body by other means"
@@ -133,7 +129,7 @@ _WORDS = {
 }
 
 
-def _separation(banks: Banks, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: Set) -> float:
+def _separation(banks: Banks, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: WalkFit) -> float:
     """Squared distance of a signal (n, 6) from what a rival (n, 6, p) can make of it, in the noise that was found."""
     root = 1.0 / np.sqrt(best.fitted.variance)
     scenes = [np.concatenate([signal[:, :, None], rival], axis=2)]

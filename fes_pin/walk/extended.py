@@ -12,10 +12,10 @@ from fes_pin.body.build import Body
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import in_full
 from fes_pin.walk.effect import central
-from fes_pin.walk.fits import Set, WalkFits
+from fes_pin.walk.models import WalkFit, WalkModels
 
 
-def extended_body(fits: WalkFits, best: Set) -> Body:
+def extended_body(models: WalkModels, best: WalkFit) -> Body:
     """The body with the segments' masses, centres and inertias of a set of causes; the same where it has none.
 
     Raises
@@ -23,11 +23,12 @@ def extended_body(fits: WalkFits, best: Set) -> Body:
     InputError
         The figures are no body's: a mass that is not positive, say.
     """
-    body = fits.banks.recordings[0].motion.body
-    believed = fits.banks.as_read.scenes[0].parameters
+    banks = models.banks
+    body = banks.recordings[0].motion.body
+    believed = banks.as_read.scenes[0].parameters
     found = {s: p.copy() for s, p in believed.items()}
-    for i, sizes in fits.sizes(best).items():
-        change = fits.banks.forms[i].segments
+    for name, sizes in models.sizes(best).items():
+        change = banks.forms[name].segments
         if change is not None:
             for segment, columns in change(believed).items():
                 found[segment] += columns @ sizes

@@ -17,7 +17,7 @@ make the required reaction larger or smaller, landmarks that are not quite found
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,8 +25,6 @@ ROUNDS = 8
 """Of alternating weights and effects; the last changes a deviance by less than 0.1."""
 STEP_SD = 1.0
 """Standard deviation of what is believed of a step of log variance beforehand: a factor e from one wave to the next."""
-WHITE_TRIED = 0.2, 40.0, 200
-"""Levels of white noise, in units: from, to, how many; a step is less than 3 %."""
 PRIOR_LEFT = 1e-4
 """Of the prior's weight, in reported sizes: an effect that nothing shows has a hundred times its plausible size."""
 FLOOR_N = 0.3
@@ -50,15 +48,12 @@ class WalkNoise:
         (6,): of the means over a stride.
     nuisance
         (n, 6, k, m): columns that every fit has, rotated, each in units of its prior's standard deviation.
-    jitter
-        (n, 6, k) variance that white noise of one unit on the coordinates leaves, in rotated channels; None: none.
     """
 
     harmonics: np.ndarray
     turn: np.ndarray
     mean_variance: np.ndarray
     nuisance: np.ndarray
-    jitter: np.ndarray | None = field(default=None, repr=False)
 
     def rotated(self, values: np.ndarray) -> np.ndarray:
         """Signals (n, 6, k, ...) in rotated channels."""
@@ -148,7 +143,7 @@ def fit_many(
     scaled = scaled.reshape(1 if prior.ndim == 1 else count, size, p)
     nuisance = noise.nuisance[: y.shape[1]].reshape(size, -1)
     flat = np.concatenate([scaled, np.broadcast_to(nuisance, (len(scaled), *nuisance.shape))], axis=2)
-    spectra = _Spectra(y, noise)
+    spectra = Spectra(y, noise)
     aim = y.reshape(count, size, 1)
     left, variance = y, spectra.update(y**2)
     for _ in range(rounds):
@@ -169,76 +164,6 @@ def fit_many(
     return likely[:, :, 0] * scale, covariance, deviance, left, variance, values[:, p:], values[:, :p] * scale
 
 
-def white_level(y: np.ndarray, noise: WalkNoise, draws: np.ndarray) -> tuple[float, float, float]:
-    """White noise on the coordinates in what differs from stride to stride.
-
-    What else differs dies out with frequency; noise of differentiated coordinates grows. A stride is no whole period of
-    the noise, so that its waves are not independent of each other: what this does to the scatter of the level is taken
-    from the draws, as that of a score whose terms are correlated (H. White, Econometrica 50:1, 1982).
-
-    Parameters
-    ----------
-    y
-        (n, 6, k) differences of strides, in rotated channels.
-    noise
-        Whose `nuisance` is not read.
-    draws
-        (d, 6, k) what noise of one unit leaves in a stride, in rotated channels.
-
-    Returns
-    -------
-    level, std, gain
-        Of the noise, in units, with its standard deviation; the deviance that it saves.
-    """
-    jitter = by_frequency(np.mean(draws**2, axis=0), noise.harmonics)
-    tried = np.concatenate([[0.0], np.geomspace(*WHITE_TRIED)])
-    many = np.broadcast_to(y, (len(tried), *y.shape))
-    spectra = _Spectra(many, replace(noise, jitter=np.broadcast_to(jitter, y.shape)), True, tried**2)
-    for _ in range(4 * ROUNDS):
-        variance = spectra.update(many**2)
-    waves = noise.harmonics > 0
-    deviance = np.sum((np.log(variance) + many**2 / variance)[..., waves], axis=(1, 2, 3)) + spectra.penalty()
-    best = int(np.argmin(deviance))
-    saved = float(deviance[0] - deviance[best])
-    if best in (0, 1, len(tried) - 1):
-        return float(tried[best]), float("inf"), saved
-    before, least, after = deviance[best - 1 : best + 2]
-    step = 0.5 * (before - after) / max(before - 2.0 * least + after, 1e-12)
-    level = float(tried[best] * (tried[best + 1] / tried[best]) ** step)
-    return level, 0.5 * level * _spread_of_white(spectra, variance, jitter, draws, best), saved
-
-
-def _spread_of_white(
-    spectra: _Spectra, variance: np.ndarray, jitter: np.ndarray, draws: np.ndarray, number: int
-) -> float:
-    """Standard deviation of the log of white noise's variance, of one of many.
-
-    With its share s of a variance v, the score is sum s (y^2 / v - 1) / 2. Its information is less what the spectrum's
-    levels and steps explain as well. Its scatter is that of the draws in the white part, s^2 z^2 / 2.
-
-    Parameters
-    ----------
-    spectra, variance
-        Of all levels that were tried, and their variances (b, n, 6, k).
-    jitter, draws
-        (6, k) and (d, 6, k), of noise of one unit.
-    number
-        Which of the levels.
-    """
-    assert spectra.white is not None
-    waves = spectra.waves
-    known = variance[number][..., waves]
-    share = spectra.white[number] * jitter[:, waves] / known
-    n, d = len(known), len(draws)
-    curve = spectra.curvature((1.0 - share)[None])[0]
-    both = 0.5 * (share * (1.0 - share)).sum(axis=0) @ spectra.gather
-    cross = np.r_[both.sum(axis=1), both.sum(axis=0) @ spectra.steps]
-    alone = 0.5 * np.sum(share**2)
-    white = np.var(0.5 * np.sum(share[0] ** 2 * draws[..., waves] ** 2 / jitter[:, waves], axis=(1, 2)), ddof=1)
-    scatter = 0.5 * np.sum(share**2 * (1.0 - share**2)) + n * (1.0 + n / d) * white
-    return float(np.sqrt(scatter / alone / (alone - cross @ np.linalg.solve(curve, cross))))
-
-
 def by_frequency(values: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
     """Values (..., k) of coefficients, each the mean over those of its frequency."""
     out = np.array(values)
@@ -247,11 +172,11 @@ def by_frequency(values: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
     return out
 
 
-class _Spectra:
+class Spectra:
     """Variances exp(level + course over frequency), by Fisher scoring of gamma regression.
 
-    The course takes a step at every wave, of any sign with a normal prior; `falling`: no step may go up. `white` (b,)
-    is the variance of white noise on the coordinates, in units of the noise's jitter.
+    The course takes a step at every wave, of any sign with a normal prior; `falling`: no step may go up. `white`
+    (b, n, 6, k) is a variance that white noise on the coordinates adds.
     """
 
     def __init__(self, y: np.ndarray, noise: WalkNoise, falling: bool = False, white: np.ndarray | None = None) -> None:
@@ -267,7 +192,7 @@ class _Spectra:
         self.level = np.log((0.3 if falling else 1.0) * power + self.floor[:, 0])
         self.step = np.zeros((count, self.steps.shape[1]))
         self.falling = falling
-        self.white, self.jitter = white, noise.jitter
+        self.white = white
 
     def update(self, squares: np.ndarray) -> np.ndarray:
         """One round; `squares` (b, n, 6, k) are expected squares of what is left. Variances of the same shape."""
@@ -299,6 +224,7 @@ class _Spectra:
         return curve
 
     def penalty(self) -> np.ndarray:
+        """Twice the negative log prior of the steps, (b,)."""
         return np.sum((self.step / STEP_SD) ** 2, axis=1)
 
     def _by_wave(self, values: np.ndarray) -> np.ndarray:
@@ -313,6 +239,6 @@ class _Spectra:
         out = np.empty(shape)
         out[..., ~self.waves] = self.means
         out[..., self.waves] = self._smooth()[:, None]
-        if self.jitter is not None and self.white is not None:
-            out += self.white[:, None, None, None] * self.jitter
+        if self.white is not None:
+            out += self.white
         return out

@@ -1,4 +1,4 @@
-"""What residuals without a cause show: the law of the best gain, and how wide values scatter."""
+"""What residuals without a cause show: the law of the largest gain, and how wide values scatter."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fes_pin.infer.family import SimulatedFamily
 from fes_pin.walk.banks import Banks
 from fes_pin.walk.likelihood import fit_many
 
 SIMULATED = 100
-"""Residuals without a cause that the critical value is taken from."""
+"""Residuals without a cause that the law of the largest gain is taken from."""
 LEVEL = 1e-4
 """Chance that anything is named where nothing is wrong, over the whole library, in soft tissue as it is simulated. That
 is one law among many, and the channels' rotation has seen the data: what is counted in walks made otherwise is more."""
@@ -25,30 +26,14 @@ class Nulls:
 
     Attributes
     ----------
-    gains
-        (draws,) of the best form, price paid.
+    family
+        Of the gains in evidence of all forms.
     spread
         By form, (p,) root mean square of value over standard deviation: 1 where the likelihood's intervals are right.
     """
 
-    gains: np.ndarray = field(repr=False)
-    spread: tuple[np.ndarray, ...] = field(repr=False)
-
-    @property
-    def _gumbel(self) -> tuple[float, float]:
-        """Place and scale of the maxima's Gumbel distribution, by moments."""
-        scale = max(float(np.std(self.gains)) * np.sqrt(6.0) / np.pi, 1e-6)
-        return float(np.mean(self.gains)) - float(np.euler_gamma) * scale, scale
-
-    def critical(self, level: float) -> float:
-        """A gain that is exceeded with this chance; no less than 0."""
-        place, scale = self._gumbel
-        return max(place - scale * float(np.log(-np.log1p(-level))), 0.0)
-
-    def p_value(self, gain: float) -> float:
-        """Chance of at least this gain."""
-        place, scale = self._gumbel
-        return float(max(-np.expm1(-np.exp(-(gain - place) / scale)), 1e-300))
+    family: SimulatedFamily
+    spread: dict[str, np.ndarray] = field(repr=False)
 
 
 def simulated_nulls(banks: Banks, variance: np.ndarray, seed: int) -> Nulls:
@@ -56,14 +41,15 @@ def simulated_nulls(banks: Banks, variance: np.ndarray, seed: int) -> Nulls:
     drawn = _without_a_cause(banks, variance, seed)
     none = np.zeros((*variance.shape, 0))
     alone = fit_many(drawn, none, np.zeros(0), banks.noise, SIMULATED_ROUNDS)[2]
-    best, spread = np.full(SIMULATED, -np.inf), []
-    for i, form in enumerate(banks.forms):
-        x = banks.noise.rotated(banks.as_read.x[i])
-        values, covariance, deviance, *_ = fit_many(drawn, x, np.array(form.plausible), banks.noise, SIMULATED_ROUNDS)
+    best, spread = np.full(SIMULATED, -np.inf), {}
+    for name in banks.forms:
+        x = banks.noise.rotated(banks.as_read.x[name])
+        fitted = fit_many(drawn, x, banks.plausible((name,)), banks.noise, SIMULATED_ROUNDS)
+        values, covariance, deviance, *_ = fitted
         best = np.maximum(best, alone - deviance)
         stds = np.sqrt(np.einsum("bpp->bp", covariance))
-        spread.append(np.sqrt(np.mean((values / stds) ** 2, axis=0)))
-    return Nulls(best, tuple(spread))
+        spread[name] = np.sqrt(np.mean((values / stds) ** 2, axis=0))
+    return Nulls(SimulatedFamily(best), spread)
 
 
 def _without_a_cause(banks: Banks, variance: np.ndarray, seed: int) -> np.ndarray:

@@ -15,9 +15,8 @@ from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Cause, Explained, show
 from fes_pin.infer.text import probability
 from fes_pin.walk.experiment import NextWalk
 from fes_pin.walk.extended import extended_body
-from fes_pin.walk.fits import Set
 from fes_pin.walk.judge import CHANNELS
-from fes_pin.walk.search import WalkSearch
+from fes_pin.walk.models import WalkFit, WalkModels
 
 NEXT_FILE = "next_trial.csv"
 
@@ -34,7 +33,7 @@ class WalkDiagnosis(Result):
         Causes that these data could not show.
     nominal_error, extended_error
         E in percent: on all strides, and on strides held out; None of a single stride.
-    search, best
+    models, best
         The fits behind it.
     """
 
@@ -44,15 +43,15 @@ class WalkDiagnosis(Result):
     extended_error: tuple[float, float | None]
     ceiling_percent: float
     next_experiment: NextWalk | None
-    search: WalkSearch
-    best: Set
+    models: WalkModels
+    best: WalkFit
     cutoff_hz: float = CUTOFF_HZ
     MODEL: ClassVar[str] = "the walking model"
 
     @property
     def model(self) -> Body:
         """The body with the masses, centres and inertias that were found."""
-        return extended_body(self.search.fits, self.best)
+        return extended_body(self.models, self.best)
 
     @property
     def explained(self) -> Explained:
@@ -87,12 +86,8 @@ class WalkDiagnosis(Result):
 
     def _noise(self) -> dict[str, Any]:
         """Root mean square of what the extended model leaves in the mean stride, by channel: N and N m."""
-        banks, best = self.search.banks, self.best
-        left = banks.bank(best.forms).y
-        if best.forms:
-            columns = np.concatenate([banks.bank(best.forms).x[i] for i in best.forms], axis=3)
-            left = left - columns @ best.fitted.values
-        size = np.sqrt(np.sum(left[0] ** 2, axis=1))
+        residual = self.models.banks.residual(self.best.names, self.best.fitted.values)
+        size = np.sqrt(np.sum(residual[0] ** 2, axis=1))
         return {
             name.replace(" ", "_"): {"std": shown(float(s)), "ar": []} for name, s in zip(CHANNELS, size, strict=True)
         }

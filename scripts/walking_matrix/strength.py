@@ -11,9 +11,9 @@ import numpy as np
 from fes_pin.data.smooth import CUTOFF_HZ
 from fes_pin.data.study import Study, read_study
 from fes_pin.walk.banks import Banks
-from fes_pin.walk.diagnosis import white_noise
-from fes_pin.walk.fits import WalkFits
+from fes_pin.walk.models import WalkModels
 from fes_pin.walk.recording import recordings_of
+from fes_pin.walk.white_noise import white_noise
 from walking_matrix.synthetic import Gait, Wrong, make
 
 
@@ -31,7 +31,7 @@ def strength(gait: Gait, wrong: Wrong, seed: int, study: Study) -> float:
         twin = _banks(read_study(folder))
     waves = min(len(twin.strides.harmonics), len(banks.strides.harmonics))
     y = [b.as_read.y[:, :, :waves] for b in (banks, twin)]
-    noise, variance = twin.noise, WalkFits(twin).fit(()).fitted.variance[:, :, :waves]
+    noise, variance = twin.noise, WalkModels(twin, 0).nominal().fitted.variance[:, :, :waves]
     means = twin.strides.harmonics[:waves] == 0
     change = np.where(means, y[0] - y[1], np.einsum("ij,njk->nik", noise.turn, y[0] - y[1])).ravel()
     nuisance = noise.nuisance[:, :, :waves].reshape(change.size, -1)

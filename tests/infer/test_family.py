@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from fes_pin.infer.family import Family, coherence_p_value
+from fes_pin.infer.family import Family, SimulatedFamily, coherence_p_value
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.6, 0.95])
@@ -34,6 +34,18 @@ def test_one_test_alone_keeps_its_p_value():
     assert family.tests == pytest.approx(1.0, abs=0.25)
     assert family.p_value(0.0, 1) == pytest.approx(1.0)
     assert family.p_value(40.0, 1) < 1e-8
+
+
+def test_a_family_that_is_simulated_alarms_at_its_level():
+    """Of 100 gains whose largest is known from as many simulations; its law is a Gumbel distribution's, nearly."""
+    rng = np.random.default_rng(3)
+    largest = rng.chisquare(1, size=(300, 200, 100)).max(axis=2)  # 300 families, 100 draws of each, and 100 of data
+    families = [SimulatedFamily(own) for own in largest[:, :100]]
+    p_values = np.array([[f.p_value(g) for g in own] for f, own in zip(families, largest[:, 100:], strict=True)])
+    for level in (0.2, 0.05, 0.01):
+        assert 0.7 * level < np.mean(p_values < level) < 1.4 * level
+    assert families[0].p_value(0.0) == families[0].p_value(-3.0) == 1.0
+    assert 0.0 < families[0].p_value(1e9) < 1e-12
 
 
 def test_coherence_is_uniform_under_the_null():

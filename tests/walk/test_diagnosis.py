@@ -16,9 +16,10 @@ from fes_pin.view.walk_report import walk_report_html
 from fes_pin.walk.diagnosis import diagnose_walk
 from fes_pin.walk.dynamics import required, segment_parameters
 from fes_pin.walk.extended import extended_body, with_segments
-from fes_pin.walk.likelihood import WalkNoise, fit_walk, white_level
+from fes_pin.walk.likelihood import WalkNoise, fit_walk
 from fes_pin.walk.motion import motion_of
 from fes_pin.walk.record import walk_files
+from fes_pin.walk.white_noise import white_level
 
 pytestmark = pytest.mark.shared
 
@@ -56,6 +57,7 @@ def test_files_are_as_the_contract_says(heavy):
         assert set(plan["separates"]) <= {heavy.causes[0].name, *heavy.causes[0].equivalents}
         assert plan["trial"] is None or plan["trial"]["file"] in files
     assert heavy.causes[0].name in str(heavy)
+    assert set(record["provenance"]["inputs"]) >= {"study.toml", "coords.csv", "grf.csv"}
 
 
 def test_the_body_is_saved_as_urdf_and_a_model_that_is_none_is_refused(heavy, tmp_path):
@@ -95,7 +97,7 @@ def test_the_data_of_the_ground_reaction_stand_behind_its_figure(heavy):
     page = walk_report_html(heavy)
     assert page.count("<svg") == len(heavy.study.trials)
     csv = unquote(re.search(r'href="data:text/csv,([^"]*)"', page)[1]).splitlines()
-    scene = heavy.search.banks.as_read.scenes[0]
+    scene = heavy.models.banks.as_read.scenes[0]
     head = csv[0].split(",")
     assert head[0] == "time_s" and len(head) == 1 + 3 * 6
     rows = np.array([[float(v) for v in line.split(",")] for line in csv[1:]])
@@ -182,7 +184,7 @@ def test_the_measured_walk_is_honestly_unexplained(walk, tmp_path):
                          ("reference/subject01_model.json", "segments.json")):  # fmt: skip
         (tmp_path / name).write_bytes((walk / source).read_bytes())
     found = diagnose_walk(read_study(tmp_path))
-    assert found.search.banks.strides.count == 2
+    assert found.models.banks.strides.count == 2
     assert found.verdict == "unexplained" and not found.causes
 
 
@@ -200,11 +202,11 @@ def test_the_extended_body_requires_what_the_column_says(measured, hip):
 
 
 def test_the_extended_body_is_the_diagnosiss(heavy):
-    body = extended_body(heavy.search.fits, heavy.best)
+    body = extended_body(heavy.models, heavy.best)
     name, site = heavy.causes[0].name, heavy.causes[0].site
     if name == "segment_mass" and site == "trunk":
         share = heavy.causes[0].parameters["share"].value
-        assert body.mass_kg > heavy.search.banks.recordings[0].motion.body.mass_kg * (1 + 0.3 * share)
+        assert body.mass_kg > heavy.models.banks.recordings[0].motion.body.mass_kg * (1 + 0.3 * share)
     assert len(body.joint_names) == 19
 
 

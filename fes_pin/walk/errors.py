@@ -1,0 +1,96 @@
+"""Errors of sets of causes in strides that took no part: in newtons, and as evidence in units of the noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fes_pin.infer.held_out import Errors, added_likelihood, held_out_gain
+from fes_pin.infer.result import Evidence, Gain
+from fes_pin.infer.search import Names
+from fes_pin.walk.banks import Banks
+from fes_pin.walk.likelihood import fit_walk
+from fes_pin.walk.models import WalkFit, WalkModels
+
+ARM = 0.1
+"""Moments count as forces at this arm, in standing heights (or 0.18 m): about a foot's half length and more."""
+
+
+class StrideErrors:
+    """Errors of sets of causes in every stride.
+
+    Parameters
+    ----------
+    models
+        The sets.
+    seed
+        Of bootstrap intervals.
+    """
+
+    def __init__(self, models: WalkModels, seed: int) -> None:
+        self.models, self.seed = models, seed
+        banks = models.banks
+        height = banks.recordings[0].motion.body.height_m or 1.8
+        self._scale = np.r_[np.ones(3), np.full(3, 1.0 / (ARM * height))][:, None]
+        self._residuals: dict[tuple[Names, bool], np.ndarray] = {}
+        about_mean = banks.measured * (banks.strides.harmonics > 0)
+        self._spread = np.sum((self._scale * about_mean) ** 2, axis=(1, 2))
+        y, _ = banks.by_stride(())
+        self._differs = np.sum((self._scale * (y - y.mean(axis=0))) ** 2, axis=0) / max(len(y) - 1, 1)
+
+    def errors(self, one: WalkFit, held_out: bool) -> Errors:
+        """Squared errors of a set by stride, N^2, moments by `ARM`; the noise is what differs from stride to stride."""
+        squares = np.sum((self._scale * self._residual(one, held_out)) ** 2, axis=(1, 2))
+        alike = np.ones_like(squares)
+        noise, scatter = float(np.sum(self._differs)), 2.0 * float(np.sum(self._differs**2))
+        return Errors(squares, self._spread, noise * alike, scatter * alike)
+
+    def error_percent(self, one: WalkFit) -> tuple[float, float | None]:
+        """E on all strides, and on strides held out; None for one stride."""
+        held_out = self.errors(one, True).error_percent() if self.models.banks.strides.count > 1 else None
+        return self.errors(one, False).error_percent(), held_out
+
+    def gain(self, without: WalkFit, best: WalkFit, held_out: bool) -> Gain:
+        """What a set removes of the nominal error above the noise, against a smaller set."""
+        sets = (self.models.nominal(), without, best)
+        nominal, before, after = (self.errors(one, held_out) for one in sets)
+        return held_out_gain(nominal, before, after, self.seed)
+
+    def evidence(self, without: WalkFit, best: WalkFit) -> Evidence:
+        """What a set adds to the likelihood of a stride that took no part, against a smaller set, in the set's noise.
+
+        What landmarks and plates may make in a session counts for neither. The mean over strides: soft tissue moves
+        alike in each, so that more strides are no more evidence.
+        """
+        before, after = (_whitened(self._residual(one, True), self.models.banks, best) for one in (without, best))
+        every = [added_likelihood(*pair) for pair in zip(before, after, strict=True)]
+        return Evidence(*np.mean([(e.added, e.squares) for e in every], axis=0).tolist())
+
+    def _residual(self, one: WalkFit, held_out: bool) -> np.ndarray:
+        if (one.names, held_out) not in self._residuals:
+            self._residuals[one.names, held_out] = _residual_by_stride(self.models.banks, one, held_out)
+        return self._residuals[one.names, held_out]
+
+
+def _residual_by_stride(banks: Banks, one: WalkFit, held_out: bool) -> np.ndarray:
+    """What a set leaves in every stride, its sizes fitted to all strides or to the others: (n, 6, k)."""
+    y, x = banks.by_stride(one.names)
+    if not (one.names and held_out):
+        return y - x @ one.fitted.values
+    out = []
+    for k in range(len(y)):
+        others = np.arange(len(y)) != k
+        mean_y, mean_x = (banks.noise.rotated(v[others].mean(axis=0, keepdims=True)) for v in (y, x))
+        out.append(y[k] - x[k] @ fit_walk(mean_y, mean_x, banks.plausible(one.names), banks.noise).values)
+    return np.array(out)
+
+
+def _whitened(residual: np.ndarray, banks: Banks, best: WalkFit) -> np.ndarray:
+    """Residuals (n, 6, k) in units of the noise of a set and of what its nuisance parameters may take: (n, 6 k).
+
+    With F the nuisance's columns in units of the noise, u s v' its singular values: (1 + F F')^(-1/2) is
+    1 - u (1 - (1 + s^2)^(-1/2)) u'.
+    """
+    root = np.sqrt(best.fitted.variance[0])
+    u, s, _ = np.linalg.svd((banks.noise.nuisance[0] / root[..., None]).reshape(root.size, -1), full_matrices=False)
+    white = (banks.noise.rotated(residual) / root).reshape(len(residual), -1)
+    return np.asarray(white - (white @ u) * (1.0 - 1.0 / np.sqrt(1.0 + s**2)) @ u.T)

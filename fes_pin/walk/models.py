@@ -1,0 +1,210 @@
+"""Sets of forms as the search of `infer` sees them: fitted many at once, judged by evidence and by a simulated null."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fes_pin.infer.fits import Candidate, FittedSets
+from fes_pin.infer.search import Names, Policy, Search, SearchResult
+from fes_pin.walk.banks import Banks
+from fes_pin.walk.likelihood import Fitted, fit_many, fitted_of
+from fes_pin.walk.nulls import LEVEL, Nulls, simulated_nulls
+from fes_pin.workers import check_limit
+
+POLICY = Policy(beam=4, fitted=None, pairs=0)
+"""Every form is fitted, so that no score proposes any."""
+MOST_FOR_NOISE = 2
+"""Causes in the set whose residual the noise is taken from, at most."""
+ALIKE = 2
+"""Sets of the same causes, at other sites, that the search extends."""
+TOGETHER = 64
+"""Fits that are made at once: as many as a processor's cache holds."""
+STRONG_EVIDENCE = 6.0
+"""Twice the log of the odds at which one set of causes is preferred to another: 20 to 1 (R. E. Kass and A. E. Raftery,
+Bayes factors, J. Am. Stat. Assoc. 90:773, 1995). The likelihood holds the priors of sizes, and so such odds."""
+POSSIBLE = 3.0
+"""Sizes beyond this many times the plausible one are no explanation."""
+
+
+@dataclass(frozen=True, eq=False)
+class WalkFit:
+    """A set of forms with its fit.
+
+    Attributes
+    ----------
+    names
+        Of the forms.
+    fitted
+        Their values, and the noise.
+    price
+        The deviance, infinite where a size is not possible. It holds the penalty of each parameter: sizes are
+        integrated over their priors.
+    """
+
+    names: Names
+    fitted: Fitted = field(repr=False)
+    price: float
+
+    @property
+    def sse(self) -> float:
+        """The same: evidence has its penalty in it."""
+        return self.price
+
+    @property
+    def degrees(self) -> int:
+        """Parameters."""
+        return len(self.fitted.values)
+
+
+class WalkModels(FittedSets[WalkFit, None]):
+    """The sets of forms of one study of walking.
+
+    Parameters
+    ----------
+    banks
+        What is fitted.
+    seed
+        Of the simulated null.
+
+    Attributes
+    ----------
+    null
+        What simulated residuals without a cause show. None before the noise is known: then the evidence alone decides.
+    readings
+        By form whose parameter a trial shows directly, its value and standard deviation.
+    """
+
+    def __init__(self, banks: Banks, seed: int) -> None:
+        super().__init__()
+        self.banks, self.seed = banks, seed
+        self.null: Nulls | None = None
+        self.most_candidates = MOST_FOR_NOISE
+        self.readings = dict(_read_off(banks))
+
+    def with_noise_of(self, best: WalkFit) -> WalkModels:
+        """The same sets with channels rotated for the residual of one of them, and the null simulated in its noise."""
+        other = copy.copy(self)
+        FittedSets.__init__(other)
+        other.banks = self.banks.turned(self.banks.residual(best.names, best.fitted.values))
+        other.null = simulated_nulls(other.banks, other.fit(best.names).fitted.variance, self.seed)
+        other.most_candidates = type(self).most_candidates
+        return other
+
+    def nominal(self) -> WalkFit:
+        """Fit the set without a form."""
+        return self.fit(())
+
+    def candidates(self, base: WalkFit) -> dict[str, Candidate[None]]:
+        """Forms of causes and sites that a set has not: no two forms of one cause at one site."""
+        forms = self.banks.forms
+        taken = {forms[n].place for n in base.names}
+        return {n: Candidate(0.0, None) for n, form in forms.items() if form.place not in taken}
+
+    def begin(self, base: WalkFit, starts: Mapping[Names, None]) -> dict[Names, WalkFit]:
+        """Fit sets, those of as many parameters and one clock together, as long as the limit of time lets it."""
+        groups: dict[tuple[int, bool], list[Names]] = {}
+        for names in starts:
+            count = sum(len(self.banks.forms[n].parameters) for n in names)
+            groups.setdefault((count, self.banks.shift in names), []).append(names)
+        out: dict[Names, WalkFit] = {}
+        for group in groups.values():
+            for at in range(0, len(group), TOGETHER):
+                check_limit()
+                out |= {one.names: one for one in self._fit_alike(group[at : at + TOGETHER])}
+        return out
+
+    def fit(self, names: Names) -> WalkFit:
+        """The fit of a set; kept."""
+        if names not in self.fits:
+            (self.fits[names],) = self._fit_alike([names])
+        return self.fits[names]
+
+    def without(self, names: Names, name: str) -> WalkFit:
+        """The fit of a set less one form."""
+        return self.fit(tuple(n for n in names if n != name))
+
+    def is_possible(self, fitted: WalkFit) -> bool:
+        """Whether every size of a fit is possible."""
+        return math.isfinite(fitted.price)
+
+    def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
+        """The best sets of a size, best first, but for some: at most `ALIKE` of the same causes."""
+        count: Counter[tuple[str, ...]] = Counter()
+        kept = []
+        for names in self.ranked(size):
+            causes = tuple(sorted(self.banks.forms[n].cause for n in names))
+            if names not in without and self.is_possible(self.fits[names]) and count[causes] < ALIKE:
+                count[causes] += 1
+                kept.append(names)
+        return kept
+
+    def noise_p_value(self, gain: float, degrees: int) -> float:
+        """Chance of a gain where nothing is wrong, over all forms; 0 for any gain before the noise is known."""
+        return float(gain <= 0.0) if self.null is None else self.null.family.p_value(gain)
+
+    def level(self, fitted: WalkFit) -> float:
+        """See `LEVEL`."""
+        return LEVEL
+
+    def near_rivals(self, found: SearchResult[WalkFit], name: str) -> list[WalkFit]:
+        """Sets with another form in the place of one that cannot be told from the best, lowest price first."""
+        return [r for r in found.rivals[name] if r.price - found.best.price < STRONG_EVIDENCE]
+
+    def sizes(self, one: WalkFit) -> dict[str, np.ndarray]:
+        """Values of a set's parameters by form; a shift counts from the clock as it was read."""
+        forms, later_s = self.banks.forms, self.banks.shifted.later_s
+        return {n: v + later_s * forms[n].shifts for n, v in self._by_form(one, one.fitted.values)}
+
+    def deviations(self, one: WalkFit) -> dict[str, np.ndarray]:
+        """Their standard deviations, wider where simulated soft tissue spreads values by more than they say."""
+        stds = np.sqrt(np.diag(one.fitted.covariance))
+        spread = self.null.spread if self.null else {}
+        return {n: v * np.maximum(spread.get(n, 1.0), 1.0) for n, v in self._by_form(one, stds)}
+
+    def _by_form(self, one: WalkFit, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+        ends = np.cumsum([len(self.banks.forms[n].parameters) for n in one.names])
+        return zip(one.names, np.split(values, ends), strict=False)
+
+    def _fit_alike(self, group: Sequence[Names]) -> list[WalkFit]:
+        """Fits of sets of as many parameters and one clock."""
+        noise, forms = self.banks.noise, self.banks.forms
+        y = noise.rotated(self.banks.bank(group[0]).y)
+        x = np.stack([self.banks.columns(names) for names in group])
+        prior = np.array([self.banks.plausible(names) for names in group]).reshape(len(group), -1)
+        found = fit_many(np.broadcast_to(y, (len(group), *y.shape)), x, prior, noise)
+        out = []
+        for k, names in enumerate(group):
+            fitted = fitted_of(found, k)
+            possible = bool((np.abs(fitted.believed) <= POSSIBLE * prior[k]).all())
+            owners = [n for n in names for _ in forms[n].parameters]
+            possible &= all(self._may_be(n, v) for n, v in zip(owners, fitted.believed.tolist(), strict=True))
+            out.append(WalkFit(names, fitted, fitted.deviance if possible else math.inf))
+        return out
+
+    def _may_be(self, name: str, value: float) -> bool:
+        """Whether a value has a meaning, and is what can be read off where it can."""
+        if self.banks.forms[name].positive and value < 0.0:
+            return False
+        known = self.readings.get(name)
+        return known is None or abs(value - known[0]) <= POSSIBLE * known[1]
+
+
+class WalkSearch(Search[WalkFit]):
+    """The search over sets of forms of one study."""
+
+    models: WalkModels
+
+
+def _read_off(banks: Banks) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Forms whose parameter a trial shows directly: the mean over trials, and its standard deviation."""
+    for name, form in banks.forms.items():
+        found = [form.reading(scene) for scene in banks.as_read.scenes] if form.reading else []
+        known = [one for one in found if one is not None]
+        if known:
+            yield name, (float(np.mean([value for value, _ in known])), known[0][1])

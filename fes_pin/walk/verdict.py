@@ -1,0 +1,134 @@
+"""The verdict on a set of causes of a walk: what is claimed, how large, how sure, and what it cannot be told from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from fes_pin.infer.distributions import chi2_tail, normal_quantile
+from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL
+from fes_pin.infer.result import FITTED, NO_GAIN, Cause, Evidence, ParameterEstimate, Remainder
+from fes_pin.infer.search import SearchResult
+from fes_pin.infer.verdict import State, Verdict, Weighed
+from fes_pin.walk.banks import Banks
+from fes_pin.walk.effect import STAGE
+from fes_pin.walk.errors import StrideErrors
+from fes_pin.walk.judge import lack_of_fit, other_leg
+from fes_pin.walk.models import WalkFit, WalkSearch
+from fes_pin.walk.nulls import LEVEL
+from fes_pin.walk.white_noise import white_noise
+
+ORDINARY_MM = 2.0
+"""Marker noise up to this is no cause: cameras' and fixations' own (L. Chiari et al., Gait Posture 21:197, 2005)."""
+SURELY = normal_quantile(1.0 - LEVEL)
+"""Standard deviations by which marker noise must exceed that: at the level of all causes of a walk."""
+
+
+@dataclass(frozen=True)
+class WalkWeighed(Weighed):
+    """What a walk says of each form of a set; `other_leg` is its gain on the other leg, None where it is of one leg."""
+
+    lack_of_fit: Remainder
+    other_leg: Mapping[str, float | None]
+
+
+Judgement = State[WalkFit, WalkWeighed]
+
+
+class WalkVerdict(Verdict[WalkFit, WalkWeighed]):
+    """How it is judged what a search over sets of forms found.
+
+    Strides that took no part in a cause's size speak for it by their likelihood, which holds as noise what soft tissue,
+    landmarks and plates make in every stride; a force in newtons is mostly that. For what belongs to neither leg the
+    other leg's stances speak as well. A single stride leaves nothing out: then only what is certain is named.
+
+    Parameters
+    ----------
+    search
+        That has run.
+    seed
+        Of bootstrap intervals.
+    """
+
+    def __init__(self, search: WalkSearch, seed: int) -> None:
+        super().__init__(search)
+        self.models, self.errors = search.models, StrideErrors(search.models, seed)
+
+    def weigh(self, found: SearchResult[WalkFit]) -> WalkWeighed:
+        """What strides held out, the other leg and the test of lack of fit say of a set."""
+        banks, best, less = self.models.banks, found.best, found.without
+        many = banks.strides.count > 1
+        p_value, where = lack_of_fit(banks, best)
+        return WalkWeighed(
+            gains={n: self.errors.gain(without, best, many) for n, without in less.items()},
+            evidence={n: self.errors.evidence(without, best) for n, without in less.items()} if many else {},
+            lack_of_fit=Remainder(p_value < CLAIM_LEVEL, p_value, where),
+            other_leg={n: other_leg(banks, self.models.fit((n,))) if self._is_of_either(n) else None for n in less},
+        )
+
+    def unsupported(self, state: Judgement) -> list[str]:
+        """Forms that nothing which took no part speaks for."""
+        return [n for n in state.names if not self._is_supported(state, n)]
+
+    def _is_supported(self, state: Judgement, name: str) -> bool:
+        weighed, p_value = state.weighed, state.found.p_values[name]
+        other = weighed.other_leg[name]
+        likely = weighed.evidence[name].low > 0.0 if weighed.evidence else p_value < CERTAIN_LEVEL
+        return likely and p_value < LEVEL and (other is None or other > 0.0)
+
+    def _is_of_either(self, name: str) -> bool:
+        """Whether a form is of neither leg alone; a clock is of no leg."""
+        form = self.models.banks.forms[name]
+        return not form.site.startswith(("left", "right")) and not form.shifts
+
+    def lack_of_fit(self, state: Judgement) -> Remainder:
+        """Whether the residual comes again in every stride, or a cause was refused."""
+        remainder = state.weighed.lack_of_fit
+        left = remainder.unexplained or bool(state.refused)
+        return replace(remainder, unexplained=left, where=remainder.where if left else None)
+
+    def cause(self, state: Judgement, name: str) -> Cause:
+        """What is reported of one form of the set."""
+        found, weighed, forms = state.found, state.weighed, self.models.banks.forms
+        best, form = found.best, forms[name]
+        near = self.models.near_rivals(found, name)
+        instead = [forms[n] for r in near for n in r.names if n not in best.names]
+        values, stds = self.models.sizes(best)[name].tolist(), self.models.deviations(best)[name].tolist()
+        each = zip(form.parameters, values, stds, form.units, strict=True)
+        gain = weighed.gains[name]
+        return Cause(
+            name=form.cause,
+            stage=STAGE,
+            site=form.site,
+            parameters={n: ParameterEstimate(v, s, u) for n, v, s, u in each},
+            equivalents=tuple(sorted({f.cause for f in instead} - {form.cause})),
+            elsewhere=tuple(dict.fromkeys(f.site for f in instead if f.cause == form.cause)),
+            p_value=found.p_values[name],
+            gain_fit=self.errors.gain(found.without[name], best, False).percent,
+            gain_held_out=gain if weighed.evidence else replace(gain, on=FITTED),
+            evidence=weighed.evidence.get(name),
+            further={"other_leg": weighed.other_leg[name]},
+        )
+
+
+def marker_noise(banks: Banks) -> Cause | None:
+    """White noise on the coordinates that is more than cameras' own, from what differs from stride to stride.
+
+    It is judged by its size, and by the likelihood of what differs: no model of the mean stride predicts it.
+    """
+    level, std, saved = white_noise(banks) or (0.0, 0.0, 0.0)
+    evidence = Evidence(saved, saved, FITTED)
+    if level - SURELY * std < ORDINARY_MM or evidence.low < 0.0:
+        return None
+    return Cause(
+        name="marker_noise",
+        stage=STAGE,
+        site="white",
+        parameters={"markers_m": ParameterEstimate(1e-3 * level, 1e-3 * std, "m")},
+        equivalents=(),
+        p_value=float(chi2_tail(saved, 1)),
+        gain_fit=NO_GAIN.percent,
+        gain_held_out=NO_GAIN,
+        evidence=evidence,
+        further={"other_leg": None},
+    )

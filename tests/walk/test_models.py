@@ -1,0 +1,109 @@
+"""Sets of forms of a walk as the search of `infer` sees them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fes_pin.data.study import read_study
+from fes_pin.walk.banks import Banks
+from fes_pin.walk.models import ALIKE, POSSIBLE, WalkModels, WalkSearch
+from fes_pin.walk.nulls import LEVEL
+from fes_pin.walk.recording import recordings_of
+from fes_pin.walk.verdict import WalkVerdict, marker_noise
+from fes_pin.workers import OutOfTime, noting_stops, time_limit
+
+pytestmark = pytest.mark.shared
+
+
+def models_of(gait, folder, seed, *args, **more):
+    from walking_matrix.synthetic import Wrong, make
+
+    make(gait, folder, Wrong(*args, **{"strides": 2, "tissue": 0.4, **more}), seed)
+    _, recordings = recordings_of(read_study(folder))
+    return WalkModels(Banks(recordings, recordings[0].cutoff_hz), seed=0)
+
+
+@pytest.fixture(scope="module")
+def models(gait, tmp_path_factory):
+    made = models_of(gait, tmp_path_factory.mktemp("pushed"), 3, "external_force", "trunk", 40.0,
+                     extra={"axis": (0, 0, 1), "at": (0, 0, 0.2)})  # fmt: skip
+    made.nominal()
+    made.extend(())
+    return made
+
+
+def test_a_set_has_no_two_forms_of_one_cause_at_one_site(models):
+    forms = models.banks.forms
+    base = models.fits[("segment_com (trunk, forward)",)]
+    further = models.candidates(base)
+    assert not any(forms[n].cause == "segment_com" and forms[n].site.startswith("trunk") for n in further)
+    assert "segment_com (pelvis, forward)" in further and "segment_mass (trunk)" in further
+
+
+def test_few_sets_of_the_same_causes_are_extended(models):
+    near = models.near(1)
+    causes = [models.banks.forms[name].cause for (name,) in near]
+    assert max(map(causes.count, causes)) == ALIKE
+    assert near[0] == models.ranked(1)[0]
+    assert models.near(1, near[:1])[0] != near[0]
+
+
+def test_sizes_that_cannot_be_are_no_explanation(models):
+    for names, fitted in models.fits.items():
+        possible = np.abs(fitted.fitted.believed) <= POSSIBLE * models.banks.plausible(names)
+        assert math.isfinite(fitted.price) <= possible.all()
+    shown = [n for n, f in models.fits.items() if not models.is_possible(f)]
+    assert not set(shown) & set(models.near(1))
+
+
+def test_fits_at_once_are_the_fits_one_by_one(models):
+    names = models.ranked(1)[0]
+    (alone,) = models._fit_alike([names])
+    assert alone.price == pytest.approx(models.fits[names].price, rel=1e-12)
+
+
+def test_evidence_decides_until_the_noise_is_known(models):
+    assert [models.noise_p_value(gain, 1) for gain in (-1.0, 1e-6)] == [1.0, 0.0]
+    best = models.fits[models.ranked(1)[0]]
+    known = models.with_noise_of(best)
+    assert models.null is None and known.null is not None
+    assert known.most_candidates > models.most_candidates
+    p_values = [known.noise_p_value(gain, 1) for gain in (-1.0, 1.0, 10.0, 100.0)]
+    assert p_values == sorted(p_values, reverse=True)
+    assert p_values[0] == 1.0 and p_values[-1] < LEVEL
+
+
+def test_a_limit_of_time_ends_the_fits_and_is_noted(models):
+    with noting_stops() as stops, time_limit(0.0), pytest.raises(OutOfTime):
+        models.extend(models.ranked(1)[0])
+    assert stops
+
+
+def test_what_strides_held_out_do_not_bear_out_is_refused(models):
+    """One form of the truth is supported; of a set with a form more, that one is not."""
+    known = models.with_noise_of(models.fits[models.ranked(1)[0]])
+    search = WalkSearch(known, lambda share, words: None)
+    found = search.run()
+    verdict = WalkVerdict(search, seed=0)
+    state = verdict.of(found)
+    assert state.found.best.names == found.best.names and not state.refused
+    assert all(e.low > 0.0 for e in state.weighed.evidence.values())
+    further = tuple(sorted((*found.best.names, "plate_gain (left plate, sideways)")))
+    known.fit(further)
+    state = verdict.of(search.result(further))
+    assert set(state.refused) == {"plate_gain (left plate, sideways)"}
+    assert verdict.lack_of_fit(state).unexplained
+
+
+def test_marker_noise_has_no_gain_where_none_is_computed(gait, tmp_path):
+    loud = marker_noise(models_of(gait, tmp_path, 5, "marker_noise", "", 0.008, strides=4).banks)
+    assert loud is not None
+    assert loud.gain_held_out.is_none and loud.evidence.low > 0.0
+    assert loud.record()["gain_percent"] == {"fit": None, "held_out": None, "ci95": None, "other_leg": None}
+    found = loud.parameters["markers_m"]
+    assert found.unit == "m" and found.value == pytest.approx(0.008, abs=3.0 * found.std)
+
+
+def test_ordinary_marker_noise_is_no_cause(models):
+    assert marker_noise(models.banks) is None
