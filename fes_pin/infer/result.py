@@ -121,8 +121,8 @@ ON = {
 }
 """The same in words."""
 ERROR, LIKELIHOOD = "squared error above the noise", "twice the log-likelihood"
-"""Measures of the gain of a cause: what the nominal model errs by, less what noise alone makes; or by how much twice the
-log-likelihood grows with it."""
+"""Measures of the gain of a cause: what the nominal model errs by, less what noise alone makes; or by how much twice
+the log-likelihood grows with it."""
 
 
 @dataclass(frozen=True)
