@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,6 +24,10 @@ class Form:
         A size that shows in a study, and the largest that is still sensible.
     states
         Names of its own states.
+    ranges
+        Shape parameters that are drawn evenly, with their limits.
+    true
+        The engine's parameters, where this is its form: each is the size, or a shape parameter.
     size, p
         Its size and shape parameters, shape (L,).
     """
@@ -32,6 +38,8 @@ class Form:
     unit: ClassVar[float] = 1.0
     cap: ClassVar[float] = np.inf
     states: ClassVar[tuple[str, ...]] = ()
+    ranges: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    true: ClassVar[Mapping[str, str]] = {}
     fine: ClassVar[int] = 5
     """Integration steps per sample that it needs; at 5 (1 kHz) every rig is within d = 0.01 of the engine."""
 
@@ -41,12 +49,15 @@ class Form:
     @classmethod
     def draw(cls, rng: np.random.Generator, angles: np.ndarray) -> dict[str, float]:
         """Shape parameters of one study; `angles` are those of its nominal motion."""
-        return {}
+        return {name: float(rng.uniform(*between)) for name, between in cls.ranges.items()}
 
     @classmethod
     def truth(cls, size: float, p: dict[str, float]) -> dict[str, float]:
         """Parameters of the engine's effect, by name, where this is the engine's form."""
-        return {}
+        own = {**p, "size": size * p.get("sign", 1.0)}
+        if "phase" in p:  # of size sin(w x + phase)
+            own |= {"in_phase": size * math.cos(p["phase"]), "quadrature": size * math.sin(p["phase"])}
+        return {name: own[which] for name, which in cls.true.items()}
 
     def begin(self, s: Any, lanes: Any) -> None:
         """Change constants: `s.load`, `s.tilt`, `s.offset`, `s.effort`; `lanes.k["number"]` numbers the trials."""

@@ -1,5 +1,6 @@
 """Causes at the joint."""
 
+# ruff: noqa: RUF012  (class attributes that nothing changes)
 from __future__ import annotations
 
 import numpy as np
@@ -11,10 +12,7 @@ BOTH = ("ankle", "joint")
 
 class Friction(Form):
     cause, rigs, unit, cap, fine = "coulomb_friction", BOTH, 0.003, 0.06, 20
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"torque_nm": size}
+    true = {"torque_nm": "size"}
 
     def torque(self, torque, s):
         creep = 0.002 + self.size * s.h / (2.0 * s.k["inertia"])
@@ -32,10 +30,7 @@ class Stiction(Friction):
 
 class Drag(Form):
     cause, rigs, unit, cap = "quadratic_damping", BOTH, 0.005, 0.08
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"coefficient": size}
+    true = {"coefficient": "size"}
 
     def torque(self, torque, s):
         return torque - self.size * s.v * np.abs(s.v)
@@ -50,14 +45,11 @@ class SteeperDrag(Drag):
 
 class Stop(Form):
     cause, rigs, unit, cap = "joint_stop", BOTH, 0.3, 20.0
+    true = {"stiffness": "size", "angle_rad": "angle"}
 
     @classmethod
     def draw(cls, rng, angles):
         return {"angle": float(np.quantile(angles, rng.uniform(0.8, 0.95)))}
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"stiffness": size, "angle_rad": p["angle"]}
 
     def torque(self, torque, s):
         return torque - self.size * np.maximum(s.q - self.p["angle"], 0.0)
@@ -73,14 +65,11 @@ class QuadraticStop(Stop):
 
 class Spring(Form):
     cause, rigs, unit, cap = "parallel_stiffness", BOTH, 0.05, 3.0
+    true = {"stiffness_nm_per_rad": "size", "rest_angle_rad": "angle"}
 
     @classmethod
     def draw(cls, rng, angles):
         return {"angle": float(np.quantile(angles, rng.uniform(0.2, 0.8)))}
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"stiffness_nm_per_rad": size, "rest_angle_rad": p["angle"]}
 
     def torque(self, torque, s):
         return torque - self.size * (s.q - self.p["angle"])
@@ -96,14 +85,8 @@ class HardeningSpring(Spring):
 
 class Maxwell(Form):
     cause, rigs, unit, cap, states = "passive_relaxation", BOTH, 0.05, 2.0, ("relaxed",)
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"time": float(rng.uniform(0.2, 0.6))}
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"stiffness_nm_per_rad": size, "relaxation_s": p["time"]}
+    true = {"stiffness_nm_per_rad": "size", "relaxation_s": "time"}
+    ranges = {"time": (0.2, 0.6)}
 
     def rest(self, name, q):
         return q
@@ -128,10 +111,7 @@ class TwoMaxwell(Maxwell):
 
 class LoadInertia(Form):
     cause, unit, cap = "load_inertia", 0.1, 3.0
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"share": size}
+    true = {"share": "size"}
 
     def accelerate(self, acceleration, s):
         moved, j = self.size * s.load * s.k["com_distance_m"] ** 2, s.k["inertia"]
@@ -149,14 +129,11 @@ class PulleyInertia(LoadInertia):
 
 class Reflex(Form):
     cause, unit, cap, states = "stretch_reflex", 0.005, 0.06, ("follow", "change")
+    true = {"gain_nms": "size", "delay_s": "delay"}
 
     @classmethod
     def draw(cls, rng, angles):
         return {"delay": float(rng.uniform(0.035, 0.06)), "side": float(rng.choice((-1.0, 1.0), p=(0.3, 0.7)))}
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"gain_nms": size, "delay_s": p["delay"]}
 
     def rates(self, s):
         pace, change = 1.0 / self.p["delay"], self.own(s, "change")
@@ -185,16 +162,12 @@ class PureReflex(Reflex):
 
 class Cogging(Form):
     cause, rigs, unit, cap = "cogging", ("joint",), 0.005, 0.5
+    true = {"in_phase": "in_phase", "quadrature": "quadrature", "waves": "waves"}
 
     @classmethod
     def draw(cls, rng, angles):
         waves = 2.0 * np.pi * rng.uniform(4.0, 12.0) / max(float(np.ptp(angles)), 1e-3)
         return {"waves": float(waves), "phase": float(rng.uniform(0.0, 2.0 * np.pi))}
-
-    @classmethod
-    def truth(cls, size, p):
-        in_phase, quadrature = size * np.cos(p["phase"]), size * np.sin(p["phase"])
-        return {"in_phase": float(in_phase), "quadrature": float(quadrature), "waves": p["waves"]}
 
     def torque(self, torque, s):
         return torque + self.size * np.sin(self.p["waves"] * s.q + self.p["phase"])
@@ -212,10 +185,7 @@ class Detented(Cogging):
 
 class Backlash(Form):
     cause, rigs, unit, cap = "backlash", ("joint",), 0.003, 0.2
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"half_width": size}
+    true = {"half_width": "size"}
 
     def reading(self, y, v, time, rest):
         return play(y, self.size, rest)

@@ -1,5 +1,6 @@
 """Causes in the muscle."""
 
+# ruff: noqa: RUF012  (class attributes that nothing changes)
 from __future__ import annotations
 
 import math
@@ -13,14 +14,8 @@ BOTH = ("ankle", "muscle")
 
 class Fatigue(Form):
     cause, rigs, unit, cap, states = "fatigue", BOTH, 0.01, 0.4, ("capacity",)
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"recovery": float(rng.uniform(15.0, 40.0))}
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"rate_per_s": size, "recovery_s": p["recovery"]}
+    true = {"rate_per_s": "size", "recovery_s": "recovery"}
+    ranges = {"recovery": (15.0, 40.0)}
 
     def rest(self, name, q):
         return 1.0
@@ -57,14 +52,8 @@ class TwoPools(Fatigue):
 
 class Potentiation(Form):
     cause, rigs, unit, cap, states = "potentiation", BOTH, 0.03, 1.0, ("level",)
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"decay": float(rng.uniform(1.5, 4.0))}
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"gain": size, "decay_s": p["decay"]}
+    true = {"gain": "size", "decay_s": "decay"}
+    ranges = {"decay": (1.5, 4.0)}
 
     def rates(self, s):
         return {"level": (s.act - self.own(s, "level")) / self.p["decay"]}
@@ -82,10 +71,7 @@ class SaturatingPotentiation(Potentiation):
 
 class Delay(Form):
     cause, rigs, unit, cap = "electromechanical_delay", BOTH, 0.004, 0.08
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"delay_s": size}
+    true = {"delay_s": "size"}
 
     def delays(self):
         return [(1.0, self.size)]
@@ -100,10 +86,7 @@ class DispersedDelay(Delay):
 
 class SecondLag(Form):
     cause, rigs, unit, cap, states = "second_order_activation", BOTH, 0.004, 0.05, ("second",)
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"second_s": size}
+    true = {"second_s": "size"}
 
     def rates(self, s):
         return {"second": (s.act - self.own(s, "second")) / np.maximum(self.size, 4.0 * s.h / 10.0)}
@@ -131,10 +114,7 @@ class TwoFibreLags(SecondLag):
 class Asymmetry(Signed):
     cause, rigs, unit, cap = "rise_fall_asymmetry", BOTH, 0.1, 1.5
     ways = (0.3, 0.7)
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"log_ratio": size * p["sign"]}
+    true = {"log_ratio": "size"}
 
     def time_constant(self, tau, s):
         return tau * np.where(s.r < s.act, np.exp(self.size * self.p["sign"]), 1.0)
@@ -150,10 +130,7 @@ class SmoothAsymmetry(Asymmetry):
 
 class ForceLength(Form):
     cause, unit, cap = "force_length", 0.1, 4.0
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"best": float(rng.uniform(1.5, 2.1))}
+    ranges = {"best": (1.5, 2.1)}
 
     @classmethod
     def truth(cls, size, p):
@@ -173,10 +150,7 @@ class Parabola(ForceLength):
 
 class ForceVelocity(Form):
     cause, unit, cap = "force_velocity", 0.03, 0.6
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"slope_s_per_rad": size}
+    true = {"slope_s_per_rad": "size"}
 
     def force(self, force, s):
         return force * (1.0 - self.size * s.v * s.moving)

@@ -1,5 +1,6 @@
 """Causes in the nerve."""
 
+# ruff: noqa: RUF012  (class attributes that nothing changes)
 from __future__ import annotations
 
 import math
@@ -13,10 +14,7 @@ BOTH = ("ankle", "muscle")
 
 class Shift(Signed):
     cause, rigs, unit, cap = "threshold_shift", BOTH, 10.0, 150.0
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"shift_us": size * p["sign"]}
+    true = {"shift_us": "size"}
 
     def width(self, w, time, lanes):
         return w - self.size * self.p["sign"]
@@ -33,10 +31,7 @@ class ShiftMoreAtSaturation(Shift):
 
 class HillRecruitment(Form):
     cause, rigs, unit, cap = "recruitment_curvature", BOTH, 0.1, 1.5
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"bend": float(rng.uniform(-1.0, 2.0))}
+    ranges = {"bend": (-1.0, 2.0)}
 
     @classmethod
     def truth(cls, size, p):
@@ -56,10 +51,7 @@ class DingRecruitment(Form):
 
 class GompertzRecruitment(Form):
     cause, name, rigs, unit, cap = "recruitment_curvature", "gompertz", BOTH, 0.1, 1.0
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"delay": float(rng.uniform(2.0, 4.0)), "steepness": float(rng.uniform(3.0, 5.0))}
+    ranges = {"delay": (2.0, 4.0), "steepness": (3.0, 5.0)}
 
     def recruit(self, r):
         b, c = self.p["delay"], self.p["steepness"]
@@ -69,10 +61,7 @@ class GompertzRecruitment(Form):
 
 class Play(Form):
     cause, rigs, unit, cap = "recruitment_hysteresis", BOTH, 5.0, 150.0
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"half_width_us": size}
+    true = {"half_width_us": "size"}
 
     def width(self, w, time, lanes):
         return play(w, self.size, 0.0 * w[0])
@@ -88,10 +77,7 @@ class TwoPlays(Form):
 class ThresholdDrift(Signed):
     cause, rigs, unit, cap = "threshold_drift", BOTH, 1.0, 40.0
     ways = (0.3, 0.7)
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"rate_us_per_s": size * p["sign"]}
+    true = {"rate_us_per_s": "size"}
 
     def width(self, w, time, lanes):
         return w - self.size * self.p["sign"] * time[:, None]
@@ -106,14 +92,8 @@ class SettlingThreshold(ThresholdDrift):
 
 class Spillover(Form):
     cause, unit, cap = "antagonist_spillover", 0.05, 1.0
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"onset": float(rng.uniform(450.0, 650.0))}
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"share": size, "onset_us": p["onset"]}
+    true = {"share": "size", "onset_us": "onset"}
+    ranges = {"onset": (450.0, 650.0)}
 
     def begin(self, s, lanes):
         room = (lanes.input - self.p["onset"]) / (lanes.k["saturation_us"] - self.p["onset"])

@@ -1,5 +1,6 @@
 """Causes in the rig: what holds the joint, drives it and loads it."""
 
+# ruff: noqa: RUF012  (class attributes that nothing changes)
 from __future__ import annotations
 
 import math
@@ -13,10 +14,7 @@ BOTH = ("ankle", "joint")
 
 class EffortOffset(Signed):
     cause, rigs, unit, cap = "effort_offset", ("joint",), 0.005, 0.5
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"offset": size * p["sign"]}
+    true = {"offset": "size"}
 
     def begin(self, s, lanes):
         s.offset = s.offset + self.size * self.p["sign"]
@@ -24,10 +22,7 @@ class EffortOffset(Signed):
 
 class EffortGain(Signed):
     cause, rigs, unit, cap = "effort_gain", ("joint",), 0.05, 0.9
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"error": size * p["sign"]}
+    true = {"error": "size"}
 
     def begin(self, s, lanes):
         s.effort = s.effort * (1.0 + self.size * self.p["sign"])
@@ -49,10 +44,7 @@ class EffortSaturates(EffortGain):
 
 class Tilt(Signed):
     cause, rigs, unit, cap = "base_tilt", BOTH, 0.02, 0.5
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"tilt_rad": size * p["sign"]}
+    true = {"tilt_rad": "size"}
 
     def begin(self, s, lanes):
         s.tilt = s.tilt + self.size * self.p["sign"]
@@ -60,10 +52,7 @@ class Tilt(Signed):
 
 class LoadError(Signed):
     cause, unit, cap = "load_error", 0.003, 0.3
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"error": size * p["sign"]}
+    true = {"error": "size"}
 
     def begin(self, s, lanes):
         s.load = s.load * (1.0 + self.size * self.p["sign"])
@@ -71,14 +60,8 @@ class LoadError(Signed):
 
 class Frame(Form):
     cause, rigs, unit, cap, states = "frame_vibration", BOTH, 0.05, 1.0, ("phi", "rate")
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"hz": float(rng.uniform(6.0, 14.0)), "zeta": float(rng.uniform(0.03, 0.08))}
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"coupling": size, "frequency_hz": p["hz"], "damping_ratio": p["zeta"]}
+    true = {"coupling": "size", "frequency_hz": "hz", "damping_ratio": "zeta"}
+    ranges = {"hz": (6.0, 14.0), "zeta": (0.03, 0.08)}
 
     def accelerate(self, acceleration, s):
         omega = 2.0 * math.pi * self.p["hz"]
@@ -101,15 +84,8 @@ class FrameSeen(Frame):
 
 class Breathing(Form):
     cause, rigs, unit, cap = "periodic_torque", BOTH, 0.002, 0.2
-
-    @classmethod
-    def draw(cls, rng, angles):
-        return {"hz": float(rng.uniform(0.2, 0.5)), "phase": float(rng.uniform(0.0, 2.0 * math.pi))}
-
-    @classmethod
-    def truth(cls, size, p):
-        in_phase, quadrature = size * math.cos(p["phase"]), size * math.sin(p["phase"])
-        return {"in_phase": in_phase, "quadrature": quadrature, "frequency_hz": p["hz"]}
+    true = {"in_phase": "in_phase", "quadrature": "quadrature", "frequency_hz": "hz"}
+    ranges = {"hz": (0.2, 0.5), "phase": (0.0, 2.0 * math.pi)}
 
     def torque(self, torque, s):
         return torque + self.size * np.sin(2.0 * math.pi * self.p["hz"] * s.t + self.p["phase"])

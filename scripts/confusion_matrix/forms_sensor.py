@@ -1,5 +1,6 @@
 """Causes in the sensor, and causes that no library has."""
 
+# ruff: noqa: RUF012  (class attributes that nothing changes)
 from __future__ import annotations
 
 import math
@@ -15,10 +16,7 @@ BOTH = ("ankle", "joint")
 
 class Offset(Signed):
     cause, rigs, unit, cap = "sensor_offset", ALL, 1e-3, 20.0
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"offset": size * p["sign"]}
+    true = {"offset": "size"}
 
     def reading(self, y, v, time, rest):
         return y + self.size * self.p["sign"]
@@ -43,10 +41,7 @@ class _Deviating(Signed):
 
 class Gain(_Deviating):
     cause, rigs, unit, cap = "sensor_gain", BOTH, 0.02, 0.6
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"error": size * p["sign"]}
+    true = {"error": "size"}
 
     def reading(self, y, v, time, rest):
         rest = self.rest_of(rest)
@@ -55,10 +50,7 @@ class Gain(_Deviating):
 
 class Drift(Signed):
     cause, rigs, unit, cap = "sensor_drift", ALL, 2e-4, 5.0
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"rate_per_s": size * p["sign"]}
+    true = {"rate_per_s": "size"}
 
     def reading(self, y, v, time, rest):
         return y + self.size * self.p["sign"] * time[:, None]
@@ -73,10 +65,7 @@ class SettlingDrift(Drift):
 
 class LowPass(Form):
     cause, rigs, unit, cap, states = "sensor_lag", ALL, 0.003, 0.08, ("read",)
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"lag_s": size}
+    true = {"lag_s": "size"}
 
     def rest(self, name, q):
         return q
@@ -104,10 +93,7 @@ class TimeShift(LowPass):
 
 class Curved(_Deviating):
     cause, rigs, unit, cap = "sensor_nonlinearity", BOTH, 0.05, 1.2
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"curvature": size * p["sign"]}
+    true = {"curvature": "size"}
 
     def reading(self, y, v, time, rest):
         return y + self.size * self.p["sign"] * (y - self.rest_of(rest)) ** 2
@@ -123,14 +109,11 @@ class CurvedMore(Curved):
 
 class Hum(Form):
     cause, rigs, unit, cap = "mains_hum", ALL, 3e-4, 5.0
+    true = {"in_phase": "in_phase", "quadrature": "quadrature"}
 
     @classmethod
     def draw(cls, rng, angles):
         return {"hz": float(rng.choice((50.0, 60.0))), "phase": float(rng.uniform(0.0, 2.0 * math.pi))}
-
-    @classmethod
-    def truth(cls, size, p):
-        return {"in_phase": size * math.cos(p["phase"]), "quadrature": size * math.sin(p["phase"])}
 
     def reading(self, y, v, time, rest):
         return y + self.size * np.sin(2.0 * math.pi * self.p["hz"] * time[:, None] + self.p["phase"])

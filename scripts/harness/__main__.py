@@ -62,6 +62,8 @@ def main(
             bad = bad or bool(said)
             typer.echo("\n".join(said) or "no worse than docs/accuracy.md")
         if onto_page:
+            if len(rows) < len(items):
+                raise typer.BadParameter(f"{label}: {len(rows)} of {len(items)} studies have an answer in the store")
             command = f"scripts/accuracy {name} --count {count} --seed {seed}" + " --nulls" * nulls
             page.write(label, command, rows)
     if bad:

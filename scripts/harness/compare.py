@@ -8,7 +8,7 @@ from statistics import median
 from scipy.stats import binomtest
 
 from harness.row import KINDS, Row
-from harness.table import one_line, table
+from harness.table import counts, notes, one_line, table
 
 HEAD = ("hidden", "studies", "both right", "only now", "only before", "neither", "p (McNemar)")
 LEAST_S = 0.1
@@ -22,7 +22,8 @@ def compared(now: Sequence[Row], before: Mapping[str, Row]) -> list[str]:
     -------
     list of str
         The table of who is right, with the exact test of McNemar (Psychometrika 12, 1947) of each kind; the ratio of
-        processor times; then every study of which other sets are named, or of which one run alone is right.
+        processor times; intervals and errors of both; then every study of which other sets are named, or of which one
+        run alone is right.
     """
     same = [(row, before[row.key]) for row in now if row.key in before and before[row.key].study == row.study]
     pairs = [(a, b) for a, b in same if a.error is None and b.error is None]
@@ -35,6 +36,8 @@ def compared(now: Sequence[Row], before: Mapping[str, Row]) -> list[str]:
     if pairs:
         ratios = [max(a.cpu_s, LEAST_S) / max(b.cpu_s, LEAST_S) for a, b in pairs]
         lines.append(f"processor time now, as a share of before, median: {median(ratios):.2f}")
+    for words, rows in (("now", [a for a, _ in pairs]), ("before", [b for _, b in pairs])):
+        lines += [f"{words}: {line}" for line in notes(counts(rows))]
     for a, b in pairs:
         if a.right != b.right or [set(s) for s in a.sets] != [set(s) for s in b.sets]:
             lines += [f"  before {one_line(b)}", f"  now    {one_line(a)}"]

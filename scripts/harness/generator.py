@@ -44,7 +44,7 @@ class Truth:
     Attributes
     ----------
     parameters
-        True values by their names in the answer; of a cause with a site, "cause at site".
+        True values by their names in the answer; of a cause with a site or a trial, "cause at site".
     beside
         Causes that act a little and may be named as well.
     part
@@ -86,6 +86,7 @@ GENERATORS = {
     "imposed": ("imposed", "Imposed"),
     "contrast": ("contrast", "Pairs"),
     "halved": ("contrast", "Halved"),
+    "misread": ("misread", "Misread"),
     "walking": ("walking", "Walks"),
 }
 """By name: module of this package, class, and what it is made with."""

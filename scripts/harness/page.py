@@ -23,7 +23,13 @@ def read() -> dict[str, Any]:
 
 
 def write(name: str, command: str, rows: Sequence[Row]) -> None:
-    """Put the counts of a run into the data, and write the page."""
+    """Put the counts of a run into the data, and write the page.
+
+    Raises
+    ------
+    ValueError
+        The rows are not of one code.
+    """
     (code,) = {row.code for row in rows}
     data = {**read(), name: {"command": command, "code": code[:12], **counts(rows)}}
     order = [*GENERATORS, *sorted(data.keys() - GENERATORS.keys())]
@@ -42,14 +48,22 @@ def tables(data: Mapping[str, Any]) -> str:
     """Counts of all generators, and beneath them what was run, and intervals, errors and times."""
     lines = [[f"`{name}`" if not k else "", *row] for name in data for k, row in enumerate(lines_of(data[name]))]
     runs = [[f"`{one['command']}`", one["code"], *_measured(one)] for one in data.values()]
-    head = ("command", "code", "95 % intervals that hold the truth", "error E, nominal to extended", "processor time")
+    head = (
+        "command",
+        "code",
+        "without an answer",
+        "95 % intervals that hold the truth",
+        "error E, nominal to extended",
+        "processor time",
+    )
     return "\n\n".join([table(("generator", *HEAD), lines), table(head, runs)])
 
 
-def _measured(found: Mapping[str, Any]) -> list[str]:
+def _measured(found: Mapping[str, Any]) -> list[str | int]:
     held, count = found["intervals"]
     errors = found["errors"].get("horizon") or found["errors"].get("held_out")
     return [
+        found["unanswered"],
         interval(held, count) if count else "",
         f"{errors[0]:g} to {errors[1]:g} %" if errors else "",
         f"{found['cpu_s']:g} s",

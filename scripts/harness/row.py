@@ -124,8 +124,8 @@ def _estimates(
 ) -> Iterator[tuple[str, float, float | None, float, float]]:
     fitted = dict(record.get("extended", {}).get("parameters", {}))
     for cause in record.get("causes", ()):
-        if "site" in cause:
-            fitted |= {f"{cause['name']} at {cause['site']}": one for one in cause["parameters"].values()}
+        if place := cause.get("site") or cause.get("trial"):
+            fitted |= {f"{cause['name']} at {place}": one for one in cause["parameters"].values()}
     nominal = record.get("nominal", {}).get("parameters", {})
     for name, value in true.items():
         if (found := fitted.get(name)) and found["std"] and math.isfinite(found["std"]):

@@ -36,7 +36,7 @@ def counts(rows: Iterable[Row]) -> dict[str, Any]:
     lines = {}
     for kind in KINDS:
         own = [row for row in good if row.kind == kind]
-        parts = sorted({row.part for row in own if row.part})
+        parts = sorted({row.part for row in own if row.part}, key=lambda part: (len(part), part))
         for name, some in [(kind, own), *((f"{kind}: {p}", [r for r in own if r.part == p]) for p in parts)]:
             if some:
                 lines[name] = [len(some), *(sum(getattr(row, column) for row in some) for column in COLUMNS[1:])]
