@@ -6,8 +6,8 @@ A constant input holds a lean where it balances gravity in every falling mode. I
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,7 +16,7 @@ from fes_pin.body.balance import balance as _balance
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode
-from fes_pin.body.programs import LinearProgram, ProgramAnswer
+from fes_pin.body.programs import LinearProgram
 from fes_pin.data.numbers import positive_number, truth
 from fes_pin.data.tabulated import Tabulated
 
@@ -45,19 +45,23 @@ class HoldingDemands:
     ground_gains: np.ndarray
     ground_room: np.ndarray
     ground_load: np.ndarray
+    inputs: Inputs
 
-    @property
-    def limits(self) -> np.ndarray:
-        """Rows of the inequalities: settling both ways, then the ground."""
-        return np.vstack([self.settle_gains, -self.settle_gains, self.ground_gains])
-
-    def case(self, i: int = 0, degrees: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Target of the falling modes, (k,), and limits of the inequalities when mode i leans by so many degrees."""
+    def program(self, i: int = 0, degrees: float = 0.0) -> LinearProgram:
+        """The inputs that meet the demands when falling mode i leans by so many degrees; their cost is nothing."""
         target, room = self.target.copy(), self.ground_room.copy()
         if degrees:
             target[i] -= self.load[i] * degrees
             room -= self.ground_load[:, i] * degrees
-        return target, np.concatenate([self.settle_high, -self.settle_low, room])
+        return LinearProgram(
+            cost=np.zeros(self.inputs.n),
+            A_ub=np.vstack([self.settle_gains, -self.settle_gains, self.ground_gains]),
+            b_ub=np.concatenate([self.settle_high, -self.settle_low, room]),
+            A_eq=self.gains,
+            b_eq=target,
+            lower=self.inputs.lower,
+            upper=self.inputs.upper,
+        )
 
 
 def demands(
@@ -109,14 +113,28 @@ def demands(
         ground_gains=torques @ inputs.on(linear),
         ground_room=np.zeros(0) if ground is None else -ground.constant - torques @ linear.C,
         ground_load=rows[:, fall] * degree[fall],
+        inputs=inputs,
     )
 
 
+@dataclass(frozen=True, eq=False)
 class Leans(Tabulated):
-    """Base of what inputs can do with leans, one row a falling mode."""
+    """Base of what inputs can do with leans, one row a falling mode.
 
-    falling: tuple[Mode, ...]
+    Parameters
+    ----------
+    falling
+        The falling modes.
+    lean_deg
+        Greatest lean in each mode, degrees of the mode's greatest joint, in the positive and in the negative direction
+        of the shape; (k, 2). NaN where not even the posture is kept.
+    error_deg
+        By how much rounding and the solver's tolerances may have moved each of them; (k, 2).
+    """
+
+    falling: tuple[Mode, ...] = field(repr=False)
     lean_deg: np.ndarray
+    error_deg: np.ndarray = field(repr=False)
 
     _index = "mode"
     _able: ClassVar[str]
@@ -139,31 +157,22 @@ class Leans(Tabulated):
 
 @dataclass(frozen=True, eq=False)
 class HeldLeans(Leans):
-    """What inputs within their bounds can hold.
+    """What inputs within their bounds can hold; see `Leans`.
+
+    Each lean is the greatest, with every other fall balanced, that inputs can still hold against gravity. No constant
+    input holds a greater one; inputs that change in time may catch it (`fes_pin.body.catchable`).
 
     Parameters
     ----------
-    falling
-        The falling modes.
     holds
         Whether some constant input balances gravity in every falling mode at once while the others settle near the
         posture.
     effort
         That input with the least greatest share of its bounds: by name; empty if it does not hold.
-    lean_deg
-        Greatest lean in each mode, with every other fall balanced, that inputs can still hold against gravity: degrees
-        of the mode's greatest joint, in the positive and in the negative direction of the shape; (k, 2). NaN where the
-        posture cannot be held at all. No constant input holds a greater lean; inputs that change in time may catch it
-        (`fes_pin.body.catchable`).
-    error_deg
-        By how much rounding and the solver's tolerances may have moved each of them; (k, 2).
     """
 
-    falling: tuple[Mode, ...] = field(repr=False)
     holds: bool
     effort: Mapping[str, float]
-    lean_deg: np.ndarray
-    error_deg: np.ndarray = field(repr=False)
 
     _able = "holds"
 
@@ -206,53 +215,34 @@ def attainable(
     """
     inputs = Inputs.of(inputs, linear)
     wanted = demands(linear, inputs, gravity, settle_deg, balance)
-    effort = _least_effort(wanted, inputs)
-    leans = np.full((len(wanted.falling), 2), np.nan)
-    errors = np.zeros_like(leans)
-    if effort is not None:
-        for i in range(len(wanted.falling)):
-            for way, sign in enumerate((1.0, -1.0)):
-                leans[i, way], errors[i, way] = _greatest_lean(wanted, inputs, i, sign)
+    effort = _least_effort(wanted)
+    leans, errors = greatest_leans(wanted.program(), wanted.program, len(wanted.falling), effort is not None)
     named = {} if effort is None else dict(zip(inputs.names, effort.tolist(), strict=True))
-    return HeldLeans(wanted.falling, effort is not None, named, leans, errors)
+    return HeldLeans(wanted.falling, leans, errors, effort is not None, named)
 
 
-def _solve(
-    wanted: HoldingDemands,
-    inputs: Inputs,
-    cost: np.ndarray,
-    balance: np.ndarray,
-    limit: np.ndarray,
-    further: np.ndarray,
-) -> ProgramAnswer:
-    """Linear program over (u, s): the posture's demands with s times two columns in them; further rows <= 0."""
-    target, room = wanted.case()
-    return LinearProgram(
-        cost=cost,
-        A_ub=np.vstack([np.column_stack([wanted.limits, limit]), further]),
-        b_ub=np.concatenate([room, np.zeros(len(further))]),
-        A_eq=np.column_stack([wanted.gains, balance]),
-        b_eq=target,
-        lower=np.append(inputs.lower, 0.0),
-        upper=np.append(inputs.upper, np.inf),
-    ).solve()
+def greatest_leans(
+    upright: LinearProgram, leant: Callable[[int, float], LinearProgram], count: int, able: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Greatest lean in each falling mode, both ways, and its error, degrees: (count, 2) each; NaN where none is `able`.
+
+    Parameters
+    ----------
+    upright, leant
+        The program of the posture, and that of a mode that leans by so many degrees.
+    """
+    leans, errors = np.full((count, 2), np.nan), np.zeros((count, 2))
+    for i, way in np.ndindex(leans.shape) if able else ():
+        leans[i, way], errors[i, way] = upright.towards(leant(i, 1.0 - 2.0 * way)).solve().greatest
+    return leans, errors
 
 
-def _least_effort(wanted: HoldingDemands, inputs: Inputs) -> np.ndarray | None:
-    span = np.where(np.isfinite(inputs.upper), inputs.upper, 1.0)
-    eye = np.eye(inputs.n)
+def _least_effort(wanted: HoldingDemands) -> np.ndarray | None:
+    """The input that holds the posture with the least greatest share of its bounds; None if none does."""
+    held, eye = wanted.program(), np.eye(wanted.inputs.n)
+    span = np.where(np.isfinite(wanted.inputs.upper), wanted.inputs.upper, 1.0)
     share = np.block([[eye, -span[:, None]], [-eye, -span[:, None]]])
-    cost = np.append(np.zeros(inputs.n), 1.0)
-    nothing = np.zeros(len(wanted.target)), np.zeros(len(wanted.limits))
-    found = _solve(wanted, inputs, cost, *nothing, share)
+    most = held.widened([1.0], np.zeros(len(held.b_ub)), np.zeros(len(held.b_eq)))
+    limited = replace(most, A_ub=np.vstack([most.A_ub, share]), b_ub=np.append(most.b_ub, np.zeros(len(share))))
+    found = limited.solve()
     return None if found.x is None else found.x[:-1]
-
-
-def _greatest_lean(wanted: HoldingDemands, inputs: Inputs, i: int, sign: float) -> tuple[float, float]:
-    """Degrees of lean in mode i that can be held, and their error: mu eta + phi'(C + Q u) = 0 in every falling mode."""
-    push = np.zeros(len(wanted.target))
-    push[i] = sign * wanted.load[i]
-    tilt = np.concatenate([np.zeros(2 * len(wanted.settle_gains)), sign * wanted.ground_load[:, i]])
-    cost = np.append(np.zeros(inputs.n), -1.0)
-    lean, error = _solve(wanted, inputs, cost, push, tilt, np.zeros((0, inputs.n + 1))).greatest
-    return (lean if np.isnan(lean) else max(0.0, lean)), error

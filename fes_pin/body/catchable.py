@@ -10,14 +10,13 @@ plan catches beyond the modal bound is lost to any stimulation; between the two 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.body.attainable import SETTLE_DEG, Leans, lean_text
+from fes_pin.body.attainable import SETTLE_DEG, Leans, greatest_leans, lean_text
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.modes import Mode
 from fes_pin.body.plans import Plans
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number, positive_number, truth
@@ -25,27 +24,19 @@ from fes_pin.data.numbers import number, positive_number, truth
 
 @dataclass(frozen=True, eq=False)
 class CaughtLeans(Leans):
-    """From which leans at rest inputs within their bounds can bring the body to rest again.
+    """From which leans at rest inputs within their bounds can bring the body to rest again; see `Leans`.
+
+    Each lean is the greatest, the other modes upright, that a plan catches.
 
     Parameters
     ----------
-    falling
-        The falling modes.
     rests
         Whether there is any rest within the limits that constant inputs keep.
-    lean_deg
-        Greatest lean in each mode, the others upright, that a plan catches: degrees of the mode's greatest joint, in
-        the positive and in the negative direction of the shape; (k, 2). NaN where not even the posture is kept.
-    error_deg
-        By how much rounding and the solver's tolerances may have moved each of them; (k, 2).
     bound_deg
         What no stimulation of these inputs catches, whatever its course (`modal_bound`); (k, 2).
     """
 
-    falling: tuple[Mode, ...] = field(repr=False)
     rests: bool
-    lean_deg: np.ndarray
-    error_deg: np.ndarray = field(repr=False)
     bound_deg: np.ndarray
 
     _able = "rests"
@@ -133,17 +124,11 @@ def catchable(
     """
     inputs = Inputs.of(inputs, linear)
     plans = plans_of(linear, inputs, settle_deg, balance, rest_deg, gravity)
-    falling = plans.modes.falling
     still = np.zeros(len(plans.modes))
-    rests = plans.program(still, still).solve().x is not None
-    leans, errors = np.full((len(falling), 2), np.nan), np.zeros((len(falling), 2))
-    for i, row in enumerate(np.flatnonzero(plans.kinds == "fall")):
-        for way, sign in enumerate((1.0, -1.0)):
-            towards = still.copy()
-            towards[row] = sign * plans.degree[row]
-            if rests:
-                leans[i, way], errors[i, way] = plans.program(still, still, towards).solve().greatest
-    return CaughtLeans(falling, rests, leans, errors, modal_bound(linear, inputs, gravity=gravity))
+    upright, falls = plans.program(still, still), np.diag(plans.degree)[plans.kinds == "fall"]
+    rests = upright.solve().x is not None
+    leans, errors = greatest_leans(upright, lambda i, sign: plans.program(sign * falls[i], still), len(falls), rests)
+    return CaughtLeans(plans.modes.falling, leans, errors, rests, modal_bound(linear, inputs, gravity=gravity))
 
 
 def plans_of(

@@ -20,7 +20,6 @@ from fes_pin.body.covering import Demand, smallest
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import SIDES, known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
-from fes_pin.body.programs import LinearProgram
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import all_known, known_word, number, positive_number, truth, whole
 
@@ -231,7 +230,7 @@ def _smallest(linear: LinearBody, inputs: Inputs, asked: _Question, alternatives
     rows, needs = _in_turn(wanted, inputs, asked.lean_deg)
     cases: list[Demand] = []
     if asked.together and asked.stimulation == "constant":
-        cases = _held(wanted, inputs, asked.lean_deg)
+        cases = _held(wanted, asked.lean_deg)
         # balance and leans in k modes need k inputs; inputs that only pull, around no load at all, k + 1
         alone = not wanted.target.any() and not inputs.lower.any()
         if wanted.falling:
@@ -242,15 +241,10 @@ def _smallest(linear: LinearBody, inputs: Inputs, asked: _Question, alternatives
     return [tuple(name for name, z in zip(inputs.names, chosen, strict=True) if z) for chosen in found]
 
 
-def _held(wanted: HoldingDemands, inputs: Inputs, lean_deg: float) -> list[Demand]:
+def _held(wanted: HoldingDemands, lean_deg: float) -> list[Demand]:
     """The posture, and a lean each way in each falling mode, held by constant inputs."""
-    leans = [(i, sign * lean_deg) for i in range(len(wanted.falling)) for sign in (1.0, -1.0)]
-    cases = [wanted.case(*lean) for lean in [(0, 0.0), *leans]]
-    nothing, owner = np.zeros(inputs.n), np.arange(inputs.n)
-    return [
-        Demand(LinearProgram(nothing, wanted.limits, room, wanted.gains, target, inputs.lower, inputs.upper), owner)
-        for target, room in cases
-    ]
+    leans = [(0, 0.0), *itertools.product(range(len(wanted.falling)), (lean_deg, -lean_deg))]
+    return [Demand(wanted.program(*lean), np.arange(wanted.inputs.n)) for lean in leans]
 
 
 def _caught(linear: LinearBody, inputs: Inputs, asked: _Question) -> list[Demand]:

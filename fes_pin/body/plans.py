@@ -8,8 +8,9 @@ Torques follow the stimulation at once.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -144,55 +145,66 @@ class Plans:
                 out[i] = (np.cos(rate * np.maximum(until, 0.0)) - np.cos(rate * np.maximum(since, 0.0))) / -value
         return out
 
-    def _ending(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of each swing, at the end of the plan: coordinate, and rate over frequency, per force: (r, pieces) each."""
-        begin, end = self._edges
-        last = self.pulse_s * float(np.sum(self.pieces))
-        since, until = last - begin, np.maximum(last - end, 0.0)
-        rate = np.sqrt(np.abs(self.modes.values))[:, None]
-        size = np.maximum(np.abs(self.modes.values), 1e-300)[:, None]
-        return (np.cos(rate * until) - np.cos(rate * since)) / size, (
-            np.sin(rate * since) - np.sin(rate * until)
-        ) / size
+    @cached_property
+    def _courses(self) -> np.ndarray:
+        """Of each mode's coordinate at each look, when nothing acts, per unit of its start and rate: (r, looks, 2).
+
+        Of a falling mode only the decaying part: the growing one is what the plan must meet. Of a drift nothing.
+        """
+        times, _ = self._looks
+        out = np.zeros((len(self.modes), len(times), 2))
+        for course, kind, value in zip(out, self.kinds, self.modes.values, strict=True):
+            w = np.sqrt(abs(value))
+            if kind == "fall":
+                course[:] = np.multiply.outer(0.5 * np.exp(-w * times), [1.0, -1.0 / w])
+            elif kind == "swing":
+                course[:] = np.column_stack([np.cos(w * times), np.sin(w * times) / w])
+        return out
 
     def _spread(self, i, response: np.ndarray) -> np.ndarray:
         """Rows over all inputs of responses (rows, pieces) of mode i."""
         return np.kron(response, self.gains[i])
 
     @cached_property
-    def _limits(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows <= limits over all inputs, for a body that starts in the posture at rest; (rows, m pieces), (rows,).
+    def _limits(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Rows <= limits over all inputs, for a body that starts in the posture at rest: (rows, m pieces), (rows,).
 
-        And what each row is about, (rows,): twice the mode's place on the way, one more in the end; -1 the ground.
+        Then what each row is about, (rows,): twice the mode's place on the way, one more in the end; -1 the ground. And
+        what the modes' starts and rates add to the limits, (rows, 2 r).
         """
-        count, later = len(self.pieces), int(self._later.sum())
-        rows, limits = [np.zeros((0, self.inputs.n * count))], [np.zeros(0)]
-        about: list[np.ndarray] = [np.zeros(0)]
+        modes = len(self.modes)
+        nothing = np.zeros((0, self.inputs.n * len(self.pieces))), np.zeros(0), np.zeros(0), np.zeros((0, 2 * modes))
+        blocks = [nothing]
+        for i in np.flatnonzero(self.kinds != "neutral"):
+            blocks += self._near_the_posture(int(i))
+        if self.balance and self.gravity:
+            blocks += self._on_the_soles()
+        rows, limits, about, starts = (np.concatenate(part) for part in zip(*blocks, strict=True))
+        return rows, limits, about, starts
+
+    def _near_the_posture(self, i: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """The block of `_limits` that keeps mode i within them, one way and the other."""
+        value, weight, count = self.modes.values[i], self.degree[i] * self.settle_deg, len(self.pieces)
         last = np.zeros((1, count))
         last[0, -1] = 1.0
-        position, rate = self._ending()
-        for i, value in enumerate(self.modes.values):
-            if self.kinds[i] == "neutral":
-                continue
-            pull, weight = self.constant[i], self.degree[i] * self.settle_deg
-            along = [self._responses[i][self._later], last / -value]
-            if self.kinds[i] == "swing":  # what still swings then goes on: |rest| + |offset| + |rate| within the limit
-                offset = position[[i]] - last / -value
-                along += [last / -value + a * offset + b * rate[[i]] for a in (1.0, -1.0) for b in (1.0, -1.0)]
-            response = np.vstack(along)
-            spread, still = self._spread(i, response) / weight, pull * response.sum(axis=1) / weight
-            room = np.ones(len(response))
-            if self.kinds[i] == "fall" and self.rest_deg is not None:
-                room[later] = self.rest_deg / self.settle_deg
-            rows += [spread, -spread]
-            limits += [room - still, room + still]
-            about += [2.0 * i + (np.arange(len(room)) >= later)] * 2
-        if self.balance and self.gravity:
-            for row, limit in self._on_the_soles():
-                rows.append(row)
-                limits.append(limit)
-                about.append(np.full(len(limit), -1.0))
-        return np.vstack(rows), np.concatenate(limits), np.concatenate(about)
+        along = [self._responses[i][self._later], last / -value]
+        alone = [self._courses[i][self._later], np.zeros((1, 2))]
+        later = len(along[0])
+        if self.kinds[i] == "swing":  # what still swings then goes on: |rest| + |offset| + |rate| within the limit
+            (begin, end), w, time = self._edges, np.sqrt(-value), self._looks[0][-1]
+            rate = (np.sin(w * (time - begin)) - np.sin(w * np.maximum(time - end, 0.0))) / -value
+            offset, ends = self._responses[i][[-1]] - last / -value, self._courses[i][[-1]]
+            turns = np.array([[-np.sin(w * time), np.cos(w * time) / w]])
+            for a, b in itertools.product((1.0, -1.0), repeat=2):
+                along.append(last / -value + a * offset + b * rate)
+                alone.append(a * ends + b * turns)
+        response, starts = np.vstack(along), np.zeros((sum(map(len, along)), 2 * len(self.modes)))
+        starts[:, 2 * i : 2 * i + 2] = np.vstack(alone) / weight
+        spread, still = self._spread(i, response) / weight, self.constant[i] * response.sum(axis=1) / weight
+        room, about = np.ones(len(response)), 2.0 * i + (np.arange(len(response)) >= later)
+        if self.kinds[i] == "fall" and self.rest_deg is not None:
+            room[later] = self.rest_deg / self.settle_deg
+        return [(spread, room - still, about, -starts), (-spread, room + still, about, starts)]
 
     @cached_property
     def _musts(self) -> np.ndarray:
@@ -206,14 +218,15 @@ class Plans:
         """The inequalities of the centre of pressure."""
         return _balance(self.linear, self.modes)
 
-    def _on_the_soles(self):
-        """Rows and limits: each foot's centre of pressure on its sole, at every look and at rest in the end."""
+    def _on_the_soles(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """Blocks of `_limits`: each foot's centre of pressure on its sole, at every look and at rest in the end."""
         times, which = self._looks
         now = np.zeros((len(times), len(self.pieces)))
         now[np.arange(len(times)), which] = 1.0
         resting = np.where(self.kinds == "neutral", 0.0, -1.0 / np.where(self.modes.values, self.modes.values, 1.0))
         shares, constant = self.ground.per_torque @ self.inputs.on(self.linear), self.ground.constant
         constant = constant + self.ground.per_torque @ self.linear.C
+        blocks = []
         for e in range(len(constant)):
             row, limit = np.kron(now, shares[e]), np.full(len(times), -constant[e])
             end, rest = shares[e].copy(), -constant[e]
@@ -223,69 +236,32 @@ class Plans:
                 limit = limit - self.constant[i] * response.sum(axis=1)
                 end += self.ground.at_rest[e, i] * resting[i] * self.gains[i]
                 rest -= self.ground.at_rest[e, i] * resting[i] * self.constant[i]
-            yield row, limit
             final = np.zeros((1, self.inputs.n * len(self.pieces)))
             final[0, -self.inputs.n :] = end
-            yield final, np.array([rest])
-
-    def _free(self, eta: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """What a start adds by itself to the limits, (rows,).
-
-        Of a falling mode only the decaying part: the growing one is what the plan must meet.
-        """
-        times, _ = self._looks
-        count = len(times)
-        frequency = np.sqrt(np.abs(self.modes.values))
-        last = self.pulse_s * float(np.sum(self.pieces))
-        added, alone = [np.zeros(0)], np.zeros((len(self.modes), count))
-        for i, kind in enumerate(self.kinds):
-            w = frequency[i]
-            if kind == "neutral":
-                continue
-            weight = self.degree[i] * self.settle_deg
-            if kind == "fall":
-                alone[i] = 0.5 * (eta[i] - rate[i] / w) * np.exp(-w * times)
-                own = np.append(alone[i][self._later], 0.0)
-            else:
-                alone[i] = eta[i] * np.cos(w * times) + rate[i] / w * np.sin(w * times)
-                end = eta[i] * np.cos(w * last) + rate[i] / w * np.sin(w * last)
-                turn = rate[i] / w * np.cos(w * last) - eta[i] * np.sin(w * last)
-                corners = [a * end + b * turn for a in (1.0, -1.0) for b in (1.0, -1.0)]
-                own = np.concatenate([alone[i][self._later], [0.0], corners])
-            added += [-own / weight, own / weight]
-        if self.balance and self.gravity:
-            for row in self.ground.per_mode:
-                added += [-(row @ alone), np.zeros(1)]
-        return np.concatenate(added)
+            starts = np.einsum("i,ilk->lik", -self.ground.per_mode[e], self._courses).reshape(len(times), -1)
+            blocks.append((row, limit, np.full(len(times), -1.0), starts))
+            blocks.append((final, np.array([rest]), np.array([-1.0]), np.zeros((1, starts.shape[1]))))
+        return blocks
 
     @property
     def owner(self) -> np.ndarray:
         """The input that each column of a plan belongs to: (m pieces,) int."""
         return np.tile(np.arange(self.inputs.n), len(self.pieces))
 
-    def program(self, eta: np.ndarray, rate: np.ndarray, towards: np.ndarray | None = None) -> LinearProgram:
-        """The plan that brings a start to rest; with `towards`, from as far that way as it can.
+    def program(self, eta: np.ndarray, rate: np.ndarray) -> LinearProgram:
+        """The plan that brings a start to rest; its cost is nothing.
 
         Parameters
         ----------
         eta, rate
             Modal coordinates of the start and their rates: (r,) each.
-        towards
-            A direction of starts at rest, (r,): the start is eta + s towards, and s, the last variable, is greatest.
         """
         fall = self.kinds == "fall"
-        rows, limits, _ = self._limits
-        limits = limits + self._free(eta, rate)
-        must = self._musts
+        rows, limits, _, starts = self._limits
         growing = eta[fall] + rate[fall] / self._rates[0] - self.constant[fall] * self._starts.sum(axis=1)
-        start = growing / self.degree[fall]
         lower, upper = (np.tile(bound, len(self.pieces)) for bound in (self.inputs.lower, self.inputs.upper))
-        cost = np.zeros(len(upper))
-        if towards is not None:
-            rows = np.column_stack([rows, -self._free(towards, np.zeros_like(towards))])
-            must = np.column_stack([must, -towards[fall] / self.degree[fall]])
-            cost, lower, upper = np.append(cost, -1.0), np.append(lower, 0.0), np.append(upper, np.inf)
-        return LinearProgram(cost, rows, limits, must, start, lower, upper)
+        limits = limits + starts @ np.column_stack([eta, rate]).ravel()
+        return LinearProgram(np.zeros(len(upper)), rows, limits, self._musts, growing / self.degree[fall], lower, upper)
 
     def gentlest(self, eta: np.ndarray, rate: np.ndarray) -> LinearProgram:
         """The plan whose modes stray least, on the way and at the rest in the end.
@@ -297,15 +273,9 @@ class Plans:
         plan, reach = self.program(eta, rate), self._reach
         modal = reach.any(axis=1)
         count, spared = reach.shape[1], np.full(len(plan.cost), _SPARED / max(len(plan.cost), 1))
-        return LinearProgram(
-            cost=np.concatenate([spared, np.ones(count), [1 / _OUTSIDE_M]]),
-            A_ub=np.column_stack([plan.A_ub, -reach, -1.0 * ~modal]),
-            b_ub=plan.b_ub - modal,
-            A_eq=np.column_stack([plan.A_eq, np.zeros((len(plan.A_eq), count + 1))]),
-            b_eq=plan.b_eq,
-            lower=np.append(plan.lower, np.zeros(count + 1)),
-            upper=np.append(plan.upper, np.full(count + 1, np.inf)),
-        )
+        price, straying = np.append(np.ones(count), 1.0 / _OUTSIDE_M), np.column_stack([-reach, -1.0 * ~modal])
+        wide = plan.widened(price, straying, np.zeros((len(plan.b_eq), count + 1)))
+        return replace(wide, b_ub=plan.b_ub - modal, cost=np.append(spared, price))
 
     @cached_property
     def _reach(self) -> np.ndarray:

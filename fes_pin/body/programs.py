@@ -8,7 +8,8 @@ Numerical Algorithms, 2002, section 3.1).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import optimize, sparse
@@ -48,6 +49,21 @@ class LinearProgram:
     b_eq: np.ndarray = field(repr=False)
     lower: np.ndarray = field(repr=False)
     upper: np.ndarray = field(repr=False)
+
+    def widened(self, cost: Sequence[float] | np.ndarray, A_ub: np.ndarray, A_eq: np.ndarray) -> LinearProgram:
+        """The same with further variables, each 0 or more: their costs (v,), and their columns, (rows, v) each."""
+        return replace(
+            self,
+            cost=np.append(self.cost, cost),
+            A_ub=np.column_stack([self.A_ub, A_ub]),
+            A_eq=np.column_stack([self.A_eq, A_eq]),
+            lower=np.append(self.lower, np.zeros(len(cost))),
+            upper=np.append(self.upper, np.full(len(cost), np.inf)),
+        )
+
+    def towards(self, other: LinearProgram) -> LinearProgram:
+        """The program whose last variable says how far from these limits to those of another, 1 there, an answer is."""
+        return self.widened([-1.0], self.b_ub - other.b_ub, self.b_eq - other.b_eq)
 
     def solve(self) -> ProgramAnswer:
         """The answer by HiGHS."""
@@ -97,4 +113,4 @@ class ProgramAnswer:
         """The last variable, of which the most was sought, and its error; infinite without end, else NaN without x."""
         if self.x is None:
             return (np.inf if self.unbounded else np.nan), 0.0
-        return float(self.x[-1]), self.error
+        return max(float(self.x[-1]), 0.0), self.error
