@@ -18,9 +18,9 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from yardsticks.rules_of_thumb import clipped, direction_error, rescaled
 
 import fes_pin as fp
-from fes_pin.allocation.walk import clipped, direction_error, rescaled
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.measured_walk import read_walk
 from fes_pin.body.passive import PassiveLegs

@@ -17,12 +17,12 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from yardsticks.strength import ANDERSON_2007, SARABON_2021, SUGIMOTO_2014, greatest_torque_nm
 
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.muscles.muscles import KNOWN_DEG, standard_muscles
 from fes_pin.muscles.nerves import HEALTHY, PARALYSED, PARALYSED_BAND, SUBJECT_HEIGHT, SUBJECT_MASS, Nerves
 from fes_pin.muscles.paths import read_table
-from fes_pin.muscles.published import ANDERSON_2007, SARABON_2021, SUGIMOTO_2014, greatest_torque_nm
 
 table = standard_muscles()
 source = replace(table, strength=np.tile([float(row["strength_N"]) for row in read_table("muscles.csv")], 2))

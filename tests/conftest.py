@@ -7,7 +7,7 @@ import pytest
 from fes_pin.body.build import Body
 
 REPOSITORY = Path(__file__).parents[1]
-sys.path.insert(0, str(REPOSITORY / "analysis"))  # paper_ankle: the twins that many tests take for a joint
+sys.path.insert(0, str(REPOSITORY / "analysis"))  # paper_ankle, yardsticks
 ROUNDING = {
     "allocation": "active sets, and certificates to the last digit",
     "body/test_controllability.py": "eigen-decompositions",

@@ -10,10 +10,8 @@ import numpy as np
 from scipy.optimize import linprog, lsq_linear
 
 from fes_pin.allocation.inputs import fractions, torque_matrix, wanted_torque
-from fes_pin.allocation.walk import allocate_walk
-from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import all_known, by_name, positive_number, shortened
+from fes_pin.data.numbers import all_known, by_name, shortened
 from fes_pin.data.show import frame, table_html
 
 if TYPE_CHECKING:
@@ -21,8 +19,6 @@ if TYPE_CHECKING:
 
 INSIDE_NM = 1e-6
 """A torque nearer to the set than this counts as inside, N m."""
-MET_NM = 1.0
-"""Default tolerance for a gait's torque to count as attained, N m per joint."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,28 +129,3 @@ class AttainableTorques:
         lowest = columns[upward < 0.0].sum(0)
         path = lowest + np.vstack([np.zeros(2), np.cumsum(edges, 0)])
         return np.vstack([path, path[-1] + lowest - path[1:-1]])
-
-
-def gait_share(torques: Any, nerves: Any, q: Any, joints: Iterable[str], tolerance_nm: float = MET_NM) -> float:
-    """Fraction of a gait's samples whose torque is attained on all the given joints within a tolerance.
-
-    Each sample is allocated with the error of these joints only; attained means that none misses by more.
-
-    Parameters
-    ----------
-    torques, q
-        (samples, 19), N m and rad, by name or in the order of `JOINT_NAMES`.
-    joints
-        The joints that count.
-    tolerance_nm
-        Above 0.
-
-    Raises
-    ------
-    InputError
-        Such arrays that do not fit, an unknown joint, a tolerance that is none.
-    """
-    positive_number(tolerance_nm, "tolerance_nm")
-    weights = by_name({name: 1.0 for name in joints}, JOINT_NAMES, "joints", 0.0)
-    walk = allocate_walk(torques, nerves, q, weights=weights, effort=1e-8)
-    return float((np.abs(walk.shortfall[:, weights > 0.0]) <= tolerance_nm).all(1).mean())

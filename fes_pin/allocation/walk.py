@@ -1,4 +1,4 @@
-"""Allocation over a motion: another posture, so other moment arms, at every sample; the rules of thumb beside it."""
+"""Allocation over a motion: another posture, so other moment arms, at every sample."""
 
 from __future__ import annotations
 
@@ -89,21 +89,3 @@ def allocate_walk(torques: Any, nerves: Any, q: Any, v: Any = None, **options: A
     curvature = np.einsum("kii->ki", H)
     residual = np.maximum.reduce(residuals(gradient, r, p.lower, p.upper, curvature)[:3])
     return WalkAllocation(r, p.curves.pulse_width_us(r), wanted, achieved, residual, p, matrices, scale)
-
-
-def clipped(matrix: np.ndarray, torque: np.ndarray) -> np.ndarray:
-    """Rule of thumb: least-squares recruitment without limits, then cut to 0 and 1."""
-    return np.clip(np.linalg.lstsq(matrix, torque, rcond=None)[0], 0.0, 1.0)
-
-
-def rescaled(matrix: np.ndarray, torque: np.ndarray) -> np.ndarray:
-    """Rule of thumb: the same, negatives to 0, then all divided by the largest if that exceeds 1."""
-    r = np.maximum(np.linalg.lstsq(matrix, torque, rcond=None)[0], 0.0)
-    return r / max(1.0, r.max(initial=0.0))
-
-
-def direction_error(wanted: np.ndarray, achieved: np.ndarray) -> np.ndarray:
-    """Angle between wanted and achieved torque, rad, over the last axis; a quarter turn where nothing is achieved."""
-    product = (wanted * achieved).sum(-1)
-    size = np.linalg.norm(wanted, axis=-1) * np.linalg.norm(achieved, axis=-1)
-    return np.arccos(np.clip(np.where(size > 0.0, product / np.where(size > 0.0, size, 1.0), 0.0), -1.0, 1.0))

@@ -237,23 +237,6 @@ def stabilizing_price(values: np.ndarray, gains: np.ndarray, scale: np.ndarray) 
     return ((vectors**2) / eigenvalues).sum(axis=1), float(eigenvalues[-1] / eigenvalues[0])
 
 
-def gramian(linear: LinearBody, inputs, horizon: float) -> np.ndarray:
-    """Controllability Gramian, the integral of e^(Fs) G G' e^(F's) over 0..horizon with G = R Q: (2n, 2n).
-
-    By Van Loan's block exponential (IEEE Trans. Autom. Control 23:395-404, 1978); works with damping and rates. A body
-    falls fast, so over long horizons its condition exceeds double precision.
-    """
-    G = linear.R @ Inputs.of(inputs, linear).on(linear)
-    n = len(linear.F)
-    block = np.zeros((2 * n, 2 * n))
-    block[:n, :n] = -linear.F
-    block[:n, n:] = G @ G.T
-    block[n:, n:] = linear.F.T
-    big = linalg.expm(block * horizon)
-    found = big[n:, n:].T @ big[:n, n:]
-    return 0.5 * (found + found.T)
-
-
 def pbh(linear: LinearBody, inputs) -> tuple[np.ndarray, np.ndarray]:
     """Poles of F and, for each, how far inputs reach it: |w' R Q| of its unit left eigenvector w. (2n,), (2n,).
 

@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 from scipy.linalg import eigh, null_space
 
 from fes_pin.body.build import GRAVITY, Body
@@ -200,13 +199,6 @@ class LinearBody(Tabulated):
             rates = np.linalg.solve(inertia, np.hstack([N.T @ self.B @ N, -N.T @ self.E @ N]))
             values = np.linalg.eigvals(np.vstack([np.eye(r, 2 * r, r), rates]))
         return values[np.lexsort((values.imag, -values.real))]
-
-    def centre_of_mass_motion(self, shape: np.ndarray) -> np.ndarray:
-        """How the centre of mass moves per unit of a shape: (3,) m, world axes."""
-        model = self.body.model
-        q, v = self.body.angles(self.whole_posture, check=False), np.zeros(model.nv)
-        v[[self.body.joint_names.index(name) for name in self.joint_names]] = shape
-        return pin.jacobianCenterOfMass(model, model.createData(), q) @ v
 
     def brace(self, joints: str | Iterable[str]) -> LinearBody:
         """The same body with these joints locked at the posture: names, or one name.

@@ -12,7 +12,7 @@ B. Around a moving posture (v0, a0) the same equation holds for the deviation wi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -188,19 +188,3 @@ def linearize_batch(
         b[...] = stiffness(model, data, posture)
         c[...] = gravity
     return A, B, C
-
-
-def linearize_chunks(
-    body: Body, postures: np.ndarray, slope: Sequence[float] = (0.0, 0.0), size: int = 4096
-) -> Iterator[tuple[slice, np.ndarray, np.ndarray, np.ndarray]]:
-    """`linearize_batch` in pieces through one pair of buffers: (rows, A, B, C), valid until the next piece.
-
-    Takes 24 MB whatever the number of postures.
-    """
-    n = body.model.nv
-    buffers = np.empty((size, n, n)), np.empty((size, n, n)), np.empty((size, n))
-    for start in range(0, len(postures), size):
-        rows = slice(start, min(start + size, len(postures)))
-        count = rows.stop - rows.start
-        A, B, C = linearize_batch(body, postures[rows], slope, tuple(buffer[:count] for buffer in buffers))
-        yield rows, A, B, C

@@ -186,14 +186,6 @@ def kind_of(value: float) -> str:
     return "fall" if value > 0.0 else "swing"
 
 
-def state_eigenvectors(found: ModeSet) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues and modal matrix of F built from the modes: (2n,), (2n, 2n) complex; the paper's second property."""
-    roots = np.emath.sqrt(found.values).astype(complex)
-    both = np.concatenate([roots, -roots])
-    columns = np.hstack([found.shapes, found.shapes])
-    return both, np.vstack([columns, columns * both])
-
-
 def _plane(share: np.ndarray, names: tuple[str, ...]) -> str:
     totals = {
         plane: sum(float(s) for s, name in zip(share, names, strict=True) if name.rsplit("_", 1)[1] in motions)

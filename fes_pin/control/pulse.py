@@ -8,8 +8,7 @@ from typing import Any
 
 from fes_pin.control.limits import Limiter, StimulationLimits
 from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import shortened
-from fes_pin.muscles.recruitment import LinearRecruitment, MeasuredRecruitment, follows, through_play
+from fes_pin.muscles.recruitment import Hysteresis, LinearRecruitment, MeasuredRecruitment
 
 SWITCH = 0.1
 """Pulses begin where this recruitment is wanted, and end where as much less than none is. Near rest the feedback wants
@@ -49,25 +48,20 @@ class PulseWidth:
         half_width_us: float = 0.0,
         limits: StimulationLimits | Mapping[str, Any] | None = None,
     ) -> None:
-        if not isinstance(curve, LinearRecruitment | MeasuredRecruitment):
-            raise InputError(f"expected a recruitment curve, found {shortened(curve)}", column="curve")
-        self.curve, self.half = curve, float(half_width_us)
+        self.play = Hysteresis(curve, half_width_us)
         self.threshold, self.saturation = float(curve.threshold_us), float(curve.saturation_us)
-        if not (self.half == 0.0 or 0.0 < self.half < self.threshold):
+        if self.play.half_width_us and self.play.half_width_us >= self.threshold:
             raise InputError(f"expected a half width from 0 to below the threshold of {self.threshold:g} us")
         self.limiter = Limiter(StimulationLimits.given(limits), self.threshold, self.saturation)
-        self.followed = 0.0
-        # one straight line needs no arrays
-        self._straight = type(curve) is LinearRecruitment
 
     @property
     def most(self) -> float:
         """The recruitment that can be held for long."""
-        return self._recruited(self.limiter.steady_us)
+        return float(self.play.curve.recruitment(self.limiter.steady_us))
 
     def reset(self) -> None:
         """After a rest: the nerve follows from 0. What was given in the last second stays given."""
-        self.followed = self.limiter.last_us = 0.0
+        self.play.acting_us = self.limiter.last_us = 0.0
 
     def __call__(self, recruitment: float) -> tuple[float, float]:
         """The pulse width in us for a recruitment, and the recruitment that it makes.
@@ -78,33 +72,18 @@ class PulseWidth:
             return self.give(0.0)
         if not self.limiter.last_us and recruitment < SWITCH:
             return self.give(0.0)
-        return self.give(self._through_play(min(max(recruitment, 0.0), 1.0)))
+        return self.give(self._nearest(min(max(recruitment, 0.0), 1.0)))
 
     def give(self, width_us: float, at_once: bool = False) -> tuple[float, float]:
         """The pulse width nearest to one that the limits allow, and the recruitment that it makes; see `Limiter`."""
         width = self.limiter.allowed(min(width_us, self.saturation), at_once)
-        made = self._made(width)
-        self.followed = follows(self.followed, width, self.half)
         self.limiter.give(width)
-        return width, made
+        return width, self.play.recruitment(width)
 
-    def _through_play(self, wanted: float) -> float:
-        width = through_play(self.followed, self._width(wanted), self.half)
-        if width >= self.threshold:
+    def _nearest(self, wanted: float) -> float:
+        """The pulse width, 0 or from the threshold on, whose recruitment through the play comes closest."""
+        width = self.play.pulse_width_us(wanted)
+        if width > self.threshold:
             return width
-        off, least = self._made(0.0), self._made(self.threshold)
+        off, least = self.play.would_recruit(0.0), self.play.would_recruit(self.threshold)
         return 0.0 if abs(off - wanted) < abs(least - wanted) else self.threshold
-
-    def _made(self, width: float) -> float:
-        return self._recruited(follows(self.followed, width, self.half))
-
-    def _width(self, recruitment: float) -> float:
-        if not self._straight:
-            return float(self.curve.pulse_width_us(recruitment))
-        width = self.threshold + recruitment * (self.saturation - self.threshold)
-        return 0.0 if recruitment <= 0.0 else min(width, self.saturation)
-
-    def _recruited(self, width: float) -> float:
-        if not self._straight:
-            return float(self.curve.recruitment(width))
-        return min(max((width - self.threshold) / (self.saturation - self.threshold), 0.0), 1.0)

@@ -117,50 +117,58 @@ class SaturatingRecruitment(LinearRecruitment):
 
 
 @dataclass(frozen=True, eq=False)
-class SigmoidRecruitment(LinearRecruitment):
+class _Scaled(LinearRecruitment):
+    """A curve that rises, scaled to be 0 at threshold and 1 at saturation."""
+
+    def raw(self, x):
+        """The curve at the fraction x of the way."""
+        raise NotImplementedError
+
+    def inverse_raw(self, y):
+        """Fraction of the way at which the curve is y."""
+        raise NotImplementedError
+
+    def shape(self, x):
+        """See the class."""
+        low, high = self.raw(0.0), self.raw(1.0)
+        return (self.raw(x) - low) / (high - low)
+
+    def inverse_shape(self, r):
+        """See the class."""
+        low, high = self.raw(0.0), self.raw(1.0)
+        return self.inverse_raw(low + r * (high - low))
+
+
+@dataclass(frozen=True, eq=False)
+class SigmoidRecruitment(_Scaled):
     """Logistic about `middle` (a fraction of the way), scaled to be 0 at threshold and 1 at saturation."""
 
     steepness: Any = 10.0
     middle: Any = 0.5
 
-    def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """The logistic at threshold and at saturation."""
-        return 1.0 / (1.0 + np.exp(self.steepness * self.middle)), 1.0 / (
-            1.0 + np.exp(-self.steepness * (1.0 - self.middle))
-        )
-
-    def shape(self, x):
+    def raw(self, x):
         """See the class."""
-        low, high = self.ends()
-        return (1.0 / (1.0 + np.exp(-self.steepness * (x - self.middle))) - low) / (high - low)
+        return 1.0 / (1.0 + np.exp(-self.steepness * (x - self.middle)))
 
-    def inverse_shape(self, r):
+    def inverse_raw(self, y):
         """See the class."""
-        low, high = self.ends()
-        y = low + r * (high - low)
         return self.middle + np.log(y / (1.0 - y)) / self.steepness
 
 
 @dataclass(frozen=True, eq=False)
-class GompertzRecruitment(LinearRecruitment):
+class GompertzRecruitment(_Scaled):
     """Gompertz: slow start, slower end, `exp(-b exp(-k x))` scaled to be 0 at threshold and 1 at saturation."""
 
     delay: Any = 5.0
     growth: Any = 6.0
 
-    def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """The curve at threshold and at saturation, unscaled."""
-        return np.exp(-self.delay), np.exp(-self.delay * np.exp(-self.growth))
-
-    def shape(self, x):
+    def raw(self, x):
         """See the class."""
-        low, high = self.ends()
-        return (np.exp(-self.delay * np.exp(-self.growth * x)) - low) / (high - low)
+        return np.exp(-self.delay * np.exp(-self.growth * x))
 
-    def inverse_shape(self, r):
+    def inverse_raw(self, y):
         """See the class."""
-        low, high = self.ends()
-        return -np.log(-np.log(low + r * (high - low)) / self.delay) / self.growth
+        return -np.log(-np.log(y) / self.delay) / self.growth
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,17 +196,6 @@ class HillRecruitment(LinearRecruitment):
         return np.where(straight < STRAIGHT_BELOW, straight, power ** (1.0 / n))
 
 
-def follows(acting_us: float, pulse_width_us: float, half_width_us: float) -> float:
-    """The width that acts after a pulse, us: the last one, held within half the play of the pulse's."""
-    return min(max(acting_us, pulse_width_us - half_width_us), pulse_width_us + half_width_us)
-
-
-def through_play(acting_us: float, target_us: float, half_width_us: float) -> float:
-    """The pulse width after which a wanted width acts, us: half the play beyond it, on the way there."""
-    ahead = half_width_us if target_us > acting_us else -half_width_us if target_us < acting_us else 0.0
-    return target_us + ahead
-
-
 class Hysteresis:
     """Play between stimulator and nerve: the width that acts follows the pulse width only beyond `half_width_us`.
 
@@ -222,15 +219,26 @@ class Hysteresis:
         No curve, or no such widths.
     """
 
-    def __init__(self, curve: LinearRecruitment, half_width_us: float, acting_us: float = 0.0) -> None:
+    def __init__(
+        self, curve: LinearRecruitment | MeasuredRecruitment, half_width_us: float, acting_us: float = 0.0
+    ) -> None:
         if not isinstance(curve, LinearRecruitment | MeasuredRecruitment) or np.ndim(curve.threshold_us):
-            raise InputError(f"expected the recruitment curve of one channel, got {curve!r:.40}")
+            raise InputError(f"expected a recruitment curve of one channel, got {curve!r:.40}", column="curve")
         self.curve, self.half_width_us = curve, between(half_width_us, 0.0, LONGEST_US, "half_width_us")
         self.acting_us = between(acting_us, 0.0, LONGEST_US, "acting_us")
 
+    def _follows(self, pulse_width_us: float) -> float:
+        """The width that acts after a pulse, us: the last one, held within half the play of the pulse's."""
+        half = self.half_width_us
+        return min(max(self.acting_us, pulse_width_us - half), pulse_width_us + half)
+
+    def would_recruit(self, pulse_width_us: float) -> float:
+        """Recruitment that the next pulse would have."""
+        return float(self.curve.recruitment(self._follows(pulse_width_us)))
+
     def recruitment(self, pulse_width_us: float) -> float:
         """Recruitment by the next pulse, which moves the play."""
-        self.acting_us = follows(self.acting_us, pulse_width_us, self.half_width_us)
+        self.acting_us = self._follows(pulse_width_us)
         return float(self.curve.recruitment(self.acting_us))
 
     def reach(self) -> tuple[float, float]:
@@ -244,10 +252,9 @@ class Hysteresis:
         """Pulse width for a recruitment from the present state: exact within `reach`, else the nearest; 0 for 0."""
         if recruitment <= 0.0:
             return 0.0
-        target = float(self.curve.pulse_width_us(recruitment))
-        threshold, saturation = float(self.curve.threshold_us), float(self.curve.saturation_us)
-        aim = through_play(self.acting_us, target, self.half_width_us)
-        return float(min(max(aim, threshold), saturation))
+        target, acting, half = float(self.curve.pulse_width_us(recruitment)), self.acting_us, self.half_width_us
+        aim = target + (half if target > acting else -half if target < acting else 0.0)
+        return min(max(aim, float(self.curve.threshold_us)), float(self.curve.saturation_us))
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +314,7 @@ class MeasuredRecruitment(ReadOnly):
 
 
 class ChannelRecruitment:
-    """One curve per channel, curves of one kind evaluated together.
+    """One curve for all channels, or one for each.
 
     Parameters
     ----------
@@ -323,58 +330,33 @@ class ChannelRecruitment:
     """
 
     def __init__(self, curves, n: int) -> None:
-        self.curves = list(curves) if isinstance(curves, Sequence) else [curves] * n
-        if len(self.curves) != n:
+        self.each = isinstance(curves, Sequence)
+        self.curves, self.n = list(curves) if self.each else [curves], n
+        if self.each and len(self.curves) != n:
             raise InputError(f"expected one recruitment curve or {n}, got {len(self.curves)}")
         for curve in self.curves:
             if not isinstance(curve, (LinearRecruitment, MeasuredRecruitment)):
                 raise InputError(f"expected a recruitment curve, got {curve!r:.40}")
             for item in fields(curve) if isinstance(curve, LinearRecruitment) else ():
                 shape = np.shape(getattr(curve, item.name))
-                if shape not in ((), (n,)):
+                if shape != () and (self.each or shape != (n,)):
                     raise InputError(f"{item.name} of a recruitment curve must be 1 number or {n}, got shape {shape}")
-        self.n = n
-        self.threshold_us = self._each("threshold_us")
-        self.saturation_us = self._each("saturation_us")
-        self.groups: list[tuple[Any, Any]] = []
-        if not isinstance(curves, Sequence):
-            self.groups.append((slice(None), curves))
-            return
-        for curve in self.curves:
-            if all(curve is not g and type(curve) is not type(g) for _, g in self.groups):
-                self._group(curve)
 
     def __eq__(self, other) -> bool:
-        return isinstance(other, ChannelRecruitment) and self.curves == other.curves
+        return isinstance(other, ChannelRecruitment) and (self.n, self.curves) == (other.n, other.curves)
 
     def __hash__(self) -> int:
-        return hash(tuple(self.curves))
-
-    def _each(self, name: str) -> np.ndarray:
-        values = [np.asarray(getattr(curve, name)) for curve in self.curves]
-        return np.array([float(v if v.ndim == 0 else v[i]) for i, v in enumerate(values)])
-
-    def _group(self, like) -> None:
-        kind = type(like)
-        where = [i for i, c in enumerate(self.curves) if type(c) is kind]
-        if kind is MeasuredRecruitment:
-            self.groups += [([i], self.curves[i]) for i in where]
-        else:
-            values = {f.name: np.array([float(getattr(self.curves[i], f.name)) for i in where]) for f in fields(kind)}
-            self.groups.append((slice(None) if len(where) == self.n else where, kind(**values)))
+        return hash((self.n, *self.curves))
 
     def recruitment(self, pulse_width_us: np.ndarray) -> np.ndarray:
         """Recruitments (..., n) at pulse widths (..., n) in us."""
-        return self._fill(np.asarray(pulse_width_us, dtype=float), "recruitment")
+        return self._by_channel("recruitment", np.asarray(pulse_width_us, dtype=float))
 
     def pulse_width_us(self, recruitment: np.ndarray) -> np.ndarray:
         """Pulse widths in us (..., n) for recruitments (..., n)."""
-        return self._fill(np.asarray(recruitment, dtype=float), "pulse_width_us")
+        return self._by_channel("pulse_width_us", np.asarray(recruitment, dtype=float))
 
-    def _fill(self, values: np.ndarray, method: str) -> np.ndarray:
-        if len(self.groups) == 1:
-            return getattr(self.groups[0][1], method)(values)
-        result = np.empty_like(values)
-        for where, curve in self.groups:
-            result[..., where] = getattr(curve, method)(values[..., where])
-        return result
+    def _by_channel(self, method: str, values: np.ndarray) -> np.ndarray:
+        if not self.each:
+            return getattr(self.curves[0], method)(values)
+        return np.stack([getattr(curve, method)(values[..., i]) for i, curve in enumerate(self.curves)], axis=-1)

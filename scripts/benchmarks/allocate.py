@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import itertools
 import os
+import sys
 import time
 import warnings
+from pathlib import Path
 
 if __name__ == "__main__":
     os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -20,11 +22,14 @@ import numpy as np
 
 from fes_pin.allocation.allocate import Allocator, allocate
 from fes_pin.allocation.horizon import Horizon, StrengthFatigue
-from fes_pin.allocation.walk import allocate_walk, clipped, direction_error, rescaled
+from fes_pin.allocation.walk import allocate_walk
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.body.measured_walk import read_walk
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.nerves import Nerves
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "analysis"))
+from yardsticks.rules_of_thumb import clipped, direction_error, rescaled
 
 SAMPLES = 100_000
 MUSCLES = (

@@ -12,11 +12,11 @@ from fes_pin.body.controllability import modal_controllability
 from fes_pin.body.gait import posture_angles, posture_names
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.joints import JOINT_NAMES
-from fes_pin.body.linearize import linearize, linearize_batch, linearize_chunks
+from fes_pin.body.linearize import linearize, linearize_batch
 from fes_pin.body.observability import observability
 from fes_pin.muscles.nerves import Nerves
 
-POSTURES = 100_000
+POSTURES, CHUNK = 100_000, 4096
 
 
 def gait(body: Body, count: int = POSTURES) -> np.ndarray:
@@ -43,9 +43,12 @@ def run() -> list[tuple[str, float, float, str]]:
     body = Body.from_subject(mass_kg=72.6, height_m=1.80)
     postures = gait(body)
 
+    buffers = np.empty((CHUNK, 19, 19)), np.empty((CHUNK, 19, 19)), np.empty((CHUNK, 19))
+
     def chunks() -> None:
-        for _ in linearize_chunks(body, postures):
-            pass
+        for start in range(0, len(postures), CHUNK):
+            some = postures[start : start + CHUNK]
+            linearize_batch(body, some, out=tuple(buffer[: len(some)] for buffer in buffers))
 
     nerves = Nerves()
 

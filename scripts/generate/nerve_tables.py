@@ -2,7 +2,7 @@
 
 The source model's fibre and tendon lengths are those of its unscaled form, while its paths are scaled to a subject:
 they are scaled here as the paths are, muscle by muscle. Strengths get one factor a nerve, so that maximal joint torques
-agree with those that people make (`fes_pin.muscles.published`).
+agree with those that people make (`analysis/yardsticks/strength.py`).
 The measured data is not in the repository; it lies in FES_PIN_DATA or in `shared` beside the repository.
 Run: python scripts/generate/nerve_tables.py
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 import csv
 import math
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,9 @@ from scipy.optimize import nnls
 from fes_pin.muscles.muscles import standard_muscles
 from fes_pin.muscles.nerves import SUBJECT_HEIGHT, SUBJECT_MASS
 from fes_pin.muscles.paths import COORDINATES, leg_paths
-from fes_pin.muscles.published import ANDERSON_2007, muscle_torques
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "analysis"))
+from yardsticks.strength import ANDERSON_2007, muscle_torques
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("FES_PIN_DATA", ROOT.parent / "shared"))

@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from scipy import integrate, linalg
 
 from fes_pin.body.build import Body
-from fes_pin.body.controllability import gramian, modal_controllability, mode_price, pbh, stabilizing_price
+from fes_pin.body.controllability import modal_controllability, mode_price, pbh, stabilizing_price
 from fes_pin.body.inputs import Inputs
 from fes_pin.body.linearize import linearize, linearize_batch
 from fes_pin.body.modes import NEUTRAL_RATE
 from fes_pin.body.observability import LOOK_S, NOISE_DEG, RATE_HZ, fewest_goniometers, observability
-from fes_pin.body.passive import ElasticJoints
 from fes_pin.data.errors import InputError
 from fes_pin.muscles.nerves import Nerves
 
@@ -73,20 +72,6 @@ def test_pbh_with_damping_sees_the_same_hole(body, standing):
     expected = -0.25 + np.sqrt(0.0625 + mode.value)
     assert reach[np.argmin(np.abs(poles - expected))] < 1e-8 * reach.max()
     assert np.sum(reach < 1e-8 * reach.max()) == 2  # its two poles and no other
-
-
-@pytest.mark.parametrize("passive", [None, ElasticJoints(damping_nms={"right_hip_flexion": 2.0})])
-def test_gramian_is_the_integral(body, passive):
-    linear = linearize(body, "mid_stance", passive=passive)
-    inputs = Inputs.torques(["right_ankle_dorsiflexion", "right_hip_adduction"])
-    G = linear.R @ inputs.on(linear)
-
-    def integrand(t):
-        x = linalg.expm(linear.F * t) @ G
-        return (x @ x.T).ravel()
-
-    brute = integrate.quad_vec(integrand, 0.0, 0.05, epsrel=1e-10)[0].reshape(38, 38)
-    assert np.abs(gramian(linear, inputs, 0.05) - brute).max() < 1e-8 * np.abs(brute).max()
 
 
 @pytest.mark.parametrize("value", [40.0, 3.0, 1e-5, 0.0, -1e-5, -9.0, -400.0])

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from yardsticks.strength import ANDERSON_2007, SARABON_2021, SUGIMOTO_2014, greatest_torque_nm
 
 from fes_pin.body.gait import ankle_angles
 from fes_pin.body.joints import JOINT_NAMES
 from fes_pin.muscles.muscles import standard_muscles
 from fes_pin.muscles.nerves import HEALTHY, SUBJECT_HEIGHT, SUBJECT_MASS, Nerves
-from fes_pin.muscles.published import ANDERSON_2007, SARABON_2021, SUGIMOTO_2014, greatest_torque_nm
 
 
 @pytest.mark.parametrize("action", ANDERSON_2007)
