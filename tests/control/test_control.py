@@ -204,7 +204,7 @@ def test_pulse_widths_with_play(wanted, half):
 
 @pytest.mark.parametrize("half", [-1.0, math.nan, 180.0, 500.0])
 def test_play_as_wide_as_the_threshold_is_refused(half):
-    with pytest.raises(InputError, match="half.width"):
+    with pytest.raises(InputError, match=r"half.width"):
         PulseWidth(LinearRecruitment(), half)
 
 
