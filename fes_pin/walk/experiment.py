@@ -131,12 +131,9 @@ _WORDS = {
 
 def _separation(banks: Banks, signal: np.ndarray, rival: np.ndarray, prior: np.ndarray, best: WalkFit) -> float:
     """Squared distance of a signal (n, 6) from what a rival (n, 6, p) can make of it, in the noise that was found."""
-    root = 1.0 / np.sqrt(best.fitted.variance)
-    scenes = [np.concatenate([signal[:, :, None], rival], axis=2)]
-    one = type(banks.strides)(
-        [w for w in banks.strides.windows if w[0] == 0][:1] or banks.strides.windows[:1], banks.strides.harmonics
-    )
-    waves = banks.noise.rotated(one.mean(scenes)) * root[..., None]
-    y, x = waves[..., 0].ravel(), waves[..., 1:].reshape(root.size, -1) * prior
+    columns = np.concatenate([signal[:, :, None], rival], axis=2)
+    _, rows, _ = banks.strides.windows[0]
+    white = banks.noise.rotated(banks.strides.first(columns[rows])) / np.sqrt(best.fitted.variance)
+    y, x = white[0].ravel(), white[1:].reshape(len(prior), -1).T * prior
     values = np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ y)
     return float(np.sum((y - x @ values) ** 2))

@@ -73,20 +73,16 @@ class Fitted:
         (p,), (p, p) of the effects: most likely under the noise that was found, without the prior of their sizes.
     believed
         (p,) with that prior, as the deviance has them.
-    taken
-        (m,) what the nuisance parameters take, in units of their priors.
     deviance
         -2 log evidence.
-    left, variance
-        (n, 6, k): what is left and the noise's variance, in rotated channels.
+    variance
+        (n, 6, k) of the noise, in rotated channels.
     """
 
     values: np.ndarray
     covariance: np.ndarray
     believed: np.ndarray
-    taken: np.ndarray
     deviance: float
-    left: np.ndarray = field(repr=False)
     variance: np.ndarray = field(repr=False)
 
 
@@ -113,19 +109,11 @@ def fit_walk(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise) 
     noise
         What is common.
     """
-    return fitted_of(fit_many(y[None], x, prior, noise), 0)
+    return fit_many(y[None], x, prior, noise)[0]
 
 
-def fitted_of(many: tuple[np.ndarray, ...], number: int) -> Fitted:
-    """One of `fit_many`."""
-    values, covariance, deviance, left, variance, taken, believed = (part[number] for part in many)
-    return Fitted(values, covariance, believed, taken, float(deviance), left, variance)
-
-
-def fit_many(
-    y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, rounds: int = ROUNDS
-) -> tuple[np.ndarray, ...]:
-    """`fit` of many at once: values, covariances, deviances, left, variances, taken, believed.
+def fit_many(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, rounds: int = ROUNDS) -> list[Fitted]:
+    """`fit_walk` of many at once.
 
     Parameters
     ----------
@@ -161,7 +149,8 @@ def fit_many(
     alone = np.linalg.inv(gram - np.diag(np.r_[np.full(p, 1.0 - PRIOR_LEFT), np.zeros(len(gram[0]) - p)]))
     likely = alone[:, :p] @ (gram @ values[:, :, None])
     covariance = alone[:, :p, :p] * (scale[:, :, None] * scale[:, None, :])
-    return likely[:, :, 0] * scale, covariance, deviance, left, variance, values[:, p:], values[:, :p] * scale
+    parts = likely[:, :, 0] * scale, covariance, values[:, :p] * scale, deviance.tolist(), variance
+    return [Fitted(*one) for one in zip(*parts, strict=True)]
 
 
 def by_frequency(values: np.ndarray, harmonics: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 from fes_pin.infer.fits import Candidate, FittedSets
 from fes_pin.infer.search import Names, Policy, Search, SearchResult
 from fes_pin.walk.banks import Banks
-from fes_pin.walk.likelihood import Fitted, fit_many, fitted_of
+from fes_pin.walk.likelihood import Fitted, fit_many
 from fes_pin.walk.nulls import LEVEL, Nulls, simulated_nulls
 from fes_pin.workers import check_limit
 
@@ -179,9 +179,8 @@ class WalkModels(FittedSets[WalkFit, None]):
         prior = np.array([self.banks.plausible(names) for names in group]).reshape(len(group), -1)
         found = fit_many(np.broadcast_to(y, (len(group), *y.shape)), x, prior, noise)
         out = []
-        for k, names in enumerate(group):
-            fitted = fitted_of(found, k)
-            possible = bool((np.abs(fitted.believed) <= POSSIBLE * prior[k]).all())
+        for names, fitted in zip(group, found, strict=True):
+            possible = bool((np.abs(fitted.believed) <= POSSIBLE * self.banks.plausible(names)).all())
             owners = [n for n in names for _ in forms[n].parameters]
             possible &= all(self._may_be(n, v) for n, v in zip(owners, fitted.believed.tolist(), strict=True))
             out.append(WalkFit(names, fitted, fitted.deviance if possible else math.inf))

@@ -40,15 +40,14 @@ def simulated_nulls(banks: Banks, variance: np.ndarray, seed: int) -> Nulls:
     """What the library makes of residuals where there is no cause, in noise of this variance, (1, 6, k)."""
     drawn = _without_a_cause(banks, variance, seed)
     none = np.zeros((*variance.shape, 0))
-    alone = fit_many(drawn, none, np.zeros(0), banks.noise, SIMULATED_ROUNDS)[2]
+    alone = [f.deviance for f in fit_many(drawn, none, np.zeros(0), banks.noise, SIMULATED_ROUNDS)]
     best, spread = np.full(SIMULATED, -np.inf), {}
     for name in banks.forms:
         x = banks.noise.rotated(banks.as_read.x[name])
         fitted = fit_many(drawn, x, banks.plausible((name,)), banks.noise, SIMULATED_ROUNDS)
-        values, covariance, deviance, *_ = fitted
-        best = np.maximum(best, alone - deviance)
-        stds = np.sqrt(np.einsum("bpp->bp", covariance))
-        spread[name] = np.sqrt(np.mean((values / stds) ** 2, axis=0))
+        best = np.maximum(best, np.subtract(alone, [f.deviance for f in fitted]))
+        z = [f.values / np.sqrt(np.diag(f.covariance)) for f in fitted]
+        spread[name] = np.sqrt(np.mean(np.square(z), axis=0))
     return Nulls(SimulatedFamily(best), spread)
 
 

@@ -39,8 +39,6 @@ class WalkRecording:
         Of the treadmill.
     start_s
         Time at which the belt's way is 0, s.
-    role
-        As in the study.
     """
 
     name: str
@@ -54,7 +52,6 @@ class WalkRecording:
     cutoff_hz: float = CUTOFF_HZ
     belt_speed_mps: float = 0.0
     start_s: float = 0.0
-    role: str | None = None
 
 
 def body_of(study: Study, stance: str = "right") -> tuple[Body, np.ndarray]:
@@ -152,5 +149,4 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
         cutoff_hz,
         belt,
         float(time[0]),
-        trial.role,
     )
