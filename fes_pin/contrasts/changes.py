@@ -6,25 +6,26 @@ import math
 
 import numpy as np
 
-from fes_pin.contrasts.decide import inflation
-from fes_pin.contrasts.fits import Fits
 from fes_pin.contrasts.grouped import Grouped, Item
-from fes_pin.contrasts.search import ContrastFound
+from fes_pin.contrasts.models import ContrastModels, Found
 from fes_pin.contrasts.words import of_cause, of_nominal
+from fes_pin.diagnosis.misread import NAME, Misread
 from fes_pin.infer.distributions import normal_quantile
 from fes_pin.infer.levels import ABSORBED_BELOW, CLAIM_LEVEL, SEPARABLE
-from fes_pin.infer.result import Change, ParameterEstimate
+from fes_pin.infer.result import Change, Evidence, ParameterEstimate
 from fes_pin.models.catalogue import Catalogue
 
 SEEN = 0.95
 """Power at which a change that was not found is called excluded."""
 
 
-def change_of(fits: Fits, found: ContrastFound, item: Item, groups: tuple[str, ...], catalogue: Catalogue) -> Change:
+def change_of(
+    models: ContrastModels, found: Found, item: Item, catalogue: Catalogue, evidence: Evidence | None
+) -> Change:
     """What is said of one change: its size in each group, in words, and what it cannot be told from."""
-    best, model = found.best, found.best.model
+    best, model, groups = found.best, found.best.model, tuple(found.best.model.models)
     assert item.group is not None
-    wider = math.sqrt(max(1.0, inflation(fits, best, found.without[item]).phi))
+    wider = math.sqrt(max(1.0, models.inflation(best, found.without[str(item)]).phi))
     nominal = item.name in found.nominal.model.free
     parameters = _by_group(best, item, groups, nominal, wider)
     first = next(iter(parameters.values()))
@@ -43,7 +44,8 @@ def change_of(fits: Fits, found: ContrastFound, item: Item, groups: tuple[str, .
         words=f"{words} (from {one} to {two})",
         parameters=parameters,
         equivalents=_equivalents(found, item),
-        p_value=found.p_values[item],
+        p_value=found.p_values[str(item)],
+        evidence=evidence,
     )
 
 
@@ -68,27 +70,27 @@ def _by_group(
     return parameters
 
 
-def _equivalents(found: ContrastFound, item: Item) -> tuple[str, ...]:
-    """What could stand in a change's place."""
-    best = found.best
-    near = [
-        f.items[-1].name
-        for f in found.rivals[item]
-        if (f.price if not best.is_driven else min(f.price, f.fit.sse + best.price - best.fit.sse))
-        < best.price + SEPARABLE
-    ]
-    return tuple(sorted(set(near) - {item.name}))
+def _equivalents(found: Found, item: Item) -> tuple[str, ...]:
+    """What could stand in a change's place; of driven rigs also with more parameters, if it is as likely."""
+    best, near = found.best, set[str]()
+    for rival in found.rivals[str(item)]:
+        price = min(rival.price, rival.sse + best.price - best.sse) if best.is_driven else rival.price
+        if price < best.price + SEPARABLE:
+            near |= {i.name for i in rival.items - best.items}
+    return tuple(sorted(near - {item.name}))
 
 
-def not_changed(found: ContrastFound) -> tuple[dict[str, float], dict[str, ParameterEstimate], tuple[str, ...]]:
+def not_changed(
+    models: ContrastModels, best: Grouped
+) -> tuple[dict[str, float], dict[str, ParameterEstimate], tuple[str, ...]]:
     """How large a change would have been seen: of what the model has as a share, of other causes in their units."""
-    changed = {i.name for i in found.best.items}
-    single = 1.0 - (1.0 - CLAIM_LEVEL) ** (1.0 / found.family.tests)
+    changed = {i.name for i in best.items}
+    single = 1.0 - (1.0 - CLAIM_LEVEL) ** (1.0 / models.family.tests)
     reach = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN)
     unchanged: dict[str, float] = {}
     sizes: dict[str, list[tuple[float, str, float]]] = {}
-    model, info = found.best.model, found.best.model.parameter_info()
-    for one in found.promises:
+    model, info = best.model, best.model.parameter_info()
+    for one in models.screen.scores(best).scored:
         if one.item.group is None:
             continue
         size = reach * one.deviation * math.sqrt(max(one.spread, 1.0))
@@ -108,3 +110,20 @@ def not_changed(found: ContrastFound) -> tuple[dict[str, float], dict[str, Param
     unseen = [n for n in sizes if n not in excluded]
     unseen += [n for n, v in unchanged.items() if not v < 1.0]
     return {n: v for n, v in unchanged.items() if v < 1.0}, excluded, tuple(sorted(unseen))
+
+
+def misread_change(models: ContrastModels, misread: Misread) -> Change:
+    """A trial that was restated, as a change of its group."""
+    known = models.nominal_model.rig.schema.conditions.get(misread.condition)
+    estimate = ParameterEstimate(misread.value, misread.std, known.unit if known is not None else "m")
+    group = next(g for g, many in models.trials.items() if misread.trial in (t.name for t in many))
+    return Change(
+        name=NAME,
+        kind="condition",
+        group=group,
+        words=misread.words,
+        parameters={misread.condition: {group: estimate}},
+        equivalents=(),
+        p_value=misread.p_value,
+        trial=misread.trial,
+    )

@@ -7,33 +7,34 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fes_pin.contrasts.changes import change_of, not_changed
-from fes_pin.contrasts.conditions import ContrastSearched, Trials, contrast_with_conditions, misread_change
-from fes_pin.contrasts.fits import Fits
+from fes_pin.contrasts.changes import change_of, misread_change, not_changed
+from fes_pin.contrasts.faults import GroupConditions, is_likelier, late_in_groups
 from fes_pin.contrasts.grouped import Grouped, noise_in
-from fes_pin.contrasts.groups import BY_GROUP, grouped_study
-from fes_pin.contrasts.late import is_cheaper, late_in_groups
-from fes_pin.contrasts.left import left_in_groups
+from fes_pin.contrasts.groups import BY_GROUP, grouped_study, in_groups, labels_of
+from fes_pin.contrasts.models import ContrastModels, ContrastSearch, Found
 from fes_pin.contrasts.result import Contrast
-from fes_pin.contrasts.search import ContrastFound, ContrastSearch
+from fes_pin.contrasts.verdict import ContrastVerdict
 from fes_pin.data.asked import asked
 from fes_pin.data.log import EFFORT, Log
+from fes_pin.data.provenance import Provenance, provenance_now
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import measured_study, split
 from fes_pin.diagnosis.logged import LogFaults
 from fes_pin.diagnosis.long_records import searched_part
+from fes_pin.diagnosis.misread import Misread
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.identify.effort_noise import words_of_noise
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.lasting import words_of_reading
 from fes_pin.identify.lateness import words_of_lateness
-from fes_pin.infer.result import STOPPED, Remainder
+from fes_pin.infer.result import STOPPED
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
-from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.workers import Progress, noting_stops, one_thread_each, time_limit
+
+UNCONFIRMED = "{} stands out of the trials that were fitted, but those that were held out do not confirm it"
 
 
 def contrast(
@@ -81,112 +82,132 @@ def contrast(
     """
     began = time.perf_counter()
     tell = asked(study, seed, limit, progress)
-    catalogue = catalogue_of(library)
+    catalogue, made = catalogue_of(library), _provenance(study, after, seed)
     measured = measured_study(grouped_study(study, after, by, groups))
-    joined, nominal = measured.study, nominal_model(measured.study)
-    names = tuple(dict.fromkeys(t.group for t in joined.trials if t.group is not None))
-    noted = [*measured.warnings, *check_study(joined, nominal)]
-    end = math.inf if limit is None else began + limit
+    warnings = [*measured.warnings, *check_study(measured.study, nominal_model(measured.study))]
     with one_thread_each(), noting_stops() as stops:
-        effects = catalogue.effects_for(nominal.rig)
-        joined, words = _quieted(joined, names, nominal, end)
-        trials, driven, said = _by_group(joined, names, nominal)
-        said = [*noted, *words, *said]
-
-        def run(those: Trials) -> tuple[Fits, ContrastFound]:
-            made = Fits(nominal, those, effects, driven)
-            with time_limit(end - time.perf_counter()):
-                return made, ContrastSearch(made, seed, tell).run()
-
-        searched = contrast_with_conditions(nominal, trials, run)
-        if not stops and (late_s := late_in_groups(searched)) is not None:
-            log = Log(effort_late_s=late_s)
-            moved = {g: [log.applied(t) for t in many] for g, many in trials.items()}
-            timed = contrast_with_conditions(nominal, moved, run)
-            if is_cheaper(timed, searched):
-                searched, said = timed, [words_of_lateness(log), *said]
-        tell(0.95, "what is left")
-        left, words = left_in_groups(searched.fits, searched.found.best, seed)
-    said += [*words, *_smoothed(searched.found.best, trials)]
+        end = math.inf if limit is None else began + limit
+        found = _Work(measured.study, catalogue, seed, tell, end, stops).contrast()
     tell(1.0, "done")
-    answer = _answer(joined, searched, left, catalogue, said)
+    warnings += found.warnings
     if stops:
-        stop = (*answer.warnings, f"the search was stopped at its limit of {limit:g} s: best set so far")
-        answer = replace(answer, verdict=STOPPED, unchanged={}, excluded={}, warnings=stop)
-    return replace(answer, wall_s=time.perf_counter() - began)
+        warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far")
+        found = replace(found, verdict=STOPPED, unchanged={}, excluded={})
+    return replace(found, warnings=tuple(warnings), provenance=made, wall_s=time.perf_counter() - began)
 
 
-def _answer(
-    study: Study, searched: ContrastSearched, left: Remainder, catalogue: Catalogue, said: Sequence[str]
-) -> Contrast:
-    """Everything that is said of a search that has run."""
-    fits, found, groups = searched.fits, searched.found, tuple(searched.fits.trials)
-    changes = [change_of(fits, found, i, groups, catalogue) for i in found.best.changes] + misread_change(searched)
-    unchanged, excluded, untestable = not_changed(found)
-    if left.unexplained:  # sizes that would have been seen are those beside a model that is right
-        unchanged, excluded = {}, {}
-        said = [*said, "beside what is left unexplained it cannot be said what did not change"]
-    return Contrast(
-        study=study,
-        groups=groups,
-        verdict="changed" if changes else "unexplained" if left.unexplained else "nothing_changed",
-        causes=tuple(sorted(changes, key=lambda c: c.p_value)),
-        common=_common(found.best),
-        unchanged=unchanged,
-        excluded=excluded,
-        untestable=untestable,
-        remainder=left,
-        fit=found.best.fit,
-        driven=fits.driven,
-        repeats=found.best.repeats,
-        warnings=tuple(said),
-    )
+class _Work:
+    """What turns a study of groups into a contrast.
+
+    Parameters
+    ----------
+    study
+        As measured, with a group in every trial.
+    catalogue, seed, tell
+        As of `contrast`.
+    end
+        When searches must have ended, of `time.perf_counter`.
+    stops
+        Holds something once a search had to; see `noting_stops`.
+    """
+
+    def __init__(
+        self, study: Study, catalogue: Catalogue, seed: int, tell: Progress, end: float, stops: list[float]
+    ) -> None:
+        self.study, self.catalogue, self.seed, self.tell = study, catalogue, seed, tell
+        self.end, self.stops = end, stops
+        self.nominal, (train, _) = nominal_model(study), split(study)
+        self.fed_back = is_fed_back(self.nominal.rig, train)
+        self.driven = self.fed_back or any(t.kind == IMPOSED for t in train)
+
+    def contrast(self) -> Contrast:
+        """Search what differs, and judge what is found."""
+        noise = self._noise_of_efforts()
+        log, unit = Log(effort_noise=noise), self.nominal.rig.units()["effort"]
+        trials, said = self._searched([log.applied(t) for t in self.study.trials])
+        said += [words_of_noise(noise, unit)] if noise else []
+        search, found, made = self._found(trials)
+        if not self.stops and (late_s := late_in_groups(search.models, found)) is not None:
+            timed = Log(effort_late_s=late_s)
+            again = self._found([timed.applied(t) for t in trials])
+            if is_likelier(again[1].best, found.best):
+                (search, found, made), said = again, [words_of_lateness(timed), *said]
+        self.tell(0.9, "held-out evidence")
+        return self._judged(search, found, made, said)
+
+    def _noise_of_efforts(self) -> float:
+        """Noise that the efforts of all groups were recorded with, in their unit; 0 where nothing speaks for it."""
+        if not self.fed_back or not all(EFFORT in self.nominal.rig.input_columns(t) for t in self.study.trials):
+            return 0.0
+        faults = LogFaults(self.study.trials, lambda trials: self._searched(trials)[0], self.end)
+        return faults.noise_beside_nominal(self.nominal)
+
+    def _searched(self, trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
+        """What a search takes of the trials of each group, and what is to be said."""
+        groups, out, said = in_groups(split(replace(self.study, trials=tuple(trials)))[0]), [], []
+        for group, many in groups.items():
+            part, _, words = searched_part(many, self.study.schema, self.fed_back, len(groups))
+            out += part
+            said += [f"group {group}: {one}" for one in words]
+        if min(map(len, in_groups(out).values())) < 2:
+            said.append("a group has one trial only: how much repeats differ is judged from its parts")
+        return out, said
+
+    def _found(self, trials: Sequence[Trial]) -> tuple[ContrastSearch, Found, Misread | None]:
+        """A search, what it found, and the trial that was restated for it."""
+        with time_limit(self.end - time.perf_counter()):
+            search, found, made = GroupConditions(self.nominal, self._run).search(trials)
+        return search, found, made.misread if made is not None else None
+
+    def _run(self, trials: Sequence[Trial]) -> tuple[ContrastSearch, Found]:
+        effects = self.catalogue.effects_for(self.nominal.rig)
+        search = ContrastSearch(
+            ContrastModels(self.nominal, in_groups(trials), effects, self.driven, self.seed), self.tell
+        )
+        return search, search.run()
+
+    def _judged(self, search: ContrastSearch, found: Found, misread: Misread | None, said: list[str]) -> Contrast:
+        """Everything that is said of a search that has run."""
+        state = ContrastVerdict(search).of(found)
+        models, found, best, left = search.models, state.found, state.found.best, state.weighed.lack_of_fit
+        evidence = state.weighed.evidence
+        changes = [change_of(models, found, i, self.catalogue, evidence.get(str(i))) for i in best.changes]
+        changes += [misread_change(models, misread)] if misread is not None else []
+        unchanged, excluded, untestable = not_changed(models, best)
+        said += [*state.weighed.said, *_smoothed(best), *(UNCONFIRMED.format(n) for n in state.refused)]
+        if left.unexplained:  # sizes that would have been seen are those beside a model that is right
+            unchanged, excluded = {}, {}
+            said.append("beside what is left unexplained it cannot be said what did not change")
+        return Contrast(
+            study=self.study,
+            groups=tuple(models.trials),
+            verdict="changed" if changes else "unexplained" if left.unexplained else "nothing_changed",
+            causes=tuple(sorted(changes, key=lambda c: c.p_value)),
+            common=best.common,
+            unchanged=unchanged,
+            excluded=excluded,
+            untestable=untestable,
+            remainder=left,
+            fit=best.fit,
+            driven=models.driven,
+            repeats=best.repeats,
+            warnings=tuple(said),
+        )
 
 
-def _by_group(study: Study, names: Sequence[str], nominal: Model) -> tuple[dict[str, list[Trial]], bool, list[str]]:
-    """The trials of each group that are searched; whether the likelihood judges them; what is to be said."""
-    train, _ = split(study)
-    fed_back = is_fed_back(nominal.rig, train)
-    trials: dict[str, list[Trial]] = {}
-    warnings: list[str] = []
-    for group in names:
-        own = [t for t in train if t.group == group]
-        trials[group], _, said = searched_part(own, study.schema, fed_back, len(names))
-        warnings += [f"group {group}: {one}" for one in said]
-    if any(len(many) < 2 for many in trials.values()):
-        warnings.append("a group has one trial only: how much repeats differ is judged from its parts")
-    return trials, fed_back or any(t.kind == IMPOSED for t in train), warnings
+def _provenance(study: Study, after: Study | None, seed: int) -> Provenance:
+    """Where a contrast made now comes from: the files of a second study stand under its name, as those of the first."""
+    made = provenance_now(study, seed)
+    if after is None:
+        return made
+    both = zip(labels_of(study, after), (study, after), strict=True)
+    return replace(made, inputs={f"{label}/{path}": sha for label, one in both for path, sha in one.inputs().items()})
 
 
-def _quieted(study: Study, names: Sequence[str], nominal: Model, end: float) -> tuple[Study, list[str]]:
-    """The study without noise that the efforts of all groups were recorded with, and what is to be said of it."""
-    train, _ = split(study)
-    logged = all(EFFORT in nominal.rig.input_columns(t) for t in study.trials)
-    if not logged or not is_fed_back(nominal.rig, train):
-        return study, []
-
-    def prepared(trials: Sequence[Trial]) -> list[Trial]:
-        by_group, _, _ = _by_group(replace(study, trials=tuple(trials)), names, nominal)
-        return [t for many in by_group.values() for t in many]
-
-    noise = LogFaults(study.trials, prepared, end).noise_beside_nominal(nominal)
-    if not noise:
-        return study, []
-    log = Log(effort_noise=noise)
-    quiet = replace(study, trials=tuple(log.applied(t) for t in study.trials))
-    return quiet, [words_of_noise(noise, nominal.rig.units()["effort"])]
-
-
-def _smoothed(best: Grouped, trials: Trials) -> tuple[str, ...]:
+def _smoothed(best: Grouped) -> tuple[str, ...]:
     """What is to be said of readings of a driven rig that were smoothed: their noise lasts as long in all groups."""
-    group, noise = next(iter(best.weights.items()))
-    return words_of_reading(noise_in(noise), best.model.rig, trials[group])
-
-
-def _common(best: Grouped) -> tuple[str, ...]:
-    """Causes of all groups, but for those that differ in one."""
-    differ = {i.name for i in best.changes}
-    return tuple(i.name for i in best.items if i.group is None and i.name not in differ)
+    noise = next(iter(best.weights.values()))
+    return words_of_reading(noise_in(noise), best.model.rig, best.fit.trials)
 
 
 __all__ = ["contrast"]

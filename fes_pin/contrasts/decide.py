@@ -24,14 +24,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, special
 
-from fes_pin.contrasts.fits import Fits
 from fes_pin.contrasts.grouped import Grouped
-from fes_pin.contrasts.promises import UNFELT, Promise, units
 from fes_pin.contrasts.repeats import Repeats
+from fes_pin.contrasts.screen import ItemScore, by_unit
 from fes_pin.infer.distributions import f_tail
-from fes_pin.infer.family import Family
-from fes_pin.infer.levels import CLAIM_LEVEL, UNUSUAL_LEVEL
-from fes_pin.infer.scatter import excess_scatter
+from fes_pin.infer.levels import UNUSUAL_LEVEL
 
 
 @dataclass(frozen=True)
@@ -51,48 +48,33 @@ class Spread:
         return Spread(max(self.phi, (more * usual.phi + self.free * self.phi) / total), total)
 
 
-def p_value(fits: Fits, family: Family, larger: Grouped, smaller: Grouped) -> float:
-    """Family-wise p-value of what a set has more than another: the larger of that against the noise and of that against
-    the spread between trials. A repeat that differs by more than its noise is no change.
+def between_trials(larger: Grouped, smaller: Grouped, degrees: int, usual: Spread) -> float:
+    """p-value of a gain against its spread between trials.
+
+    Parameters
+    ----------
+    larger, smaller
+        Sets under the same weights.
+    degrees
+        Of freedom that the larger has more.
+    usual
+        Spread that is usual among the causes of the library; see `usual_spread`.
     """
-    degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
-    noise = noise_p_value(family, larger, smaller)
-    if not noise < CLAIM_LEVEL:
-        return noise
-    return max(noise, family.adjusted(between_trials(fits, larger, fits.weighed_as(smaller, larger), degrees)))
-
-
-def noise_p_value(family: Family, larger: Grouped, smaller: Grouped) -> float:
-    """Family-wise p-value against the noise alone: of a cause of all groups, which claims no change.
-
-    Gains count as far as pieces of the data agree on them.
-    """
-    degrees = max(len(larger.fit.free) - len(smaller.fit.free), 1)
-    scatter = excess_scatter(larger.fit, smaller.fit)
-    return family.p_value((smaller.fit.sse - larger.fit.sse) / scatter, degrees)
-
-
-def between_trials(fits: Fits, larger: Grouped, smaller: Grouped, degrees: int) -> float:
-    """p-value of a gain against its spread between trials; both sets under the same weights."""
-    spread, gain = inflation(fits, larger, smaller), smaller.fit.sse - larger.fit.sse
+    spread, gain = inflation(larger, smaller, usual), smaller.sse - larger.sse
     if spread.free < 1 or gain <= 0.0:
         return 1.0
     return float(f_tail(gain / (degrees * max(spread.phi, 1e-12)), degrees, spread.free))
 
 
-def inflation(fits: Fits, larger: Grouped, smaller: Grouped) -> Spread:
-    """phi beside what is usual in the library; the mean of all trials and that of one group are fitted."""
+def inflation(larger: Grouped, smaller: Grouped, usual: Spread) -> Spread:
+    """phi together with what is usual in the library; the mean of all trials and that of one group are fitted."""
     left = np.concatenate([p.residual for p in larger.fit.parts])
     moved = np.concatenate([p.residual for p in smaller.fit.parts]) - left
-    cuts = units(larger.fit.parts)
-    sizes = np.array([float(moved[c] @ moved[c]) for c in cuts])
-    along = np.array([float(moved[c] @ left[c]) for c in cuts])
-    felt = sizes > UNFELT * max(float(sizes.max()), 1e-300)
+    sizes, along, felt = by_unit(moved, left, larger.fit.parts)
     free = int(felt.sum()) - 1 - max(1, len(larger.changes))
     if free < 1:
         return Spread(1.0, free)
-    own = _clustered(sizes, along)
-    both = own.beside(usual_spread(fits.promises(larger)[0]))
+    both = _clustered(sizes, along).beside(usual)
     share = _leaning(larger, moved) / float(sizes.sum())
     return Spread(both.phi, 1.0 / (1.0 / both.free + share**2 / free))
 
@@ -121,14 +103,14 @@ def _leaning(one: Grouped, moved: np.ndarray) -> float:
     return total
 
 
-def usual_spread(promises: Sequence[Promise]) -> Spread:
+def usual_spread(scored: Sequence[ItemScore]) -> Spread:
     """The spread that is usual among the causes of a library; no more degrees stand behind it than it has causes."""
-    told = np.array([(p.spread, p.spread_degrees) for p in promises if p.spread_degrees > 0 and p.spread > 0.0])
+    told = np.array([(s.spread, s.spread_degrees) for s in scored if s.spread_degrees > 0 and s.spread > 0.0])
     if len(told) < 2:
         return Spread(1.0, 0.0)
     phi, half = told[:, 0], 0.5 * told[:, 1]
     logs = np.log(phi) - special.digamma(half) + np.log(half)
-    free = _degrees(float(logs.var(ddof=1) - np.mean(special.polygamma(1, half))), len({p.item.name for p in promises}))
+    free = _degrees(float(logs.var(ddof=1) - np.mean(special.polygamma(1, half))), len({s.item.name for s in scored}))
     shift = special.digamma(0.5 * free) - np.log(0.5 * free)
     return Spread(float(np.exp(logs.mean() + shift)), free)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,8 +14,8 @@ from fes_pin.contrasts.repeats import RepeatedProblem, Repeats
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
-from fes_pin.identify.problem import Problem, products_of
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.identify.problem import products_of
+from fes_pin.infer.levels import PARAMETER_PRICE, SEPARABLE
 from fes_pin.infer.noise import Noise, NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point
@@ -25,22 +25,29 @@ from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
 
-Weight = NoiseModel | Repeats | Doubt
-"""What weighs the residuals of a group: the noise of simulations, perhaps beside the scatter of repeats, or what is
-random about predictions."""
+Weight = Repeats | Doubt
+"""What weighs the residuals of a group: the noise of simulations with the scatter of repeats, or what is random about
+predictions."""
 
 
 def group_problem(model: Model, trials: Sequence[Trial], weight: Weight, free: tuple[str, ...] | None = None) -> Any:
-    """A model on the trials of one group, as their weight demands."""
+    """A model on the trials of one group, as their weight demands; predictions move all that can be fitted."""
     if isinstance(weight, Doubt):
         return LikelihoodProblem(model, trials, weight)
-    kind = RepeatedProblem if isinstance(weight, Repeats) else Problem
-    return kind(model, trials, weight, free)  # type: ignore[arg-type]
+    return RepeatedProblem(model, trials, weight, free)
 
 
 def noise_in(weight: Weight) -> NoiseModel:
     """The noise alone."""
     return weight.noise if isinstance(weight, Repeats) else weight
+
+
+def reweigh(problem: Any, weight: Weight) -> None:
+    """Change the weight of the problem of a group, in place."""
+    if isinstance(weight, Doubt):
+        problem.noise = weight
+    else:
+        problem.noise, problem.weight = weight.noise, weight
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,15 @@ class Item:
 
     name: str
     group: str | None = None
+
+    def __str__(self) -> str:
+        return self.name if self.group is None else f"{self.name}@{self.group}"
+
+    @classmethod
+    def of(cls, text: str) -> Item:
+        """The item of a name, or of a name, "@" and a group."""
+        name, _, group = text.partition("@")
+        return cls(name, group or None)
 
 
 @dataclass(frozen=True)
@@ -115,52 +131,33 @@ class GroupedModel:
         """The rig, and the effects of each group."""
         return tuple(f"{g}: {n}" for g, m in self.models.items() for n in m.structure())
 
-    def with_item(self, item: Item, effect: Effect | None = None) -> GroupedModel:
-        """The same with one thing more: a parameter or a cause of its own in one group, or a cause in all.
+    def having(self, items: Collection[Item], new: Sequence[Effect] = ()) -> GroupedModel:
+        """The same rig with these items alone.
+
+        A group that has a cause beside the other groups has all its parameters for itself; where all groups have the
+        cause, its amplitudes alone.
 
         Parameters
         ----------
-        effect
-            The cause with its start values, where the group's model does not have it yet.
+        new
+            Causes with their start values, for groups that do not have them yet.
         """
-        models, own = dict(self.models), set(self.own)
-        for group in models if item.group is None else (item.group,):
-            if effect is not None and item.name not in (e.name for e in models[group].effects):
-                models[group] = models[group] + effect
-        if item.group is not None:
-            own |= {(n, item.group) for n in models[item.group].parameters() if self._differs(n, item, models)}
-        return GroupedModel(models, frozenset(own))
+        models, own = {}, set[tuple[str, str]]()
+        for group, model in self.models.items():
+            wanted = {i.name for i in items if i.group in (None, group)}
+            known = [e for e in model.effects if e.name in wanted]
+            known += [e for e in new if e.name in wanted and e.name not in {k.name for k in known}]
+            models[group] = Model(model.rig, tuple(known))
+            own |= {(n, group) for i in items if i.group == group for n in _differing(i, known, Item(i.name) in items)}
+        return _agreed(GroupedModel(models, frozenset(own)))
 
-    @staticmethod
-    def _differs(path: str, item: Item, models: Mapping[str, Model]) -> bool:
-        """True of what an item gives a group of its own: of a cause that others have as well its amplitudes alone."""
-        cause, _, name = path.rpartition(".")
-        if item.name != cause:
-            return item.name == path
-        shared = any(item.name == e.name for g, m in models.items() if g != item.group for e in m.effects)
-        (effect,) = (e for e in models[str(item.group)].effects if e.name == item.name)
-        return not shared or name in effect.amplitudes()
 
-    def with_common(self, name: str, groups: Sequence[str]) -> GroupedModel:
-        """The same with a cause that every group has of its own as one of all, whose amplitudes differ in some."""
-        out = GroupedModel(self.models, frozenset((n, g) for n, g in self.own if n.rpartition(".")[0] != name))
-        for group in groups:
-            out = out.with_item(Item(name, group))
-        return _agreed(out)
-
-    def without(self, item: Item, items: Sequence[Item]) -> GroupedModel:
-        """The same without one of its items."""
-        models, own = dict(self.models), set(self.own)
-        rest = [i for i in items if i != item]
-        if item.group is not None:
-            own -= {(n, g) for n, g in own if g == item.group and item.name in (n, n.split(".")[0])}
-        for group, model in models.items():
-            if item.name in (e.name for e in model.effects) and not any(
-                i.name == item.name and i.group in (None, group) for i in rest
-            ):
-                models[group] = model - item.name
-        left = {(n, g) for n, g in own if n in models[g].parameters()}
-        return _agreed(GroupedModel(models, frozenset(left)))
+def _differing(item: Item, effects: Sequence[Effect], is_common: bool) -> list[str]:
+    """Names of the parameters that an item gives a group of its own."""
+    for effect in effects:
+        if effect.name == item.name:
+            return [f"{item.name}.{n}" for n in (effect.amplitudes() if is_common else effect.common())]
+    return [item.name]
 
 
 def _agreed(model: GroupedModel) -> GroupedModel:
@@ -283,7 +280,7 @@ class GroupedProblem(NoisyProblem):
 
 def _of_group(parameters: Mapping[str, float], group: str) -> dict[str, float]:
     """Parameters of a group's noise, by name."""
-    split = ((name.rpartition("@"), v) for name, v in parameters.items())
+    split = ((name.partition("@"), v) for name, v in parameters.items())
     return {name: v for (name, _, g), v in split if g == group}
 
 
@@ -294,14 +291,14 @@ class Grouped:
     Attributes
     ----------
     items
-        What it has beside the nominal model, in the order in which it was found.
+        What it has besides the nominal model.
     fit
         Its `model` is the grouped one; `sse` twice the negative log-likelihood, but for a constant.
     weights
         By group.
     """
 
-    items: tuple[Item, ...]
+    items: frozenset[Item]
     fit: Fit
     weights: Mapping[str, Weight]
 
@@ -311,18 +308,37 @@ class Grouped:
         return self.fit.model  # type: ignore[return-value]
 
     @property
+    def sse(self) -> float:
+        """Twice the negative log-likelihood, but for a constant."""
+        return self.fit.sse
+
+    @property
+    def degrees(self) -> int:
+        """Free parameters."""
+        return len(self.fit.free)
+
+    @property
     def price(self) -> float:
-        """What the set costs, with what each parameter must earn."""
-        return self.fit.sse + PARAMETER_PRICE * len(self.fit.free)
+        """`sse` with a penalty for each parameter, and for each change: a common cause that explains as much is taken.
+
+        A model that is wrong in all groups is no change.
+        """
+        return self.sse + PARAMETER_PRICE * self.degrees + SEPARABLE * len(self.changes)
 
     @property
     def changes(self) -> tuple[Item, ...]:
-        """The items that differ in one group."""
-        return tuple(i for i in self.items if i.group is not None)
+        """The items that differ in one group, by name."""
+        return tuple(sorted((i for i in self.items if i.group is not None), key=str))
+
+    @property
+    def common(self) -> tuple[str, ...]:
+        """Causes of all groups, but for those that differ in one."""
+        differ = {i.name for i in self.changes}
+        return tuple(sorted(i.name for i in self.items if i.group is None and i.name not in differ))
 
     @property
     def is_driven(self) -> bool:
-        """True if predictions are judged, beside everything that is random."""
+        """True if predictions are judged, with everything that is random."""
         return any(isinstance(w, Doubt) for w in self.weights.values())
 
     @property

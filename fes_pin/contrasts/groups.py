@@ -24,7 +24,7 @@ def grouped_study(study: Study, other: Study | None, by: str, chosen: Sequence[s
     if study.rig == "body":
         raise InputError("expected a rig whose trials are simulated; walking has no contrast", file=study.folder)
     labelled = _labelled(study, by) if other is None else _joined(study, instance(other, Study, "after"))
-    groups = list(dict.fromkeys(t.group for t in labelled.trials if t.group is not None))
+    groups = list(in_groups(labelled.trials))
     if chosen is not None:
         instance(chosen, Sequence, "groups")
     chosen = (chosen,) if isinstance(chosen, str) else chosen
@@ -40,6 +40,14 @@ def grouped_study(study: Study, other: Study | None, by: str, chosen: Sequence[s
         if not any(t.group == group and t.role != "held_out" for t in trials):
             raise InputError(f"group {group!r} has no trial to fit: all have role = held_out", file=study.folder)
     return replace(labelled, trials=tuple(trials))
+
+
+def in_groups(trials: Sequence[Trial]) -> dict[str, list[Trial]]:
+    """Trials by their group, groups in the order of their first trials."""
+    out: dict[str, list[Trial]] = {}
+    for trial in trials:
+        out.setdefault(str(trial.group), []).append(trial)
+    return out
 
 
 def _labelled(study: Study, by: str) -> Study:
@@ -73,8 +81,13 @@ def _joined(before: Study, after: Study) -> Study:
     if set(before.start) != set(after.start):
         odd = sorted(set(before.start) ^ set(after.start))[0]
         raise InputError(f"expected start.{odd} in both studies, or in none", file=after.document)
-    names = (before.name, after.name) if before.name != after.name else ("before", "after")
+    names = labels_of(before, after)
     trials: list[Trial] = []
     for label, study in zip(names, (before, after), strict=True):
         trials += [derived_trial(t, name=f"{label}/{t.name}", group=label) for t in study.trials]
     return replace(before, name=f"{names[0]} and {names[1]}", trials=tuple(trials))
+
+
+def labels_of(before: Study, after: Study) -> tuple[str, str]:
+    """What two studies are called as groups."""
+    return (before.name, after.name) if before.name != after.name else ("before", "after")

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fes_pin.contrasts.fits import Fits
 from fes_pin.contrasts.grouped import Grouped
+from fes_pin.contrasts.models import ContrastModels
 from fes_pin.diagnosis.remainder.driven import driven_remainder
 from fes_pin.diagnosis.remainder.open_set import unexplained_remainder
 from fes_pin.identify.fit import Fit
@@ -17,11 +17,11 @@ from fes_pin.infer.result import Remainder
 from fes_pin.workers import in_parallel
 
 
-def left_in_groups(fits: Fits, best: Grouped, seed: int) -> tuple[Remainder, list[str]]:
+def left_in_groups(models: ContrastModels, best: Grouped, seed: int) -> tuple[Remainder, list[str]]:
     """What is left in some groups alone; what is left in all is an error of the model, and is said."""
-    parts = in_parallel(lambda g: fits.part(best, g), list(fits.trials))
-    each = dict(zip(fits.trials, in_parallel(lambda f: _left_by(f, seed), parts), strict=True))
-    each = {g: _in_single_trials(fits, best, g, r, seed) if r.unexplained else r for g, r in each.items()}
+    parts = in_parallel(lambda g: models.maxima.part(best, g), list(models.trials))
+    each = dict(zip(models.trials, in_parallel(lambda f: _left_by(f, seed), parts), strict=True))
+    each = {g: _in_single_trials(models, best, g, r, seed) if r.unexplained else r for g, r in each.items()}
     least = min(each.values(), key=lambda r: r.p_value)
     open_ = [g for g, r in each.items() if r.unexplained]
     p = min(1.0, len(each) * least.p_value)
@@ -38,11 +38,11 @@ def _left_by(fitted: Fit, seed: int) -> Remainder:
     return driven_remainder(fitted, seed) if isinstance(fitted, LikelihoodFit) else unexplained_remainder(fitted, seed)
 
 
-def _in_single_trials(fits: Fits, best: Grouped, group: str, left: Remainder, seed: int) -> Remainder:
+def _in_single_trials(models: ContrastModels, best: Grouped, group: str, left: Remainder, seed: int) -> Remainder:
     """What is left in a group, if half of its trials leave something, each with nominal values of its own.
 
     Trials whose strength or friction differs, of whatever group, leave something beside values that they share.
     """
-    alone = in_parallel(lambda k: fits.part(best, group, k), range(len(fits.trials[group])))
+    alone = in_parallel(lambda k: models.maxima.part(best, group, k), range(len(models.trials[group])))
     p = min(1.0, 2.0 * float(np.median([_left_by(one, seed).p_value for one in alone])))
     return replace(left, unexplained=p < CLAIM_LEVEL, p_value=max(left.p_value, p))

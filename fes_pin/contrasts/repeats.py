@@ -14,7 +14,8 @@ explains beyond that is not taken from it. Source: Laird and Ware, Biometrics 38
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -35,7 +36,7 @@ COARSE, STEP, FINE = 27, 0.5, 21
 
 @dataclass(frozen=True, eq=False)
 class Repeats:
-    """Noise of a group's trials, and how much their nominal parameters scatter.
+    """Noise of a group's trials, and how much their nominal parameters scatter, if they do.
 
     Attributes
     ----------
@@ -48,8 +49,17 @@ class Repeats:
     """
 
     noise: NoiseModel
-    deviations: Mapping[str, float]
-    along: tuple[np.ndarray, ...]
+    deviations: Mapping[str, float] = field(default_factory=dict)
+    along: tuple[np.ndarray, ...] = ()
+
+    @cached_property
+    def shrinks(self) -> list[Shrink]:
+        """Of each trial; empty where nothing scatters."""
+        return [Shrink.of(v) for v in self.along]
+
+    def of_trials(self, kept: Sequence[int]) -> Repeats:
+        """The same of some trials alone."""
+        return replace(self, along=tuple(self.along[k] for k in kept if self.along))
 
     def leaning(self, moved: Sequence[np.ndarray]) -> float:
         """Part of the squares of what moves each trial, weighed, that is the larger the less repeats scatter.
@@ -57,8 +67,7 @@ class Repeats:
         With the logarithm of s^2 it falls as this part of it, and so is as uncertain.
         """
         total = 0.0
-        for one, along in zip(moved, self.along, strict=True):
-            shrink = _Shrink.of(along)
+        for one, shrink in zip(moved if self.along else (), self.shrinks, strict=True):
             total += float(np.sum((shrink.basis.T @ one) ** 2 * shrink.powers / (1.0 + shrink.powers)))
         return total
 
@@ -70,23 +79,23 @@ class RepeatedProblem(Problem):
         self, model: Model, trials: Sequence[Trial], weight: Repeats, free: tuple[str, ...] | None = None
     ) -> None:
         super().__init__(model, trials, weight.noise, free)
-        self._shrinks = [_Shrink.of(v) for v in weight.along]
+        self.weight = weight
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """As a `Problem` does, times (I + V D^2 V')^(-1/2)."""
         plain = super().linearize(values, unknowns)
-        return [shrink.shrunk(part) for part, shrink in zip(plain, self._shrinks, strict=True)]
+        return [s.shrunk(p) for p, s in zip(plain, self.weight.shrinks, strict=True)] if self.weight.along else plain
 
 
 @dataclass(frozen=True)
-class _Shrink:
+class Shrink:
     """(I + V D^2 V')^(-1/2) of one trial: orthonormal directions, and the powers of V D along them."""
 
     basis: np.ndarray
     powers: np.ndarray
 
     @classmethod
-    def of(cls, along: np.ndarray) -> _Shrink:
+    def of(cls, along: np.ndarray) -> Shrink:
         powers, vectors = np.linalg.eigh(along.T @ along)
         felt = powers > 1e-12 * max(powers.max(initial=0.0), 1e-300)
         return cls(along @ vectors[:, felt] / np.sqrt(powers[felt]), powers[felt])
@@ -107,7 +116,7 @@ class _Shrink:
 
 def without_scatter(parts: Sequence[Linearized], weight: Repeats) -> list[Linearized]:
     """Trials of a `RepeatedProblem` as a `Problem` would have them."""
-    return [_Shrink.of(v).grown(p) for p, v in zip(parts, weight.along, strict=True)]
+    return [s.grown(p) for p, s in zip(parts, weight.shrinks, strict=True)] if weight.along else list(parts)
 
 
 def scatter(parts: Sequence[Linearized], columns: Sequence[np.ndarray], names: Sequence[str]) -> dict[str, float]:

@@ -26,7 +26,7 @@ from fes_pin.diagnosis.long_records import searched_part, thinned
 from fes_pin.diagnosis.misread import NAME as MISREAD
 from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.plausibility import check_study
-from fes_pin.diagnosis.restate import restated_study, search_with_conditions, with_misread
+from fes_pin.diagnosis.restate import StudyConditions, restated_study, with_misread
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import NominalFitError, SimulationSearch
@@ -164,7 +164,7 @@ class _Work:
 
     def _judged(self, study: Study, searches: Searches, train: list[Trial], test: list[Trial]) -> Diagnosis:
         with time_limit(self.end - time.perf_counter()):
-            search, searched, again = search_with_conditions(searches.nominal, train, searches.run)
+            search, searched, again = StudyConditions(searches.nominal, searches.run).search(train)
         self.tell(0.88, "held-out gain")
         whole, stated = study, train
         if again is not None:

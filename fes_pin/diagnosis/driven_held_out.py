@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.gains_ahead import Fold
 from fes_pin.diagnosis.decide.held_out import folds_of
@@ -14,15 +12,11 @@ from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
 from fes_pin.diagnosis.search.likelihood_models import Found
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
+from fes_pin.infer.held_out import marginal_cost
 from fes_pin.infer.maximise import together
-from fes_pin.infer.problem import Unknowns, normal_equations
+from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.result import Evidence
-from fes_pin.infer.scatter import at_rest
 from fes_pin.workers import in_parallel
-
-WIDE = 10.0
-"""Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size. Of what
-the data tell it cancels between the trials and their folds."""
 
 
 class Again:
@@ -98,13 +92,8 @@ def _problem(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[Likelihood
 def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, Evidence]:
     """What each cause adds to twice the log-likelihood of held-out trials, foretold by fits to the others.
 
-    By Bayes' rule p(held | others) = p(all) / p(others), each the integral over the parameters about its fit (Laplace):
-
-        -2 log p(trials) = cost + log det(1 + H S^2),   H the information, S the widths of a prior,
-
-    so that what the others leave in doubt of a parameter is doubt about the held trials as well. What is random is as
-    in all trials: learned without one that is unlike the others, it made that one so unlikely that no cause could
-    speak for itself. The ratio of likelihoods of a true cause scatters by twice the root of its mean.
+    What is random is as in all trials: learned without one that is unlike the others, it made that one so unlikely
+    that no cause could speak for itself. See `infer.held_out.marginal_cost`.
     """
     foretold = {n: 0.0 for n in ("", *found.without)}
     for fold in folds:
@@ -114,19 +103,12 @@ def evidence_of(folds: Sequence[Fold], found: Found, alike: Again) -> dict[str, 
         else:
             whole = dict(zip(part, alike([(f, (*f.trials, *fold.test)) for f in part.values()]), strict=True))
         for n in foretold:
-            foretold[n] += _weight(whole[n]) - _weight(part[n])
-    gains = {n: foretold[n] - foretold[""] for n in found.without}
-    return {n: Evidence(g, max(g, 0.0)) if np.isfinite(g) else Evidence(0.0, 0.0) for n, g in gains.items()}
+            foretold[n] += _cost(whole[n]) - _cost(part[n])
+    return {n: Evidence.of(foretold[n] - foretold[""]) for n in found.without}
 
 
-@np.errstate(all="ignore")
-def _weight(fitted: LikelihoodFit) -> float:
-    """Twice the negative log of the probability of a fit's trials; see `evidence_of`."""
-    system = normal_equations(at_rest(fitted.parts))
-    info = fitted.model.parameter_info()
-    widths = [WIDE * max(abs(fitted.values[n]), info[n].scale) for n in fitted.free]
-    scaled = system.hessian * np.outer(widths, widths)
-    return fitted.sse + float(np.linalg.slogdet(np.eye(len(widths)) + scaled)[1])
+def _cost(fitted: LikelihoodFit) -> float:
+    return marginal_cost(fitted, {n: one.scale for n, one in fitted.model.parameter_info().items()})
 
 
 def held_errors_ahead(folds: Sequence[Fold], horizon_s: float, falling: bool) -> tuple[Ahead, Ahead] | None:

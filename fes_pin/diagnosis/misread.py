@@ -132,10 +132,10 @@ def restated_trials(model: Model, trials: Sequence[Trial], found: Misread) -> li
     return [model.rig.restated(t, found.condition, found.value) if t.name == found.trial else t for t in trials]
 
 
-def takes_most(found: Misread, trials: Sequence[Trial]) -> bool:
+def takes_most(found: Misread) -> bool:
     """True if restating the trial takes away more than half of what the model gets wrong, by squares beyond noise."""
     whole = found.whole
-    restated = restated_trials(whole.model, trials, found)
+    restated = restated_trials(whole.model, whole.trials, found)
     after = fit_problem(Problem(whole.model, restated, whole.noise), whole.values)
     wrong = max(whole.sse - whole.samples, 0.0)
     return after.sse - after.samples < 0.5 * wrong

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fes_pin.infer.optimum import Optimum
+from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.result import Evidence, Gain
+from fes_pin.infer.scatter import at_rest
 
 RESAMPLES = 2000
 """Bootstrap draws of a gain: the standard error of its 95 % bounds is 1.5 % of their distance, of a normal gain."""
 FAR = 1e6
 """Whitened residuals count as no larger, in standard deviations."""
-
+WIDE = 10.0
+"""Width of the prior of a parameter, in units of its value or scale: nothing is known beforehand but its size. Of what
+the data tell it cancels between the trials and their folds."""
 
 FOLDS = 5
 """Parts that units are dealt to: each is predicted by the other four, which hold most of what is known."""
@@ -106,6 +111,25 @@ def _share(
     """
     excess = np.maximum(np.maximum(nominal - noise, nominal - extended), np.sqrt(scatter))
     return np.asarray(100.0 * (without - extended) / excess)
+
+
+@np.errstate(all="ignore")
+def marginal_cost(fitted: Optimum, scales: Mapping[str, float]) -> float:
+    """Twice the negative log of the probability of a fit's trials, integrated over its parameters (Laplace).
+
+    cost + log det(1 + H S^2), with H the information and S the widths of a prior. By Bayes' rule
+    p(held | others) = p(all) / p(others): of the fit to all trials less that to the others it is the cost of the held
+    ones, in which what the others leave uncertain of a parameter is uncertainty about the held ones as well.
+
+    Parameters
+    ----------
+    scales
+        Of every parameter, by name.
+    """
+    system = normal_equations(at_rest(fitted.parts))
+    widths = [WIDE * max(abs(fitted.parameters[n]), scales[n]) for n in fitted.free]
+    scaled = system.hessian * np.outer(widths, widths)
+    return fitted.sse + float(np.linalg.slogdet(np.eye(len(widths)) + scaled)[1])
 
 
 def speaks_for(evidence: Evidence | Gain | None, gain: Gain, alone: bool) -> bool:

@@ -200,6 +200,11 @@ class Evidence:
         """Lower end of the 95 % interval."""
         return self.added - 2.0 * CONFIDENCE_95 * math.sqrt(self.squares)
 
+    @classmethod
+    def of(cls, added: float) -> Evidence:
+        """From a ratio of likelihoods alone: that of a true cause scatters by twice the root of its mean."""
+        return cls(added, max(added, 0.0)) if math.isfinite(added) else cls(0.0, 0.0)
+
     def __add__(self, other: Evidence) -> Evidence:
         return Evidence(self.added + other.added, self.squares + other.squares, self.on)
 
@@ -476,11 +481,14 @@ class Change(Named):
         The group that has a value of its own.
     parameters
         By name and group: of a group that does not have the cause its null, without deviation.
+    evidence
+        By how much the likelihood of held-out trials grows with it; None where none could be held out.
     """
 
     parameters: Mapping[str, Mapping[str, ParameterEstimate]]
     kind: str
     group: str
+    evidence: Evidence | None = None
     PLACE: ClassVar[tuple[str, ...]] = ("kind", "group", "site")
     CELL: ClassVar[tuple[str, ...]] = ("parameter", "group")
 
@@ -490,6 +498,9 @@ class Change(Named):
 
     def _parameters(self) -> dict[str, Any]:
         return {n: {g: one.record() for g, one in groups.items()} for n, groups in self.parameters.items()}
+
+    def _gains(self) -> dict[str, Any]:
+        return {"judged_by": self.evidence.record()} if self.evidence is not None else {}
 
     def row(self) -> tuple[str, ...]:
         """Name, what happened, values by group, p, what it cannot be told from."""

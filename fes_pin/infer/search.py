@@ -192,8 +192,13 @@ class Search(Generic[F]):
         return self.models.fits[()]
 
     def _search(self) -> SearchResult[F]:
-        best = self._kept
+        self._forward()
+        return self.settle(self._backward(self._kept))
+
+    def _forward(self) -> None:
+        """Extend the best set so far as long as a larger one is accepted."""
         for size in self._sizes():
+            best = self._kept
             self.progress(min(0.1 + 0.2 * size, 0.7), f"sets of {size}")
             if best and not self._worth_extending(best):
                 break
@@ -201,12 +206,12 @@ class Search(Generic[F]):
             larger = self._first_accepted(size, best)
             if larger is None:
                 break
-            best = self._kept = larger
-        return self.settle(self._backward(best))
+            self._kept = larger
 
     def _sizes(self) -> Iterable[int]:
-        most = self.models.most_candidates
-        return itertools.count(1) if most is None else range(1, most + 1)
+        """Sizes of sets that are larger than the best so far."""
+        first, most = len(self._kept) + 1, self.models.most_candidates
+        return itertools.count(first) if most is None else range(first, most + 1)
 
     def earns(self, larger: F, smaller: F, gain: float, explained: float) -> bool:
         """Whether a larger set is worth its degrees of freedom where it gains so much in twice the log-likelihood."""

@@ -9,8 +9,8 @@ from contrast_pairs.free import free_pair
 import fes_pin as fp
 from fes_pin.contrasts.decide import Spread, usual_spread
 from fes_pin.contrasts.grouped import Item
-from fes_pin.contrasts.promises import Promise
 from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, scatter, without_locals, without_scatter
+from fes_pin.contrasts.screen import ItemScore
 from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.problem import Linearized
@@ -81,7 +81,7 @@ def test_the_squares_are_those_of_the_covariance(tmp_path):
 
 def spreads(values, free=4):
     return [
-        Promise(Item(f"cause{k}"), None, 0.0, 1, 1.0, 1.0, {}, spread=float(v), spread_degrees=free)
+        ItemScore(Item(f"cause{k}"), None, 0.0, 1, 1.0, 1.0, {}, spread=float(v), spread_degrees=free)
         for k, v in enumerate(values)
     ]
 

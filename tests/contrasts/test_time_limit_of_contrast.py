@@ -6,8 +6,8 @@ import pytest
 from contrast_pairs.free import free_pair
 
 import fes_pin as fp
+from fes_pin.contrasts.models import ContrastSearch
 from fes_pin.contrasts.record import contrast_json
-from fes_pin.contrasts.search import ContrastSearch
 from fes_pin.view.contrast_report import contrast_html
 from fes_pin.workers import OutOfTime
 
@@ -28,10 +28,10 @@ def test_without_time_nothing_is_claimed(study):
 
 
 def test_a_change_that_was_found_in_time_is_kept(study, monkeypatch):
-    def out_of_time(search, best):
+    def out_of_time(search, names):
         raise OutOfTime
 
-    monkeypatch.setattr(ContrastSearch, "_settled", out_of_time)
+    monkeypatch.setattr(ContrastSearch, "settle", out_of_time)
     found = fp.contrast(study, limit=1e3)
     assert found.verdict == "stopped" and [c.name for c in found.changes] == ["gain"]
     assert "stopped: best set so far: one thing changed" in str(found)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,9 +13,13 @@ from fes_pin.diagnosis.search.refined_forms import is_identified
 from fes_pin.diagnosis.search.starts import STARTS, begun_anew, forms_beside, refinements
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
+from fes_pin.infer.fits import more_degrees
 from fes_pin.infer.optimize import WORTH
+from fes_pin.infer.search import Fitted
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
+
+F = TypeVar("F", bound=Fitted)
 
 
 class LikelihoodForms:
@@ -34,9 +39,6 @@ class LikelihoodForms:
     def refined(self, base: LikelihoodFit, barred: str | None = None) -> LikelihoodFit | None:
         """The best fit of a set with the form of one of its effects refined; None where the data demand no form.
 
-        What is not half way to what is demanded once its parameters were fitted, beside randomness as it was, is not
-        gone on with.
-
         Parameters
         ----------
         barred
@@ -44,12 +46,12 @@ class LikelihoodForms:
         """
         models = [refinements(base.model, effect, self._measured, barred) for effect in base.model.effects]
         looks = in_parallel(lambda s: self._maxima.look(s, base), [s for many in models for s in many])
-        looks = sorted(looks, key=lambda f: f.price)
-        demanded = chi2_quantile(1.0 - level_of(base) / forms_beside(base.model, base.model.effects), 1)
-        worth = [f for f in looks[:STARTS] if base.sse - f.sse > 0.5 * max(demanded, base.sse - looks[0].sse)]
-        found = [f for f in in_parallel(self._maxima.go_on, worth) if is_identified(f, base)]
-        best = min(found, key=lambda f: f.price, default=None)
-        return best if best is not None and _is_demanded(best, base) else None
+        level = level_of(base) / forms_beside(base.model, base.model.effects)
+
+        def finished(worth: Sequence[LikelihoodFit]) -> list[LikelihoodFit]:
+            return [f for f in in_parallel(self._maxima.go_on, worth) if is_identified(f, base)]
+
+        return demanded_form(base, looks, level, finished)
 
     def otherwise(self, base: LikelihoodFit) -> LikelihoodFit | None:
         """The best fit of a set whose form lacks one of several refinements, grown from none; None if none is cheaper.
@@ -87,7 +89,27 @@ class LikelihoodForms:
         return self._maxima.cheaper(starts, base, base.price - WORTH)
 
 
-def _is_demanded(refined: LikelihoodFit, base: LikelihoodFit) -> bool:
-    degrees = max(refined.degrees - base.degrees, 1)
-    p_value = float(chi2_tail(max(base.sse - refined.sse, 0.0), degrees))
-    return p_value * forms_beside(base.model, base.model.effects) < level_of(base)
+def demanded_form(
+    base: F, looks: Sequence[F], level: float, finished: Callable[[Sequence[F]], Sequence[F]]
+) -> F | None:
+    """The best fit of a set in another form that the data demand; None where they demand none.
+
+    What does not gain half of what is demanded once its parameters were fitted, under noise as it was, is not gone on
+    with.
+
+    Parameters
+    ----------
+    looks
+        First fits of the set in other forms.
+    level
+        Of each form by itself.
+    finished
+        Lets fits converge; returns those that are possible.
+    """
+    looks = sorted(looks, key=lambda f: f.price)
+    demanded = chi2_quantile(1.0 - level, 1)
+    worth = [f for f in looks[:STARTS] if base.sse - f.sse > 0.5 * max(demanded, base.sse - looks[0].sse)]
+    best = min(finished(worth), key=lambda f: f.price, default=None)
+    if best is None or not chi2_tail(max(base.sse - best.sse, 0.0), more_degrees(best, base)) < level:
+        return None
+    return best

@@ -1,0 +1,85 @@
+"""Faults of a recording that are no change: a trial that states a wrong condition, efforts written down late."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.contrasts.grouped import Grouped
+from fes_pin.contrasts.groups import in_groups
+from fes_pin.contrasts.models import ContrastModels, ContrastSearch, Found
+from fes_pin.data.log import EFFORT
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.conditions import Conditions, Restated
+from fes_pin.diagnosis.misread import Misread, find_misread
+from fes_pin.identify.lateness import lateness_of
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
+from fes_pin.infer.levels import CLAIM_LEVEL
+from fes_pin.models.predictor import Doubt
+from fes_pin.workers import in_parallel
+
+
+class GroupConditions(Conditions[ContrastSearch, Found]):
+    """Conditions of the trials of a contrast: one that stands out does so of its own group."""
+
+    def misread(self, trials: Sequence[Trial], searched: Found | None) -> Misread | None:
+        """The trial that stands out of its group, all groups being asked."""
+        groups = in_groups(trials)
+        models = dict.fromkeys(groups, self.nominal) if searched is None else searched.best.model.models
+        found = [one for g, many in groups.items() if (one := find_misread(models[g], many)) is not None]
+        first = min(found, key=lambda m: m.p_value, default=None)
+        if first is None or not len(groups) * first.p_value < CLAIM_LEVEL:
+            return None
+        return replace(first, p_value=len(groups) * first.p_value)
+
+    def has_causes(self, searched: Found) -> bool:
+        """Whether anything was found."""
+        return bool(searched.best.items)
+
+    def leaves_noise(self, made: Restated[ContrastSearch, Found]) -> bool:
+        """True: where nothing changed, and nothing is wrong, no explanation is simpler."""
+        return True
+
+    def saved(self, searched: Found, trials: Sequence[Trial], made: Restated[ContrastSearch, Found]) -> float:
+        """By how much the price falls, under the noise of the restated trials."""
+        best, after = searched.best, made.searched.best
+        fits = ContrastModels(self.nominal, in_groups(trials), (), best.is_driven).maxima
+        return fits.converged(best.model, best.items, after.weights, best.fit.unknowns).price - after.price
+
+
+def late_in_groups(models: ContrastModels, found: Found) -> float | None:
+    """How late the efforts of a driven rig were written down, s, in the mean over groups; None where one is in time.
+
+    What was found in all groups may stand for it: then the nominal model is asked.
+    """
+    rig, trials = models.nominal_model.rig, [t for many in models.trials.values() for t in many]
+    if not models.driven or not all(EFFORT in rig.input_columns(t) for t in trials):
+        return None
+    asked = [found.best, found.nominal] if set(found.best.items) - set(found.best.changes) else [found.best]
+    return next((late for one in asked if (late := _late_beside(models, one)) is not None), None)
+
+
+def _late_beside(models: ContrastModels, one: Grouped) -> float | None:
+    """How late efforts are beside a set, each group with nominal values of its own; None where one is in time."""
+
+    def late_in(group: str) -> float:
+        part = models.maxima.part(one, group)
+        if not isinstance(part, LikelihoodFit):
+            return math.nan
+        late = lateness_of(maximum_from(part, part.trials), min(t.dt for t in part.trials))
+        return math.nan if late is None else late.log.effort_late_s
+
+    try:
+        mean = float(np.mean(in_parallel(late_in, models.trials)))
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return None
+    return mean if math.isfinite(mean) else None
+
+
+def is_likelier(timed: Grouped, recorded: Grouped) -> bool:
+    """True if efforts in time explain the same readings at a lower price."""
+    one, other = ({w.lasts_s for w in f.weights.values() if isinstance(w, Doubt)} for f in (timed, recorded))
+    return one == other and timed.price < recorded.price

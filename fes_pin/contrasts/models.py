@@ -1,0 +1,223 @@
+"""Sets of common causes and changes as the search of `infer` sees them: how they are fitted and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from fes_pin.contrasts.decide import Spread, between_trials, inflation, usual_spread
+from fes_pin.contrasts.fits import GroupedFits, PredictedGroups, SimulatedGroups
+from fes_pin.contrasts.grouped import Grouped, GroupedModel, Item
+from fes_pin.contrasts.screen import ItemScore, Screen
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.search.library import Library
+from fes_pin.diagnosis.search.likelihood_forms import demanded_form
+from fes_pin.diagnosis.search.starts import STARTS, forms_beside, refinements
+from fes_pin.infer.covariance import step_gain
+from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.fits import Candidate, FittedSets, more_degrees
+from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL
+from fes_pin.infer.problem import normal_equations
+from fes_pin.infer.scatter import excess_scatter
+from fes_pin.infer.scoring import LITTLE
+from fes_pin.infer.search import Names, Policy, Search, SearchResult
+from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
+from fes_pin.workers import Progress, in_parallel
+
+MOST_ITEMS = 5
+"""Common causes and changes together."""
+FITTED, FITTED_DRIVEN = 10, 6
+"""Items that are fitted with a set, those of largest score; on driven rigs a fit is some five times as long."""
+
+Found = SearchResult[Grouped]
+"""What a search of what differs found."""
+
+
+class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
+    """Sets of items, "cause" or "cause@group", fitted to the trials of several groups.
+
+    Parameters
+    ----------
+    nominal
+        The believed model of all groups.
+    trials
+        By group.
+    effects
+        The causes that are looked for.
+    driven
+        True for rigs that are judged by the likelihood of predictions.
+    seed
+        Of critical values.
+    """
+
+    most_candidates: int | None = MOST_ITEMS
+
+    def __init__(
+        self,
+        nominal: Model,
+        trials: Mapping[str, Sequence[Trial]],
+        effects: Sequence[type[Effect]],
+        driven: bool,
+        seed: int = 0,
+    ) -> None:
+        super().__init__()
+        self.nominal_model, self.trials, self.driven, self.seed = Model(nominal.rig), dict(trials), driven, seed
+        every = [t for many in trials.values() for t in many]
+        self._library = Library(self.nominal_model, every, effects)
+        self.screen = Screen(self.nominal_model, self.trials, self._library)
+        self.maxima: GroupedFits = (
+            PredictedGroups(nominal, trials) if driven else SimulatedGroups(nominal, trials, effects)
+        )
+        self._compared: dict[tuple[Names, str], Grouped] = {}
+
+    def nominal(self) -> Grouped:
+        """Fit the nominal model to all groups, and simulate the family of the score tests of all changes."""
+        self.fits[()] = self.maxima.first()
+        self.family = self.screen.scores(self.fits[()]).family(self.seed)
+        return self.fits[()]
+
+    def candidates(self, base: Grouped) -> dict[str, Candidate[list[ItemScore]]]:
+        """The items of largest score, and every parameter and cause of the set as one group could have it.
+
+        What is random in the set hides how much the latter gain.
+        """
+        by_item: dict[Item, list[ItemScore]] = {}
+        for one in sorted(self.screen.scores(base).scored, key=lambda s: -s.net_gain):
+            if one.gain > 1.0:
+                by_item.setdefault(one.item, []).append(one)
+        most = FITTED_DRIVEN if self.driven else FITTED
+        chosen = [many for k, many in enumerate(by_item.values()) if k < most or many[0].effect is None]
+        return {str(many[0].item): Candidate(many[0].net_gain, many[:STARTS]) for many in chosen}
+
+    def begin(self, base: Grouped, starts: Mapping[Names, list[ItemScore]]) -> dict[Names, Grouped]:
+        """First fits of sets with one item more, from its shapes of largest score."""
+        looks = in_parallel(lambda many: self._look(base, many), list(starts.values()))
+        return dict(zip(starts, looks, strict=True))
+
+    def _look(self, base: Grouped, scores: Sequence[ItemScore]) -> Grouped:
+        out = []
+        for one in scores:
+            items = base.items | {one.item}
+            model = base.model.having(items, () if one.effect is None else (one.effect,)).with_parameters(one.start)
+            out.append(self.maxima.look(model, items, base))
+        return min(out, key=lambda f: f.price)
+
+    def converged(self, fits: Sequence[Grouped]) -> list[Grouped]:
+        """Fits once they have converged."""
+        return in_parallel(self.maxima.go_on, fits)
+
+    def step_gain(self, fitted: Grouped) -> float:
+        """What a further step of a fit gains, by its slope and curvature; 0 where it has converged."""
+        fit = fitted.fit
+        if fit.gradient_norm < LITTLE:
+            return 0.0
+        return step_gain(normal_equations(fit.parts), [n not in fit.at_bound for n in fit.free])
+
+    def form_of(self, fitted: Grouped) -> frozenset[tuple[str, str, tuple[str, ...]]]:
+        """Of each cause of each group its name, and which refinements it has."""
+        models = fitted.model.models.items()
+        return frozenset((g, e.name, e.refined()) for g, m in models for e in m.effects)
+
+    def without(self, names: Names, name: str) -> Grouped:
+        """The fit of a set less one item, from the set's own values where that is better."""
+        rest, whole = tuple(n for n in names if n != name), self.fits[names]
+        if self._compared.get((names, name)) is not whole:
+            items = whole.items - {Item.of(name)}
+            own = self.maxima.converged(whole.model.having(items), items, whole.weights, whole.fit.unknowns)
+            if rest not in self.fits or own.price < self.fits[rest].price:
+                self.fits[rest] = own
+            self._converged.add(rest)
+            self._compared[names, name] = whole
+        return self.fits[rest]
+
+    def excess_scatter(self, larger: Grouped, smaller: Grouped) -> float:
+        """See `identify.scatter.excess_scatter`."""
+        return excess_scatter(larger.fit, smaller.fit)
+
+    def p_value(self, larger: Grouped, smaller: Grouped, gain: float | None = None) -> float:
+        """Family-wise p-value of what a set has more than another.
+
+        Of a cause of all groups that against the noise; of a change the larger of that, and of that against the spread
+        between trials: a repeat that differs by more than its noise is no change.
+        """
+        noise = super().p_value(larger, smaller, gain)
+        if not set(larger.changes) - set(smaller.changes) or not noise < CLAIM_LEVEL:
+            return noise
+        degrees, usual = more_degrees(larger, smaller), usual_spread(self.screen.scores(larger).scored)
+        spread = between_trials(larger, self.maxima.weighed_as(smaller, larger), degrees, usual)
+        return max(noise, self.family.adjusted(spread))
+
+    def inflation(self, larger: Grouped, smaller: Grouped) -> Spread:
+        """Variance between trials of what a set has more than another; see `decide.inflation`."""
+        usual = usual_spread(self.screen.scores(larger).scored)
+        return inflation(larger, self.maxima.weighed_as(smaller, larger), usual)
+
+    def extension_p_value(self, fitted: Grouped) -> float:
+        """Family-wise p-value of the largest score of a further item."""
+        scores = (float(chi2_tail(s.gain, s.degrees)) for s in self.screen.scores(fitted).scored)
+        return self.family.adjusted(min(scores, default=1.0))
+
+    def leaves_noise(self, fitted: Grouped) -> bool:
+        """False where repeats scatter, or something random acts: that may be a change that is missed."""
+        return not (fitted.repeats or fitted.is_driven)
+
+    def better_form(self, fitted: Grouped) -> Grouped | None:
+        """The set with the form of a cause refined as the data of a driven rig demand; None where they demand none."""
+        if not self.driven:
+            return None
+        starts, tried = [], 0
+        for group, effect in _causes(fitted):
+            own = fitted.model.models[group]
+            tried += forms_beside(own, [effect])
+            starts += [_moved(fitted.model, group, m) for m in refinements(own, effect, self._library.measured)]
+        looks = in_parallel(lambda start: self.maxima.look(start, fitted.items, fitted), starts)
+        return demanded_form(fitted, looks, DRIVEN_LEVEL / max(tried, 1), self.converged)
+
+    def begin_again(self, names: Names) -> bool:
+        """Fit a set and the nominal model under the noise that the set leaves; False where every fit has its own."""
+        weights = self.maxima.under_own_noise(self.fits[names])
+        if weights is None:
+            return False
+        kept = {k: self.fits[k] for k in ((), names)}
+        self.fits = {k: self.maxima.converged(f.model, f.items, weights, f.fit.unknowns) for k, f in kept.items()}
+        self._converged, self._begun, self._compared = set(self.fits), set(), {}
+        for name in names:
+            self.without(names, name)
+        return True
+
+
+def _causes(fitted: Grouped) -> list[tuple[str, Effect]]:
+    """The causes of a set, each once for all groups that share it, with a group that has it."""
+    models = fitted.model.models
+    out: dict[tuple[str, str | None], tuple[str, Effect]] = {}
+    for group, model in models.items():
+        for effect in model.effects:
+            alone = None if Item(effect.name) in fitted.items else group
+            out.setdefault((effect.name, alone), (group, effect))
+    return list(out.values())
+
+
+def _moved(model: GroupedModel, group: str, own: Model) -> GroupedModel:
+    """A grouped model with the values that differ in one group's model."""
+    known = model.models[group].parameters()
+    return model.with_parameters({model.path(n, group): v for n, v in own.parameters().items() if v != known[n]})
+
+
+class ContrastSearch(Search[Grouped]):
+    """The search for what differs between groups; forward again under the noise that what was found leaves."""
+
+    models: ContrastModels
+
+    def __init__(self, models: ContrastModels, progress: Progress) -> None:
+        super().__init__(models, progress, Policy())
+
+    def _search(self) -> Found:
+        self._forward()
+        if self.models.begin_again(self._kept):
+            self._rejected.clear()
+            self._formed.clear()
+            self._forward()
+        return self.settle(self._backward(self._kept))
+
+
+__all__ = ["ContrastModels", "ContrastSearch", "Found"]

@@ -1,0 +1,292 @@
+"""Score tests of every item that a grouped model may be extended by."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fes_pin.contrasts.grouped import Grouped, Item, group_problem, reweigh
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.search.library import Library
+from fes_pin.diagnosis.search.score import Projection
+from fes_pin.diagnosis.search.starts import near_null, started
+from fes_pin.infer.family import MIN_UNITS, Family
+from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.problem import Linearized, Unknowns, completed
+from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
+from fes_pin.workers import in_parallel
+
+FEWEST_TRIALS = 6
+"""Trials that alone show how much repeats differ; of fewer each is cut into pieces, as a diagnosis does."""
+UNFELT = 1e-4
+"""Share of the largest part that a unit must have in a change to say something of its spread."""
+LEAST_KEPT = 1e-6
+"""Share of its norm that an item's sensitivity must keep to be scored: below it is rounding."""
+
+
+@dataclass(frozen=True)
+class ItemScore:
+    """What an item would add to a set, linearly.
+
+    Attributes
+    ----------
+    effect
+        The cause with its start values; None for a parameter, or a cause, that the group's model has.
+    gain
+        Drop in twice the negative log-likelihood.
+    degrees
+        Parameters that it adds.
+    kept
+        Share of its sensitivity that the set does not take up.
+    deviation
+        Standard deviation of its first amplitude.
+    start
+        Values of parameters that the model has, by path.
+    spread, spread_degrees
+        Variance of what single trials say of it, in units of what the noise explains, and its degrees of freedom.
+    """
+
+    item: Item
+    effect: Effect | None
+    gain: float
+    degrees: int
+    kept: float
+    deviation: float
+    start: Mapping[str, float]
+    spread: float = 1.0
+    spread_degrees: int = 0
+
+    @property
+    def net_gain(self) -> float:
+        """Gain less the penalty of the parameters."""
+        return self.gain - PARAMETER_PRICE * self.degrees
+
+
+@dataclass(frozen=True)
+class ItemScores:
+    """The scores of items, and the Gram matrix of what the set leaves of their columns.
+
+    Attributes
+    ----------
+    gram
+        Shape (k, k).
+    blocks
+        The rows of `gram` of each change.
+    """
+
+    scored: list[ItemScore]
+    gram: np.ndarray
+    blocks: list[slice]
+
+    def family(self, seed: int) -> Family:
+        """The family of the tests of all changes."""
+        return Family(self.gram, self.blocks, seed)
+
+
+@dataclass(frozen=True)
+class _Column:
+    """An item with one choice of shapes.
+
+    Attributes
+    ----------
+    amplitudes
+        By name: value without the item, and bounds.
+    columns
+        Whitened sensitivities to them, zero in the rows of groups that the item does not concern.
+    """
+
+    item: Item
+    effect: Effect | None
+    amplitudes: Mapping[str, tuple[float, float, float]]
+    columns: np.ndarray
+
+
+class Screen:
+    """Scores of the items that grouped models of some trials may be extended by.
+
+    Parameters
+    ----------
+    nominal
+        The rig, without effects.
+    trials
+        By group.
+    library
+        Of all trials together.
+    """
+
+    def __init__(self, nominal: Model, trials: Mapping[str, Sequence[Trial]], library: Library) -> None:
+        self._nominal, self._trials, self._library = nominal, trials, library
+        self._kept: dict[int, tuple[Grouped, ItemScores]] = {}
+        self._effects = [e for e in library.effects if library.felt(e)]
+        self._problems: dict[tuple[Any, ...], Any] = {}
+
+    def scores(self, base: Grouped) -> ItemScores:
+        """Every item that a set does not have, scored."""
+        if id(base) not in self._kept:
+            self._kept[id(base)] = (base, self._scores(base))
+        return self._kept[id(base)][1]
+
+    def _scores(self, base: Grouped) -> ItemScores:
+        projection, made = Projection(base.fit.parts), list(self._columns(base))
+        left = np.concatenate([projection(np.nan_to_num(c.columns)) for c in made], axis=1)
+        gram, along = left.T @ left, left.T @ projection.residual
+        ends = np.cumsum([0, *(c.columns.shape[1] for c in made)])
+        blocks = [slice(a, b) for a, b in itertools.pairwise(ends)]
+        scored = []
+        for c, b in zip(made, blocks, strict=True):
+            spread = _spread(left[:, b.start], projection.residual, base.fit.parts)
+            scored.append(_score(c, gram[b, b], along[b], spread))
+        return ItemScores(scored, gram, [b for c, b in zip(made, blocks, strict=True) if c.item.group is not None])
+
+    def _columns(self, base: Grouped) -> Iterator[_Column]:
+        """Every item that a set does not have."""
+        rows = _rows(base.fit.parts, self._trials)
+        for item in self._differing(base):
+            yield _own(base, item, rows[str(item.group)])
+        unknowns = {g: base.fit.unknowns[k] for g, k in _places(self._trials).items()}
+        wanted = [e for e in self._effects if Item(e.name) not in base.items]
+        for many in in_parallel(lambda e: list(self._of_cause(e, base, unknowns, rows)), wanted):
+            yield from many
+
+    def _differing(self, base: Grouped) -> Iterator[Item]:
+        """Parameters and causes of all groups that could have a value of their own in one.
+
+        Of two groups it is one and the same which of them has it: the second.
+        """
+        groups = list(self._trials)
+        free = groups[1:] if len(groups) == 2 else groups
+        for name in (*self._nominal.fitted_parameters(), *sorted(i.name for i in base.items if i.group is None)):
+            taken = [i.group for i in base.items if i.name == name and i.group is not None]
+            if len(taken) < len(groups) - 1:
+                yield from (Item(name, g) for g in free if g not in taken)
+
+    def _of_cause(
+        self, kind: type[Effect], base: Grouped, unknowns: Mapping[str, Unknowns], rows: Mapping[str, slice]
+    ) -> Iterator[_Column]:
+        """A cause in all groups that lack it, and in each of them; in the form that it has in others, if any have it.
+
+        The last group that lacks it has no item of its own: with it the cause acts in all.
+        """
+        has = [g for g in rows if Item(kind.name, g) in base.items]
+        lacks = [g for g in rows if g not in has]
+        forms = [_at_null(base.model.models[has[0]], kind)] if has else self._library.grid(kind)
+        wanted: list[tuple[Item, list[str]]] = [(Item(kind.name), lacks)]
+        wanted += [(Item(kind.name, g), [g]) for g in lacks if len(lacks) > 1]
+        pieces = {g: self._linearized(base, g, forms, unknowns[g]) for g in lacks}
+        for k, one in enumerate(forms):
+            info = one.parameters()
+            amplitudes = {n: (float(info[n].null or 0.0), info[n].lower, info[n].upper) for n in one.amplitudes()}
+            for item, groups in wanted:
+                columns = np.zeros((max(r.stop for r in rows.values()), len(amplitudes)))
+                for g in groups:
+                    columns[rows[g]] = pieces[g][k]
+                yield _Column(item, one, amplitudes, columns)
+
+    def _linearized(self, base: Grouped, group: str, forms: Sequence[Effect], unknowns: Unknowns) -> list[np.ndarray]:
+        """Sensitivities of the trials of a group to the amplitudes of each form of a cause."""
+        bare, weight, out = Model(base.model.models[group].rig), base.weights[group], []
+        for one in forms:
+            names = tuple(f"{one.name}.{n}" for n in one.amplitudes())
+            key = (group, one.name, *one.unused().items())  # what is unused is compiled in, with its values
+            if key not in self._problems:
+                self._problems[key] = group_problem(bare + one, self._trials[group], weight, names)
+            problem = self._problems[key]
+            reweigh(problem, weight)
+            at = [problem.free.index(n) for n in names]
+            parts = problem.linearize((bare + one).parameters(), completed(problem.start_unknowns(), unknowns))
+            out.append(np.concatenate([p.jacobian[:, at] for p in parts]))
+        return out
+
+
+def _places(trials: Mapping[str, Sequence[Trial]]) -> dict[str, slice]:
+    """Places of the trials of each group, all groups end to end."""
+    ends = itertools.accumulate((len(many) for many in trials.values()), initial=0)
+    return {g: slice(a, b) for g, (a, b) in zip(trials, itertools.pairwise(ends), strict=True)}
+
+
+def _rows(parts: Sequence[Linearized], trials: Mapping[str, Sequence[Trial]]) -> dict[str, slice]:
+    """The rows of each group, all trials end to end."""
+    ends = [0, *itertools.accumulate(len(p.residual) for p in parts)]
+    return {g: slice(ends[k.start], ends[k.stop]) for g, k in _places(trials).items()}
+
+
+def _at_null(model: Model, kind: type[Effect]) -> Effect:
+    """A cause of a model without its size."""
+    effect = next(e for e in model.effects if e.name == kind.name)
+    nulls: dict[str, Any] = {n: near_null(kind, n) for n in effect.amplitudes()}
+    return replace(effect, **nulls)
+
+
+def _own(base: Grouped, item: Item, rows: slice) -> _Column:
+    """A parameter, or a cause's amplitudes, in one group alone."""
+    model, group = base.model, str(item.group)
+    names = [item.name]
+    for effect in model.models[group].effects:
+        if effect.name == item.name:
+            names = [f"{effect.name}.{n}" for n in effect.amplitudes()]
+    paths = [model.path(n, group) for n in names]
+    every = np.concatenate([p.jacobian for p in base.fit.parts])[:, [model.free.index(p) for p in paths]]
+    columns = np.zeros_like(every)
+    columns[rows] = every[rows]
+    values, info = model.parameters(), model.parameter_info()
+    amplitudes = {n: (values[p], info[p].lower, info[p].upper) for n, p in zip(names, paths, strict=True)}
+    return _Column(item, None, amplitudes, columns)
+
+
+def _score(one: _Column, gram: np.ndarray, along: np.ndarray, spread: tuple[float, int]) -> ItemScore:
+    """The score of an item from what a set leaves of its columns.
+
+    Parameters
+    ----------
+    gram, along
+        Inner products of what is left, with itself and with the residual.
+    spread
+        Of what single trials say of it, with its degrees of freedom.
+    """
+    size, norms = np.sqrt(np.maximum(np.diag(gram), 0.0)), np.linalg.norm(one.columns, axis=0)
+    kept = float(np.max(size / np.where(norms > 0.0, norms, np.inf), initial=0.0))
+    degrees = len(one.amplitudes) if one.effect is None else len(one.effect.fitted_parameters())
+    if kept < LEAST_KEPT:
+        return ItemScore(one.item, one.effect, 0.0, degrees, 0.0, np.inf, {}, *spread)
+    scale = 1.0 / np.maximum(size, 1e-300)
+    inverse = np.linalg.pinv(gram * np.outer(scale, scale), rcond=1e-10, hermitian=True)
+    nulls, low, high = np.array(list(one.amplitudes.values())).T
+    step = np.clip(scale * (inverse @ (along * scale)), low - nulls, high - nulls)
+    gain = float(2.0 * along @ step - step @ gram @ step)
+    deviation = float(scale[0] * np.sqrt(max(inverse[0, 0], 0.0)))
+    values = dict(zip(one.amplitudes, (nulls + step).tolist(), strict=True))
+    if one.effect is not None:
+        return ItemScore(one.item, started(one.effect, values), gain, degrees, kept, deviation, {}, *spread)
+    start = {f"{n}@{one.item.group}": v or one.amplitudes[n][0] for n, v in values.items()}
+    return ItemScore(one.item, None, gain, degrees, kept, deviation, start, *spread)
+
+
+def units(parts: Sequence[Linearized]) -> list[slice]:
+    """Rows of each unit of evidence: a trial, or a piece of one where trials are few."""
+    pieces = 1 if len(parts) >= FEWEST_TRIALS else -(-MIN_UNITS // len(parts))
+    ends = itertools.accumulate((len(p.residual) for p in parts), initial=0)
+    cuts = [np.linspace(a, b, pieces + 1).round().astype(int) for a, b in itertools.pairwise(ends)]
+    return [slice(int(a), int(b)) for cut in cuts for a, b in itertools.pairwise(cut)]
+
+
+def by_unit(
+    moved: np.ndarray, left: np.ndarray, parts: Sequence[Linearized]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of each unit the squares of what moves it, their inner product with its residual, and whether it is moved."""
+    cuts = units(parts)
+    sizes = np.array([float(moved[c] @ moved[c]) for c in cuts])
+    along = np.array([float(moved[c] @ left[c]) for c in cuts])
+    felt = sizes > UNFELT * max(float(sizes.max()), 1e-300)
+    return sizes, along, felt
+
+
+def _spread(column: np.ndarray, residual: np.ndarray, parts: Sequence[Linearized]) -> tuple[float, int]:
+    """Variance of what each unit says of a parameter, in units of what the noise explains; its degrees of freedom."""
+    sizes, along, felt = by_unit(column, residual, parts)
+    free = int(felt.sum()) - 2
+    return (float(np.sum(along[felt] ** 2 / sizes[felt])) / free, free) if free > 0 else (1.0, 0)
