@@ -25,6 +25,7 @@ from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.noise import NoiseModel, as_white
 from fes_pin.infer.problem import Linearized, normal_equations
+from fes_pin.infer.projection import without_locals
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import simulated_trial
 from fes_pin.workers import in_parallel
@@ -173,7 +174,7 @@ def _screen(
         i, name = pick
         column = _column(whole.model, trials[i], name, whole, noise, sizes[name])
         own = parts[i]
-        column, r, j = (_beside(own.local, x) for x in (column[:, None], own.residual[:, None], own.jacobian))
+        column, r, j = (without_locals(own, x) for x in (column[:, None], own.residual[:, None], own.jacobian))
         cross = j.T @ column[:, 0]
         power = float(column[:, 0] @ column[:, 0]) - float(cross @ inverse @ cross)
         along = float(column[:, 0] @ r[:, 0]) - float(cross @ inverse @ system.gradient)
@@ -181,15 +182,6 @@ def _screen(
 
     scores = in_parallel(score, list(wanted))
     return [wanted[k] for k in np.argsort(scores)[::-1][:CANDIDATES] if scores[k] > LEAST_SCORE]
-
-
-def _beside(local: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Columns without what a trial's own unknowns take up."""
-    felt = local[:, local.any(axis=0)]
-    if not felt.shape[1]:
-        return columns
-    basis = np.linalg.qr(felt)[0]
-    return columns - basis @ (basis.T @ columns)
 
 
 def _column(model: Model, trial: Trial, name: str, fitted: Fit, noise: NoiseModel, step: float) -> np.ndarray:
@@ -261,8 +253,8 @@ def _step(
     covariance = np.where(np.isfinite(fitted.covariance), fitted.covariance, 0.0)
     for _ in range(steps):
         part = _residual(fitted.model, now, fitted, noise)
-        column = _beside(part.local, _column(fitted.model, now, name, fitted, noise, size)[:, None])[:, 0]
-        r, j = _beside(part.local, part.residual[:, None])[:, 0], _beside(part.local, part.jacobian)
+        column = without_locals(part, _column(fitted.model, now, name, fitted, noise, size)[:, None])[:, 0]
+        r, j = without_locals(part, part.residual[:, None])[:, 0], without_locals(part, part.jacobian)
         if half is not None:
             column = np.where(halves(len(column))[half], column, 0.0)
         power = float(column @ column)
@@ -274,7 +266,7 @@ def _step(
         now = rig.restated(now, name, rig.stated(now)[name] + move)
         if abs(move) < 0.01 * std:
             break
-    r = _beside(part.local, _residual(fitted.model, now, fitted, noise).residual[:, None])[:, 0]
+    r = without_locals(part, _residual(fitted.model, now, fitted, noise).residual[:, None])[:, 0]
     return _Step(rig.stated(now)[name] - begun, std, float(r @ r) / max(len(r), 1))
 
 

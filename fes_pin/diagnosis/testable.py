@@ -18,7 +18,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.long_records import searched_part
 from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.score import Projection, Scores
+from fes_pin.diagnosis.search.score import Scores, score_test
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.fit import Fit, fit_multistart, rough_noise
 from fes_pin.identify.problem import Problem
@@ -89,7 +89,7 @@ def testable_causes(study: Study, catalogue: Catalogue | None = None) -> Testabl
             if not math.isfinite(fitted.sse):
                 return "the nominal model runs away when it is simulated from its start values"
             library = Library(nominal, trials, effects)
-            scores = Projection(fitted.parts).score(library.probes(fitted, fitted.noise))
+            scores = score_test(fitted.parts, library.probes(fitted, fitted.noise))
             warnings = _given_away(nominal, trials, fitted)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             return f"the nominal model cannot be fitted ({problem})"

@@ -23,6 +23,7 @@ from fes_pin.infer.distributions import chi2_quantile, normal_quantile
 from fes_pin.infer.levels import CLAIM_LEVEL, SEPARABLE, SURE, UNUSUAL_LEVEL
 from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, normal_equations
+from fes_pin.infer.projection import without_locals
 
 F = TypeVar("F", bound=Optimum)
 
@@ -140,7 +141,9 @@ def scores_of(parts: Sequence[Linearized]) -> np.ndarray:
     pieces = [
         piece
         for part, count in zip(parts, shares, strict=True)
-        for piece in np.add.reduceat(_beside_own(part) * part.residual[:, None], _beginnings(part, count))
+        for piece in np.add.reduceat(
+            without_locals(part, part.jacobian) * part.residual[:, None], _beginnings(part, count)
+        )
     ]
     return np.array(pieces)
 
@@ -153,13 +156,6 @@ def _beginnings(part: Linearized, count: int) -> np.ndarray:
 def in_pieces(values: np.ndarray, trials: int) -> np.ndarray:
     """Sums of the values of one trial of so many over its pieces."""
     return np.array([piece.sum() for piece in np.array_split(values, max(1, PIECES // trials)) if len(piece)])
-
-
-def _beside_own(part: Linearized) -> np.ndarray:
-    """A trial's sensitivities without what its own unknowns take up, as the information is without it."""
-    if not part.local.any():
-        return part.jacobian
-    return np.asarray(part.jacobian - part.local @ np.linalg.lstsq(part.local, part.jacobian, rcond=1e-10)[0])
 
 
 def at_rest(parts: Sequence[Linearized]) -> list[Linearized]:

@@ -20,10 +20,10 @@ from fes_pin.diagnosis.remainder.open_set import FULL_NOISE, unexplained_remaind
 from fes_pin.diagnosis.remainder.play import play_p_value
 from fes_pin.diagnosis.remainder.repeated import repeated_p_value
 from fes_pin.diagnosis.remainder.slips import slip_p_value
-from fes_pin.diagnosis.search.score import Projection
 from fes_pin.identify.fit import fit
 from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.noise import Noise, estimate_noise
+from fes_pin.infer.projection import Projection
 from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predict import predict

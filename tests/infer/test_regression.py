@@ -5,7 +5,7 @@ import pytest
 import scipy.stats
 from infer.regression import COUNT, Regression, equivalents
 
-from fes_pin.infer.levels import CLAIM_LEVEL, CONFIDENCE_95
+from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.infer.search import Search
 
 RUNS = 6
@@ -19,10 +19,6 @@ def searched(models):
     return Search(models, lambda share, words: None).run()
 
 
-def names_of(models, fitted):
-    return next(n for n, f in models.fits.items() if f is fitted)
-
-
 def test_two_of_twenty_are_found_and_their_intervals_hold():
     rng = np.random.default_rng(0)
     inside = exact = 0
@@ -31,12 +27,12 @@ def test_two_of_twenty_are_found_and_their_intervals_hold():
         runs = 3.0 + 0.5 * x["x03"] - 0.4 * x["x11"] + rng.standard_normal((RUNS, COUNT))
         models = Regression(x, runs)
         found = searched(models)
-        exact += names_of(models, found.best) == ("x03", "x11")
-        assert {"x03", "x11"} <= set(names_of(models, found.best))
+        exact += found.best.free == ("x03", "x11")
+        assert {"x03", "x11"} <= set(found.best.free)
         assert all(p < CLAIM_LEVEL for p in found.p_values.values())
-        if names_of(models, found.best) == ("x03", "x11"):
-            half = CONFIDENCE_95 * np.sqrt(np.diag(found.best.covariance))
-            inside += int(np.sum(np.abs(found.best.values - [0.5, -0.4]) < half))
+        if found.best.free == ("x03", "x11"):
+            best, true = found.best, {"x03": 0.5, "x11": -0.4}
+            inside += sum(abs(best.values[n] - v) < best.reach(n) for n, v in true.items())
     assert exact >= scipy.stats.binom.ppf(0.001, 40, 1.0 - CLAIM_LEVEL)
     assert inside >= scipy.stats.binom.ppf(0.001, 2 * exact, 0.95)
 
@@ -60,7 +56,7 @@ def test_a_column_that_is_nearly_another_is_its_equivalent_and_no_other_is():
     x["x05"] = x["x03"] + 0.05 * rng.standard_normal(COUNT)
     models = Regression(x, 0.5 * x["x03"] + rng.standard_normal((RUNS, COUNT)))
     found = searched(models)
-    (name,) = names_of(models, found.best)
+    (name,) = found.best.free
     assert equivalents(found.best, found.rivals[name], models.fits) == [tuple({"x03", "x05"} - {name})]
 
 
@@ -73,7 +69,7 @@ def test_a_group_that_changed_is_told_from_one_that_did_not(changed):
     runs[groups == 1] += 0.7 * changed * x["x05"]
     models = Regression(x, runs, groups)
     found = searched(models)
-    assert names_of(models, found.best) == (("x02", "x05@1") if changed else ("x02",))
+    assert found.best.free == (("x02", "x05@1") if changed else ("x02",))
 
 
 def test_what_no_candidate_explains_is_a_lack_of_fit():

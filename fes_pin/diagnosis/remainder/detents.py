@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fes_pin.diagnosis.search.score import Projection
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
+from fes_pin.infer.projection import Projection
 from fes_pin.models.maths import cos, sin
 from fes_pin.models.model import Model
 from fes_pin.models.parameters import parameter

@@ -15,12 +15,12 @@ import numpy as np
 
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.remainder.open_set import beside_smooth, inflation_by_signs, trial_shares
-from fes_pin.diagnosis.search.score import Projection
 from fes_pin.identify.fit import fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
 from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.projection import Projection
 from fes_pin.infer.result import Remainder
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
 from fes_pin.models.stage import Effect

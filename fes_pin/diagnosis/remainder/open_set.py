@@ -23,11 +23,11 @@ from fes_pin.diagnosis.remainder.lines import LONGEST_NOISE, line_p_value
 from fes_pin.diagnosis.remainder.play import play_p_value
 from fes_pin.diagnosis.remainder.repeated import repeated_p_value
 from fes_pin.diagnosis.remainder.slips import slip_p_value
-from fes_pin.diagnosis.search.score import Projection
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import chi2_quantile, chi2_tail
 from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL
 from fes_pin.infer.noise import Noise, NoiseModel, first_order_low_pass
+from fes_pin.infer.projection import Projection
 from fes_pin.infer.result import Remainder
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import Simulator

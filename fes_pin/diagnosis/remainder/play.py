@@ -7,10 +7,10 @@ import itertools
 import numpy as np
 
 from fes_pin.diagnosis.remainder.innovations import Stretch, stretches
-from fes_pin.diagnosis.search.score import Projection
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import f_tail
 from fes_pin.infer.levels import ABSORBED_BELOW
+from fes_pin.infer.projection import Projection
 from fes_pin.models.simulate import Simulator
 
 WIDTHS = (0.003, 0.01, 0.03, 0.1)

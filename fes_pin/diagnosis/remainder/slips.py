@@ -8,11 +8,11 @@ import numpy as np
 import scipy.fft
 
 from fes_pin.diagnosis.remainder.innovations import CLIP, Stretch, stretches
-from fes_pin.diagnosis.search.score import Projection
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import pearson3_tail
 from fes_pin.infer.levels import ABSORBED_BELOW
 from fes_pin.infer.noise import Noise
+from fes_pin.infer.projection import Projection
 
 TRIM = 0.15
 """Share of a trial at either end that no jump is looked for in: Andrews, Tests for parameter instability and structural

@@ -8,7 +8,7 @@ import numpy as np
 
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.library import Library, Probe
-from fes_pin.diagnosis.search.score import Projection, Scores
+from fes_pin.diagnosis.search.score import Scores, score_test
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.models.model import Model
@@ -31,7 +31,7 @@ class LikelihoodScreen:
         if id(base) not in self._scores:
             wanted = [e for e in self._library.effects if e.name not in names_of(base) and self._library.felt(e)]
             groups = in_parallel(lambda e: self._probes(e, base), wanted)
-            self._scores[id(base)] = (base, Projection(base.parts).score([p for g in groups for p in g]))
+            self._scores[id(base)] = (base, score_test(base.parts, [p for g in groups for p in g]))
         return self._scores[id(base)][1]
 
     def _probes(self, effect: type[Effect], base: LikelihoodFit) -> list[Probe]:

@@ -15,12 +15,10 @@ from fes_pin.diagnosis.search.library import Probe
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.problem import Linearized
-from fes_pin.workers import in_parallel
+from fes_pin.infer.projection import Projection
 
 RIDGE = 1e-8
 """Added to the scaled Gram matrix of two probes, which may be the same."""
-LARGEST = float(np.finfo(float).max) ** 0.25
-"""Largest entry of a column: products of inner products stay floating-point numbers. What runs away tells nothing."""
 
 
 @dataclass(frozen=True)
@@ -44,99 +42,53 @@ class Scored:
     kept: float
 
 
-class Projection:
-    """What is left of whitened vectors beside a fit's own parameters and its trials' unknowns."""
+def score_test(parts: Sequence[Linearized], probes: Sequence[Probe]) -> Scores:
+    """The scores of probes in a fit, and the Gram matrix of what the fit leaves of them.
 
-    def __init__(self, parts: Sequence[Linearized]) -> None:
-        ends = np.cumsum([0, *(len(p.residual) for p in parts)])
-        self._trials = [slice(a, b) for a, b in itertools.pairwise(ends)]
-        self._own = [np.linalg.qr(_scaled(p.local[:, p.local.any(axis=0)]))[0] for p in parts]
-        self._basis = _basis(self._without_locals(np.concatenate([p.jacobian for p in parts])))
-        self.residual = self(np.concatenate([p.residual for p in parts])[:, None])[:, 0]
+    Those that can be other in each trial are scored both ways.
+    """
+    if not probes:
+        return Scores([], np.zeros((0, 0)), np.zeros(0), [])
+    projection = Projection(parts)
+    made = projection.products([p.columns for p in probes])
+    ends = np.cumsum([0, *(p.columns.shape[1] for p in probes)])
+    blocks = [slice(a, b) for a, b in itertools.pairwise(ends)]
+    out = [
+        _score(replace(p, columns=p.columns[:0]), made.gram[b, b], made.along[b], float(made.before[b].sum()))
+        for p, b in zip(probes, blocks, strict=True)
+    ]
+    if len(parts) > 1:
+        varying = [(p, b) for p, b in zip(probes, blocks, strict=True) if p.effect.varies]
+        out += [_each(projection, p, [c[:, b] for c in made.by_trial], float(made.before[b].sum())) for p, b in varying]
+    return Scores(out, made.gram, made.along, blocks)
 
-    def _without_locals(self, columns: np.ndarray) -> np.ndarray:
-        out = np.array(columns, dtype=float)
-        for own, rows in zip(self._own, self._trials, strict=True):
-            out[rows] -= own @ (own.T @ out[rows])
-        return out
 
-    def __call__(self, columns: np.ndarray) -> np.ndarray:
-        """Columns of shape (m, k) without the part that the fit could take up."""
-        partly = self._without_locals(columns)
-        return partly - self._basis @ (self._basis.T @ partly)
+def _each(projection: Projection, probe: Probe, partly: Sequence[np.ndarray], before: float) -> Scored:
+    """A probe with amplitudes of each trial's own: its columns, cut into trials, side by side.
 
-    def taken(self, rows: slice) -> list[np.ndarray]:
-        """Orthonormal vectors, cut to rows of one trial, that are taken from columns which are zero elsewhere."""
-        own = [
-            basis[rows.start - where.start : rows.stop - where.start]
-            for basis, where in zip(self._own, self._trials, strict=True)
-            if where.start <= rows.start and rows.stop <= where.stop
-        ]
-        return [*own, self._basis[rows]]
-
-    def score(self, probes: Sequence[Probe]) -> Scores:
-        """The scores of probes, and the Gram matrix of what is left of them, trial by trial.
-
-        Those that can be other in each trial are scored both ways.
-        """
-        if not probes:
-            return Scores([], np.zeros((0, 0)), np.zeros(0), [])
-        begun = in_parallel(lambda k: self._partly(probes, k), range(len(self._trials)))
-        before, shared = (np.sum([b[j] for b in begun], axis=0) for j in (1, 2))
-        left = in_parallel(lambda k: self._left(begun[k][0], shared, k), range(len(self._trials)))
-        gram, along = (np.sum([one[j] for one in left], axis=0) for j in (0, 1))
-        ends = np.cumsum([0, *(p.columns.shape[1] for p in probes)])
-        blocks = [slice(a, b) for a, b in itertools.pairwise(ends)]
-        out = [
-            _score(replace(p, columns=p.columns[:0]), gram[b, b], along[b], float(before[b].sum()))
-            for p, b in zip(probes, blocks, strict=True)
-        ]
-        if len(self._trials) > 1:
-            varying = [(p, b) for p, b in zip(probes, blocks, strict=True) if p.effect.varies]
-            out += [self._each(p, [one[0][:, b] for one in begun], float(before[b].sum())) for p, b in varying]
-        return Scores(out, gram, along, blocks)
-
-    def _partly(self, probes: Sequence[Probe], k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """One trial's part of all columns without what its own unknowns take up; what it was, squared; its share in
-        the inner products with the basis of what all trials share."""
-        rows, own = self._trials[k], self._own[k]
-        columns = np.concatenate([p.columns[rows] for p in probes], axis=1)
-        columns[~(np.abs(columns) < LARGEST)] = 0.0
-        before = np.einsum("mi,mi->i", columns, columns)
-        columns -= own @ (own.T @ columns)
-        return columns, before, self._basis[rows].T @ columns
-
-    def _left(self, partly: np.ndarray, shared: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """One trial's part of the Gram matrix of what is left, and of its inner products with the residual."""
-        left = partly - self._basis[self._trials[k]] @ shared
-        return left.T @ left, left.T @ self.residual[self._trials[k]]
-
-    def _each(self, probe: Probe, partly: Sequence[np.ndarray], before: float) -> Scored:
-        """A probe with amplitudes of each trial's own: its columns, cut into trials, side by side.
-
-        With c_i the columns of trial i beside its own unknowns and B the basis of what all trials share, the Gram
-        matrix of what is left is diag(c_i' c_i) - (c_i' B_i) (c_j' B_j)'.
-        """
-        count = probe.columns.shape[1]
-        gram = np.zeros((count * len(partly),) * 2)
-        for k, columns in enumerate(partly):
-            own = slice(count * k, count * (k + 1))
-            gram[own, own] = columns.T @ columns
-        trials = list(zip(partly, self._trials, strict=True))
-        shared = np.concatenate([columns.T @ self._basis[rows] for columns, rows in trials])
-        gram -= shared @ shared.T
-        along = np.concatenate([columns.T @ self.residual[rows] for columns, rows in trials])
-        after = float(np.trace(gram))
-        effect = type(probe.effect).of_each_trial(**{n: getattr(probe.effect, n) for n in probe.effect.shapes()})
-        probe = Probe(effect, probe.columns[:0])
-        felt = np.diag(gram) > 1e-12 * np.diag(gram).max(initial=1e-300)
-        if not after > 1e-18 * max(before, 1e-300) or not felt.any():
-            return Scored(probe, 0.0, {}, 0.0)
-        gram, along = gram[np.ix_(felt, felt)], along[felt]
-        scale = 1.0 / np.sqrt(np.diag(gram))
-        x = np.linalg.lstsq(gram * np.outer(scale, scale), along * scale, rcond=1e-10)[0]
-        gain = float((along * scale) @ x) - PARAMETER_PRICE * max(len(along) - count, 0)
-        return Scored(probe, gain, {}, float(np.sqrt(after / before)))
+    With c_i the columns of trial i beside its own unknowns and B the basis of what all trials share, the Gram
+    matrix of what is left is diag(c_i' c_i) - (c_i' B_i) (c_j' B_j)'.
+    """
+    count = probe.columns.shape[1]
+    gram = np.zeros((count * len(partly),) * 2)
+    for k, columns in enumerate(partly):
+        own = slice(count * k, count * (k + 1))
+        gram[own, own] = columns.T @ columns
+    trials = list(zip(partly, projection.trials, strict=True))
+    shared = np.concatenate([columns.T @ projection.shared[rows] for columns, rows in trials])
+    gram -= shared @ shared.T
+    along = np.concatenate([columns.T @ projection.residual[rows] for columns, rows in trials])
+    after = float(np.trace(gram))
+    effect = type(probe.effect).of_each_trial(**{n: getattr(probe.effect, n) for n in probe.effect.shapes()})
+    probe = Probe(effect, probe.columns[:0])
+    felt = np.diag(gram) > 1e-12 * np.diag(gram).max(initial=1e-300)
+    if not after > 1e-18 * max(before, 1e-300) or not felt.any():
+        return Scored(probe, 0.0, {}, 0.0)
+    gram, along = gram[np.ix_(felt, felt)], along[felt]
+    scale = 1.0 / np.sqrt(np.diag(gram))
+    x = np.linalg.lstsq(gram * np.outer(scale, scale), along * scale, rcond=1e-10)[0]
+    gain = float((along * scale) @ x) - PARAMETER_PRICE * max(len(along) - count, 0)
+    return Scored(probe, gain, {}, float(np.sqrt(after / before)))
 
 
 @dataclass(frozen=True)
@@ -178,22 +130,6 @@ def _score(probe: Probe, gram: np.ndarray, along: np.ndarray, before: float) -> 
     gain = float(2.0 * along @ amplitudes - amplitudes @ gram @ amplitudes)
     values = dict(zip(names, (float(a) for a in amplitudes + nulls), strict=True))
     return Scored(probe, gain, values, float(np.sqrt(after / before)))
-
-
-def _scaled(columns: np.ndarray) -> np.ndarray:
-    norms = np.linalg.norm(columns, axis=0)
-    return columns / np.where(norms > 0, norms, 1.0)
-
-
-def _basis(columns: np.ndarray, tolerance: float = 1e-7) -> np.ndarray:
-    """Orthonormal basis of the span of columns, shape (m, rank)."""
-    if not columns.shape[1]:
-        return columns
-    scaled = _scaled(columns)
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    good = values > tolerance**2 * max(values[-1], 1e-300) * 1e4
-    rough = (scaled @ vectors[:, good]) / np.sqrt(values[good])
-    return np.linalg.qr(rough)[0] if good.any() else columns[:, :0]
 
 
 def best_by_effect(scored: Sequence[Scored]) -> Mapping[str, list[Scored]]:

@@ -12,7 +12,7 @@ from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.model_fitter import FIRST_ITERATIONS, ModelFitter
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.refined_forms import RefinedForms
-from fes_pin.diagnosis.search.score import Projection, Scores
+from fes_pin.diagnosis.search.score import Scores, score_test
 from fes_pin.identify.fit import Fit, noise_of
 from fes_pin.identify.noise_floor import rich_noise
 from fes_pin.infer.noise import NoiseModel, as_white
@@ -65,7 +65,7 @@ class SimulationFits:
         """Score of every effect that a fit does not have."""
         if id(base) not in self._scores:
             probes = self.library.probes(base, self.fitter.noise, exclude=names_of(base))
-            self._scores[id(base)] = (base, Projection(base.parts).score(probes))
+            self._scores[id(base)] = (base, score_test(base.parts, probes))
         return self._scores[id(base)][1]
 
     def ranked(self, size: int) -> list[Names]:
