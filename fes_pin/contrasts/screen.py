@@ -12,11 +12,11 @@ import numpy as np
 from fes_pin.contrasts.grouped import Grouped, Item, group_problem, reweigh
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
-from fes_pin.diagnosis.search.score import Projection
 from fes_pin.diagnosis.search.starts import near_null, started
 from fes_pin.infer.family import MIN_UNITS, Family
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.problem import Linearized, Unknowns, completed
+from fes_pin.infer.projection import Projection
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
