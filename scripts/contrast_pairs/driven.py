@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from driven_rigs.draw import BASES, Recording, _references, _sizes, urdf
+from driven_rigs.draw import BASES, Recording, references_of, sizes, urdf
 from driven_rigs.plant import DT, Plant, run
 
 from fes_pin.data.study import Study
@@ -34,7 +34,7 @@ def driven_pair(
     omega = base.bandwidth * rng.uniform(0.8, 1.2)
     gain = base.inertia * omega**2 + abs(base.weight)
     bare = Plant(base.inertia, base.damping, base.weight, gain, 1.2 * base.inertia * omega)
-    references = _references(base, 4, round(float(rng.uniform(5.0, 8.0)) / DT), rng)
+    references = references_of(base, 4, round(float(rng.uniform(5.0, 8.0)) / DT), rng)
     effort, position = run(bare, references, rng)
     usual = float(np.sqrt(np.mean(effort**2)))
     speed = float(np.sqrt(np.mean((np.diff(position, axis=0) / DT) ** 2)))
@@ -45,7 +45,7 @@ def driven_pair(
         torque=usual * float(rng.uniform(0.005, 0.03)),
         torque_s=float(rng.choice([0.02, 0.2])),
     )
-    hidden = _sizes(tuple(c for c in changes if c in CAUSES), size * usual, position, speed, rng)
+    hidden = sizes(tuple(c for c in changes if c in CAUSES), size * usual, position, speed, rng)
     inertia = base.inertia * (float(rng.uniform(1.2, 2.0)) if "inertia_scale" in changes else 1.0)
     damping = base.damping + (size * usual / speed if "damping" in changes else 0.0)
     other = replace(plant, hidden=hidden, inertia=inertia, damping=damping)

@@ -137,11 +137,11 @@ def draw(
         rate_gain=1.2 * base.inertia * omega,
     )
     trials, seconds = int(rng.integers(3, 5)), float(rng.uniform(6.0, 12.0))
-    references = _references(base, trials, round(seconds / DT), rng)
+    references = references_of(base, trials, round(seconds / DT), rng)
     effort, position = run(plant, references, rng)
     usual = float(np.sqrt(np.mean(effort**2)))
     speed = float(np.sqrt(np.mean((np.diff(position, axis=0) / DT) ** 2)))
-    hidden = _sizes(causes, size * usual, position, speed, rng)
+    hidden = sizes(causes, size * usual, position, speed, rng)
     own = np.random.default_rng([seed, 1])
     if recorded and "coulomb_friction" in hidden:
         hidden["bristles"] = base.reach * float(np.exp(own.uniform(*np.log(BRISTLES))))
@@ -161,7 +161,7 @@ def draw(
     return Drawn(study, base.name, causes, truth)
 
 
-def _references(base: Base, trials: int, n: int, rng: np.random.Generator) -> np.ndarray:
+def references_of(base: Base, trials: int, n: int, rng: np.random.Generator) -> np.ndarray:
     """Sums of three sines, or smoothed steps, from where the rig rests; shape (n, trials)."""
     t = np.arange(n) * DT
     out = np.empty((n, trials))
@@ -179,7 +179,7 @@ def _references(base: Base, trials: int, n: int, rng: np.random.Generator) -> np
     return out - out[0]
 
 
-def _sizes(
+def sizes(
     causes: tuple[str, ...], torque: float, position: np.ndarray, speed: float, rng: np.random.Generator
 ) -> dict[str, float]:
     """Numbers of what is hidden, so that each acts with about this torque."""

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from driven_rigs.draw import Base, Drawn, written
+from driven_rigs.draw import Base, Drawn, sizes, written
 
 CAUSES = ("coulomb_friction", "effort_offset", "parallel_stiffness", "quadratic_damping", "joint_stop", "cogging")
 PAIRS = (("coulomb_friction", "effort_offset"), ("coulomb_friction", "parallel_stiffness"))
@@ -162,21 +162,13 @@ def hidden_numbers(
     causes: tuple[str, ...], torque: float, position: np.ndarray, dt: float, reach: float, rng: np.random.Generator
 ) -> dict[str, float]:
     """Numbers of what is hidden, so that each acts with about this torque."""
-    goes, speed = float(np.ptp(position)) / 2.0, float(np.sqrt(np.mean(np.gradient(position, dt, axis=0) ** 2)))
+    speed = float(np.sqrt(np.mean(np.gradient(position, dt, axis=0) ** 2)))
     out: dict[str, float] = {}
     for cause in causes:
         if cause == "coulomb_friction":
             out |= {cause: torque, "way": reach * float(np.exp(rng.uniform(*np.log([3e-4, 4e-3]))))}
-        elif cause == "parallel_stiffness":
-            out |= {cause: torque / goes, "rest": float(rng.uniform(-0.5, 0.5)) * goes}
-        elif cause == "quadratic_damping":
-            out[cause] = torque / speed**2
-        elif cause == "joint_stop":
-            out |= {cause: 8.0 * torque / goes, "at": float(np.quantile(position, 0.85))}
-        elif cause == "cogging":
-            out |= {cause: torque, "waves": np.pi / goes * float(rng.uniform(4.0, 9.0))}
         else:
-            out[cause] = torque * float(rng.choice([-1.0, 1.0]))
+            out |= sizes((cause,), torque, position, speed, rng)
     return out
 
 

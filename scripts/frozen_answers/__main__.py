@@ -28,7 +28,7 @@ def freeze(wanted: list[Frozen], table: Path) -> None:
     """Answer the studies that the table does not hold, and add them to it as they come."""
     done = read(table)
     for one in wanted:
-        if f"{one.kind} {one.key}" not in done:
+        if one.name not in done:
             with table.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(answer(one)) + "\n")
 
@@ -36,12 +36,12 @@ def freeze(wanted: list[Frozen], table: Path) -> None:
 def compare(wanted: list[Frozen], table: Path, loosely: bool) -> int:
     """Print what differs, study by study, and the ratio of processor times; the number of studies that differ."""
     frozen, odd, ratios = read(table), 0, []
-    known = [one for one in wanted if f"{one.kind} {one.key}" in frozen]
+    known = [one for one in wanted if one.name in frozen]
     for one in known:
-        old, new = frozen[f"{one.kind} {one.key}"], answer(one)
+        old, new = frozen[one.name], answer(one)
         if lines := differences(old, new, loosely):
             odd += 1
-            typer.echo(f"{one.kind} {one.key} (hidden: {', '.join(one.hidden or ()) or '-'})")
+            typer.echo(f"{one.name} (hidden: {', '.join(one.item.hidden) or '-'})")
             typer.echo("\n".join(f"    {line}" for line in lines))
         if "cpu_s" in old and "cpu_s" in new:
             ratios.append(new["cpu_s"] / max(old["cpu_s"], 0.1))

@@ -8,11 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import fes_pin as fp
-from fes_pin.contrasts.record import contrast_record
 from fes_pin.data.numbers import printed
-from fes_pin.diagnosis.record import diagnosis_record
-from fes_pin.walk.record import walk_record
 from frozen_answers.studies import Frozen
 
 LATER = ("explained", "judged_by")
@@ -33,25 +29,17 @@ def answer(one: Frozen) -> dict[str, Any]:
         `kind`, `key`, `hidden`, `answer` (the record, numbers to four digits) or `error`, and `cpu_s`, the processor
         time of the answer alone.
     """
-    row: dict[str, Any] = {"kind": one.kind, "key": one.key, "hidden": one.hidden and list(one.hidden)}
+    row: dict[str, Any] = {"kind": one.kind, "key": one.item.key, "hidden": list(one.item.hidden)}
     with tempfile.TemporaryDirectory(prefix="frozen") as folder:
-        study = one.make(Path(folder))
+        study, _ = one.generator.make(one.item, Path(folder))
         began = time.process_time()
         try:
-            record = _record(one.kind, study)
+            record = one.generator.ask(study).record()
         except Exception as error:
             return {**row, "error": f"{type(error).__name__}: {error}"}
         seconds = time.process_time() - began
     kept = {name: value for name, value in record.items() if name not in LEFT_OUT}
     return {**row, "answer": _rounded(kept), "cpu_s": round(seconds, 1)}
-
-
-def _record(kind: str, study: fp.Study) -> dict[str, Any]:
-    if kind == "contrast":
-        return contrast_record(fp.contrast(study))
-    if kind == "walking":
-        return walk_record(fp.diagnose_walk(study))
-    return diagnosis_record(fp.diagnose(study))
 
 
 def _rounded(value: Any) -> Any:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterable, Iterator
 from itertools import chain, cycle, islice
 from pathlib import Path
+from typing import NamedTuple
 
 from harness.contrast import Pairs
 from harness.driven import Driven, rows
 from harness.free import Free
-from harness.generator import Generator, Item
+from harness.generator import Generator, Item, Truth
 from harness.imposed import RIGS, Imposed
 from harness.walking import Walks
 
-from fes_pin.data.study import Study, read_study
+import fes_pin as fp
 
 SEED = 9_127_000
 """Of the first study of each generator. No rule was ever made or tried on these seeds."""
@@ -27,26 +26,25 @@ PRACTICE = ("practice", "practice_loops")
 """Folders of studies whose answers are known."""
 
 
-@dataclass(frozen=True)
-class Frozen:
+class Frozen(NamedTuple):
     """A study whose answer is frozen.
 
     Attributes
     ----------
     kind
         "free", "driven", "imposed", "contrast", "walking" or "measured".
-    key
-        Its name in the table.
-    make
-        Makes the study in a folder.
-    hidden
-        Causes that are hidden in it; None where that is not known.
+    generator, item
+        What makes it; the item's key is its name in the table.
     """
 
     kind: str
-    key: str
-    make: Callable[[Path], Study]
-    hidden: tuple[str, ...] | None = None
+    generator: Generator
+    item: Item
+
+    @property
+    def name(self) -> str:
+        """Kind and key."""
+        return f"{self.kind} {self.item.key}"
 
 
 def studies(shared: Path) -> list[Frozen]:
@@ -57,36 +55,35 @@ def studies(shared: Path) -> list[Frozen]:
     shared
         Folder of the measured data.
     """
-    walks = Walks(strength=False)
     queues = {
-        "free": _of("free", Free(), Free().plan(SEED)),
+        "free": _of(Free(), Free().plan(SEED)),
         "driven": _driven(),
-        "imposed": _of("imposed", Imposed(), _imposed()),
-        "contrast": _of("contrast", Pairs(), Pairs().plan(SEED)),
-        "walking": _of("walking", walks, walks.plan(SEED)),
-        "measured": _measured(shared),
+        "imposed": _of(Imposed(), _imposed()),
+        "contrast": _of(Pairs(), Pairs().plan(SEED)),
+        "walking": _of(walks := Walks(strength=False), walks.plan(SEED)),
+        "measured": _of(measured := Measured(shared), measured.plan(0)),
     }
-    rows = [list(islice(queue, COUNTS.get(kind))) for kind, queue in queues.items()]
-    longest = max(len(row) for row in rows)
-    spread = [((k + 0.5) / len(row) * longest, one) for row in rows for k, one in enumerate(row)]
+    each = {kind: list(islice(queue, COUNTS.get(kind))) for kind, queue in queues.items()}
+    longest = max(map(len, each.values()))
+    spread = [
+        ((k + 0.5) / len(row) * longest, Frozen(kind, *one)) for kind, row in each.items() for k, one in enumerate(row)
+    ]
     return [one for _, one in sorted(spread, key=lambda pair: pair[0])]
 
 
-def _of(kind: str, generator: Generator, items: Iterable[Item]) -> Iterator[Frozen]:
-    for item in items:
-        yield Frozen(kind, item.key, partial(_made, generator, item), item.hidden)
+Made = tuple[Generator, Item]
 
 
-def _made(generator: Generator, item: Item, folder: Path) -> Study:
-    return generator.make(item, folder)[0]
+def _of(generator: Generator, items: Iterable[Item]) -> Iterator[Made]:
+    return ((generator, item) for item in items)
 
 
-def _driven() -> Iterator[Frozen]:
+def _driven() -> Iterator[Made]:
     """Of five generators in turn, each with its own causes in turn."""
     causes = {name: cycle(rows(name)) for name in DRIVEN}
     for k, name in enumerate(cycle(DRIVEN)):
         generator = Driven(name)
-        yield from _of("driven", generator, [generator.item(next(causes[name]), SEED + k)])
+        yield generator, generator.item(next(causes[name]), SEED + k)
 
 
 def _imposed() -> Iterator[Item]:
@@ -96,13 +93,20 @@ def _imposed() -> Iterator[Item]:
         yield Imposed().item(rig, hidden, SEED + k)
 
 
-def _measured(shared: Path) -> Iterator[Frozen]:
-    folders = [shared / "data" / name for name in MEASURED]
-    folders += [one for name in PRACTICE for one in sorted((shared / name).iterdir())]
-    for folder in folders:
-        if (folder / "study.toml").exists():
-            yield Frozen("measured", f"{folder.parent.name}-{folder.name}", partial(_read, folder))
+class Measured:
+    """Studies of others, as they are."""
 
+    ask = staticmethod(fp.diagnose)
 
-def _read(folder: Path, _: Path) -> Study:
-    return read_study(folder)
+    def __init__(self, shared: Path) -> None:
+        self.shared = shared
+
+    def plan(self, seed: int) -> Iterator[Item]:
+        folders = [self.shared / "data" / name for name in MEASURED]
+        folders += [one for name in PRACTICE for one in sorted((self.shared / name).iterdir())]
+        for folder in folders:
+            if (folder / "study.toml").exists():
+                yield Item(f"{folder.parent.name}-{folder.name}", seed, part=str(folder))
+
+    def make(self, item: Item, folder: Path) -> tuple[fp.Study, Truth]:
+        return fp.read_study(item.part), Truth()

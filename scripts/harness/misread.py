@@ -29,7 +29,8 @@ class Misread:
             yield Item(f"misread-{k}", k, (NAME,))
 
     def make(self, item: Item, folder: Path) -> tuple[fp.Study, Truth]:
-        study = free_pair("ankle", (), 80.0, item.seed, folder)
+        pair = free_pair("ankle", (), 80.0, item.seed, folder)
+        study = replace(pair, trials=tuple(replace(t, group=None) for t in pair.trials))
         if not item.hidden:
             return study, Truth()
         rng = np.random.default_rng([item.seed, 79])

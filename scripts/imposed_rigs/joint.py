@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from driven_rigs.draw import URDF
 from scipy.integrate import solve_ivp
 
 from fes_pin.data.study import Study
@@ -24,13 +25,6 @@ CAUSES = (
     "mains_hum",
 )
 DT, SECONDS = 0.002, 5.0
-URDF = """<?xml version="1.0"?>
-<robot name="rig"><link name="base"/>
-<link name="arm"><inertial><origin xyz="0 0 -0.2"/><mass value="{mass}"/>
-<inertia ixx="{about}" iyy="{about}" izz="{about}" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="joint" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
-<limit lower="-10" upper="10" effort="1e6" velocity="1e3"/></joint></robot>
-"""
 
 
 def study(causes: tuple[str, ...], size: float, rng: np.random.Generator, folder: Path) -> Study:
@@ -61,7 +55,8 @@ def study(causes: tuple[str, ...], size: float, rng: np.random.Generator, folder
         position = motion.at(time) + noise[2] * rng.standard_normal(len(time))
         trials.append(Trial(f"{k:02d}", "imposed", {"position": position, "effort": read}, time))
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "rig.urdf").write_text(URDF.format(mass=mass, about=about))
+    shape = {"lever": "0 0 -0.2", "mass": mass, "about": about, "kind": "revolute", "axis": "0 1 0"}
+    (folder / "rig.urdf").write_text(URDF.format(name="rig", **shape))
     start = {"inertia_scale": float(rng.uniform(0.8, 1.25)), "damping": damping * float(rng.uniform(0.5, 1.5))}
     return Study(
         folder.name, "joint", {"gravity_scale": 1.0}, start, tuple(trials), folder, {"urdf": folder / "rig.urdf"}

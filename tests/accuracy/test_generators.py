@@ -85,7 +85,7 @@ def test_a_cause_is_named(monkeypatch):
 
 @pytest.mark.shared
 def test_frozen_answers_are_of_studies_that_there_are(shared):
-    wanted = [f"{one.kind} {one.key}" for one in studies(shared)]
+    wanted = [one.name for one in studies(shared)]
     from frozen_answers.__main__ import TABLE, read
 
     assert len(wanted) == len(set(wanted)) and sum(COUNTS.values()) + 71 == len(wanted)
