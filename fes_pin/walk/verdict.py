@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from fes_pin.infer.distributions import chi2_tail, normal_quantile
+from fes_pin.infer.held_out import speaks_for
 from fes_pin.infer.levels import CERTAIN_LEVEL, CLAIM_LEVEL
 from fes_pin.infer.result import FITTED, NO_GAIN, Cause, Evidence, ParameterEstimate, Remainder
 from fes_pin.infer.search import SearchResult
@@ -20,8 +21,8 @@ from fes_pin.walk.white_noise import white_noise
 
 ORDINARY_MM = 2.0
 """Marker noise up to this is no cause: cameras' and fixations' own (L. Chiari et al., Gait Posture 21:197, 2005)."""
-SURELY = normal_quantile(1.0 - LEVEL)
-"""Standard deviations by which marker noise must exceed that: at the level of all causes of a walk."""
+SURELY = normal_quantile(1.0 - CLAIM_LEVEL)
+"""Standard deviations by which marker noise must exceed that."""
 
 
 @dataclass(frozen=True)
@@ -71,10 +72,11 @@ class WalkVerdict(Verdict[WalkFit, WalkWeighed]):
         return [n for n in state.names if not self._is_supported(state, n)]
 
     def _is_supported(self, state: Judgement, name: str) -> bool:
-        weighed, p_value = state.weighed, state.found.p_values[name]
+        weighed, p_value, alone = state.weighed, state.found.p_values[name], len(state.names) == 1
         other = weighed.other_leg[name]
-        likely = weighed.evidence[name].low > 0.0 if weighed.evidence else p_value < CERTAIN_LEVEL
-        return likely and p_value < LEVEL and (other is None or other > 0.0)
+        if p_value >= (LEVEL if weighed.evidence else CERTAIN_LEVEL) or (other is not None and other <= 0.0):
+            return False
+        return not weighed.evidence or speaks_for(weighed.evidence[name], weighed.gains[name], alone)
 
     def _is_of_either(self, name: str) -> bool:
         """Whether a form is of neither leg alone; a clock is of no leg."""
