@@ -25,8 +25,7 @@ import numpy as np
 
 from fes_pin.body.joints import SIDES
 from fes_pin.body.skeleton import Segment, Skeleton
-from fes_pin.data.errors import InputError
-from fes_pin.data.numbers import as_number, known_word, shortened
+from fes_pin.data.numbers import between, known_word
 
 ANKLE_HEIGHT = 0.039
 HIP_SPACING = 0.095
@@ -106,15 +105,8 @@ class Subject:
     sex: str = "male"
 
     def __post_init__(self) -> None:
-        for label, value, unit, (low, high) in (
-            ("mass_kg", self.mass_kg, "kg", MASS_RANGE_KG),
-            ("height_m", self.height_m, "m", HEIGHT_RANGE_M),
-        ):
-            number = as_number(value)
-            if number is None or not low <= number <= high:
-                wanted = f"must be between {low:g} and {high:g} {unit} (an adult's)"
-                raise InputError(f"{wanted}, got {shortened(value)}", column=label)
-            object.__setattr__(self, label, number)
+        for label, ends in (("mass_kg", MASS_RANGE_KG), ("height_m", HEIGHT_RANGE_M)):
+            object.__setattr__(self, label, between(getattr(self, label), *ends, label))
         known_word(self.sex, _DE_LEVA, "sex")
 
 

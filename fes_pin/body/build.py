@@ -279,7 +279,8 @@ def _parsed(urdf: str) -> pin.Model:
     names = set(model.names[1:])
     if names != set(JOINT_NAMES):
         odd = sorted(names ^ set(JOINT_NAMES))[0]
-        raise InputError(f"its joints are not the body's 19: {odd!r} is {_odd(odd, names)}")
+        fault = "not one of them" if odd in names else "missing"
+        raise InputError(f"its joints are not the body's 19: {odd!r} is {fault}")
     return model
 
 
@@ -289,10 +290,6 @@ def _stance_of(model: pin.Model) -> str:
     if min(depth) != 2:
         raise InputError("it is not rooted at a forefoot")
     return SIDES[int(np.argmin(depth))]
-
-
-def _odd(name: str, names: set[str]) -> str:
-    return "not one of them" if name in names else "missing"
 
 
 def _check_segments(model: pin.Model, stance: str) -> None:

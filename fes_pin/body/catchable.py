@@ -83,11 +83,7 @@ def modal_bound(linear: LinearBody, inputs, lag_s: float = 0.0, gravity: bool = 
     fall = found.kinds == "fall"
     shapes, values = found.shapes[:, fall], found.values[fall]
     gains, constant = shapes.T @ inputs.on(linear), shapes.T @ linear.C * gravity
-    with np.errstate(invalid="ignore"):  # a gain of 0 times no bound
-        ends = np.nan_to_num(
-            np.stack([gains * inputs.lower, gains * inputs.upper]), nan=0.0, posinf=np.inf, neginf=-np.inf
-        )
-    least, most = constant + ends.min(axis=0).sum(axis=1), constant + ends.max(axis=0).sum(axis=1)
+    least, most = (constant + push.sum(axis=1) for push in inputs.pushes(gains))
     share = np.maximum(np.column_stack([-least, most]), 0.0) / values[:, None]
     return share / found.degree[fall, None] / (1.0 + np.sqrt(values) * lag_s)[:, None]
 

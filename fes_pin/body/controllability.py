@@ -144,7 +144,7 @@ def modal_controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> M
     greatest = np.abs(found.shapes).max(axis=0)
     squared = (gains**2).sum(axis=1)
     price = mode_price(found.values, horizon) * (np.radians(1.0) / greatest) ** 2
-    controllable = _independent(found.values, gains)
+    controllable = independent(found.values, gains)
     with np.errstate(divide="ignore"):
         energy = np.where(controllable, price / squared, np.inf)
     return ModalControllability(
@@ -154,38 +154,25 @@ def modal_controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> M
         horizon=float(horizon),
         gains=gains,
         controllable=controllable,
-        both_ways=_both_ways(gains, inputs),
+        both_ways=np.logical_and(*(push.any(axis=1) for push in inputs.pushes(gains))),
         energy=energy,
         mode_influence=gains * greatest[:, None],
         joint_influence=linear.mobility @ torque,
     )
 
 
-def _independent(values: np.ndarray, gains: np.ndarray) -> np.ndarray:
+def independent(values: np.ndarray, gains: np.ndarray) -> np.ndarray:
     """PBH per mode: within a group of equal poles as many independent rows as modes are needed."""
-    groups, start = [], 0
-    for i in range(1, len(values) + 1):
-        if i == len(values) or abs(values[i] - values[i - 1]) > SAME_POLE * max(1.0, abs(values[i])):
-            groups.append(range(start, i))
-            start = i
     found = np.zeros(len(values), dtype=bool)
-    for group in groups:
-        rows = gains[list(group)]
-        found[list(group)] = len(group) == 1 and rows.any() if len(group) == 1 else _full_rank(rows)
+    apart = np.abs(np.diff(values)) > SAME_POLE * np.maximum(1.0, np.abs(values[1:]))
+    for group in np.split(np.arange(len(values)), np.flatnonzero(apart) + 1):
+        found[group] = gains[group].any() if len(group) == 1 else _full_rank(gains[group])
     return found
 
 
 def _full_rank(rows: np.ndarray) -> bool:
     singular = np.linalg.svd(rows, compute_uv=False)
     return len(singular) >= len(rows) and bool(singular[len(rows) - 1] > RELATIVE_TOLERANCE * max(singular[0], 1e-300))
-
-
-def _both_ways(gains: np.ndarray, inputs: Inputs) -> np.ndarray:
-    """Whether inputs within their bounds push each mode up and down."""
-    plus, minus = gains > 0.0, gains < 0.0
-    up = (plus & (inputs.upper > 0.0)) | (minus & (inputs.lower < 0.0))
-    down = (minus & (inputs.upper > 0.0)) | (plus & (inputs.lower < 0.0))
-    return np.logical_and(up.any(axis=1), down.any(axis=1))
 
 
 def mode_price(values: np.ndarray, horizon: float) -> np.ndarray:

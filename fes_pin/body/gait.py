@@ -57,10 +57,7 @@ def posture_angles(name: str, stance: str) -> dict[str, float]:
         angles = dict.fromkeys(JOINT_NAMES, 0.0)
         return {**angles, f"{stance}_ankle_inversion": -_ONE_LEG_LEAN} if name == "one_leg" else angles
     all_known([name], posture_names(), "posture")
-    angles = _table()[name]
-    if stance == "right":
-        return dict(angles)
-    return {mirrored(joint): MIRROR_SIGN.get(joint, 1.0) * angle for joint, angle in angles.items()}
+    return dict(_table()[name]) if stance == "right" else mirror(_table()[name])
 
 
 def mirror(angles: Mapping[str, float]) -> dict[str, float]:
@@ -82,18 +79,21 @@ def turn(axis: Sequence[float] | np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 def ankle_angles(rotation: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Dorsiflexion, inversion and rotation, in this order from the shank, that give rotations (N, 3, 3)."""
-    sign = 1.0 if side == "right" else -1.0
     inversion = -np.arcsin(np.clip(rotation[:, 1, 2], -1.0, 1.0))
     dorsiflexion = -np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
     rotated = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])
-    return dorsiflexion, sign * inversion, sign * rotated
+    return dorsiflexion, _sign(side) * inversion, _sign(side) * rotated
+
+
+def _sign(side: str) -> float:
+    """What turns about forward and upright axes are multiplied by: they are mirrored on the left."""
+    return 1.0 if side == "right" else -1.0
 
 
 def ankle_rotation(side: str, dorsiflexion: np.ndarray, inversion: np.ndarray, rotated: np.ndarray) -> np.ndarray:
-    """Rotation of the hindfoot in the shank's frame, (N, 3, 3), of ankle angles, rad (N,)."""
-    sign = 1.0 if side == "right" else -1.0
-    forward, left, up = np.eye(3)
-    return turn(-left, dorsiflexion) @ turn(sign * forward, inversion) @ turn(sign * up, rotated)
+    """Rotation of the hindfoot in the shank's frame, (N, 3, 3), of ankle angles, rad (N,); of a hip's angles alike."""
+    forward, left, up = np.diag([_sign(side), 1.0, _sign(side)])
+    return turn(-left, dorsiflexion) @ turn(forward, inversion) @ turn(up, rotated)
 
 
 def ankle_torques(side: str, angles: np.ndarray, torques: np.ndarray, dorsiflexion, inversion) -> np.ndarray:
@@ -111,14 +111,12 @@ def ankle_torques(side: str, angles: np.ndarray, torques: np.ndarray, dorsiflexi
     dorsiflexion, inversion
         Our angles of the same foot: (N,) rad (see `ankle_angles`).
     """
-    sign = 1.0 if side == "right" else -1.0
-    forward, left, up = np.eye(3)
-    mirror = np.array([sign, 1.0, sign])
-    first, second = (axis * mirror / np.linalg.norm(axis) for axis in (_ANKLE_AXIS, _SUBTALAR_AXIS))
+    forward, left, up = mirrored_axes = np.diag([_sign(side), 1.0, _sign(side)])
+    first, second = (axis @ mirrored_axes / np.linalg.norm(axis) for axis in (_ANKLE_AXIS, _SUBTALAR_AXIS))
     theirs = np.stack([np.broadcast_to(first, (len(angles), 3)), turn(first, angles[:, 0]) @ second], axis=1)
     bent = turn(-left, dorsiflexion)
-    inverted = bent @ turn(sign * forward, inversion)
-    ours = np.stack([np.broadcast_to(-left, (len(angles), 3)), bent @ (sign * forward), inverted @ (sign * up)], axis=1)
+    inverted = bent @ turn(forward, inversion)
+    ours = np.stack([np.broadcast_to(-left, (len(angles), 3)), bent @ forward, inverted @ up], axis=1)
     return (ours @ np.linalg.pinv(theirs) @ torques[..., None])[..., 0]
 
 
@@ -158,11 +156,10 @@ def postures_of_walk(coordinates: Mapping[str, np.ndarray], stance: str, flat_fo
             angles[f"{side}_{joint}"] = measured(f"{joint}_{s}")
         angles[f"{side}_knee_flexion"] = -measured(f"knee_angle_{s}")
         angles[f"{side}_mtp_extension"] = measured(f"mtp_angle_{s}")
-        sign = np.array([1.0, 1.0, 1.0]) if side == "right" else np.array([-1.0, 1.0, -1.0])
-        foot = turn(_ANKLE_AXIS * sign, measured(f"ankle_angle_{s}"))
-        foot = foot @ turn(_SUBTALAR_AXIS * sign, measured(f"subtalar_angle_{s}"))
+        axes = [axis * [_sign(side), 1.0, _sign(side)] for axis in (_ANKLE_AXIS, _SUBTALAR_AXIS)]
+        foot = turn(axes[0], measured(f"ankle_angle_{s}")) @ turn(axes[1], measured(f"subtalar_angle_{s}"))
         if side == stance and flat_foot:
-            foot = _flat_ankle(angles, measured, side, foot)
+            foot = _flat_ankle(angles, pelvis_turns(coordinates), side, foot)
         for joint, value in zip(
             ("ankle_dorsiflexion", "ankle_inversion", "ankle_rotation"), ankle_angles(foot, side), strict=True
         ):
@@ -199,25 +196,14 @@ def pelvis_turns(coordinates: Mapping[str, np.ndarray]) -> np.ndarray:
     InputError
         One of them is missing or not finite.
     """
-    forward, left, up = np.eye(3)
-    turns = []
-    for name, axis in (("tilt", -left), ("list", forward), ("rotation", up)):
-        turns.append(turn(axis, _coordinate(coordinates, f"pelvis_{name}")))
-    return turns[0] @ turns[1] @ turns[2]
+    return ankle_rotation("right", *(_coordinate(coordinates, f"pelvis_{n}") for n in ("tilt", "list", "rotation")))
 
 
-def _flat_ankle(angles: Mapping[str, np.ndarray], measured, side: str, foot: np.ndarray) -> np.ndarray:
+def _flat_ankle(angles: Mapping[str, np.ndarray], pelvis: np.ndarray, side: str, foot: np.ndarray) -> np.ndarray:
     """Rotation shank -> hindfoot that keeps the shank upright as measured, and the foot's heading, forefoot flat."""
-    forward, left, up = np.eye(3)
-    sign = 1.0 if side == "right" else -1.0
-    pelvis = pelvis_turns({f"q_pelvis_{n}": measured(f"pelvis_{n}") for n in ("tilt", "list", "rotation")})
-    shank = (
-        pelvis
-        @ turn(-left, angles[f"{side}_hip_flexion"])
-        @ turn(sign * forward, angles[f"{side}_hip_adduction"])
-        @ turn(sign * up, angles[f"{side}_hip_rotation"])
-        @ turn(left, angles[f"{side}_knee_flexion"])
-    )
+    _, left, up = np.eye(3)
+    hip = ankle_rotation(side, *(angles[f"{side}_hip_{name}"] for name in ("flexion", "adduction", "rotation")))
+    shank = pelvis @ hip @ turn(left, angles[f"{side}_knee_flexion"])
     ahead = (shank @ foot)[:, :, 0]
     flat = turn(up, np.arctan2(ahead[:, 1], ahead[:, 0])) @ turn(left, angles[f"{side}_mtp_extension"])
     return np.swapaxes(shank, 1, 2) @ flat

@@ -119,6 +119,12 @@ class Inputs(ReadOnly):
                 matrix[i] = self.matrix[rows[name]]
         return matrix
 
+    def pushes(self, gains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far each input within its bounds pushes downwards and upwards, by gains (rows, n_inputs): same shape."""
+        with np.errstate(invalid="ignore"):  # a gain of 0 times no bound
+            ends = np.nan_to_num([gains * self.lower, gains * self.upper], nan=0.0, posinf=np.inf, neginf=-np.inf)
+        return ends.min(axis=0), ends.max(axis=0)
+
     def select(self, names: Iterable[str]) -> Inputs:
         """Only these inputs.
 

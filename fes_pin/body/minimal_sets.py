@@ -258,10 +258,9 @@ def _caught(linear: LinearBody, inputs: Inputs, asked: _Question) -> list[Demand
 
 def _in_turn(wanted: HoldingDemands, inputs: Inputs, lean_deg: float) -> tuple[np.ndarray, np.ndarray]:
     """Rows that every set must cover: in every falling mode the pulls reach a lean both ways, on their own."""
-    up = np.maximum(wanted.gains * inputs.upper, wanted.gains * inputs.lower)
-    down = np.maximum(-wanted.gains * inputs.upper, -wanted.gains * inputs.lower)
+    down, up = inputs.pushes(wanted.gains)
     needs = np.concatenate([wanted.target + wanted.load * lean_deg, -wanted.target + wanted.load * lean_deg])
-    rows = np.nan_to_num(np.vstack([up, down]), nan=0.0, posinf=1e9)
+    rows = np.minimum(np.vstack([up, -down]), 1e9)
     return rows[needs > 1e-9], needs[needs > 1e-9]
 
 

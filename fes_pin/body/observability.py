@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.body.controllability import RELATIVE_TOLERANCE, _independent
+from fes_pin.body.controllability import RELATIVE_TOLERANCE, independent
 from fes_pin.body.joints import known_joint, names_of
 from fes_pin.body.linear_body import LinearBody
 from fes_pin.body.modes import Mode, ModeSet
@@ -91,7 +91,7 @@ def observability(linear: LinearBody, sensors: Iterable[str]) -> ModalObservabil
             raise InputError(f"{name!r} is braced: nothing moves there")
     rows = _angles(linear, found, names)
     return ModalObservability(
-        found, names, rows, _independent(found.values, rows), _posteriors(found.modes, rows[None])[0]
+        found, names, rows, independent(found.values, rows), _posteriors(found.modes, rows[None])[0]
     )
 
 

@@ -67,7 +67,6 @@ class LinearProgram:
 
     def solve(self) -> ProgramAnswer:
         """The answer by HiGHS."""
-        equal = len(self.b_eq) > 0
         if not len(self.cost):
             kept = np.all(self.b_ub >= -FEASIBLE) and np.all(np.abs(self.b_eq) <= FEASIBLE)
             return ProgramAnswer(np.zeros(0) if kept else None, 0.0)
@@ -75,27 +74,26 @@ class LinearProgram:
             self.cost,
             A_ub=sparse.csr_array(self.A_ub),
             b_ub=self.b_ub,
-            A_eq=sparse.csr_array(self.A_eq) if equal else None,
-            b_eq=self.b_eq if equal else None,
+            A_eq=sparse.csr_array(self.A_eq),
+            b_eq=self.b_eq,
             bounds=np.column_stack([self.lower, self.upper]),
         )
         if found.status != 0:
             return ProgramAnswer(None, np.inf, unbounded=found.status == 3)
-        return ProgramAnswer(found.x, self._error(found, equal))
+        return ProgramAnswer(found.x, self._error(found))
 
-    def _error(self, found, equal: bool) -> float:
-        x, z = found.x, np.minimum(found.ineqlin.marginals, 0.0)
-        y = found.eqlin.marginals if equal else np.zeros(0)
-        reduced = self.cost - self.A_ub.T @ z - (self.A_eq.T @ y if equal else 0.0)
+    def _error(self, found) -> float:
+        x, z, y = found.x, np.minimum(found.ineqlin.marginals, 0.0), found.eqlin.marginals
+        reduced = self.cost - self.A_ub.T @ z - self.A_eq.T @ y
         ends = np.where(reduced > 0.0, self.lower, self.upper)
         far = ~np.isfinite(ends)  # where a bound is infinite a multiplier is rounding: it acts over the answer's reach
         ends = np.where(far, x, ends)
         gap = abs(self.cost @ x - (self.b_ub @ z + self.b_eq @ y + reduced @ ends))
         over = np.maximum(self.A_ub @ x - self.b_ub, 0.0)
-        missed = np.abs(self.A_eq @ x - self.b_eq) if equal else np.zeros(0)
+        missed = np.abs(self.A_eq @ x - self.b_eq)
         size = np.abs(x)
         terms = np.abs(z) @ (np.abs(self.A_ub) @ size + np.abs(self.b_ub)) + np.abs(self.cost) @ size
-        terms += np.abs(y) @ (np.abs(self.A_eq) @ size + np.abs(self.b_eq)) if equal else 0.0
+        terms += np.abs(y) @ (np.abs(self.A_eq) @ size + np.abs(self.b_eq))
         rounding = (len(x) + len(self.b_ub) + len(self.b_eq)) * _UNIT * terms
         return float(gap + np.abs(z) @ over + np.abs(y) @ missed + rounding)
 

@@ -17,17 +17,6 @@ BURST = 0.2
 any one second can hold."""
 
 
-def check_width(value: object, name: str) -> float:
-    """A pulse width that a stimulator can give, us.
-
-    Raises
-    ------
-    InputError
-        Anything else; see `RANGES`.
-    """
-    return in_range(value, "pulse_width_us", name)
-
-
 @dataclass(frozen=True)
 class StimulationLimits:
     """Limits that hold for every pulse, whatever the feedback wants; by default the muscle's own.
@@ -111,7 +100,7 @@ class Limiter:
     """
 
     def __init__(self, limits: StimulationLimits, threshold_us: float, saturation_us: float) -> None:
-        check_width(saturation_us, "saturation_us")
+        in_range(saturation_us, "pulse_width_us", "saturation_us")
         between(threshold_us, 0.0, saturation_us, "threshold_us")
         if limits.pulse_width_us < threshold_us:
             raise InputError(

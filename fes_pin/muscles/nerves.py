@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from fes_pin.body.joints import JOINT_NAMES
+from fes_pin.body.joints import JOINT_NAMES, names_of
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, shortened, truth
 from fes_pin.data.read_only import ReadOnly
@@ -37,9 +37,7 @@ def nerve_names(names: Iterable[str]) -> tuple[str, ...]:
     InputError
         None is given, or something else.
     """
-    if isinstance(names, str) or not isinstance(names, Iterable):
-        names = (names,)
-    found = tuple(sorted(names, key=str) if isinstance(names, Set) else names)
+    found = tuple(names_of(names)) if isinstance(names, Iterable) else (names,)
     if not found or not all(isinstance(name, str) for name in found):
         what = "none is named" if not found else f"got {shortened(names)}"
         raise InputError(f"nerves are given by their names, and {what}")
