@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -98,7 +99,7 @@ class AnkleDynamics(Tabulated):
             *(() if frame is None else map(float, (frame.coupling, frame.frequency_hz, frame.damping_ratio))),
         )
 
-    @property
+    @cached_property
     def pieces(self) -> int:
         """Integration steps per pulse that resolve damping and stiffness up to where full activation holds."""
         return max(2, math.ceil(PULSE_S * self._fastest() / RESOLVED))
@@ -139,37 +140,15 @@ class AnkleDynamics(Tabulated):
         f[2] = pull * share, stiff, -self.damping / j, 1.0 / j, pull * activation
         return f
 
-
-class PulseToPulse:
-    """What a pulse does to an ankle's state, in plain numbers.
-
-    Parameters
-    ----------
-    dynamics
-        The ankle.
-    pieces
-        Integration steps per pulse; by default as many as the ankle's fastest motion needs.
-    """
-
-    def __init__(self, dynamics: AnkleDynamics, pieces: int | None = None) -> None:
-        self.dynamics = dynamics
-        self.pieces = dynamics.pieces if pieces is None else pieces
-        self.step_s = PULSE_S / self.pieces
-        self.fade = math.exp(-self.step_s / dynamics.time_constant)
-        self.half_fade = math.exp(-0.5 * self.step_s / dynamics.time_constant)
-        # the variation's own pieces are finer, by halving: a quarter of those of the motion, in powers of two
-        self.halvings = max(2, math.ceil(math.log2(4 * self.pieces)))
-
     def moved(
         self, act: float, q: float, v: float, torque: float, share: float, recruitment: float
     ) -> tuple[float, float, float]:
         """Activation, angle and rate a pulse later: the classical Runge-Kutta method, activation exact."""
-        rise, h = self.dynamics.acceleration, self.step_s
-        pull = self.dynamics.pull_nm * share
-        half = 0.5 * h
+        rise, pull, h = self.acceleration, self.pull_nm * share, PULSE_S / self.pieces
+        half, half_fade = 0.5 * h, math.exp(-0.5 * h / self.time_constant)
         for _ in range(self.pieces):
-            rest = act - recruitment
-            middle, end = recruitment + rest * self.half_fade, recruitment + rest * self.fade
+            rest = (act - recruitment) * half_fade
+            middle, end = recruitment + rest, recruitment + rest * half_fade
             k1 = rise(q, v, pull * act, torque)
             v2 = v + half * k1
             k2 = rise(q + half * v, v2, pull * middle, torque)
@@ -183,12 +162,14 @@ class PulseToPulse:
         return act, q, v
 
     def transition(self, q: float, activation: float, share: float) -> np.ndarray:
-        """The state's transition over a pulse, linear about a state, shape (5, 5).
+        """The transition of `linear` over a pulse about a state, shape (5, 5).
 
         exp(f t) by its series to the third power and by squaring; to 1e-4.
         """
-        f = self.dynamics.linear(q, activation, share) * (PULSE_S / (1 << self.halvings))
+        # the variation's pieces are finer than those of the motion, by halving: a quarter of them, in powers of two
+        halvings = max(2, math.ceil(math.log2(4 * self.pieces)))
+        f = self.linear(q, activation, share) * (PULSE_S / (1 << halvings))
         a = _ONE + f @ (_ONE + f @ (_ONE + f / 3.0) / 2.0)
-        for _ in range(self.halvings):
+        for _ in range(halvings):
             a = a @ a
         return a

@@ -13,7 +13,7 @@ import math
 import numpy as np
 import scipy.linalg
 
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, PulseToPulse
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, positive_number, shortened
 
@@ -73,7 +73,6 @@ class JointObserver:
         between(share_wander, 0.0, math.inf, "share_wander")
         self.dynamics, self.variance = dynamics, angle_std_rad**2
         self.angle_std_rad = angle_std_rad
-        self.pulse = PulseToPulse(dynamics)
         activation = -math.expm1(-PULSE_S / dynamics.time_constant) * RECRUITMENT_STD / math.sqrt(PULSE_S)
         wander = [activation, 0.0, RATE_WANDER, torque_wander, share_wander]
         self.noise = [float(w * w * PULSE_S) for w in wander]
@@ -117,8 +116,8 @@ class JointObserver:
     def predict(self, recruitment: float) -> None:
         """Go on by one pulse with this recruitment in the nerve."""
         act, q, v, torque, share = self.x
-        a = self.pulse.transition(q, act, share)
-        self.x = [*self.pulse.moved(act, q, v, torque, share, recruitment), torque, share]
+        a = self.dynamics.transition(q, act, share)
+        self.x = [*self.dynamics.moved(act, q, v, torque, share, recruitment), torque, share]
         spread = a @ self.covariance @ a.T
         self.covariance = 0.5 * (spread + spread.T)
         self.covariance.flat[::6] += self.noise  # its diagonal

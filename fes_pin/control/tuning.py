@@ -218,12 +218,20 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver, given: GivenAnkle | N
     """
     angles = np.linspace(dynamics.rest_angle(), dynamics.rest_angle(1.0), ANGLES)
     tables = [np.array([regulator(dynamics, q, boldness) for q in angles]) for boldness in LADDER]
-    around, quickest = _Around(dynamics, angles[::2], given), observer.torque_wander
+    places = [(_truths(dynamics, q, given), plant(dynamics, q)) for q in angles[::2].tolist()]
+    quickest = observer.torque_wander
     tried: list[Gains] = []
     for share in SLOWER:
         observer.torque_wander = share * quickest
-        rungs = zip(LADDER, tables, around.radii(tables, observer), strict=True)
-        tried += [Gains(angles, table, boldness, r, observer.torque_wander) for boldness, table, r in rungs]
+        steady = [observer.steady_gain(believed[0]) for _, believed in places]
+        for boldness, table in zip(LADDER, tables, strict=True):
+            loops = [
+                Loop.of(truth, believed, k, see)
+                for (truths, believed), k, see in zip(places, table[::2], steady, strict=True)
+                for truth in truths
+            ]
+            worst = max(loop.radius() for loop in loops)
+            tried.append(Gains(angles, table, boldness, worst, observer.torque_wander))
         if min(g.radius for g in tried) < 1.0 and not dynamics.frame_coupling:
             break
     least = min(g.radius for g in tried)
@@ -239,23 +247,8 @@ def tune(dynamics: AnkleDynamics, observer: JointObserver, given: GivenAnkle | N
     )
 
 
-class _Around:
-    """An ankle and its corners at some angles."""
-
-    def __init__(self, dynamics: AnkleDynamics, angles: np.ndarray, given: GivenAnkle | None) -> None:
-        self.truths = [[moved(other, q) for other in (dynamics, *corners(dynamics))] for q in angles]
-        if given is not None:
-            self.truths = [[m for f in ((1.0, 1.0, 1.0), *CORNERS) for m in given.moved(q, f)] for q in angles.tolist()]
-        self.believed = [plant(dynamics, q) for q in angles]
-
-    def radii(self, tables: list[np.ndarray], observer: JointObserver) -> list[float]:
-        """Worst modulus for each table of gains."""
-        steady = [observer.steady_gain(a) for a, _, _ in self.believed]
-        return [
-            max(
-                Loop.of(truth, believed, k, see).radius()
-                for truths, believed, k, see in zip(self.truths, self.believed, table[::2], steady, strict=True)
-                for truth in truths
-            )
-            for table in tables
-        ]
+def _truths(dynamics: AnkleDynamics, q: float, given: GivenAnkle | None) -> list[Sampled]:
+    """What may move at an angle: the ankle and its corners."""
+    if given is None:
+        return [moved(other, q) for other in (dynamics, *corners(dynamics))]
+    return [m for factors in ((1.0, 1.0, 1.0), *CORNERS) for m in given.moved(q, factors)]

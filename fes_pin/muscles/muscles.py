@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -122,28 +123,30 @@ class MuscleTable(ReadOnly):
             sentences.append(f"moment arms at {name} {asked:.0f} degrees are not known: those at {used:.0f} are used")
         return tuple(sentences)
 
-    def _of_sides(self, q) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
-        """Postures (n, 19), the angles of their legs, side after side (2 n, 7), and the shape to return to."""
+    def _postures(self, q) -> tuple[np.ndarray, tuple[int, ...]]:
+        """Postures (n, 19), and the shape to return to."""
         angles = self.within(q)
-        flat = angles.reshape(-1, len(JOINT_NAMES))
-        return flat, np.concatenate([flat[:, LEG_OF[side]] for side in SIDES]), angles.shape[:-1]
+        return angles.reshape(-1, len(JOINT_NAMES)), angles.shape[:-1]
+
+    def _legs(self, flat: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, slice]]:
+        """Of each leg its angles (n, 8), their places among the 19, and those of its muscles."""
+        for start, places in zip((0, len(self.names) // 2), LEG_OF.values(), strict=True):
+            yield flat[:, places], places, slice(start, start + len(self.legs.names))
 
     def moment_arms(self, q=None) -> np.ndarray:
         """Moment arms at a posture, m: (..., 19, m) for angles (..., 19)."""
-        flat, legs, shape = self._of_sides(q)
+        flat, shape = self._postures(q)
         arms = np.tile(self.levers.T, (len(flat), 1, 1))
-        for k, each in enumerate(np.split(self.legs.moment_arms(legs), 2)):
-            start = k * len(self.names) // 2
-            arms[:, LEG_OF[SIDES[k]], start : start + len(self.legs.names)] = each
+        for leg, places, muscles in self._legs(flat):
+            arms[:, places, muscles] = self.legs.moment_arms(leg)
         return arms.reshape(*shape, *arms.shape[1:])
 
     def lengths(self, q=None) -> np.ndarray:
         """Length of muscle and tendon, m: (..., m)."""
-        flat, legs, shape = self._of_sides(q)
+        flat, shape = self._postures(q)
         lengths = self.neutral_length - flat @ self.levers.T
-        for k, each in enumerate(np.split(self.legs.lengths(legs), 2)):
-            start = k * len(self.names) // 2
-            lengths[:, start : start + len(self.legs.names)] = each
+        for leg, _, muscles in self._legs(flat):
+            lengths[:, muscles] = self.legs.lengths(leg)
         return lengths.reshape(*shape, len(self.names))
 
     def isometric_fraction(self, q=None) -> np.ndarray:

@@ -9,7 +9,7 @@ length along a joint's angle, is the torque about that joint per unit of force.
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
@@ -263,36 +263,41 @@ def leg_paths(sizes: tuple[tuple[str, float], ...] = ()) -> LegPaths:
     """
     rows = read_table("paths.csv")
     names = tuple(dict.fromkeys(row["muscle"] for row in rows))
-    owner = [names.index(row["muscle"]) for row in rows]
+    owner = [row["muscle"] for row in rows]
     carrying = {**{b: k for k, b in enumerate(BODIES)}, "patella": BODIES.index("tibia")}
-    edges = []
+    return LegPaths(
+        names=names,
+        first=np.array([owner.index(name) for name in names]),
+        body=np.array([carrying[row["body"]] for row in rows]),
+        place=np.array([[float(row[f"{axis}_mm"] or 0.0) / 1e3 for axis in "xyz"] for row in rows]),
+        edges=tuple(_edges(rows)),
+        kneecap=tuple(_kneecap(rows)),
+        slide=(_slide("forward"), _slide("up")),
+        size={**dict.fromkeys((*BODIES, "talus"), 1.0), **dict(sizes)},
+    )
+
+
+def _edges(rows: list[dict[str, str]]) -> Iterator[Edge]:
     for i, row in enumerate(rows):
         if row["joint"]:
             front = row["joint"] == "hip_flexion" or bool(row["from_deg"])
             low, high = (np.radians(float(row[key] or end)) for key, end in (("from_deg", -np.inf), ("to_deg", np.inf)))
             after = next(k for k in range(i + 1, len(rows)) if not rows[k]["joint"])
-            edges.append(Edge(i, after, COORDINATES.index(row["joint"]), low, high, 1.0 if front else -1.0))
-    knee, patella = read_table("knee.csv"), read_table("patella.csv")
+            yield Edge(i, after, COORDINATES.index(row["joint"]), low, high, 1.0 if front else -1.0)
+
+
+def _kneecap(rows: list[dict[str, str]]) -> Iterator[tuple[int, Any]]:
+    """Points that move with the kneecap, and splines of their x, y over the knee's flexion, m."""
+    patella = read_table("patella.csv")
     flexion = np.radians([float(row["knee_flexion_deg"]) for row in patella])
-    kneecap = []
     for i, row in enumerate(rows):
         if row["body"] == "patella":
             track = [[float(p[f"{row['muscle']}_{axis}_mm"]) / 1e3 for axis in "xy"] for p in patella]
-            kneecap.append((i, CubicSpline(flexion, np.array(track))))
-    slide = [
-        CubicSpline(
-            np.radians([float(row["knee_flexion_deg"]) for row in knee if row["direction"] == direction]),
-            np.array([float(row["shift_mm"]) / 1e3 for row in knee if row["direction"] == direction]),
-        )
-        for direction in ("forward", "up")
-    ]
-    return LegPaths(
-        names=names,
-        first=np.array([owner.index(k) for k in range(len(names))]),
-        body=np.array([carrying[row["body"]] for row in rows]),
-        place=np.array([[float(row[f"{axis}_mm"] or 0.0) / 1e3 for axis in "xyz"] for row in rows]),
-        edges=tuple(edges),
-        kneecap=tuple(kneecap),
-        slide=(slide[0], slide[1]),
-        size={**dict.fromkeys((*BODIES, "talus"), 1.0), **dict(sizes)},
-    )
+            yield i, CubicSpline(flexion, np.array(track))
+
+
+def _slide(direction: str) -> Any:
+    """Spline of the tibia's origin in the femur over the knee's flexion, m."""
+    rows = [row for row in read_table("knee.csv") if row["direction"] == direction]
+    flexion = np.radians([float(row["knee_flexion_deg"]) for row in rows])
+    return CubicSpline(flexion, np.array([float(row["shift_mm"]) / 1e3 for row in rows]))

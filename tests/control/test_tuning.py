@@ -11,7 +11,7 @@ from paper_ankle.ratios import RatioProblem, ankle_of, least_error
 from paper_ankle.twin import RunningTwin, record, staircase
 
 from fes_pin.control.control import PositionController
-from fes_pin.control.dynamics import PULSE_S, AnkleDynamics, PulseToPulse
+from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
 from fes_pin.control.loop import sine, track
 from fes_pin.control.margins import delay_margin, margins
 from fes_pin.control.observer import JointObserver
@@ -40,17 +40,17 @@ def test_a_pulses_transition_is_the_matrix_exponential(twin):
         q = dynamics.rest_angle(act)
         exact = scipy.linalg.expm(dynamics.linear(q, act, share) * PULSE_S)
         scale = np.abs(exact).max()
-        np.testing.assert_allclose(PulseToPulse(dynamics).transition(q, act, share), exact, atol=3e-4 * scale)
+        np.testing.assert_allclose(dynamics.transition(q, act, share), exact, atol=3e-4 * scale)
 
 
 @pytest.mark.parametrize("twin", [TWIN, paper_twin("4-24"), replace(TWIN, damping_nms=0.5)])
 def test_prediction_comes_to_the_twins_motion(twin):
     """One pulse from the same state, against another integrator of eq. (1)."""
-    pulse, joint = PulseToPulse(dynamics_of(twin)), RunningTwin(twin)
+    believed, joint = dynamics_of(twin), RunningTwin(twin)
     for recruitment in (1.0, 0.3, 0.8, 0.0, 0.5):
         act, q, v = joint.state[:3]
         joint.step(180.0 + recruitment * 820.0 if recruitment else 0.0, PULSE_S)
-        moved = pulse.moved(act, q, v, 0.0, 1.0, recruitment)
+        moved = believed.moved(act, q, v, 0.0, 1.0, recruitment)
         assert (np.abs(np.subtract(moved, joint.state[:3])) < [1e-8, 5e-4, 0.05]).all()
 
 
@@ -67,7 +67,7 @@ def test_the_observer_does_the_sums_of_a_kalman_filter():
         if p[4, 4] <= 0.09:
             np.testing.assert_allclose(observer.covariance, p, rtol=1e-9, atol=1e-15)
         x, p = observer.x, observer.covariance
-        change = observer.pulse.transition(x[1], x[0], x[4])
+        change = observer.dynamics.transition(x[1], x[0], x[4])
         observer.predict(0.5 + 0.5 * math.sin(k))
         np.testing.assert_allclose(observer.covariance, change @ p @ change.T + np.diag(observer.noise), rtol=1e-9)
 
