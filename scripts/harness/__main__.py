@@ -47,6 +47,8 @@ def main(
 ) -> None:
     """Hide known causes in studies, and count what the answers make of them."""
     typer.echo(f"fes_pin of {Path(fp.__file__).parent}, code {code_hash()[:12]}")
+    if unknown := [name for name in generators if name not in GENERATORS and not Path(name, "answers").is_dir()]:
+        raise typer.BadParameter(f"{', '.join(unknown)}: neither a generator nor a folder of studies and `answers`")
     bad = False
     for name in generators:
         items = planned(name, count, seed, nulls, only or [])

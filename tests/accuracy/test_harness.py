@@ -3,14 +3,19 @@
 import json
 from collections import Counter
 from itertools import islice
+from types import SimpleNamespace
 
+import harness.__main__
 import pytest
+import typer
 from harness import run as runs
+from harness.__main__ import main
 from harness.compare import compared
 from harness.generator import GENERATORS, Item, Truth, generator_of
 from harness.row import Row, judged
 from harness.run import answered, rows_of, run
 from harness.table import counts, interval, lines_of, notes, worse, wrong
+from typer.testing import CliRunner
 
 
 def row(key="a", hidden=("fatigue",), sets=(("fatigue",),), **more):
@@ -192,3 +197,20 @@ def test_studies_that_are_kept_are_not_made_again(fake, tmp_path):
     file.write_text(file.read_text().replace("0.01,0.0,0.01", "0.01,0.0,0.02"))
     changed = answered("fake", ITEMS[0], tmp_path)
     assert changed.study != one.study and changed.error == "ValueError: not as it was made"
+
+
+def test_the_command_line_says_what_it_does_not_know_and_reads_a_store(fake, tmp_path, monkeypatch):
+    command = CliRunner()
+    app = typer.Typer()
+    app.command()(main)
+    odd = command.invoke(app, ["nonsense", "--count", "1"])
+    assert odd.exit_code == 2 and "nonsense" in odd.output
+    (tmp_path / "mine/answers").mkdir(parents=True)
+    monkeypatch.setattr(harness.__main__, "generator_of", lambda name: SimpleNamespace(plan=lambda seed: iter(ITEMS)))
+    asked = [str(tmp_path / "mine"), "--store", str(tmp_path / "now"), "--workers", "1"]
+    first = command.invoke(app, asked)
+    assert first.exit_code == 0 and "| one | 1 | 1 of 1" in first.output and Fake.made == 2
+    again = command.invoke(app, [*asked, "--stored", "--compare", str(tmp_path / "now"), "--nulls"])
+    assert again.exit_code == 0 and Fake.made == 2
+    assert "1 of 1 studies were answered by both" in again.output and "b: nothing -> causes_found" in again.output
+    assert command.invoke(app, [*asked, "--check"]).output.endswith("no worse than docs/accuracy.md\n")
