@@ -26,9 +26,9 @@ from fes_pin.diagnosis.long_records import searched_part
 from fes_pin.diagnosis.misread import Misread
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.identify.effort_noise import words_of_noise
+from fes_pin.identify.effort_timing import words_of_lateness
 from fes_pin.identify.feedback import is_fed_back
 from fes_pin.identify.lasting import words_of_reading
-from fes_pin.identify.lateness import words_of_lateness
 from fes_pin.infer.result import STOPPED
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
 from fes_pin.models.nominal import nominal_model

@@ -15,7 +15,7 @@ from fes_pin.data.log import EFFORT
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.conditions import Conditions, Restated
 from fes_pin.diagnosis.misread import Misread, find_misread
-from fes_pin.identify.lateness import lateness_of
+from fes_pin.identify.effort_timing import lateness_of
 from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.infer.levels import CLAIM_LEVEL
 from fes_pin.models.predictor import Doubt

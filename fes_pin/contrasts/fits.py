@@ -14,13 +14,13 @@ from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Ite
 from fes_pin.contrasts.repeats import Repeats, scatter, without_locals, without_scatter
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
-from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.fit import Fit, ended, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.identify.noise_floor import rich_noise
 from fes_pin.identify.problem import Problem
+from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.maximise import alternate
 from fes_pin.infer.noise import Noise, as_white
 from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise

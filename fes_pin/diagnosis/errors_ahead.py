@@ -10,10 +10,10 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import SquaredErrors, forecast_errors, forecasts, one_step, own_noise, reach_of
-from fes_pin.identify.doubts import driving_size
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import predictions
+from fes_pin.identify.process_noise import driving_size
 from fes_pin.infer.held_out import Errors, percent_of_spread
 from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel

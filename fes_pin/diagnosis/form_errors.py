@@ -1,4 +1,4 @@
-"""What was found, judged again where errors of form passed for a random effort that lasts: `identify.fresh_efforts`."""
+"""What was found, judged again where errors of form passed for a random effort that lasts: `identify.process_noise`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from fes_pin.diagnosis.errors_ahead import errors_over_horizon
 from fes_pin.diagnosis.search.cause_sets import Names, names_of
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
 from fes_pin.diagnosis.search.simulation_search import NominalFitError
-from fes_pin.identify.fresh_efforts import beside_fresh_efforts, step_s
-from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.identify.likelihood_fit import LikelihoodFit, beside_fresh_efforts
+from fes_pin.identify.process_noise import step_s
 from fes_pin.infer.held_out import held_out_gain
 from fes_pin.infer.levels import NOTHING_PERCENT
 from fes_pin.workers import OutOfTime, in_parallel, time_limit

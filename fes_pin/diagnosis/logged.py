@@ -17,11 +17,15 @@ from fes_pin.diagnosis.decide.rivals import estimates
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.effort_noise import Prepared, effort_noise_of, words_of_noise
+from fes_pin.identify.effort_timing import (
+    Lateness,
+    lateness_of,
+    with_lateness,
+    with_timing_of_readings,
+    words_of_lateness,
+)
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.fresh_efforts import beside_fresh_efforts
-from fes_pin.identify.lateness import Lateness, lateness_of, words_of_lateness
-from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
-from fes_pin.identify.timing import with_doubt_of_lateness, with_doubt_of_timing
+from fes_pin.identify.likelihood_fit import LikelihoodFit, beside_fresh_efforts, maximum_from
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.models.model import Model
 from fes_pin.workers import OutOfTime, in_parallel, time_limit
@@ -107,9 +111,9 @@ class LogFaults:
         def doubted(wide: LikelihoodFit, timed: Log) -> LikelihoodFit:
             log = with_timing_of(diagnosis.log, timed)
             moved = self.prepared([log.applied(t) for t in self.trials])
-            return with_doubt_of_lateness(wide, maximum_from(fitted, moved))
+            return with_lateness(wide, maximum_from(fitted, moved))
 
-        wide = known = self._told(lambda: with_doubt_of_timing(fitted, row_s), fitted)
+        wide = known = self._told(lambda: with_timing_of_readings(fitted, row_s), fitted)
         if late is not None:
             wide = self._told(lambda: doubted(known, late.at_most), known)
         causes = tuple(replace(c, parameters=estimates(wide, c.name)) for c in diagnosis.causes)

@@ -22,8 +22,8 @@ import numpy as np
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
 from fes_pin.identify.autoregressions import autoregressions, with_autoregressions
-from fes_pin.identify.doubts import doubt_limits, first_doubt
 from fes_pin.identify.problem import limits_of, products_of
+from fes_pin.identify.process_noise import noise_limits, spread_of_start
 from fes_pin.infer.noise import ORDERS
 from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point, fisher_scoring
@@ -69,7 +69,7 @@ class LikelihoodProblem(NoisyProblem):
         self.limits = limits_of(model, self.trials)
         self.unknown_names = model.own_unknowns()
         self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
-        self.priors = [first_doubt(model, t) for t in starts or self.trials]
+        self.priors = [spread_of_start(model, t) for t in starts or self.trials]
         self._predictor: Predictor | None = None
         self._batched: Predictor | None = None
 
@@ -110,7 +110,7 @@ class LikelihoodProblem(NoisyProblem):
     @property
     def noise_limits(self) -> dict[str, tuple[float, float]]:
         """How small and how large those may become."""
-        return doubt_limits(self.model, self.trials, self.noise.lasts_s)
+        return noise_limits(self.model, self.trials, self.noise.lasts_s)
 
     def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
         """One-step predictions of all trials at each of several points."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fes_pin.data.trial import Trial
 from fes_pin.identify.fit import Fit, ended
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.process_noise import without_memory
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.maximise import ROUNDS, alternate, together
 from fes_pin.infer.optimum import Optimum
@@ -64,3 +65,14 @@ def maximum_from(fitted: LikelihoodFit, trials: Sequence[Trial], noise: Doubt | 
     """
     problem = LikelihoodProblem(fitted.model, trials, noise or fitted.noise)
     return maximise(problem, fitted.values, fitted.unknowns, near=fitted.together)
+
+
+def beside_fresh_efforts(fitted: LikelihoodFit) -> LikelihoodFit:
+    """A fit of the same model to the same trials, with random efforts that are new in every reading.
+
+    Their size is fitted before anything moves: too small, parameters would go after every error, and too large,
+    inertia would be what noise of the reading makes of it.
+    """
+    problem = LikelihoodProblem(fitted.model, fitted.trials, without_memory(fitted.noise, fitted.trials))
+    problem.noise_step(fitted.values, fitted.unknowns)
+    return maximise(problem, fitted.values, fitted.unknowns)

@@ -13,10 +13,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fes_pin.data.trial import Trial, derived_trial
-from fes_pin.identify.doubts import first_doubt
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Problem
+from fes_pin.identify.process_noise import spread_of_start
 from fes_pin.infer.noise import Noise, NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns, normal_equations
 from fes_pin.models.least_squares import least_squares
@@ -72,12 +72,12 @@ def _estimated(
     """The start with the effects' unknowns as the samples that are seen say, by least squares beside the initial state.
 
     Sinusoids are estimated as well by ordinary least squares as with the right weights (Grenander 1954). An initial
-    state, which what is seen may have forgotten, is no farther from the start than `first_doubt` has it.
+    state, which what is seen may have forgotten, is no farther from the start than `spread_of_start` has it.
     """
     white = {n: Noise(max(m.std, 1e-12)) for n, m in noise.items()}
     problem = Problem(model, trials, white, ())
     names, now = problem.unknown_names, start
-    doubts = [first_doubt(model, t) for t in trials]
+    doubts = [spread_of_start(model, t) for t in trials]
     reaches = [{n: (s[n] - d, s[n] + d) for n, d in doubt.items()} for doubt, s in zip(doubts, start, strict=True)]
     for _ in range(STEPS):
         moved = []

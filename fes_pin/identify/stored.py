@@ -84,7 +84,7 @@ def load_random(path: str | Path) -> Random | None:
         ar = {n: _coefficients(document, f"{KEY}.ar.{n}", one) for n, one in own.items()}
         lasts = {n: v for n, v in table.items() if n not in (*_PARTS, "ar")}
         numbers = document.numbers(KEY, lasts, {"lasts_s": NumberKey("s", required=False)})
-        return Doubt(**parts, **numbers, ar=ar)  # type: ignore[arg-type]
+        return Doubt(parts["white"], parts["std"], parts["time"], numbers.get("lasts_s", 0.0), ar)
     channels = document.table(f"{KEY}.noise", table)
     return {name: _noise(document, name, channels) for name in channels}
 

@@ -241,9 +241,14 @@ class Effect:
         return {}
 
     @classmethod
+    def nulls(cls) -> dict[str, float]:
+        """Values at which the effect vanishes, and its refinements are off."""
+        return {n: float(info.null) for n, info in cls.parameters().items() if info.null is not None}
+
+    @classmethod
     def absent(cls) -> Effect:
         """The effect at its null."""
-        nulls: dict[str, Any] = {n: i.null for n, i in cls.parameters().items() if i.null is not None}
+        nulls: dict[str, Any] = cls.nulls()
         return cls(**nulls)
 
 

@@ -13,8 +13,8 @@ from fes_pin.diagnosis.driven import Judged, _foretelling_more
 from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
 from fes_pin.diagnosis.form_errors import beside_what_is_new
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
-from fes_pin.identify.doubts import first_guess
-from fes_pin.identify.fresh_efforts import beside_fresh_efforts, fresh
+from fes_pin.identify.likelihood_fit import beside_fresh_efforts
+from fes_pin.identify.process_noise import first_guess, without_memory
 from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.infer.result import Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, with_honest_intervals
@@ -67,12 +67,12 @@ def test_it_foretells_more(fitted):
 def test_what_is_new_in_every_sample_has_the_same_power_and_stays_so(fitted):
     _, likeliest, new = fitted[0]
     doubt, step = likeliest.noise, likeliest.trials[0].dt
-    begun = fresh(doubt, likeliest.trials)
+    begun = without_memory(doubt, likeliest.trials)
     assert begun.std["effort"] ** 2 * step == pytest.approx(doubt.std["effort"] ** 2 * doubt.time["effort"])
     assert new.noise.time == {"effort": step}
     assert new.noise.timed == ("effort",)
     apart = Doubt(doubt.white, doubt.std, doubt.time, lasts_s=8.0 * step)
-    assert fresh(apart, likeliest.trials).time == {"effort": 8.0 * step}
+    assert without_memory(apart, likeliest.trials).time == {"effort": 8.0 * step}
 
 
 EDGE = "on the edge: a play that gains next to nothing over the horizon is named beside the friction, or not"

@@ -14,8 +14,8 @@ from fes_pin.data.smooth import low_pass
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.lasting import FEWEST, with_new_noise
+from fes_pin.identify.process_noise import first_guess
 from fes_pin.identify.stored import load_random, stored_tables
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.predictor import are_news

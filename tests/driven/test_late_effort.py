@@ -16,7 +16,7 @@ from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.record import diagnosis_files
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.ahead import foretell
-from fes_pin.identify.lateness import lateness_of
+from fes_pin.identify.effort_timing import lateness_of
 from fes_pin.identify.likelihood_fit import maximum_from
 from fes_pin.identify.stored import load_log, log_table
 from fes_pin.models.nominal import nominal_model

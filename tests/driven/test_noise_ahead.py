@@ -8,9 +8,9 @@ from identify.test_likelihood import TRUE, believed, held
 
 from fes_pin.diagnosis.driven_refused import is_moved_by_what_is_recorded
 from fes_pin.diagnosis.errors_ahead import errors_ahead, errors_over_horizon, noise_that_is_small, random_parts
-from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
+from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.levels import SMALL_SHARE
 
 

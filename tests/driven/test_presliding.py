@@ -10,8 +10,8 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
-from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.process_noise import first_guess
 from fes_pin.models.effects import CoulombFriction
 from fes_pin.models.simulate import simulate
 

@@ -6,9 +6,9 @@ import pytest
 from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
-from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
+from fes_pin.identify.process_noise import first_guess
 from fes_pin.models.effects import ParallelStiffness
 from fes_pin.models.nominal import nominal_model
 

@@ -10,7 +10,7 @@ from driven_rigs.draw import Base, draw, urdf
 from fes_pin.data.study import Study, read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
-from fes_pin.identify.timing import with_doubt_of_timing
+from fes_pin.identify.effort_timing import with_timing_of_readings
 from fes_pin.infer.scatter import with_honest_intervals
 from fes_pin.models.nominal import nominal_model
 
@@ -52,7 +52,7 @@ def test_intervals_hold_the_truth_where_an_effort_acts_after_its_row_has_begun(t
     truth = {"inertia_scale": 1.0, "damping": DAMPING}
     plain, doubtful = (
         [[(f.values[n] - truth[n]) / f.std(n) for n in truth] for f in some]
-        for some in ([with_honest_intervals(f) for f in fits], [with_doubt_of_timing(f, DT) for f in fits])
+        for some in ([with_honest_intervals(f) for f in fits], [with_timing_of_readings(f, DT) for f in fits])
     )
     assert np.sqrt(np.mean(np.square(plain), axis=0)).max() > 2.5, plain
     assert np.sqrt(np.mean(np.square(doubtful), axis=0)).max() < 1.5, doubtful
@@ -64,8 +64,8 @@ def test_where_time_is_known_nothing_is_doubted(tmp_path):
     fitted = LikelihoodFits(nominal_model(study), study.trials, []).nominal()
     plain, doubtful, sure = (
         with_honest_intervals(fitted),
-        with_doubt_of_timing(fitted, study.trials[0].dt),
-        with_doubt_of_timing(fitted, 1e-9),
+        with_timing_of_readings(fitted, study.trials[0].dt),
+        with_timing_of_readings(fitted, 1e-9),
     )
     ratios = {n: doubtful.std(n) / plain.std(n) for n in fitted.free}
     assert min(ratios.values()) > 0.999 and max(ratios.values()) > 1.1, ratios
@@ -77,11 +77,11 @@ def test_what_intervals_hold_beside_is_kept(tmp_path):
     fitted = fitted_slide(0, tmp_path)
     honest = with_honest_intervals(fitted)
     wider = replace(honest, covariance=honest.covariance * np.outer(*[[4.0, 1.0]] * 2))
-    plain, wide = with_doubt_of_timing(honest, DT), with_doubt_of_timing(wider, DT)
+    plain, wide = with_timing_of_readings(honest, DT), with_timing_of_readings(wider, DT)
     first, second = (wide.std(n) ** 2 - plain.std(n) ** 2 for n in fitted.free)
     assert first == pytest.approx(15.0 * honest.std(fitted.free[0]) ** 2, rel=1e-6)
     assert second == pytest.approx(0.0, abs=1e-9 * plain.std(fitted.free[1]) ** 2)
-    assert np.allclose(with_doubt_of_timing(fitted, DT).covariance, plain.covariance)
+    assert np.allclose(with_timing_of_readings(fitted, DT).covariance, plain.covariance)
     untold = replace(fitted, parts=tuple(replace(p, jacobian=p.jacobian * (1.0, 0.0)) for p in fitted.parts))
     assert np.isinf(with_honest_intervals(untold).std(fitted.free[1]))
-    assert np.isfinite(with_doubt_of_timing(with_honest_intervals(untold), DT).covariance).all()
+    assert np.isfinite(with_timing_of_readings(with_honest_intervals(untold), DT).covariance).all()

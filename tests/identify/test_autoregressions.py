@@ -11,9 +11,9 @@ from scipy.signal import lfilter
 from fes_pin.data.errors import InputError
 from fes_pin.data.log import Log
 from fes_pin.identify.autoregressions import autoregressions, with_autoregressions
-from fes_pin.identify.doubts import first_guess, stilled
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import Problem
+from fes_pin.identify.process_noise import first_guess, stilled
 from fes_pin.identify.stored import load_random, stored_tables
 from fes_pin.infer.noise import ORDERS, Noise
 from fes_pin.models.autoregression import unforetold

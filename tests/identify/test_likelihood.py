@@ -5,9 +5,9 @@ import pytest
 
 from fes_pin.data.trial import Trial
 from fes_pin.identify.ahead import falls, one_step, over_horizon
-from fes_pin.identify.doubts import driving_size, first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
+from fes_pin.identify.process_noise import driving_size, first_guess
 from fes_pin.infer.problem import whitened_sse
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.effects.sensor_gain import SensorGain

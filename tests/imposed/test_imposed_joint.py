@@ -13,8 +13,8 @@ from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import Trial, read_trial, write_trial
 from fes_pin.diagnosis import logged
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.process_noise import first_guess
 from fes_pin.models.catalogue import Catalogue, shipped
 from fes_pin.models.effects import CoulombFriction, EffortGain, EffortOffset, PassiveRelaxation, SensorGain
 from fes_pin.models.model import Model

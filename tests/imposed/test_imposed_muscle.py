@@ -12,9 +12,9 @@ from fes_pin.data.plausibility import implausible
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.identify.doubts import first_guess
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import maximise
+from fes_pin.identify.process_noise import first_guess
 from fes_pin.models.catalogue import Catalogue, shipped
 from fes_pin.models.effects import ForceLength, ForceVelocity, ParallelStiffness, PulseSummation, SeriesElasticity
 from fes_pin.models.model import Model

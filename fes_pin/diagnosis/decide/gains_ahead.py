@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
@@ -56,10 +56,11 @@ def gains_of(
 def _gains_over(folds: Sequence[Fold], names: Sequence[str], horizon_s: float, seed: int) -> dict[str, Gain]:
     """What causes gain on the trials of the folds, so far ahead."""
 
-    def errors(of: Callable[[Fold], LikelihoodFit]) -> Errors:
-        return errors_over_horizon([(of(f), f.best, f.test) for f in folds], horizon_s)
+    def errors(fits: Sequence[LikelihoodFit]) -> Errors:
+        pairs = zip(fits, folds, strict=True)
+        return errors_over_horizon([(one, fold.best, fold.test) for one, fold in pairs], horizon_s)
 
     if not names:
         return {}
-    nominal, best = errors(lambda f: f.nominal), errors(lambda f: f.best)
-    return {n: held_out_gain(nominal, errors(lambda f, n=n: f.without[n]), best, seed) for n in names}  # type: ignore[misc]
+    nominal, best = errors([f.nominal for f in folds]), errors([f.best for f in folds])
+    return {n: held_out_gain(nominal, errors([f.without[n] for f in folds]), best, seed) for n in names}

@@ -18,11 +18,10 @@ from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
 from fes_pin.diagnosis.search.starts import STARTS, from_afar, started
-from fes_pin.identify.doubts import first_guess, stilled
-from fes_pin.identify.fresh_efforts import fresh
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.identify.process_noise import first_guess, stilled, without_memory
 from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.fits import Candidate, FittedSets
 from fes_pin.infer.optimize import WORTH
@@ -133,7 +132,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
             return self._calm
         known = self.fits[()].noise
         guess = first_guess(self.model, self.trials, known.lasts_s if known else 0.0)
-        return fresh(guess, self.trials) if known and known.timed else guess
+        return without_memory(guess, self.trials) if known and known.timed else guess
 
     def candidates(self, base: LikelihoodFit) -> dict[str, Candidate[Starts]]:
         """Causes that a fit does not have, each with its shapes of largest score."""
@@ -220,7 +219,7 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         fitted = self._parts(names)[0]
         for one in effects:
             if one.name not in names_of(fitted):
-                nothing = {n: float(one.parameters()[n].null) for n in one.amplitudes()}  # type: ignore[arg-type]
+                nothing = {n: one.nulls()[n] for n in one.amplitudes()}
                 fitted = self._maxima.from_start(fitted.model + started(one, nothing), fitted.noise, fitted.unknowns)
         return fitted
 

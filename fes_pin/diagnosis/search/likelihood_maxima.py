@@ -69,8 +69,7 @@ class LikelihoodMaxima:
         The others are where the fit's covariance takes them, or where they were: whichever is likelier. An effort's
         gain stands for an inertia that is another without it.
         """
-        info, shared = effect.parameters(), [n for n in gone if n in effect.common()]
-        nulls = {f"{effect.name}.{n}": float(info[n].null) for n in shared}  # type: ignore[arg-type]
+        nulls = {f"{effect.name}.{n}": effect.nulls()[n] for n in gone if n in effect.common()}
         moving = [n for n in nulls if n in whole.free]
         here = np.array([whole.values[n] for n in whole.free])
         change = np.array([nulls[n] - whole.values[n] for n in moving])

@@ -121,8 +121,8 @@ def _score(probe: Probe, gram: np.ndarray, along: np.ndarray, before: float) -> 
     names, info = probe.effect.amplitudes(), probe.effect.parameters()
     after = float(np.trace(gram))
     if not after > 1e-18 * max(before, 1e-300):
-        return Scored(probe, 0.0, {n: float(info[n].null or 0.0) for n in names}, 0.0)
-    nulls = np.array([info[n].null for n in names], dtype=float)
+        return Scored(probe, 0.0, {n: probe.effect.nulls()[n] for n in names}, 0.0)
+    nulls = np.array([probe.effect.nulls()[n] for n in names])
     lower, upper = np.array([[info[n].lower, info[n].upper] for n in names]).T
     scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
     amplitudes = scale * np.linalg.lstsq(gram * np.outer(scale, scale), along * scale, rcond=1e-10)[0]

@@ -21,10 +21,8 @@ TINY = 0.02
 
 def near_null(effect: type[Effect], name: str) -> float:
     """The null of an amplitude, or next to it where that is a bound."""
-    info = effect.parameters()[name]
-    assert info.null is not None
-    one_sided = info.null in {info.lower, info.upper}
-    return info.null + (TINY * info.scale if one_sided else 0.0)
+    info, null = effect.parameters()[name], effect.nulls()[name]
+    return null + (TINY * info.scale if null in {info.lower, info.upper} else 0.0)
 
 
 def from_afar(effect: Effect, measured: Mapping[str, np.ndarray]) -> list[Effect]:
@@ -48,8 +46,7 @@ def started(
     info = effect.parameters()
     values: dict[str, Any] = {}
     for name, value in amplitudes.items():
-        null, one = info[name].null, info[name]
-        assert null is not None
+        null, one = effect.nulls()[name], info[name]
         nothing = abs(value - null) < 1e-6 * one.scale
         if not nothing:
             away = np.inf if reach is None else reach * one.scale

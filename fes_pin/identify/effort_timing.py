@@ -1,0 +1,281 @@
+"""When recorded efforts acted, and when readings were taken: what no log says to less than its rows.
+
+A log that asks a controller less often than it works holds an effort for as long as a row lasts, and the rig seems to
+answer before it is driven: by half a row where rows are regular, by one and more where they are not. The effort between
+rows is in none of them; as far as it followed what is smooth, a spline through the rows gives it. The log does not say
+either when within its row an effort that answers the reading begins to act; it is at most half a row later than the
+reading, for what is later is a lag. The likelihood says how late an effort is, in the model that was found.
+
+**Efforts that answer the readings that they predict.** An effort that is said to have acted before it was written down
+is one that a controller asked for when it had read what the effort is now said to have caused. With the readings y and
+the efforts u of all rows,
+
+    y = A + H u + innovations,   u = B + G y,
+
+readings and efforts have the density of the innovations times |det(1 - H G)|. Where causes come before effects that is
+1. Where efforts are moved, H has parts on its diagonal and above, and to first order in those above
+
+    cost = -2 sum_k log |1 - sum_i H_(k-i, k) G_(k, k-i)|,   i = 0, 1
+
+is added to twice the negative log-likelihood of the innovations. Without it, what answers a reading to come enlarges
+the innovations, and efforts are estimated as less late than they are. With it they are estimated as later: that between
+its rows a log holds nothing of what answers the noise of a reading is not in it. The truth lies between.
+
+**Time of a reading.** A controller reads, and asks for an effort some time later; a simulation in steps lets it act
+before. With d the time by which a reading is early, and v the velocity of what is read,
+
+    y = h(x) + d v,   |d| <= row / 2, of deviation row / sqrt(12) before anything is measured.
+
+The data determine d, but an error of form, as of friction by bristles, looks like one. So estimates stay where d is 0,
+and intervals hold the mean square of what d moves them by, by the data and by what was known before.
+
+Source: Koopmans, Rubin and Leipnik, Measuring the equation systems of dynamic economics, in Statistical Inference in
+Dynamic Economic Models, Cowles Commission Monograph 10, Wiley, 1950.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from fes_pin.data.answered import answer_of
+from fes_pin.data.log import EFFORT, Log
+from fes_pin.data.trial import Trial, derived_trial
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
+from fes_pin.infer.covariance import covariance_of, widened
+from fes_pin.infer.levels import CERTAIN_GAIN
+from fes_pin.infer.problem import Linearized, normal_equations, whitened_sse
+from fes_pin.infer.scatter import at_rest, scores_of, with_honest_intervals
+from fes_pin.models.parameters import parameter
+from fes_pin.models.predictor import are_news
+from fes_pin.models.stage import Effect, Stage
+from fes_pin.workers import in_parallel
+
+LEAST_ROWS = 0.25
+"""The least: of a log that asks in every second sample of a controller, which holds for half a row."""
+MOST_ROWS = 2.0
+"""Rows of a log by which an effort may be late: one that it is held when it is written down, and one until the next."""
+MOST_EARLY_ROWS = 0.5
+"""Rows by which it may act later than written: what is more is a lag, see `SensorLag.smallest`."""
+SPACING = 40
+"""Rows from one pulse by which H is measured to the next: by then the response to the last one is smooth."""
+PULSE = 1e-3
+"""Of an effort's deviation: a pulse so small moves a rig in proportion."""
+STEP = 0.05
+"""Of a row: half the difference that the slope of the cost is. Readings are smooth over a row."""
+
+_Way = tuple[Callable[[float], Log], float]
+
+
+@dataclass(frozen=True)
+class Lateness:
+    """What a log says of when efforts acted, and the cost of trials with efforts when they did.
+
+    Attributes
+    ----------
+    log
+        Half way between when they acted by the innovations alone, and by these and what the efforts answer: one is too
+        early and the other too late.
+    at_most
+        The latter.
+    """
+
+    log: Log
+    cost: float
+    at_most: Log
+
+
+def lateness_of(fitted: LikelihoodFit, row_s: float, as_logged: bool = False) -> Lateness | None:
+    """How late the efforts of a fit's trials are; None where they are in time.
+
+    Parameters
+    ----------
+    fitted
+        Of a rig that an effort drives.
+    row_s
+        Time step of the log.
+    as_logged
+        Whether rows are as they were logged, and no averages: then efforts may also act later than written, or between
+        rows.
+    """
+    tried: dict[Log, LikelihoodFit] = {}
+
+    def moved(log: Log) -> LikelihoodFit:
+        if log not in tried:
+            tried[log] = maximum_from(fitted, [log.applied(t) for t in fitted.trials])
+        return tried[log]
+
+    def lowest(way: _Way, cost: Callable[[Log], float]) -> Log:
+        at, most = way
+        bounds, options = (0.0, most * row_s), {"xatol": 0.02 * row_s}
+        found = minimize_scalar(lambda s: cost(at(float(s))), bounds=bounds, method="bounded", options=options)
+        return at(float(found.x))
+
+    ways = _WAYS if as_logged else _WAYS[:1]
+    begun = in_parallel(lambda way: moved(way[0](LEAST_ROWS * row_s)).sse, ways)
+    if min(begun) > fitted.sse - CERTAIN_GAIN:
+        return None
+    worth = [way for way, sse in zip(ways, begun, strict=True) if sse < fitted.sse]
+    found = {lowest(way, lambda log: moved(log).sse): way for way in worth}
+    best = min(found, key=lambda log: moved(log).sse)
+    answering = lowest(found[best], lambda log: moved(log).sse + cost_of_answers(moved(log), fitted.trials, log))
+    late_s, over_s = (0.5 * (getattr(best, n) + getattr(answering, n)) for n in ("effort_late_s", "effort_over_s"))
+    between = Log(effort_late_s=late_s, effort_over_s=over_s)
+    return Lateness(between, moved(between).sse, answering)
+
+
+_WAYS: tuple[_Way, ...] = (
+    (lambda late_s: Log(effort_late_s=late_s), MOST_ROWS),
+    (lambda early_s: Log(effort_late_s=-early_s), MOST_EARLY_ROWS),
+    (lambda late_s: Log(effort_over_s=2.0 * late_s), MOST_EARLY_ROWS),
+)
+"""How efforts can be late by some time, and by how many rows at most: a controller that works often is late by half."""
+
+
+def words_of_lateness(log: Log) -> str:
+    """What is reported of efforts that were moved, or read between rows."""
+    if log.effort_over_s:
+        return (
+            f"the effort was written down less often than the controller acted, and was read between the rows, over "
+            f"{1e3 * log.effort_over_s:.2g} ms from each"
+        )
+    late_s = log.effort_late_s
+    when = "after" if late_s > 0.0 else "before"
+    return f"the effort was written down {1e3 * abs(late_s):.2g} ms {when} it acted, and was moved to when it did"
+
+
+def cost_of_answers(fitted: LikelihoodFit, logged: Sequence[Trial], log: Log) -> float:
+    """What is added to a fit's cost because its efforts answer the readings predicted from them; 0 of those in time.
+
+    Parameters
+    ----------
+    fitted
+        To trials whose efforts were moved.
+    logged
+        The same trials as they were logged.
+    log
+        How they were.
+    """
+    if log.effort_late_s <= 0.0 and log.effort_over_s <= 0.0:
+        return 0.0
+    lasts_s = fitted.noise.lasts_s
+    rows = [_pulse_rows(t, lasts_s) for t in logged]
+    sizes = [PULSE * float(np.std(t[EFFORT])) for t in logged]
+    pulsed = [_pulsed(t, at, size) for t, at, size in zip(logged, rows, sizes, strict=True)]
+    plain, moved = (
+        LikelihoodProblem(fitted.model, [log.applied(t) for t in some], fitted.noise).foretold(fitted.values)
+        for some in (logged, pulsed)
+    )
+    total = 0.0
+    for trial, at, size, before, after in zip(logged, rows, sizes, plain, moved, strict=True):
+        if not len(at) or size == 0.0:
+            continue
+        gains = answer_of(trial[EFFORT], [trial[n] for n in before]).gains[at]
+        loop = sum(_loop((after[n].values - before[n].values) / size, at, gains[:, k]) for k, n in enumerate(before))
+        counted = int(np.sum(are_news(trial, lasts_s)))
+        with np.errstate(divide="ignore"):
+            total -= 2.0 * counted * float(np.mean(np.log(np.abs(1.0 - loop))))
+    return total
+
+
+def _pulse_rows(trial: Trial, lasts_s: float) -> np.ndarray:
+    """Where the pulses of a trial are: at readings that count."""
+    news = np.flatnonzero(are_news(trial, lasts_s))
+    return news[(news >= SPACING) & (np.diff(news // SPACING, prepend=-1) > 0)]
+
+
+def _pulsed(trial: Trial, at: np.ndarray, size: float) -> Trial:
+    effort = np.array(trial[EFFORT], dtype=float)
+    effort[at] += size
+    return derived_trial(trial, columns={**trial.columns, EFFORT: effort})
+
+
+def _loop(change: np.ndarray, at: np.ndarray, gains: np.ndarray) -> np.ndarray:
+    """What an effort asks for itself, by way of a reading, from the change of predictions by its pulses.
+
+    The response to earlier pulses goes on as a parabola, from the last three rows that an effort which is held and
+    moved leaves alone; a spline moves the efforts before them by some hundredths of the pulse.
+    """
+    last = [change[at - k] for k in (2, 3, 4)]
+    now = change[at] - np.tensordot([6.0, -8.0, 3.0], last, 1)
+    earlier = change[at - 1] - np.tensordot([3.0, -3.0, 1.0], last, 1)
+    return np.asarray(now * gains[:, 0] + earlier * gains[:, 1])
+
+
+@dataclass(frozen=True)
+class EarlyReading(Effect):
+    """A reading that is early: of no library, as it is never reported."""
+
+    early_s: float = parameter(0.0, unit="s", null=0.0)
+
+    name, stage, signal, rigs = "early_reading", Stage.SENSOR, "reading", ("joint",)
+
+    def apply(self, value: Any, s: Any) -> Any:
+        return value + self.early_s * s.x.v
+
+
+EARLY = "early_reading.early_s"
+
+
+def with_timing_of_readings(fitted: LikelihoodFit, row_s: float) -> LikelihoodFit:
+    """A fit of a joint that an effort drives, with intervals that hold for any time of a reading within its row.
+
+    What the intervals hold beyond how scores scatter they still hold. The fit is as it was where nothing that is read
+    is a place with a velocity `v`, as of a rig of one's own, or where a reading that is a little earlier cannot be
+    predicted.
+
+    Parameters
+    ----------
+    row_s
+        Time from one row of the log to the next.
+    """
+    rig = fitted.model.rig
+    if not (rig.takes(EarlyReading) and all("v" in rig.states(t.kind) for t in fitted.trials)):
+        return fitted
+    before, now, after = (_linearized(fitted, early_s) for early_s in (-STEP * row_s, 0.0, STEP * row_s))
+    slope = 0.5 * (whitened_sse(after) - whitened_sse(before)) / (2.0 * STEP * row_s)  # of half the cost
+    if not math.isfinite(slope):
+        return fitted
+    parts, free = at_rest(now), np.array([*(n not in fitted.at_bound for n in fitted.free), True])
+    hessian = normal_equations(parts).hessian
+    hessian[-1, -1] += 12.0 / row_s**2
+    known = covariance_of(hessian, free)
+    moved = known[:, -1] * min(abs(slope), 0.5 * row_s / known[-1, -1])
+    wide = (widened(known, scores_of(parts)) + np.outer(moved, moved))[:-1, :-1]
+    return replace(fitted, covariance=wide + _beyond_scatter(fitted))
+
+
+def _beyond_scatter(fitted: LikelihoodFit) -> np.ndarray:
+    """What the covariance of a fit has more than how its scores scatter, shape (free, free); 0 of parameters that have
+    less."""
+    with np.errstate(invalid="ignore"):  # what is not identified
+        more = fitted.covariance - with_honest_intervals(fitted).covariance
+    kept = np.nan_to_num(np.diag(more)) > 0.0
+    return np.where(np.isfinite(more) & np.outer(kept, kept), more, 0.0)
+
+
+def _linearized(fitted: LikelihoodFit, early_s: float) -> Sequence[Linearized]:
+    """The trials of a fit, with readings that are so early, and sensitivities to that behind those of the fit."""
+    free = (*fitted.free, EARLY)
+    problem = LikelihoodProblem(fitted.model + EarlyReading(), fitted.trials, fitted.noise, free)
+    return problem.linearize({**fitted.values, EARLY: early_s}, fitted.unknowns)
+
+
+def with_lateness(fitted: LikelihoodFit, at_most: LikelihoodFit) -> LikelihoodFit:
+    """A fit with intervals that hold by how much its efforts may be later or earlier: up to those of another fit.
+
+    Anything between has the same probability, and the mean square of an estimate's error is a third of the largest.
+
+    Parameters
+    ----------
+    at_most
+        The same model, with efforts as late as they can be.
+    """
+    apart = np.array([at_most.values[n] - fitted.values[n] for n in fitted.free])
+    return replace(fitted, covariance=fitted.covariance + np.outer(apart, apart) / 3.0)
