@@ -1,4 +1,5 @@
-"""The imports run one way: view -> diagnosis -> identify -> models -> data; control -> allocation -> muscles -> body.
+"""The imports run one way: cohort -> verdict -> view -> diagnosis -> identify -> models -> data; and control ->
+allocation -> muscles -> body.
 
 Inference (infer) knows no rig and no body: all may use it, and it uses nothing of ours but `workers`.
 The controller takes eq. (1) from paper, which takes recruitment from muscles. Measured walking (walk) reads the body,
@@ -28,8 +29,8 @@ ALLOWED = {
     "muscles": {"body", "models", "data"},
     "allocation": {"muscles", "body", "data"},
     "control": {"paper", "allocation", "muscles", "identify", "models", "data"},
-    "verdict": {"walk", "diagnosis", "models", "data"},
-    "cohort": {"view", "walk", "diagnosis", "identify", "models", "data"},
+    "verdict": {"view", "walk", "diagnosis", "models", "data"},
+    "cohort": {"verdict", "view", "walk", "diagnosis", "identify", "models", "data"},
     "view": {
         *("paper", "contrasts", "diagnosis", "identify", "models", "data"),
         *("control", "allocation", "muscles", "body", "walk"),

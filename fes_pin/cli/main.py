@@ -20,7 +20,6 @@ from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
 from fes_pin.cli.predict import predict
 from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
-from fes_pin.cli.walk import diagnose_walking, print_effects
 from fes_pin.data.errors import InputError
 
 if TYPE_CHECKING:
@@ -39,8 +38,6 @@ app.command()(contrast)
 app.command()(compare)
 app.command()(predict)
 
-ANSWER = ("diagnosis.json", "model.toml", "report.html", "next_trial.csv")
-"""What a diagnosis writes, the last where it proposes a trial."""
 DIAGNOSING = 0.8
 """Share of the time of `diagnose` before the report is drawn, about."""
 
@@ -83,7 +80,12 @@ def diagnose(
 ) -> None:
     """Show what the study's model gets wrong, name the cause, extend the model, measure the gain."""
     from fes_pin.data.outputs import Outputs
+    from fes_pin.data.provenance import this_command
     from fes_pin.data.tabular import SUFFIXES, check_table, table_bytes
+    from fes_pin.diagnosis.result import Diagnosis
+    from fes_pin.diagnosis.trajectories import trajectories
+    from fes_pin.verdict.ask import diagnose as find
+    from fes_pin.verdict.files import NEXT_FILE, REPORT_FILE, answer_files, answer_names
 
     catalogue = catalogue_with(library)
     measured = study_of(study, catalogue, trials, exclude)
@@ -91,22 +93,12 @@ def diagnose(
     if table is not None:
         if f".{tables}" not in SUFFIXES:
             raise InputError(f"expected csv or parquet, found {tables!r}", column="--tables")
+        if measured.schema.owner is None:
+            raise InputError("goes only with a rig; walking has no such tables", column="--tables")
         check_table(table)
     outputs = Outputs("diagnose", force)
-    outputs.check(out, (*ANSWER, *([table] if table else [])))  # what cannot be written is said before any work
-    if measured.rig == "body":
-        if tables is not None:
-            raise InputError("goes only with a rig; walking has no such tables", column="--tables")
-        with progress() as tell:
-            verdict = diagnose_walking(measured, outputs, out, seed, limit, tell)
-        typer.echo(f"{verdict}\nreport: {out / 'report.html'}")
-        return
-    from fes_pin.data.provenance import this_command
-    from fes_pin.diagnosis.diagnosis import diagnose_joint as find
-    from fes_pin.diagnosis.record import NEXT_FILE, by_command, diagnosis_files
-    from fes_pin.diagnosis.trajectories import trajectories
-    from fes_pin.view.report import report_html
-
+    names = (*answer_names(measured), *([table] if table else []))
+    outputs.check(out, names)  # what cannot be written is said before any work
     with progress() as tell:
         to_be_said = [catalogue]
 
@@ -115,32 +107,39 @@ def diagnose(
                 say_whose_code(to_be_said.pop())
             tell(DIAGNOSING * share, words)
 
-        found = find(measured, library=catalogue, seed=seed, limit=limit, progress=told)
-        diagnosis = by_command(found, this_command())
+        brought = None if measured.schema.owner is None else catalogue
+        found = find(measured, library=brought, seed=seed, limit=limit, progress=told)
         tell(DIAGNOSING, "report")
-        files: dict[str, str | bytes] = {**diagnosis_files(diagnosis), "report.html": report_html(diagnosis)}
-        if table is not None:
-            names, columns = trajectories(diagnosis)
-            files[table] = table_bytes({"trial": names, **columns}, table)
+        files = answer_files(found, this_command())
+        if table is not None and isinstance(found, Diagnosis):
+            trial, columns = trajectories(found)
+            files[table] = table_bytes({"trial": trial, **columns}, table)
         tell(1.0, "done")
     old = {NEXT_FILE, *(f"trajectories{suffix}" for suffix in SUFFIXES)}
     outputs.write(out, files, without=old - set(files))  # what an earlier diagnosis proposed is not this one's
-    _print_verdict(diagnosis)
-    typer.echo(f"report: {out / 'report.html'}")
+    if isinstance(found, Diagnosis):
+        _print_verdict(found)
+    else:
+        typer.echo(str(found))
+    typer.echo(f"report: {out / REPORT_FILE}")
 
 
 @app.command()
 def effects(library: Libraries = None) -> None:
     """List the causes it knows, with stage, equation and parameters."""
     from fes_pin.diagnosis.misread import DESCRIBED as MISREAD
-    from fes_pin.models.describe import describe
+    from fes_pin.models.describe import describe, described
+    from fes_pin.walk.effect import STAGE
+    from fes_pin.walk.effects import EFFECTS
 
     catalogue = catalogue_with(library)
     say_whose_code(catalogue)
     for one in catalogue.effects:
         typer.echo(describe(one))
     typer.echo(MISREAD)
-    print_effects()
+    for cause in EFFECTS:
+        sizes = {n: u for form in cause.forms() for n, u in zip(form.parameters, form.units, strict=True)}
+        typer.echo(described(cause, STAGE, {n: f"[{unit or '1'}], absent at 0" for n, unit in sizes.items()}))
 
 
 def _print_verdict(diagnosis: Diagnosis) -> None:

@@ -152,18 +152,17 @@ def _template(
     """Name and text of the URDF that was asked for."""
     from fes_pin.data import templates
 
-    asked = {"pendulum": pendulum, "rod": rod, "slide": slide}
-    given = [name for name, value in asked.items() if value is not None]
+    turning = {"pendulum": pendulum, "rod": rod}
+    asked = {name: (*numbers, upright) for name, numbers in turning.items() if numbers is not None}
+    given = {**asked, **({} if slide is None else {"slide": (slide,)})}
     if len(given) > 1:
         raise InputError("expected one of --pendulum, --rod and --slide, found several")
-    try:
-        if pendulum is not None:
-            return "pendulum.urdf", templates.pendulum(*pendulum, upright)
-        if rod is not None:
-            return "rod.urdf", templates.rod(*rod, upright)
-        return None if slide is None else ("slide.urdf", templates.slide(slide))
-    except InputError as error:
-        raise InputError(error.message, column=f"--{given[0]}") from None
+    for name, numbers in given.items():
+        try:
+            return f"{name}.urdf", getattr(templates, name)(*numbers)
+        except InputError as error:
+            raise InputError(error.message, column=f"--{name}") from None
+    return None
 
 
 @contextmanager

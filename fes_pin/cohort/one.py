@@ -16,7 +16,9 @@ from pathlib import Path
 from fes_pin.data.errors import InputError
 from fes_pin.data.provenance import hashes, versions
 from fes_pin.data.sources import code_hash
-from fes_pin.data.study import Study, read_study
+from fes_pin.data.study import read_study
+from fes_pin.verdict.ask import diagnose
+from fes_pin.verdict.files import answer_files
 
 
 @dataclass(frozen=True)
@@ -96,18 +98,5 @@ def _files(work: Work) -> dict[str, str | bytes]:
 
     catalogue = load_library(*work.library)
     study = read_study(work.folder, rigs=catalogue.schemas())
-    if study.rig == "body":
-        return _walking(study, work)
-    from fes_pin.diagnosis.diagnosis import diagnose_joint  # noqa: PLC0415
-    from fes_pin.diagnosis.record import by_command, diagnosis_files  # noqa: PLC0415
-    from fes_pin.view.report import report_html  # noqa: PLC0415
-
-    found = by_command(diagnose_joint(study, library=catalogue, seed=work.seed, limit=work.limit), work.command)
-    return {**diagnosis_files(found), "report.html": report_html(found)}
-
-
-def _walking(study: Study, work: Work) -> dict[str, str | bytes]:
-    from fes_pin.view.walk_playback import walk_answer_files  # noqa: PLC0415
-    from fes_pin.walk.diagnosis import diagnose_walk  # noqa: PLC0415
-
-    return walk_answer_files(diagnose_walk(study, seed=work.seed, limit=work.limit))
+    brought = None if study.schema.owner is None else catalogue
+    return answer_files(diagnose(study, library=brought, seed=work.seed, limit=work.limit), work.command)

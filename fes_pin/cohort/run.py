@@ -30,6 +30,7 @@ from fes_pin.data.results import Saveable
 from fes_pin.data.tabular import SUFFIXES, table_bytes
 from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import load_library
+from fes_pin.verdict.files import OF_ALL, OF_WALKS
 
 
 @dataclass(frozen=True)
@@ -140,7 +141,7 @@ def run_cohort(
     todo: list[Task] = [(work, key) for work in every if not store.has(work, key := work.key())]
     outputs.check(out, ("cohort.html", *(f"{name}.{kind}" for name in HEADS for kind in ("csv", "parquet"))))
     for work, _ in todo:
-        outputs.check(store.place(work.name), ANSWER)
+        outputs.check(store.place(work.name), (*OF_ALL, *OF_WALKS, STATE))
     tell, began = progress or (lambda _progress: None), time.monotonic()
     done, failed = len(every) - len(todo), 0
     waiting: list[Answer] = []  # failures, until there is a study that did not fail: else nothing is written
@@ -188,8 +189,6 @@ def _files(made: Cohort, seed: int, command: str) -> dict[str, str | bytes]:
     return out
 
 
-ANSWER = ("diagnosis.json", "model.toml", "report.html", "next_trial.csv", "body.urdf", "playback.html", STATE)
-"""What is written of one study, at most."""
 HEADS = {
     "studies": (
         *("study", "verdict", "causes", "unexplained", *ERRORS, "horizon_s", "ceiling_percent", "wall_s", "error"),

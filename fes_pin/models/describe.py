@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Mapping
+from typing import Any
 
 from fes_pin.models.outside import origin
 from fes_pin.models.parameters import ROTARY
@@ -35,14 +37,19 @@ def remark(effect: type[Effect], label: str) -> str:
 
 def describe(effect: type[Effect]) -> str:
     """Name, stage, sentence, equation, tell-tale and parameters."""
-    whose = f"; code of {where}" if (where := origin(effect)) else ""
-    lines = [f"{effect.name} ({effect.stage}; rigs: {', '.join(effect.rigs)}{whose})", f"  {sentence(effect)}"]
-    lines += [f"      {line}" for line in equation(effect).split("\n")]
-    lines.append(f"  Tell-tale: {remark(effect, 'Tell-tale:')}")
+    parameters = {}
     for name, info in effect.parameters().items():
         absent = f"absent at {info.null:g}" if info.null is not None else "a shape"
         also = ", a refinement" if info.optional else ""
-        lines.append(
-            f"    {name} [{info.in_units(ROTARY).unit or '1'}] in [{info.lower:g}, {info.upper:g}], {absent}{also}"
-        )
+        unit = info.in_units(ROTARY).unit or "1"
+        parameters[name] = f"[{unit}] in [{info.lower:g}, {info.upper:g}], {absent}{also}"
+    return described(effect, effect.stage, parameters)
+
+
+def described(effect: Any, stage: str, parameters: Mapping[str, str]) -> str:
+    """Name, stage, sentence, equation, tell-tale, and what is said of each parameter."""
+    whose = f"; code of {where}" if (where := origin(effect)) else ""
+    lines = [f"{effect.name} ({stage}; rigs: {', '.join(effect.rigs)}{whose})", f"  {sentence(effect)}"]
+    lines += [f"      {line}" for line in equation(effect).split("\n")]
+    lines += [f"  Tell-tale: {remark(effect, 'Tell-tale:')}", *(f"    {n} {told}" for n, told in parameters.items())]
     return "\n".join(lines) + "\n"

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -56,17 +57,19 @@ WAVES = (1, 2, 4, 8)
 """Waves over a trial, and half waves over the range of the angle."""
 
 
-def _waves() -> dict[str, FeatureFunction]:
-    out: dict[str, FeatureFunction] = {}
+def _waves() -> Iterator[tuple[str, FeatureFunction]]:
     for k in WAVES:
-        out[f"time: sin {k}"] = lambda f, k=k: sin(2.0 * math.pi * k * f.t)  # type: ignore[misc]
-        out[f"time: cos {k}"] = lambda f, k=k: cos(2.0 * math.pi * k * f.t)  # type: ignore[misc]
-        out[f"angle: sin {k} q"] = lambda f, k=k: sin(math.pi * k * f.q)  # type: ignore[misc]
-        out[f"angle: cos {k} q"] = lambda f, k=k: cos(math.pi * k * f.q)  # type: ignore[misc]
-    return out
+        yield f"time: sin {k}", partial(_wave, sin, "t", 2.0 * math.pi * k)
+        yield f"time: cos {k}", partial(_wave, cos, "t", 2.0 * math.pi * k)
+        yield f"angle: sin {k} q", partial(_wave, sin, "q", math.pi * k)
+        yield f"angle: cos {k} q", partial(_wave, cos, "q", math.pi * k)
 
 
-EFFORTS: Mapping[str, FeatureFunction] = {**MOTION, **_waves()}
+def _wave(function: Any, variable: str, rate: float, f: Any) -> Any:
+    return function(rate * getattr(f, variable))
+
+
+EFFORTS: Mapping[str, FeatureFunction] = {**MOTION, **dict(_waves())}
 """Features as an effort, by "variable: function"."""
 READINGS: Mapping[str, FeatureFunction] = {
     n: MOTION[n] for n in ("offset: 1", "time: t", "time: t2", "rate: v", "rate: sign v", "angle: q2", "angle: q3")
@@ -91,12 +94,13 @@ class _Features(Effect):
     def scaled(self, s: Any) -> SimpleNamespace:
         """Angle, rate, drive, activation and time, each from about -1 to 1."""
         drive = next((getattr(s.u, n) for n in ("effort", "pulse_width_us", "stim") if hasattr(s.u, n)), 0.0)
+        centre, reach, speed, most, duration = (getattr(self, n) for n in SCALES)
         return SimpleNamespace(
-            q=(getattr(s.x, "q", getattr(s, "q", 0.0)) - self.centre) / self.reach,  # type: ignore[attr-defined]
-            v=getattr(s.x, "v", getattr(s, "v", 0.0)) / self.speed,  # type: ignore[attr-defined]
-            u=drive / self.drive,  # type: ignore[attr-defined]
+            q=(getattr(s.x, "q", getattr(s, "q", 0.0)) - centre) / reach,
+            v=getattr(s.x, "v", getattr(s, "v", 0.0)) / speed,
+            u=drive / most,
             act=getattr(s.x, "act", 0.0),
-            t=s.time / self.duration,  # type: ignore[attr-defined]
+            t=s.time / duration,
         )
 
 
@@ -104,9 +108,8 @@ def _made(name: str, stage: Stage, signal: str, functions: Mapping[str, FeatureF
     scales = [(n, float, parameter(1.0, fitted=False)) for n in SCALES]
     amplitudes = [(f"a{k:02d}", float, parameter(0.0, null=0.0)) for k in range(len(functions))]
     title = "".join(part.capitalize() for part in name.split("_"))
-    made = dataclasses.make_dataclass(title, [*amplitudes, *scales], bases=(_Features,), frozen=True)
-    made.__module__, made.__qualname__ = __name__, title
-    made.name, made.stage, made.signal, made.functions = name, stage, signal, functions  # type: ignore[attr-defined]
+    own = {"name": name, "stage": stage, "signal": signal, "functions": functions, "__module__": __name__}
+    made = dataclasses.make_dataclass(title, [*amplitudes, *scales], bases=(_Features,), namespace=own, frozen=True)
     return made
 
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.numbers import instance, shortened
-from fes_pin.data.schema import unknown
+from fes_pin.data.schema import check_known
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import ParameterInfo
@@ -60,25 +60,18 @@ class Model:
         name = getattr(effect, "name", effect)
         if not isinstance(name, str):
             raise InputError(f"expected an effect of the model or its name, found {shortened(effect)}")
-        left = tuple(e for e in self.effects if e.name != name)
-        if len(left) == len(self.effects):
-            raise InputError(unknown(name, [e.name for e in self.effects]), column=name)
-        return Model(self.rig, left)
+        check_known([name], [e.name for e in self.effects], fault_at())
+        return Model(self.rig, tuple(e for e in self.effects if e.name != name))
 
     def parameters(self) -> dict[str, float]:
         """The value of every parameter that all trials share, by name."""
         values = {n: float(getattr(self.rig, n)) for n in self.rig.parameters()}
-        for effect in self.effects:
-            values.update({f"{effect.name}.{n}": float(getattr(effect, n)) for n in effect.common()})
-        return values
+        return values | {f"{e.name}.{n}": float(getattr(e, n)) for e in self.effects for n in e.common()}
 
     def parameter_info(self) -> dict[str, ParameterInfo]:
         """Every parameter's unit, null, bounds and scale, by name."""
-        info = dict(self.rig.parameters())
-        for effect in self.effects:
-            own = effect.parameters()
-            info.update({f"{effect.name}.{n}": own[n] for n in effect.common()})
-        return {n: one.in_units(self.rig.units()) for n, one in info.items()}
+        own = {f"{e.name}.{n}": e.parameters()[n] for e in self.effects for n in e.common()}
+        return {n: one.in_units(self.rig.units()) for n, one in {**self.rig.parameters(), **own}.items()}
 
     def own_unknowns(self) -> tuple[str, ...]:
         """Names of what each trial must estimate for itself because an effect says so."""
@@ -98,10 +91,8 @@ class Model:
 
     def fitted_parameters(self) -> tuple[str, ...]:
         """What a fit moves: the rig's fitted parameters, and of the effects' all but choices and unused forms."""
-        names = list(self.rig.fitted_parameters())
-        for effect in self.effects:
-            names += [f"{effect.name}.{n}" for n in effect.fitted_parameters()]
-        return tuple(names)
+        own = (f"{e.name}.{n}" for e in self.effects for n in e.fitted_parameters())
+        return (*self.rig.fitted_parameters(), *own)
 
     def unused_parameters(self) -> dict[str, float]:
         """Values, by name, of the parameters that belong to forms of effects that are switched off."""
@@ -115,16 +106,13 @@ class Model:
         InputError
             For a name that the model does not have, or a value out of its bounds.
         """
-        known = self.parameters()
-        for name in values:
-            if name not in known:
-                raise InputError(unknown(str(name), known), column=str(name))
+        check_known(values, self.parameters(), fault_at())
         nominal: dict[str, Any] = {n: float(v) for n, v in values.items() if "." not in n}
         rig = dataclasses.replace(self.rig, **nominal)
         effects = []
         for effect in self.effects:
-            prefix = f"{effect.name}."
-            own: dict[str, Any] = {n.removeprefix(prefix): float(v) for n, v in values.items() if n.startswith(prefix)}
+            paths = {n: f"{effect.name}.{n}" for n in effect.common()}
+            own: dict[str, Any] = {n: float(values[path]) for n, path in paths.items() if path in values}
             effects.append(dataclasses.replace(effect, **own))
         return Model(rig, tuple(effects))
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from fes_pin.data.errors import InputError
+from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.numbers import instance
-from fes_pin.data.schema import unknown
+from fes_pin.data.schema import check_known
 from fes_pin.data.study import Study
 from fes_pin.models.model import Model
 from fes_pin.models.rigs.base import Rig
@@ -28,9 +28,7 @@ def nominal_model(study: Study) -> Model:
         If the rig has no model of trials, no parameter of a name in `start`, or lacks its URDF; a value that cannot be.
     """
     kind = rig_of(study)
-    for name in study.start:
-        if name not in kind.parameters():
-            raise InputError(unknown(name, kind.parameters()), file=study.folder, column=f"start.{name}")
+    check_known(study.start, kind.parameters(), fault_at("start.{}", study.folder))
     rig = kind.of_study(study)
     stimulated = [t for t in study.trials if rig.recruited(t) is not None]
     return Model(replace(rig, session=session_of(stimulated, rig.recruited)))  # type: ignore[arg-type]

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from numbers import Real
-from typing import Any
+from typing import Any, Concatenate, ParamSpec
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import NumberKey, any_number
 from fes_pin.models.maths import is_expression
 
+P = ParamSpec("P")
 _KEY = "fes_pin"
 ROUNDING = 1e-12
 """Share of a bound by which a value may lie beyond it: sums of double precision end so near it, and no nearer."""
@@ -92,23 +93,15 @@ class ParameterInfo:
         return dataclasses.replace(self, unit=self.unit.format_map(units)) if "{" in self.unit else self
 
 
-def parameter(
-    default: float,
-    *,
-    unit: str = "",
-    null: float | None = None,
-    lower: float = -math.inf,
-    upper: float = math.inf,
-    scale: float = 1.0,
-    grid: tuple[float, ...] = (),
-    fitted: bool = True,
-    optional: bool = False,
-    rigs: tuple[str, ...] = (),
-    times: str = "",
-) -> Any:
-    """A dataclass field that is a parameter; see `ParameterInfo`."""
-    info = ParameterInfo(unit, null, lower, upper, scale, grid, fitted, optional, rigs, times)
-    return dataclasses.field(default=default, metadata={_KEY: info})
+def _field_of(about: Callable[P, ParameterInfo]) -> Callable[Concatenate[float, P], Any]:
+    def parameter(default: float, *args: P.args, **attributes: P.kwargs) -> Any:
+        """A dataclass field that is a parameter, by its default and the attributes of `ParameterInfo` by name."""
+        return dataclasses.field(default=default, metadata={_KEY: about(*args, **attributes)})
+
+    return parameter
+
+
+parameter = _field_of(ParameterInfo)
 
 
 def parameters_of(thing: Any) -> dict[str, ParameterInfo]:
@@ -130,10 +123,7 @@ def checked_number(value: Any, name: str, key: NumberKey = ANY_NUMBER) -> float:
         Not a number, not finite, or out of its bounds; names it by `name`.
     """
     number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else value
-    try:
-        return key.check(number)
-    except ValueError as problem:
-        raise InputError(str(problem), column=name) from None
+    return key.check(number, partial(InputError, column=name))
 
 
 def check_parameters(thing: Any, keys: Mapping[str, NumberKey] | None = None) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -14,20 +13,15 @@ from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.infer.noise import Noise
 from fes_pin.models.autoregression import noise_ahead, stationary_variance
-from fes_pin.models.compile.layout import doubt_constants, width_of
-from fes_pin.models.compile.program import compiled_program
 from fes_pin.models.disturbance import disturbed
 from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial, Readings
 from fes_pin.models.model import Model
 from fes_pin.models.simulate import (
-    LatestInputs,
+    Block,
     is_delayed,
-    lane_inputs,
-    lane_values,
     max_step,
     side_by_side,
     substeps,
-    timing,
     total_delay,
 )
 
@@ -130,7 +124,7 @@ class Predictor:
         self.max_step_s = min([max_step(model), *(e.foretold_step_s for e in model.effects)])
         self._delayed = is_delayed(model)
         together, own = side_by_side(self.trials, columns, self._key), (columns, processes, priors)
-        self._blocks = [_Block(model, self.trials, lanes, *own, self.max_step_s, lasts_s) for lanes in together]
+        self._blocks = [_Prediction(model, self.trials, lanes, *own, self.max_step_s, lasts_s) for lanes in together]
 
     def _key(self, trial: Trial) -> tuple[Any, ...]:
         """What trials share that can share a block: kind, inputs, what was measured, integration steps per sample."""
@@ -187,8 +181,8 @@ def _measured(model: Model, trial: Trial) -> tuple[str, ...]:
     return tuple(n for n in model.rig.outputs(trial.kind) if n in trial.columns)
 
 
-class _Block:
-    """Trials that are foretold side by side, as many at most as `widest` lets."""
+class _Prediction(Block):
+    """A block with what was measured."""
 
     def __init__(
         self,
@@ -201,35 +195,17 @@ class _Block:
         max_step_s: float,
         lasts_s: float,
     ) -> None:
-        first, self.lanes = trials[lanes[0]], lanes
-        self.rig = rig = model.rig
-        self.inputs = model.driven_by(first)
-        self.outputs = _measured(model, first)
-        model = disturbed(model.acting(first.kind, rig.input_columns(first)), first.kind, processes)
-        available = set(model.parameters()) | set(model.unknowns(first.kind))
-        chosen = tuple(c for c in columns if c in available)
-        self.program = compiled_program(model, first.kind, self.inputs, chosen, self.outputs, width_of(len(lanes)))
-        self.layout, self.width = self.program.layout, self.program.layout.width
-        self.places = [columns.index(n) for n in self.layout.columns]
-        self.substeps = substeps(model, first.dt, max_step_s)
-        self.trials = [trials[i] for i in lanes]
-        self.count = max(len(t) for t in self.trials)
-        padded = self.trials + [self.trials[-1]] * (self.width - len(lanes))
-        known = [{**rig.constants_of(t), **timing(t, self.substeps)} for t in padded]
-        own = [priors[i] for i in lanes] + [priors[lanes[-1]]] * (self.width - len(lanes))
-        for constants, prior in zip(known, own, strict=True):
-            constants.update({f"prior.{n}": prior[n] for n in rig.unknowns(first.kind)})
-        self.doubtful = [n for n in doubt_constants(model, first.kind, self.outputs) if not n.startswith("prior.")]
-        self.constants = np.array([[c.get(n, 0.0) for c in known] for n in self.layout.constants], dtype=float).reshape(
-            -1, self.width
-        )
-        self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
+        kind, self.outputs = trials[lanes[0]].kind, _measured(model, trials[lanes[0]])
+        super().__init__(disturbed(model, kind, processes), trials, lanes, columns, max_step_s, self.outputs)
+        for name in self.rig.unknowns(kind):
+            self._set(self.constants, f"prior.{name}", [priors[i][name] for i in lanes])
+        self.doubtful = [n for n in self.layout.constants if n.startswith(("white.", "std.", "time."))]
         self.seen = np.zeros((self.count, len(self.outputs), self.width), dtype=bool)
         self.measured = np.zeros((self.count, len(self.outputs), self.width))
         self.repeated = np.ones((self.count, len(self.outputs), self.width))
         self.readings: list[Readings] = []
         for lane, trial in enumerate(self.trials):
-            followed = rig.follows(trial) & are_news(trial, lasts_s)
+            followed = self.rig.follows(trial) & are_news(trial, lasts_s)
             judged, repeats = np.zeros((2, len(trial), len(self.outputs)))
             for k, name in enumerate(self.outputs):
                 column, hunting = trial[name], hunts(trial[name])
@@ -240,12 +216,10 @@ class _Block:
                 self.repeated[: len(trial), k, lane] = repeated(column, hunting)
                 repeats[:, k] = self.repeated[: len(trial), k, lane] if count_of(column) > 0.0 else 1.0
             self.readings.append(Readings(self.outputs, judged.astype(bool), repeats))
-        self._latest = LatestInputs()
 
     def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
         """Inputs of all lanes, later by whole samples, beside what was measured and whether it was."""
-        driven = lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.width), shift)
-        return np.concatenate([driven, self.measured, self.seen.astype(float), self.repeated], axis=1)
+        return np.concatenate([super()._inputs(shift), self.measured, self.seen.astype(float), self.repeated], axis=1)
 
     def run(
         self,
@@ -255,14 +229,8 @@ class _Block:
         delays: Sequence[float],
     ) -> tuple[np.ndarray, np.ndarray]:
         """What the program gives of all lanes; see `Program`. Everything is that of all trials."""
-        p = lane_values(self.layout, [values[i] for i in self.lanes], [unknowns[i] for i in self.lanes])
-        shift = tuple(math.floor(delays[i] / t.dt + 1e-9) for i, t in zip(self.lanes, self.trials, strict=True))
-        constants, known = self.constants.copy(), [doubts[i] for i in self.lanes]
-        known += [known[-1]] * (self.width - len(known))
-        for name in self.doubtful:
-            constants[self.layout.constants.index(name)] = [one[name] for one in known]
-        constants[self.layout.constants.index("shift"), : len(shift)] = shift
-        return self.program.run(self._latest.of(shift, self._inputs), p, constants, self.guess, self.substeps)
+        known = {n: [doubts[i][n] for i in self.lanes] for n in self.doubtful}
+        return self._run(values, unknowns, delays, **known)
 
     def innovations(self, y: np.ndarray, s: np.ndarray, width: int, doubts: Sequence[Doubt]) -> Iterator[ForetoldTrial]:
         """The innovations of each lane and under its doubt, with sensitivities to `width` columns."""
@@ -270,11 +238,11 @@ class _Block:
         for lane, readings in enumerate(self.readings):
             n = len(readings.seen)
             own = by_lane[lane, :n]
-            if self.places == list(range(width)):
+            if self.places == tuple(range(width)):
                 sensitivities = own
             else:
                 sensitivities = np.zeros((n, k, width))
-                sensitivities[..., self.places] = own
+                sensitivities[..., list(self.places)] = own
             values = told[lane, :n, :k] if readings.all_seen else np.where(readings.seen, told[lane, :n, :k], 0.0)
             white = tuple(doubts[lane].white[o] for o in self.outputs)
             ar = tuple(doubts[lane].ar.get(o, ()) for o in self.outputs)
@@ -287,14 +255,12 @@ class _Block:
         """
         count = len(self.outputs)
         for lane, trial in enumerate(self.trials):
-            told, variances = (
-                self.measured[: len(trial), :, lane] - y[: len(trial), :count, lane],
-                y[: len(trial), count:, lane],
-            )
+            n = len(trial)
+            told, variances = self.measured[:n, :, lane] - y[:n, :count, lane], y[:n, count:, lane]
             each = {o: ForetoldOutput(told[:, k], variances[:, k]) for k, o in enumerate(self.outputs)}
             for k, o in enumerate(self.outputs):
                 if ar := doubt.ar.get(o):
-                    each[o] = _with_noise_ahead(each[o], y[: len(trial), k, lane], self.seen[: len(trial), k, lane], ar)
+                    each[o] = _with_noise_ahead(each[o], y[:n, k, lane], self.seen[:n, k, lane], ar)
             yield each
 
 

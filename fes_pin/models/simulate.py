@@ -96,7 +96,7 @@ class Simulator:
         self.max_step_s = max_step(model) if max_step_s is None else max_step_s
         self._delayed = is_delayed(model)
         steps, together = self.max_step_s, side_by_side(self.trials, columns, self._key)
-        self._blocks = [_Block(model, self.trials, lanes, columns, steps) for lanes in together]
+        self._blocks = [_Simulation(model, self.trials, lanes, columns, steps) for lanes in together]
         self._fixed = {n: value for block in self._blocks for n, value in block.layout.fixed}
 
     def _key(self, trial: Trial) -> tuple[Any, ...]:
@@ -208,48 +208,86 @@ def _first_samples(trial: Trial) -> Trial:
     return trial.first(max(FEWEST, math.ceil(FIRST_S / trial.dt)))
 
 
-class _Block:
-    """Trials that run side by side, as many at most as `widest` lets."""
+class Block:
+    """Trials of one kind that run side by side in the lanes of one program, as many at most as `widest` lets.
+
+    Parameters
+    ----------
+    model, trials
+        Of all blocks.
+    lanes
+        Places of those among the trials that are in this one.
+    columns
+        Sensitivities that are asked for; those that the model has not are left out.
+    max_step_s
+        Longest integration step.
+    measured
+        Outputs whose measurement corrects the states, for a predictor.
+    """
 
     def __init__(
-        self, model: Model, trials: Sequence[Trial], lanes: list[int], columns: tuple[str, ...], max_step_s: float
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        lanes: list[int],
+        columns: tuple[str, ...],
+        max_step_s: float,
+        measured: tuple[str, ...] = (),
     ) -> None:
-        first = trials[lanes[0]]
-        self.inputs = model.driven_by(first)
-        self.rig = rig = model.rig
-        model = model.acting(first.kind, rig.input_columns(first))
-        self.lanes, self.trials = lanes, [trials[i] for i in lanes]
+        first, self.lanes, self.trials = trials[lanes[0]], lanes, [trials[i] for i in lanes]
+        self.rig, self.inputs = model.rig, model.driven_by(first)
+        model = model.acting(first.kind, self.rig.input_columns(first))
         available = set(model.parameters()) | set(model.unknowns(first.kind))
-        self.program: Program = compiled_program(
-            model,
-            first.kind,
-            self.inputs,
-            tuple(c for c in columns if c in available),
-            width=width_of(len(lanes)),
-        )
-        self.layout = self.program.layout
+        chosen, width = tuple(c for c in columns if c in available), width_of(len(lanes))
+        self.program: Program = compiled_program(model, first.kind, self.inputs, chosen, measured, width)
+        self.layout, self.width = self.program.layout, width
         self.places = tuple(columns.index(n) for n in self.layout.columns)
         self.substeps = substeps(model, first.dt, max_step_s)
         self.count = max(len(t) for t in self.trials)
-        padded = self.trials + [self.trials[-1]] * (self.layout.width - len(lanes))
-        constants = [{**rig.constants_of(t), **timing(t, self.substeps)} for t in padded]
-        self.constants = np.array([[c[n] for c in constants] for n in self.layout.constants])
-        self.constants = self.constants.reshape(-1, self.layout.width)
-        self.guess = np.array([rig.guess(t) for t in padded], dtype=float)
+        padded = self.trials + [self.trials[-1]] * (width - len(lanes))
+        known = [{**self.rig.constants_of(t), **timing(t, self.substeps)} for t in padded]
+        self.constants = np.array([[c.get(n, 0.0) for c in known] for n in self.layout.constants], dtype=float)
+        self.constants = self.constants.reshape(-1, width)
+        self.guess = np.array([self.rig.guess(t) for t in padded], dtype=float)
         self._latest = LatestInputs()
 
     def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
         """Inputs of all lanes, later by whole samples; before the trial begins they are as at rest: zero."""
-        return lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.layout.width), shift)
+        return lane_inputs(self.rig, self.trials, self.inputs, (self.count, self.width), shift)
+
+    def _set(self, constants: np.ndarray, name: str, values: Sequence[float]) -> None:
+        """Write a constant of each lane; spare lanes are as the last trial."""
+        constants[self.layout.constants.index(name)] = [*values, *[values[-1]] * (self.width - len(values))]
+
+    def _run(
+        self,
+        values: Mapping[str, float] | Sequence[Mapping[str, float]],
+        unknowns: Sequence[Mapping[str, float]],
+        delays: Sequence[float],
+        **known: Sequence[float],
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What the program gives of all lanes; see `Program`.
+
+        Parameters
+        ----------
+        values, unknowns, delays
+            Of all trials: parameters, of each the same or its own; unknowns; delays, s.
+        known
+            Further constants of each lane.
+        """
+        own = values if isinstance(values, Mapping) else [values[i] for i in self.lanes]
+        p, constants = lane_values(self.layout, own, [unknowns[i] for i in self.lanes]), self.constants.copy()
+        shift = tuple(math.floor(delays[i] / t.dt + 1e-9) for i, t in zip(self.lanes, self.trials, strict=True))
+        for name, each in {**known, "shift": shift}.items():
+            self._set(constants, name, each)
+        return self.program.run(self._latest.of(shift, self._inputs), p, constants, self.guess, self.substeps)
+
+
+class _Simulation(Block):
+    """A block without measurements."""
 
     def run(self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]], delay: float) -> Abreast:
-        p = lane_values(self.layout, values, [unknowns[i] for i in self.lanes])
-        shift = tuple(math.floor(delay / t.dt + 1e-9) for t in self.trials)
-        constants = self.constants
-        if delay:
-            constants = constants.copy()
-            constants[self.layout.constants.index("shift"), : len(shift)] = shift
-        y, s = self.program.run(self._latest.of(shift, self._inputs), p, constants, self.guess, self.substeps)
+        y, s = self._run(values, unknowns, [delay] * len(unknowns))
         for lane, trial in enumerate(self.trials):
             if len(trial) < self.count:
                 y[len(trial) :, :, lane] = s[len(trial) :, ..., lane] = 0.0

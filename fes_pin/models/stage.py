@@ -15,8 +15,17 @@ import numpy as np
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import unknown
-from fes_pin.models.maths import sqrt, where
+from fes_pin.models.maths import where
 from fes_pin.models.parameters import ParameterInfo, check_parameters, parameters_of
+
+Measured = Mapping[str, np.ndarray]
+"""Every measured column, all trials end to end, by name; `time` since each trial began, s."""
+ByName = Mapping[str, Any]
+"""Values of states or memories, or their rates, by name."""
+Bounds = dict[str, tuple[float, float]]
+"""The least and the largest value of parameters, by name."""
+Grids = dict[str, tuple[float, ...]]
+"""Values of parameters that are tried, by name."""
 
 
 class Stage(StrEnum):
@@ -104,11 +113,11 @@ class Effect:
         """The signal with the effect, from the signal without it."""
         raise NotImplementedError
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         """Time derivative of each state."""
         return {}
 
-    def update(self, s: Any) -> Mapping[str, Any]:
+    def update(self, s: Any) -> ByName:
         """Next value of each memory."""
         return {}
 
@@ -116,19 +125,19 @@ class Effect:
         """Of each memory that only follows something by `update` once a slack is taken up: what, and half the slack."""
         return {}
 
-    def rest(self, s: Any) -> Mapping[str, Any]:
+    def rest(self, s: Any) -> ByName:
         """States and memories at rest that are not zero."""
         return {}
 
-    def intensities(self, c: Any) -> Mapping[str, Any]:
+    def intensities(self, c: Any) -> ByName:
         """Intensity of the white noise that drives each state at random, from the constants `random`."""
         return {}
 
-    def stationary_variances(self, c: Any) -> Mapping[str, Any]:
+    def stationary_variances(self, c: Any) -> ByName:
         """Variance of what is random in each state when a trial begins, from the constants `random`."""
         return {}
 
-    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
+    def start_variances(self, reach: Any, speed: Any) -> ByName:
         """How uncertain states, and memories that states go into, are when a trial begins, beside `rest`: unit squared.
 
         Parameters
@@ -205,7 +214,7 @@ class Effect:
         return dataclasses.replace(cls.absent(), each_trial=True, **shapes)
 
     @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def grids(cls, measured: Measured) -> Grids:
         """Start values of each parameter for a search, most likely first.
 
         Parameters
@@ -216,24 +225,24 @@ class Effect:
         return {n: info.grid or (getattr(cls, n),) for n, info in cls.parameters().items()}
 
     @classmethod
-    def far_sizes(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def far_sizes(cls, measured: Measured) -> Grids:
         """Sizes of amplitudes that no slope leads to, and a fit begins with as well; `measured` as in `grids`."""
         info = cls.parameters()
         return {n: info[n].grid for n in cls.amplitudes() if info[n].grid}
 
     @classmethod
-    def forms(cls, measured: Mapping[str, np.ndarray]) -> tuple[Mapping[str, float], ...]:
+    def forms(cls, measured: Measured) -> tuple[Mapping[str, float], ...]:
         """Forms that a screen tries, each by the values of the refinements that it has: the plain one, by default.
 
         A refinement belongs here if without it the effect may look like none at all; `measured` as in `grids`.
         """
         return ({},)
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """Bounds that the measured range sets to parameters, inside the physical ones; `measured` as in `grids`."""
         return {}
 
-    def smallest(self, measured: Mapping[str, np.ndarray]) -> dict[str, float]:
+    def smallest(self, measured: Measured) -> dict[str, float]:
         """Sizes of amplitudes below which readings as coarse as these do not tell them.
 
         `measured` is as in `grids`, with `answer` the effort of a controller that answers what is read.
@@ -318,17 +327,21 @@ def counted_from(s: Any, place: Any) -> Any:
     return where(place < 0.5, s.rest_reading, where(place < 1.5, s.idle_reading, 0.0))
 
 
-def places(measured: Mapping[str, np.ndarray]) -> tuple[float, ...]:
-    """The choices of `counted_from` that a search has: a joint's trial may begin anywhere."""
-    reads_position = np.array_equal(measured.get("position", ()), measured.get("reading", ()))
-    return (1.0, 0.0, 2.0) if "position" in measured and reads_position else (0.0,)
+class FromAPlace(Effect):
+    """Base of what a sensor does to deviations that are counted from a place of the rig, the parameter `place`."""
+
+    @classmethod
+    def grids(cls, measured: Measured) -> Grids:
+        """Deviations are counted from any place that the rig has: a joint's trial may begin anywhere."""
+        position = measured.get("position")
+        anywhere = position is not None and np.array_equal(position, measured.get("reading", ()))
+        return {**super().grids(measured), "place": (1.0, 0.0, 2.0) if anywhere else (0.0,)}
 
 
-def reading_range(measured: Mapping[str, np.ndarray]) -> float:
+def reading_range(measured: Measured) -> float:
     """Largest difference between first readings; 0 where there are none."""
-    if "reading" not in measured:
-        return 0.0
-    return float(np.nanmax(measured["reading"]) - np.nanmin(measured["reading"]))
+    reading = measured.get("reading", np.zeros(1))
+    return float(np.nanmax(reading) - np.nanmin(reading))
 
 
 def symmetric(size: float) -> tuple[float, float]:
@@ -336,26 +349,12 @@ def symmetric(size: float) -> tuple[float, float]:
     return (-size, size) if size > 0.0 else (-math.inf, math.inf)
 
 
-def lag(target: Any, state: Any, time_constant: Any, step: Any) -> tuple[Any, Any]:
-    """First-order low pass of `target` that is exact at time constant 0 and never stiff.
-
-    With e = (T^8 + (h/2)^8)^(1/8), h the integration step: x' = (target - x) / e, out = target - T x'.
-    The transfer function (1 + (e - T) s) / (1 + e s) has the low pass's delay T. It differs from the low pass where T
-    is below a step, and then only above 2/h: e - T is h/2 at T = 0, h/4000 at T = h. Runge-Kutta steps of order four
-    are stable down to e = 0.36 h.
-
-    Returns
-    -------
-    out, rate
-        The lagged signal and the time derivative of `state`.
-    """
-    rate = (target - state) / lag_time(time_constant, step)
-    return target - time_constant * rate, rate
+def span(measured: Measured, name: str) -> float:
+    """How far a column goes, from its least to its largest value; 0 where it was not measured."""
+    return float(np.ptp(measured.get(name, np.zeros(1))))
 
 
-def lag_time(time_constant: Any, step: Any) -> Any:
-    """By how much the state of `lag` is late: e, s."""
-    shortest = 0.5 * step
-    ratio = time_constant / shortest
-    fourth = ratio * ratio * ratio * ratio
-    return shortest * sqrt(sqrt(sqrt(1.0 + fourth * fourth)))
+def least_step(values: np.ndarray) -> float:
+    """The least difference of neighbours that is none of equal ones; infinite where all are equal."""
+    steps = np.abs(np.diff(values))
+    return float(np.min(steps, where=steps > 0.0, initial=np.inf))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -86,11 +86,8 @@ def load_model(path: str | Path, *, library: Source | Sequence[Source] | None = 
     if found != FORMAT or isinstance(found, bool):
         raise document.error("format", f"expected format = {FORMAT}: a model that fes-pin saved")
     name = document.data.get("rig")
-    try:
-        kind = kinds[one_of(name, tuple(kinds))]
-    except ValueError as problem:
-        raise document.error("rig", _missing(document, name, str(problem))) from None
-    nominal: dict[str, Any] = _numbers(document, "nominal", set(kind.parameters()))
+    kind = kinds[one_of(name, tuple(kinds), lambda told: document.error("rig", _missing(document, name, told)))]
+    nominal: dict[str, Any] = _numbers(document, "nominal", kind.parameters())
     constants, fitted = _numbers(document, "constants", None), document.data.get("fitted", "")
     try:
         model = Model(kind(**nominal, constants=constants, fitted=fitted, session=document.data.get("session", ())))
@@ -131,16 +128,11 @@ def _effect(document: Document, catalogue: Catalogue, name: str, listed: dict[st
     each_trial = document.table(key, listed).pop(EACH_TRIAL, False)
     if not isinstance(each_trial, bool) or (each_trial and not kind.varies):
         raise document.error(f"{key}.{EACH_TRIAL}", f"expected {'true or false' if kind.varies else 'none'}")
-    return kind(**_numbers(document, key, set(kind.parameters()), listed), each_trial=each_trial)
+    return kind(**_numbers(document, key, kind.parameters(), listed), each_trial=each_trial)
 
 
 def _numbers(
-    document: Document, key: str, known: set[str] | None, inside: dict[str, Any] | None = None
+    document: Document, key: str, known: Iterable[str] | None, inside: dict[str, Any] | None = None
 ) -> dict[str, float]:
     values = document.table(key, inside)
-    for name in values:
-        if known is not None and name not in known:
-            raise document.error(f"{key}.{name}", f"unknown; expected one of {', '.join(sorted(known))}")
-    if known is not None and (missing := known - set(values)):
-        raise document.error(key, f"expected {', '.join(sorted(missing))} as well")
-    return document.numbers(key, values, dict.fromkeys(values, NumberKey("")))
+    return document.numbers(key, values, dict.fromkeys(values if known is None else known, NumberKey("")))

@@ -129,7 +129,12 @@ def _multiply(root: Element, moving: list[str], mass: float, length: float) -> N
 
 def _lengthen(origin: Element | None, factor: float) -> None:
     if origin is not None and origin.get("xyz") and factor != 1.0:
-        origin.set("xyz", in_full(*(factor * float(x) for x in origin.get("xyz", "").split())))
+        origin.set("xyz", in_full(*(factor * _vector(origin, "xyz", ""))))
+
+
+def _vector(element: Element | None, key: str, default: str) -> np.ndarray:
+    """The three numbers of an attribute, shape (3,)."""
+    return np.array([float(x) for x in (default if element is None else element.get(key, default)).split()])
 
 
 def _add(root: Element, joint: Element, moving: list[str], extra: float, urdf: str | Path) -> bool:
@@ -142,10 +147,7 @@ def _add(root: Element, joint: Element, moving: list[str], extra: float, urdf: s
     inertia = None if bare is None else bare.find("inertia")
     if bare is None or inertia is None:
         raise InputError("expected a mass on the link that the joint moves", file=urdf, column=moving[0])
-    found = joint.find("axis")
-    axis = np.array([float(x) for x in (found.get("xyz", "1 0 0") if found is not None else "1 0 0").split()])
-    origin = bare.find("origin")
-    rpy = [float(x) for x in (origin.get("rpy", "0 0 0") if origin is not None else "0 0 0").split()]
+    axis, rpy = _vector(joint.find("axis"), "xyz", "1 0 0"), _vector(bare.find("origin"), "rpy", "0 0 0")
     axis = pin.rpy.rpyToMatrix(*rpy).T @ (axis / np.linalg.norm(axis))
     keys = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
     tensor = np.zeros((3, 3))

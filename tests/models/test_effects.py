@@ -22,6 +22,7 @@ from fes_pin.models.effects import EFFECTS, effect_named, effects_for
 from fes_pin.models.model import Model
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import Simulator, max_step, simulate
+from fes_pin.models.stage import Effect, classes_in, in_order
 
 GOLDEN = Path(__file__).with_name("causes.txt")
 NOT_YET = {
@@ -95,7 +96,7 @@ def test_a_cause_is_one_file(tmp_path, monkeypatch):
     """Nothing else has to be edited for it to stand at its place on the path."""
     (tmp_path / "joint_creep.py").write_text(NEW_CAUSE)
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
-    names = [e.name for e in effects.find_effects()]
+    names = [e.name for e in in_order(classes_in(effects.__path__, effects.__name__, Effect))]
     sys.modules.pop("fes_pin.models.effects.joint_creep")
     at = names.index("joint_creep")
     assert names[at - 1 : at + 2] == ["effort_offset", "joint_creep", "joint_stop"]
@@ -183,10 +184,10 @@ def test_a_trial_starts_at_rest(one, rig, kind):
     timing = {"t0": 0.0, "dt": first.dt, "step": first.dt / 4, "shift": 0.0}
     p = np.array([model.parameters()[n] for n in layout.values])
     c = np.array([{**RIGS[rig].constants_of(first), **timing}[n] for n in layout.constants])
-    z = newton(lambda z: float(program.equations.rest(z, p, c)[0]), RIGS[rig].guess(first))
-    state, memory = program.equations.start(z, p, c)
-    held = program.equations.sample(state, memory, [0.0], 0.0, p, c)
-    rates = np.array(program.equations.rates(state, held, [0.0], 0.0, 0.0, 0.0, p, c)).ravel()
+    z = newton(lambda z: float(program.equations.functions["rest"](z, p, c)[0]), RIGS[rig].guess(first))
+    state, memory = program.equations.functions["start"](z, p, c)
+    held = program.equations.functions["sample"](state, memory, [0.0], 0.0, p, c)
+    rates = np.array(program.equations.functions["rates"](state, held, [0.0], 0.0, 0.0, 0.0, p, c)).ravel()
     assert np.abs(rates).max() <= 1e-9
 
 

@@ -74,7 +74,7 @@ def robot(folder, kind="revolute", axis="0 1 0", base="0 0 0", com="0.05 -0.02 0
 def acceleration(model, kind, inputs, constants, states):
     """The engine's acceleration at states, as a function (q, v, act, u) -> number, through CasADi's interpreter."""
     layout = make_layout(model, kind, inputs, ())
-    rates = derive(model, layout).rates
+    rates = derive(model, layout).functions["rates"]
     values = {**model.parameters(), **dict.fromkeys(layout.unknowns, 0.0)}
     p = [values[n] for n in layout.values]
     c = [{**constants, **TIMING}[n] for n in layout.constants]

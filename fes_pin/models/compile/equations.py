@@ -17,6 +17,7 @@ than dt / (J - 1). The stretch is part of the equations, so the sensitivity to t
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -31,27 +32,23 @@ from fes_pin.models.stage import Signals
 
 @dataclass(frozen=True)
 class Equations:
-    """The functions of one model and kind of trial; see the module."""
+    """The functions of one model and kind of trial; see the module.
+
+    Attributes
+    ----------
+    functions
+        By name: rest, start, sample, rates and output; of a predictor also correct and follow.
+    """
 
     layout: Layout
-    rest: ca.Function
-    start: ca.Function
-    sample: ca.Function
-    rates: ca.Function
-    output: ca.Function
-    correct: ca.Function | None = None
-    follow: ca.Function | None = None
-
-    def functions(self) -> dict[str, ca.Function]:
-        """Every function that a program is made of, by name."""
-        names = ("rest", "start", "sample", "rates", "output", "correct", "follow")
-        return {n: f for n in names if (f := getattr(self, n)) is not None}
+    functions: Mapping[str, ca.Function]
 
     @property
     def sizes(self) -> Sizes:
         """Lengths of the vectors of states, memories and readings, each with its sensitivities."""
-        reading = self.output.numel_out(0) if self.correct is None else self.correct.numel_out(1)
-        return Sizes(self.start.numel_out(0), self.start.numel_out(1), reading, self.rates.numel_out(0))
+        f = self.functions
+        reading = f["correct"].numel_out(1) if "correct" in f else f["output"].numel_out(0)
+        return Sizes(f["start"].numel_out(0), f["start"].numel_out(1), reading, f["rates"].numel_out(0))
 
 
 class _Symbols:
@@ -234,19 +231,25 @@ def derive(model: Model, layout: Layout) -> Equations:
     m0 = ca.vertcat(d.m0, nonzeros(d.at_start(d.m0), r_pattern))
     after = ca.vertcat(d.after, nonzeros(d.through(d.after, *inner), r_pattern))
     rates = ca.vertcat(d.rates, nonzeros(d.through(d.rates, *inner), s_pattern))
-    return Equations(
-        layout=layout,
-        rest=dense_function("rest", [d.z, d.p, d.c], [d.g, d.g_z]),
-        start=dense_function("start", [d.z, d.p, d.c], [x0, m0]),
-        sample=dense_function("sample", [state, memory, d.u, d.t, d.p, d.c], [after]),
-        rates=dense_function("rates", [state, memory, d.u, d.t, d.since, d.into, d.p, d.c], [rates]),
-        output=dense_function("output", [state, memory, d.u, d.t, d.p, d.c], [y]),
+    given = [d.u, d.t, d.p, d.c]
+    return equations_of(
+        d,
+        start=([], [x0, m0]),
+        sample=([state, memory, *given], [after]),
+        rates=([state, memory, d.u, d.t, d.since, d.into, d.p, d.c], [rates]),
+        output=([state, memory, *given], [y]),
     )
 
 
-def dense_function(name: str, ins: list[Any], outs: list[Any]) -> ca.Function:
-    """A function whose outputs are dense and share their common terms."""
-    return ca.Function(name, ins, ca.cse([ca.densify(o) for o in outs]))
+def equations_of(d: Tangents, **written: tuple[list[Any], list[Any]]) -> Equations:
+    """Inputs and outputs of each function as functions, whose outputs are dense and share their common terms.
+
+    That of the static equilibrium is added; functions without inputs are of what is known there.
+    """
+    made = {}
+    for name, (ins, outs) in {"rest": ([], [d.g, d.g_z]), **written}.items():
+        made[name] = ca.Function(name, ins or [d.z, d.p, d.c], ca.cse([ca.densify(o) for o in outs]))
+    return Equations(d.layout, made)
 
 
 def _symbols(prefix: str, names: Any) -> dict[str, ca.SX]:

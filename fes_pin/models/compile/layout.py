@@ -89,15 +89,6 @@ def reading_inputs(measured: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(f"{what}.{n}" for what in ("measured", "seen", "repeated") for n in measured)
 
 
-def doubt_constants(model: Model, kind: str, measured: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the constants of a predictor: deviations of reading noise and initial states, of random states too."""
-    return (
-        *(f"white.{n}" for n in measured),
-        *(f"prior.{n}" for n in model.rig.unknowns(kind)),
-        *(n for e in model.effects for n in e.random),
-    )
-
-
 def make_layout(
     model: Model,
     kind: str,
@@ -108,7 +99,10 @@ def make_layout(
 ) -> Layout:
     """The layout of a model's program for trials of a kind with these input columns."""
     rig = model.rig
-    doubt = doubt_constants(model, kind, measured) if measured else ()
+    noise: tuple[str, ...] = ()  # of a predictor: deviations of reading noise and initial states, of random states too
+    if measured:
+        noise = (*(f"white.{n}" for n in measured), *(f"prior.{n}" for n in rig.unknowns(kind)))
+        noise = (*noise, *(n for e in model.effects for n in e.random))
     past = PAST if any(e.remembers for e in model.effects) else ()
     fixed = {n: value for n, value in model.unused_parameters().items() if n not in columns}
     return Layout(
@@ -116,7 +110,7 @@ def make_layout(
         inputs=(*inputs, *reading_inputs(measured)),
         parameters=tuple(n for n in model.parameters() if n not in fixed),
         unknowns=model.unknowns(kind),
-        constants=(*rig.constant_names(kind), *rig.motion_names(kind), *past, *TIMING, *doubt),
+        constants=(*rig.constant_names(kind), *rig.motion_names(kind), *past, *TIMING, *noise),
         outputs=rig.outputs(kind),
         columns=columns,
         fixed=tuple(fixed.items()),

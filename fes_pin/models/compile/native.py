@@ -53,8 +53,7 @@ def compile_equations(equations: Equations) -> bytes:
 
 def emit(equations: Equations) -> tuple[str, Sizes]:
     """LLVM assembly of a program, and its sizes: static equilibrium, then samples of Runge-Kutta steps."""
-    functions = equations.functions()
-    made = {n: lowered(f, known=_known(n, f), width=equations.layout.width) for n, f in functions.items()}
+    made = {n: lowered(f, known=_known(n, f), width=equations.layout.width) for n, f in equations.functions.items()}
     sizes = replace(equations.sizes, kept=sum(one.kept for one in made.values()))
     declared = {name: line for one in made.values() for name, line in one.declared.items()}
     loop = _Loop(equations, made, sizes).module
@@ -78,7 +77,7 @@ class _Loop:
         self.vector = ir.VectorType(DOUBLE, equations.layout.width)
         double, elsewhere = ir.PointerType(self.vector), ir.Module()  # the parts are text: here they are names
         self.parts = dict[str, ir.Function]()
-        for n, f in equations.functions().items():
+        for n, f in equations.functions.items():
             for part in made[n].parts.values():
                 read = f.n_in() + 1 + (f.n_out() if part == n else 0)
                 kind = ir.FunctionType(ir.VoidType(), [double] * read)
@@ -179,7 +178,7 @@ class _Loop:
         for name in LOOPED:
             if name in self.made:
                 known = [self.p, self.c]
-                self._before(name, [self.state] * (self.equations.functions()[name].n_in() - len(known)) + known, 0)
+                self._before(name, [self.state] * (self.equations.functions[name].n_in() - len(known)) + known, 0)
 
     def _samples(self) -> None:
         b, inputs = self.b, len(self.equations.layout.inputs)

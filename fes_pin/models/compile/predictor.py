@@ -41,7 +41,7 @@ from typing import Any
 
 import casadi as ca
 
-from fes_pin.models.compile.equations import Equations, Tangents, column, dense_function, nonzeros
+from fes_pin.models.compile.equations import Equations, Tangents, column, equations_of, nonzeros
 from fes_pin.models.compile.layout import Layout
 from fes_pin.models.compile.slack import Gaussian, Slack, read_across
 from fes_pin.models.model import Model
@@ -182,19 +182,15 @@ def derive_predictor(model: Model, layout: Layout) -> Equations:
     after = ca.vertcat(d.after, nonzeros(d.through(d.after, *inner), r_pattern))
     reached = ca.SX.sym("x1", count)
     given = [state, memory, d.u, d.t, d.p, d.c]
-    return Equations(
-        layout=layout,
-        rest=dense_function("rest", [d.z, d.p, d.c], [d.g, d.g_z]),
-        start=dense_function("start", [d.z, d.p, d.c], [x0, m0]),
-        sample=dense_function("sample", given, [after]),
-        rates=dense_function("rates", [d.x, held, memory, d.u, d.t, d.since, d.into, d.p, d.c], [d.rates]),
-        output=dense_function("output", given, [d.readings]),
-        correct=dense_function("correct", given, _corrected(d, doubt, s, inner, packed)),
-        follow=dense_function(
-            "follow",
-            [state, reached, memory, d.u, d.t, d.since, d.into, d.p, d.c],
-            [packed(reached, *_followed(d, doubt, s, r, reached))],
-        ),
+    during = [memory, d.u, d.t, d.since, d.into, d.p, d.c]
+    return equations_of(
+        d,
+        start=([], [x0, m0]),
+        sample=(given, [after]),
+        rates=([d.x, held, *during], [d.rates]),
+        output=(given, [d.readings]),
+        correct=(given, _corrected(d, doubt, s, inner, packed)),
+        follow=([state, reached, *during], [packed(reached, *_followed(d, doubt, s, r, reached))]),
     )
 
 

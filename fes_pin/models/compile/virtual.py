@@ -27,7 +27,7 @@ class VirtualProgram:
         out = np.empty((n, self.equations.sizes.reading, width))
         for lane in range(width):
             p, c = values[:, lane], constants[:, lane]
-            state, memory = self.equations.start(self._rest(float(guess[lane]), p, c), p, c)
+            state, memory = self.equations.functions["start"](self._rest(float(guess[lane]), p, c), p, c)
             trajectory = self._trajectory(n, substeps)
             times = self._times(c, n)
             ended = trajectory(state, memory, inputs[:, :, lane].T, times, ca.repmat(p, 1, n), ca.repmat(c, 1, n))
@@ -41,7 +41,7 @@ class VirtualProgram:
 
     def _rest(self, z: float, p: np.ndarray, c: np.ndarray) -> float:
         for _ in range(REST_ITERATIONS):
-            g, slope = self.equations.rest(z, p, c)
+            g, slope = self.equations.functions["rest"](z, p, c)
             with np.errstate(all="ignore"):
                 z -= float(np.clip(np.float64(g) / np.float64(slope), -REST_STEP, REST_STEP))
         return z
@@ -52,20 +52,20 @@ class VirtualProgram:
 
     def _sample(self, substeps: int) -> ca.Function:
         """From one sample to the next, by classical Runge-Kutta steps of order four."""
-        e, layout = self.equations, self.layout
+        e, layout, f = self.equations, self.layout, self.equations.functions
         names = ("state", "memory", "u", "t", "p", "c")
         sizes = (e.sizes.state, e.sizes.memory, len(layout.inputs), 1, len(layout.values), len(layout.constants))
         state, memory, u, t, p, c = given = [ca.MX.sym(n, k) for n, k in zip(names, sizes, strict=True)]
-        held = e.sample(state, memory, u, t, p, c)
-        if e.correct is None:
-            y = e.output(state, held, u, t, p, c)
+        held = f["sample"](state, memory, u, t, p, c)
+        if "correct" in f:
+            state, y = f["correct"](state, held, u, t, p, c)
         else:
-            state, y = e.correct(state, held, u, t, p, c)
+            y = f["output"](state, held, u, t, p, c)
         h = c[layout.constants.index("step")]
         for j in range(substeps):
 
-            def rates(x: Any, at: float, since: Any = j * h, begun: Any = (state,) if e.follow else ()) -> Any:
-                return e.rates(x, *begun, held, u, t, since, at * h, p, c)
+            def rates(x: Any, at: float, since: Any = j * h, begun: Any = (state,) if "follow" in f else ()) -> Any:
+                return f["rates"](x, *begun, held, u, t, since, at * h, p, c)
 
             begun = state[: e.sizes.integrated]
             first = rates(begun, 0.0)
@@ -73,5 +73,5 @@ class VirtualProgram:
             third = rates(begun + 0.5 * h * second, 0.5)
             fourth = rates(begun + h * third, 1.0)
             end = begun + h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
-            state = end if e.follow is None else e.follow(state, end, held, u, t, j * h, 0.5 * h, p, c)
+            state = f["follow"](state, end, held, u, t, j * h, 0.5 * h, p, c) if "follow" in f else end
         return ca.Function("sample", given, [state, held, y])

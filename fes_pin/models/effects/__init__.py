@@ -9,14 +9,8 @@ from typing import Any
 
 from fes_pin.models.stage import Effect, by_name, classes_in, in_order
 
-
-def find_effects() -> tuple[type[Effect], ...]:
-    """The effects of this folder's files, in the order of the signal path, by name at each stage."""
-    return in_order(classes_in(__path__, __name__, Effect))
-
-
-EFFECTS = find_effects()
-"""Every effect, in the order of the signal path."""
+EFFECTS = in_order(classes_in(__path__, __name__, Effect))
+"""The effects of this folder's files, in the order of the signal path, by name at each stage."""
 
 
 def __getattr__(name: str) -> Any:  # each has parameters of its own, which no type of all effects names

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.maths import clip, maximum
+from fes_pin.models.maths import clip, lag, maximum
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage, lag
+from fes_pin.models.stage import ByName, Effect, Stage
 
 
 @dataclass(frozen=True)
@@ -38,9 +37,9 @@ class AntagonistSpillover(Effect):
     def apply(self, value: Any, s: Any) -> Any:
         return value - self.share * s.force_scale * lag(s.own.recruited, s.own.act, self.lag_s, s.step)[0]
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         return {"act": lag(s.own.recruited, s.own.act, self.lag_s, s.step)[1]}
 
-    def update(self, s: Any) -> Mapping[str, Any]:
+    def update(self, s: Any) -> ByName:
         room = maximum(s.c.saturation_us - self.onset_us, 1.0)
         return {"recruited": clip((s.u.pulse_width_us - self.onset_us) / room, 0.0, 1.0)}

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.models.maths import where
+from fes_pin.models.maths import play
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, least_step, span
 
 WIDTHS = (0.003, 0.03)
 """Half widths that a fit begins with beside those that slopes lead to, as shares of the range of the motion."""
@@ -37,40 +37,33 @@ class Backlash(Effect):
     memories = ("followed",)
 
     @classmethod
-    def far_sizes(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def far_sizes(cls, measured: Measured) -> Grids:
         """Shares of the motion: slopes beside a reading that follows at once end at a slack of a few counts."""
-        position = measured.get("position", np.zeros(1))
-        size = float(np.max(position) - np.min(position))
+        size = span(measured, "position")
         return {"half_width": tuple(share * size for share in WIDTHS)} if size > 0.0 else {}
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """A slack that the motion never crosses would hide all of it."""
-        position = measured.get("position", np.zeros(1))
-        size = float(np.max(position) - np.min(position))
+        size = span(measured, "position")
         return {"half_width": (0.0, 0.5 * size)} if size > 0.0 else {}
 
-    def smallest(self, measured: Mapping[str, np.ndarray]) -> dict[str, float]:
+    def smallest(self, measured: Measured) -> dict[str, float]:
         """Half a count: a reading that stands still for less has not come to the next."""
-        steps = np.abs(np.diff(measured.get("position", np.zeros(1))))
-        return {"half_width": 0.5 * float(np.min(steps, where=steps > 0.0, initial=np.inf))} if steps.any() else {}
+        step = least_step(measured.get("position", np.zeros(1)))
+        return {"half_width": 0.5 * step} if np.isfinite(step) else {}
 
     def apply(self, value: Any, s: Any) -> Any:
-        return self._play(value, s)
+        return play(s.own.followed, value, self.half_width)
 
-    def update(self, s: Any) -> Mapping[str, Any]:
-        return {"followed": self._play(s.q, s)}
+    def update(self, s: Any) -> ByName:
+        return {"followed": play(s.own.followed, s.q, self.half_width)}
 
     def slack(self, s: Any) -> Mapping[str, tuple[Any, Any]]:
         return {"followed": (s.q, self.half_width)}
 
-    def rest(self, s: Any) -> Mapping[str, Any]:
+    def rest(self, s: Any) -> ByName:
         return {"followed": s.q}
 
-    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
+    def start_variances(self, reach: Any, speed: Any) -> ByName:
         """Where in the slack a trial begins nobody knows: evenly spread over 2 half_width."""
         return {"followed": self.half_width**2 / 3.0}
-
-    def _play(self, position: Any, s: Any) -> Any:
-        # strict comparisons, unlike clip, keep the derivative of the side that pulls also at half width 0
-        b, low, high = s.own.followed, position - self.half_width, position + self.half_width
-        return where(b < low, low, where(b > high, high, b))

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fes_pin.models.maths import cos, sin
+from fes_pin.models.maths import TURN, cos, sin
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage
 
-TURN = 6.283185307179586
-"""2 pi, rad per turn."""
 FEWEST, MOST = 1.5, 30.0
 """Waves within the measured range: one is a spring that hardens, or gravity; of one and a half, half comes again. More
 would be about a degree on half a radian."""
@@ -49,7 +46,7 @@ class Cogging(Effect):
     name, stage, signal, rigs = "cogging", Stage.JOINT, "torque", ("joint",)
 
     @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def grids(cls, measured: Measured) -> Grids:
         """Waves that come again within the measured range; of a joint that turns round also whole ones a turn."""
         grids, size = super().grids(measured), _range(measured)
         if not size > 0.0:
@@ -58,7 +55,7 @@ class Cogging(Effect):
         waves += [float(n) for n in range(1, TEETH + 1) if size > TURN and n * size > TURN * MOST]
         return {**grids, "waves": tuple(waves)}
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """What does not come again within the measured range is not seen to be periodic."""
         size = _range(measured)
         return {"waves": (FEWEST * TURN / size, np.inf)} if size > 0.0 else {}
@@ -69,7 +66,7 @@ class Cogging(Effect):
         return value + self.second * sin(2.0 * angle + self.phase_rad)
 
 
-def _range(measured: Mapping[str, np.ndarray]) -> float:
+def _range(measured: Measured) -> float:
     """All but the outermost hundredths of the positions that were measured, rad or m; 0 where there are none."""
     position = measured.get("position", np.zeros(1))
     return float(np.quantile(position, 0.99) - np.quantile(position, 0.01))

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.models.maths import exp, fabs, log, sqrt, where
+from fes_pin.models.maths import exp, fabs, lag, log, play, power, sqrt
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage, lag
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage
 
 STIFFEST = 2.5
 """Largest rate of decay times step that it may show; RK4 is stable to 2.78: Hairer, Wanner, Solving ODEs II, IV.2."""
@@ -110,7 +110,7 @@ class CoulombFriction(Effect):
     foretold_step_s = 4e-3 / 3.0
 
     @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def grids(cls, measured: Measured) -> Grids:
         """Of a joint, speeds in the measure of its own, which a sine is below for a fifth of the time, more or less."""
         grids, speed, info = super().grids(measured), _usual_speed(measured), cls.parameters()
         tried: dict[str, tuple[Sequence[float], float]] = {
@@ -123,7 +123,7 @@ class CoulombFriction(Effect):
         return {**grids, **own}
 
     @classmethod
-    def forms(cls, measured: Mapping[str, np.ndarray]) -> tuple[Mapping[str, float], ...]:
+    def forms(cls, measured: Measured) -> tuple[Mapping[str, float], ...]:
         """With presliding as well where the motion is imposed: at rates of many samples a band's stretch is no jump.
 
         With a stretch where an effort answers what is read: beside a play, a joint that sticks and creeps otherwise
@@ -132,7 +132,7 @@ class CoulombFriction(Effect):
         grids, tried = cls.grids(measured), "stretch" if "answer" in measured else "presliding"
         return ({}, *({tried: way} for way in grids[tried] if way > 0.0))
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """A fall of friction with speed ends among the speeds that a joint moves at; else it is less damping.
 
         What a joint moves by without slipping is little of its motion; else the contact is a spring.
@@ -144,7 +144,7 @@ class CoulombFriction(Effect):
 
     def apply(self, value: Any, s: Any) -> Any:
         ratio = s.v / self.stribeck_speed
-        loaded = exp(0.5 * self.load_exponent * log(s.bearing_load * s.bearing_load + UNLOADED * UNLOADED))
+        loaded = power(s.bearing_load, self.load_exponent, UNLOADED)
         most = self.torque_nm * loaded * (1.0 + self.stiction * exp(-ratio * ratio))
         both_ways = self._acting(most, value, s)[0]
         most = most * (1.0 + self.asymmetry * both_ways / _length(both_ways))
@@ -157,16 +157,13 @@ class CoulombFriction(Effect):
         beyond = 0.5 * (_length(y + 1.0) + _length(y - 1.0))
         return y / (beyond * beyond)
 
-    def update(self, s: Any) -> Mapping[str, Any]:
-        if not hasattr(s.own, "anchor"):
-            return {}
-        a, low, high = s.own.anchor, s.q - self._way(s), s.q + self._way(s)
-        return {"anchor": where(a < low, low, where(a > high, high, a))}
+    def update(self, s: Any) -> ByName:
+        return {"anchor": play(s.own.anchor, s.q, self._way(s))} if hasattr(s.own, "anchor") else {}
 
-    def rest(self, s: Any) -> Mapping[str, Any]:
+    def rest(self, s: Any) -> ByName:
         return {"anchor": s.q} if hasattr(s.own, "anchor") else {}
 
-    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
+    def start_variances(self, reach: Any, speed: Any) -> ByName:
         """How far the contact is stretched when a trial begins nobody knows."""
         return {"anchor": self.stretch**2 / 3.0}
 
@@ -181,7 +178,7 @@ class CoulombFriction(Effect):
             return self.creep_speed
         return sqrt(self.creep_speed * self.creep_speed + 0.25 * most * self._way(s) / s.inertia)
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         return {"share": self._acting(self.torque_nm, 0.0, s)[1]} if hasattr(s.own, "share") else {}
 
     def _acting(self, most: Any, value: Any, s: Any) -> tuple[Any, Any]:
@@ -212,23 +209,19 @@ def _stopping(s: Any) -> Any:
     return STIFFEST * getattr(s, "stopping", s.inertia / s.step)
 
 
-def _free_way(measured: Mapping[str, np.ndarray]) -> float:
+def _free_way(measured: Measured) -> float:
     """How far a motion goes that is read as a position, rad or m; 0 of others."""
     position = measured.get("position", np.empty(0))
-    if not len(position) or not np.array_equal(position, measured.get("reading", ())):
-        return 0.0
-    return float(np.max(position) - np.min(position))
+    return float(np.ptp(position)) if len(position) and np.array_equal(position, measured.get("reading", ())) else 0.0
 
 
-def _imposed_way(measured: Mapping[str, np.ndarray]) -> float:
+def _imposed_way(measured: Measured) -> float:
     """How far an imposed motion goes, rad or m; 0 where the motion is what is read."""
-    position = measured.get("position", measured.get("angle_rad", np.empty(0)))
-    if not len(position) or np.array_equal(position, measured.get("reading", ())):
-        return 0.0
-    return float(np.max(position) - np.min(position))
+    position = measured.get("position", measured.get("angle_rad", np.zeros(1)))
+    return 0.0 if np.array_equal(position, measured.get("reading", ())) else float(np.ptp(position))
 
 
-def _usual_speed(measured: Mapping[str, np.ndarray]) -> float:
+def _usual_speed(measured: Measured) -> float:
     """Root mean square of a joint's speed over SPAN_S, rad/s or m/s; 0 where no position was measured.
 
     That of a sine is its median as well; but a joint that rests most of the time has the median of its noise.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, Effect, Measured, Stage
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,7 @@ class EffortOffset(Effect):
 
     name, stage, signal, rigs = "effort_offset", Stage.JOINT, "effort", ("joint",)
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """No more than the largest effort that was commanded: more would be another rig."""
         largest = float(np.max(np.abs(measured.get("effort", np.zeros(1)))))
         return {"offset": (-largest, largest)} if largest > 0.0 else {}

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.parameters import parameter
 from fes_pin.models.session import after_the_past
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import ByName, Effect, Stage
 
 FLOOR = 0.35
 """Share of the force that never tires; Riener and Fuhr fit 0.3 to 0.4 to quadriceps."""
@@ -38,13 +37,13 @@ class Fatigue(Effect):
     def apply(self, value: Any, s: Any) -> Any:
         return value * (1.0 - s.own.lost)
 
-    def rest(self, s: Any) -> Mapping[str, Any]:
+    def rest(self, s: Any) -> ByName:
         speed, recovery = self.rate_per_s, 1.0 / self.recovery_s
         lost = after_the_past(
             s, lambda act: speed * act + recovery, lambda act: speed * act * (1.0 - FLOOR) / (speed * act + recovery)
         )
         return {"lost": lost}
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         lost = s.own.lost
         return {"lost": self.rate_per_s * s.act * (1.0 - FLOOR - lost) - lost / self.recovery_s}

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from fes_pin.models.maths import exp
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, span
 
 
 @dataclass(frozen=True)
@@ -36,14 +33,14 @@ class ForceLength(Effect):
     name, stage, signal, rigs = "force_length", Stage.MUSCLE, "fibres", ("ankle", "muscle")
 
     @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def grids(cls, measured: Measured) -> Grids:
         """A skew of either sign that shows at the ends of the imposed lengths."""
-        way = float(np.ptp(measured["length_m"])) if "length_m" in measured else 0.0
+        way = span(measured, "length_m")
         return {**super().grids(measured), "skew_per_rad3": (2.0 / way**3, -2.0 / way**3) if way > 0.0 else ()}
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """A joint: within a radian by no more than 10 e-folds up, 30 down; a muscle: as much within the lengths."""
-        way = float(np.ptp(measured["length_m"])) if "length_m" in measured else 1.0
+        way = span(measured, "length_m") if "length_m" in measured else 1.0
         return {"slope_per_rad": (-10.0 / way, 10.0 / way), "curvature_per_rad2": (-10.0 / way**2, 30.0 / way**2)}
 
     def apply(self, value: Any, s: Any) -> Any:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from fes_pin.models.maths import sqrt, where
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage
 
 PLATEAU = 2.0
 """1 / (1.5 - 1): a stretched muscle bears half more than its isometric force at most, until data show another: van
@@ -45,13 +42,13 @@ class ForceVelocity(Effect):
     name, stage, signal, rigs = "force_velocity", Stage.MUSCLE, "fibres", ("ankle", "muscle")
 
     @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def grids(cls, measured: Measured) -> Grids:
         """Hill's branches where the motion is imposed, which may be fast; else the bend."""
         if not {"length_m", "torque_nm"} & set(measured):
             return super().grids(measured)
         return {**super().grids(measured), "bend": (), "hill": (4.0,), "plateau": (1.0, 4.0)}
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """Of a joint, down to half a radian a second; an imposed motion shows that a muscle is damped, not driven."""
         if "length_m" in measured:
             return {"slope_s_per_rad": (0.0, 1e4)}

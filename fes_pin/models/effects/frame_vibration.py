@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from fes_pin.models.maths import TURN
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
-
-TURN = 6.283185307179586
-"""2 pi, rad per turn."""
+from fes_pin.models.stage import ByName, Effect, Stage
 
 
 @dataclass(frozen=True)
@@ -40,11 +37,11 @@ class FrameVibration(Effect):
     def apply(self, value: Any, s: Any) -> Any:
         return value - self._swing(s, value)
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         # the joint's own acceleration is torque / J = q'' + phi'', solved for it
         return {"angle": s.own.rate, "rate": self._swing(s, s.driving)}
 
-    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
+    def start_variances(self, reach: Any, speed: Any) -> ByName:
         """Where a trial begins in motion, the frame swings already."""
         swings = (self.coupling * speed) ** 2
         return {"angle": swings / (TURN * self.frequency_hz) ** 2, "rate": swings}

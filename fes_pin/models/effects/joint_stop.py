@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from fes_pin.models.maths import ramp
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class JointStop(Effect):
     name, stage, signal, rigs = "joint_stop", Stage.JOINT, "torque", ("ankle", "joint")
 
     @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def grids(cls, measured: Measured) -> Grids:
         """Angles at the ends of the measured range, where a stop can be."""
         angles = measured.get("angle_rad", measured.get("position"))
         if angles is None:
@@ -38,7 +37,7 @@ class JointStop(Effect):
         quantiles = np.quantile(angles, (0.98, 0.93, 0.85, 0.7, 0.5, 0.3, 0.15, 0.07, 0.02))
         return {**super().grids(measured), "angle_rad": tuple(float(a) for a in quantiles)}
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """A stop is inside the measured range, and out of touch for a third of the time; else it would be a spring."""
         angles = measured.get("angle_rad", measured.get("position"))
         if angles is None:

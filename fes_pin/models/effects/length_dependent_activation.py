@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from fes_pin.models.maths import exp, log
+from fes_pin.models.maths import exp, power
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, Effect, Measured, Stage, span
 
 LEAST = 1e-3
 """Activation below which a power of it is not told from a straight line: it keeps derivatives finite."""
@@ -33,11 +30,11 @@ class LengthDependentActivation(Effect):
 
     name, stage, signal, rigs = "length_dependent_activation", Stage.MUSCLE, "sensitivity", ("muscle",)
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """Over the imposed lengths the power changes by no more than a factor of twenty."""
-        way = float(np.ptp(measured["length_m"])) if "length_m" in measured else 0.0
+        way = span(measured, "length_m")
         return {"slope": (-3.0 / way, 3.0 / way)} if way > 0.0 else {}
 
     def apply(self, value: Any, s: Any) -> Any:
-        power = exp(-self.slope * getattr(s, "bent", 0.0))
-        return value * exp(0.5 * (power - 1.0) * log(value * value + LEAST * LEAST))
+        exponent = exp(-self.slope * getattr(s, "bent", 0.0))
+        return value * power(value, exponent - 1.0, LEAST)

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.maths import cos, sin
+from fes_pin.models.maths import TURN, cos, sin
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
-
-TURN = 6.283185307179586
-"""2 pi, rad per turn."""
 
 
 @dataclass(frozen=True)

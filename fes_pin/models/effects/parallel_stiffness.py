@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from fes_pin.models.maths import exp, ramp, sqrt
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage
 
 FLAT = 1e-6
 """Squared rate of the exponential that stands for a straight line, 1/m2."""
@@ -39,7 +38,7 @@ class ParallelStiffness(Effect):
     name, stage, signal, rigs = "parallel_stiffness", Stage.JOINT, "torque", ("ankle", "joint", "muscle")
 
     @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def grids(cls, measured: Measured) -> Grids:
         """A spring at rest in the middle of the measured motion, or at an end of it."""
         angles = next((measured[n] for n in ("angle_rad", "position", "length_m") if n in measured), None)
         if angles is None:
@@ -49,7 +48,7 @@ class ParallelStiffness(Effect):
             "rest_angle_rad": tuple(float(np.quantile(angles, q)) for q in (0.5, 0.0, 1.0)),
         }
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """The spring rests at an angle that the joint comes near; elsewhere it would be a constant torque."""
         angles = next((measured[n] for n in ("angle_rad", "position", "length_m") if n in measured), None)
         if angles is None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import ByName, Effect, Stage
 
 NOTHING = 1e-30
 """Below any square of a motion: a rig that begins at rest has 0 / 0."""
@@ -34,13 +33,13 @@ class PassiveRelaxation(Effect):
     def apply(self, value: Any, s: Any) -> Any:
         return value - self.stiffness_nm_per_rad * (s.q - s.own.relaxed)
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         return {"relaxed": (s.q - s.own.relaxed) / self.relaxation_s}
 
-    def rest(self, s: Any) -> Mapping[str, Any]:
+    def rest(self, s: Any) -> ByName:
         return {"relaxed": s.q}
 
-    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
+    def start_variances(self, reach: Any, speed: Any) -> ByName:
         """Where a trial begins in motion, how it moved before nobody knows: the damper is late, within what it does."""
         late = self.relaxation_s * speed
         return {"relaxed": late * late * reach * reach / (late * late + reach * reach + NOTHING)}

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fes_pin.models.maths import cos, sin
+from fes_pin.models.maths import TURN, cos, sin
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage
 
-TURN = 6.283185307179586
-"""2 pi, rad per turn."""
 FASTEST_HZ = 0.8
 """The fastest breathing that is looked for; see the source below."""
 
@@ -44,13 +41,13 @@ class PeriodicTorque(Effect):
     varies = True
 
     @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def grids(cls, measured: Measured) -> Grids:
         """The frequencies of which a trial holds a period."""
         grids = super().grids(measured)
         slowest = _slowest(measured)
         return {**grids, "frequency_hz": tuple(f for f in grids["frequency_hz"] if f >= slowest) or (FASTEST_HZ,)}
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """What does not come again within a trial is not seen to be periodic: with a phase of each trial's own it would
         stand for anything slow."""
         return {"frequency_hz": (_slowest(measured), FASTEST_HZ)}
@@ -60,5 +57,5 @@ class PeriodicTorque(Effect):
         return value + self.in_phase * sin(phase) + self.quadrature * cos(phase)
 
 
-def _slowest(measured: Mapping[str, np.ndarray]) -> float:
+def _slowest(measured: Measured) -> float:
     return min(1.0 / float(np.max(measured["time"])), FASTEST_HZ)

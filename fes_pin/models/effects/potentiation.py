@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.parameters import parameter
 from fes_pin.models.session import after_the_past
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import ByName, Effect, Stage
 
 
 @dataclass(frozen=True)
@@ -34,8 +33,8 @@ class Potentiation(Effect):
     def apply(self, value: Any, s: Any) -> Any:
         return value * (1.0 + self.gain * s.own.level)
 
-    def rest(self, s: Any) -> Mapping[str, Any]:
+    def rest(self, s: Any) -> ByName:
         return {"level": after_the_past(s, lambda act: 1.0 / self.decay_s, lambda act: act)}
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         return {"level": (s.act - s.own.level) / self.decay_s}

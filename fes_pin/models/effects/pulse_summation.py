@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.maths import exp, log
+from fes_pin.models.maths import power
 from fes_pin.models.parameters import parameter
 from fes_pin.models.stage import Effect, Stage
 
@@ -32,5 +32,5 @@ class PulseSummation(Effect):
     name, stage, signal, rigs = "pulse_summation", Stage.MUSCLE, "activation", ("muscle",)
 
     def apply(self, value: Any, s: Any) -> Any:
-        bound = value * exp(self.cooperation * log(value * value + LEAST * LEAST) * 0.5)
+        bound = value * power(value, self.cooperation, LEAST)
         return (1.0 + self.saturation) * bound / (1.0 + self.saturation * bound)

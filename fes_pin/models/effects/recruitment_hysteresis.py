@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.maths import where
+from fes_pin.models.maths import play
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import ByName, Effect, Stage
 
 
 @dataclass(frozen=True)
@@ -29,12 +28,7 @@ class RecruitmentHysteresis(Effect):
     memories = ("followed",)
 
     def apply(self, value: Any, s: Any) -> Any:
-        return self._play(value, s)
+        return play(s.own.followed, value, self.half_width_us)
 
-    def update(self, s: Any) -> Mapping[str, Any]:
-        return {"followed": self._play(s.commanded, s)}
-
-    def _play(self, width: Any, s: Any) -> Any:
-        # strict comparisons, unlike clip, keep the derivative of the side that pulls also at half width 0
-        b, low, high = s.own.followed, width - self.half_width_us, width + self.half_width_us
-        return where(b < low, low, where(b > high, high, b))
+    def update(self, s: Any) -> ByName:
+        return {"followed": play(s.own.followed, s.commanded, self.half_width_us)}

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from fes_pin.models.maths import ramp
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, ByName, Effect, Measured, Stage, span
 
 LOST_S = 0.1
 """Time constant with which it is lost where the muscle is not activated, s: it does not outlast deactivation
@@ -33,14 +30,14 @@ class ResidualForceEnhancement(Effect):
     name, stage, signal, rigs = "residual_force_enhancement", Stage.MUSCLE, "fibres", ("muscle",)
     states = ("stretched",)
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """A stretch over the whole way doubles the force at most: no experiment came near."""
-        way = float(np.ptp(measured["length_m"])) if "length_m" in measured else 0.0
+        way = span(measured, "length_m")
         return {"gain": (-1.0 / way, 1.0 / way)} if way > 0.0 else {}
 
     def apply(self, value: Any, s: Any) -> Any:
         return value * (1.0 + self.gain * s.own.stretched)
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         gained = s.act * ramp(getattr(s, "stretching", 0.0))
         return {"stretched": gained - ramp(1.0 - s.act) * s.own.stretched / LOST_S}

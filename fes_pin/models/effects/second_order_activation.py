@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from fes_pin.models.maths import lag
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage, lag
+from fes_pin.models.stage import ByName, Effect, Stage
 
 
 @dataclass(frozen=True)
@@ -31,5 +31,5 @@ class SecondOrderActivation(Effect):
         s.unlagged = value
         return lag(value, s.own.lagged, self.second_s, s.step)[0]
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         return {"lagged": lag(s.unlagged, s.own.lagged, self.second_s, s.step)[1]}

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage, reading_range, symmetric
+from fes_pin.models.stage import Bounds, Effect, Measured, Stage, reading_range, symmetric
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class SensorDrift(Effect):
 
     name, stage, signal, rigs = "sensor_drift", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """Within a trial the sensor drifts by no more than its readings differ."""
         low, high = symmetric(reading_range(measured))
         longest = float(np.max(measured.get("time", np.zeros(1))))

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage, counted_from, places
+from fes_pin.models.stage import FromAPlace, Stage, counted_from
 
 
 @dataclass(frozen=True)
-class SensorGain(Effect):
+class SensorGain(FromAPlace):
     """Deviations of the output from its rest value are scaled.
 
         y_rest + (1 + error) (y - y_rest)
@@ -32,11 +29,6 @@ class SensorGain(Effect):
 
     name, stage, signal, rigs = "sensor_gain", Stage.SENSOR, "reading", ("ankle", "joint")
     scales = True
-
-    @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
-        """Deviations are counted from any place that the rig has."""
-        return {**super().grids(measured), "place": places(measured)}
 
     def apply(self, value: Any, s: Any) -> Any:
         return value + self.error * (value - counted_from(s, self.place))

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+from fes_pin.models.maths import lag, lag_time
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage, lag, lag_time
+from fes_pin.models.stage import ByName, Effect, Measured, Stage, least_step
 
 
 @dataclass(frozen=True)
@@ -35,23 +33,20 @@ class SensorLag(Effect):
     states = ("filtered",)
     max_step_s = 1.25e-3
 
-    def smallest(self, measured: Mapping[str, np.ndarray]) -> dict[str, float]:
+    def smallest(self, measured: Measured) -> dict[str, float]:
         """Half a row of a controller's log, which does not say when in it the effort answered the reading."""
-        if "answer" not in measured:
-            return {}
-        steps = np.diff(measured["time"])
-        return {"lag_s": 0.5 * float(np.min(steps, where=steps > 0.0, initial=np.inf))}
+        return {"lag_s": 0.5 * least_step(measured["time"])} if "answer" in measured else {}
 
     def apply(self, value: Any, s: Any) -> Any:
         return value + (1.0 + self.shift) * (self._lagged(s)[0] - s.sensed)
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         return {"filtered": self._lagged(s)[1]}
 
-    def rest(self, s: Any) -> Mapping[str, Any]:
+    def rest(self, s: Any) -> ByName:
         return {"filtered": s.sensed - lag_time(self._lag(), s.step) * s.sensed_rate}
 
-    def start_variances(self, reach: Any, speed: Any) -> Mapping[str, Any]:
+    def start_variances(self, reach: Any, speed: Any) -> ByName:
         """Where a trial begins in motion, how it moved before nobody knows."""
         return {"filtered": (self._lag() * speed) ** 2}
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage, counted_from, places
+from fes_pin.models.stage import FromAPlace, Stage, counted_from
 
 
 @dataclass(frozen=True)
-class SensorNonlinearity(Effect):
+class SensorNonlinearity(FromAPlace):
     """Curvature of the sensor's characteristic.
 
         y + curvature x^2 (1 + skew x),   x = y - y_rest
@@ -40,11 +37,6 @@ class SensorNonlinearity(Effect):
     )
 
     name, stage, signal, rigs = "sensor_nonlinearity", Stage.SENSOR, "reading", ("ankle", "joint")
-
-    @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
-        """Deviations are counted from any place that the rig has."""
-        return {**super().grids(measured), "place": places(measured)}
 
     def apply(self, value: Any, s: Any) -> Any:
         x = value - counted_from(s, self.place)

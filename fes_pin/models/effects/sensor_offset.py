@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage, reading_range, symmetric
+from fes_pin.models.stage import Bounds, Effect, Measured, Stage, reading_range, symmetric
 
 
 @dataclass(frozen=True)
@@ -26,7 +23,7 @@ class SensorOffset(Effect):
 
     name, stage, signal, rigs = "sensor_offset", Stage.SENSOR, "reading", ("ankle", "joint", "muscle")
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """No more than the sensor's readings differ by: more would be another place."""
         return {"offset": symmetric(reading_range(measured))}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from fes_pin.models.maths import exp
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, span
 
 RIGID = 1e-16
 """Compliance that stands for none, m/N."""
@@ -40,12 +39,12 @@ class SeriesElasticity(Effect):
     beside = ("force_velocity",)
 
     @classmethod
-    def grids(cls, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, ...]]:
+    def grids(cls, measured: Measured) -> Grids:
         """A toe of some hundredths of the way that was imposed, over a quarter of the force."""
-        way, force = (float(np.ptp(measured[n])) if n in measured else 0.0 for n in ("length_m", "reading"))
+        way, force = span(measured, "length_m"), span(measured, "reading")
         return {**super().grids(measured), "toe": (0.05 * way,), "toe_force": (max(0.25 * force, 1e-3),)}
 
-    def limits(self, measured: Mapping[str, np.ndarray]) -> dict[str, tuple[float, float]]:
+    def limits(self, measured: Measured) -> Bounds:
         """No tendon stretches by more than a tenth of muscle and tendon under the largest force: it tears before."""
         if "length_m" not in measured:
             return {}
@@ -65,5 +64,5 @@ class SeriesElasticity(Effect):
     def apply(self, value: Any, s: Any) -> Any:
         return value
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         return {"tension": (s.tendon - s.own.tension) / (0.5 * s.step)}

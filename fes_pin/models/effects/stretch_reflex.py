@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import ramp
 from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import ByName, Effect, Stage
 
 
 @dataclass(frozen=True)
@@ -34,6 +33,6 @@ class StretchReflex(Effect):
         late = s.v - self.delay_s * s.own.change
         return value - self.side * self.gain_nms * ramp(self.side * late)
 
-    def rate(self, s: Any) -> Mapping[str, Any]:
+    def rate(self, s: Any) -> ByName:
         own, pace = s.own, 1.0 / self.delay_s
         return {"follow": own.change, "change": 12.0 * pace * pace * (s.v - own.follow) - 6.0 * pace * own.change}

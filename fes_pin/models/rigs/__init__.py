@@ -5,8 +5,6 @@ A rig is in the study format, the diagnosis, the report and the command line by 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from fes_pin.models.rigs.ankle import Ankle
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.rigs.joint import Joint
@@ -16,10 +14,5 @@ from fes_pin.models.stage import classes_in
 __all__ = ["RIGS", "Ankle", "Joint", "Muscle", "Rig", "pulse_period"]
 
 
-def written_here() -> Iterator[type[Rig]]:
-    """The rigs of this folder's files."""
-    return (one for one in classes_in(__path__, __name__, Rig) if hasattr(one, "name"))
-
-
-RIGS: tuple[type[Rig], ...] = tuple(sorted(written_here(), key=lambda rig: rig.name))
-"""Every rig, by name."""
+RIGS = tuple(sorted((one for one in classes_in(__path__, __name__, Rig) if hasattr(one, "name")), key=lambda r: r.name))
+"""The rigs of this folder's files, by name."""

@@ -19,7 +19,7 @@ from fes_pin.models.maths import cos, exp, ramp, sin, where
 from fes_pin.models.parameters import parameter
 from fes_pin.models.rigs.base import GRAVITY, IMPOSED_STOPPING, Rig, imposed_now
 from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
-from fes_pin.models.rigs.stimuli import pulse_widths, recruited_now
+from fes_pin.models.rigs.stimuli import recruited_now, recruitment_of
 from fes_pin.models.stage import Signals
 
 UPRIGHT = 1.5707963267948966
@@ -115,10 +115,6 @@ class Ankle(Rig):
                 out |= {(kind, tuple(sorted({**values, name: round(float(v), 3)}.items()))) for v in many}
         return out
 
-    @classmethod
-    def driven(cls, study: Study, shape: np.ndarray) -> np.ndarray:
-        return pulse_widths(study, shape)
-
     def signals(self, kind: str) -> tuple[str, ...]:
         muscle = ("pulse_width", "recruitment", "delay", "time_constant", "activation", "fibres", "force", "pull")
         joint = ("load", "net_force", "gravity_angle", "torque", "friction")
@@ -153,8 +149,8 @@ class Ankle(Rig):
         return {**known, **{name: float(value) for name, value in own.items()}}
 
     def recruited(self, trial: Trial) -> np.ndarray:
-        low, high = (float(self.constants[n]) for n in ("threshold_us", "saturation_us"))
-        return np.clip((trial["pulse_width_us"] - low) / (high - low), 0.0, 1.0)
+        known = (float(self.constants[n]) for n in ("threshold_us", "saturation_us"))
+        return np.asarray(recruitment_of(trial["pulse_width_us"], *known))
 
     def driving_sizes(self, trials: Sequence[Trial]) -> dict[str, float]:
         """Of a free motion what the cable's torque would be at the start values."""

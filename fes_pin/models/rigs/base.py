@@ -23,7 +23,7 @@ from fes_pin.models.parameters import (
     checked_number,
     parameters_of,
 )
-from fes_pin.models.rigs.stimuli import both_signs
+from fes_pin.models.rigs.stimuli import shaped
 from fes_pin.models.session import Session, checked_session, past_of
 from fes_pin.models.stage import Effect, Signals
 
@@ -159,7 +159,7 @@ class Rig(ReadOnly):
         """Values of the steered column of a shape from 0 (off) to 1, shape (n,)."""
         column = cls.steered(study)
         assert column is not None
-        return both_signs(study, column, shape)
+        return shaped(study, column, shape)
 
     @classmethod
     def other_stimuli(cls, study: Study, time: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
@@ -324,8 +324,8 @@ def undone(s: Signals, signal: str, value: Any) -> Any:
     return (value - at_zero) / (at_one - at_zero)
 
 
-def first_rate(time: np.ndarray, position: np.ndarray, span_s: float = 0.05) -> tuple[float, float]:
-    """Position and its rate at the first sample, from a parabola through the first `span_s` seconds.
+def first_rate(time: np.ndarray, position: np.ndarray, span_s: float = 0.05) -> float:
+    """The rate of a position at the first sample, from a parabola through the first `span_s` seconds.
 
     Parameters
     ----------
@@ -334,5 +334,4 @@ def first_rate(time: np.ndarray, position: np.ndarray, span_s: float = 0.05) -> 
     """
     count = int(np.clip(np.searchsorted(time - time[0], span_s), min(6, len(time)), len(time)))
     t = time[:count] - time[0]
-    coefficients = np.polynomial.polynomial.polyfit(t, position[:count], min(2, count - 1))
-    return float(coefficients[0]), float(coefficients[1])
+    return float(np.polynomial.polynomial.polyfit(t, position[:count], min(2, count - 1))[1])

@@ -157,9 +157,9 @@ class Joint(Rig):
     def initial_unknowns(self, trial: Trial) -> dict[str, float]:
         if trial.kind == IMPOSED:
             return {}
-        position, rate = first_rate(trial.time, trial["position"]) if "position" in trial.columns else (0.0, 0.0)
+        position, rate = 0.0, 0.0
         if "position" in trial.columns:
-            position = float(trial["position"][0])
+            position, rate = float(trial["position"][0]), first_rate(trial.time, trial["position"])
         if "velocity" in trial.columns:
             rate = float(trial["velocity"][0])
         conditions = trial.conditions

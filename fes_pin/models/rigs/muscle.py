@@ -14,7 +14,7 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.parameters import HELD, parameter
 from fes_pin.models.rigs.base import Rig, imposed_now
-from fes_pin.models.rigs.stimuli import pulse_widths, recruited_now, trains
+from fes_pin.models.rigs.stimuli import recruited_now, recruitment_of, trains
 from fes_pin.models.stage import Signals
 
 
@@ -58,10 +58,6 @@ class Muscle(Rig):
     @classmethod
     def steered(cls, study: Study) -> str | None:
         return "pulse_width_us" if "pulse_width_us" in study.trials[0] else None
-
-    @classmethod
-    def driven(cls, study: Study, shape: np.ndarray) -> np.ndarray:
-        return pulse_widths(study, shape)
 
     @classmethod
     def other_stimuli(cls, study: Study, time: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
@@ -113,8 +109,7 @@ class Muscle(Rig):
         known = self.trial_constants(trial)
         if "stim" in trial.columns:
             return trial["stim"] * known["pulse_period_s"] / trial.dt
-        low, high = known["threshold_us"], known["saturation_us"]
-        return np.clip((trial["pulse_width_us"] - low) / (high - low), 0.0, 1.0)
+        return np.asarray(recruitment_of(trial["pulse_width_us"], known["threshold_us"], known["saturation_us"]))
 
     def set_rest(self, s: Signals, z: Any) -> None:
         s.x.act = s.m.r = s.m.r_before = 0.0

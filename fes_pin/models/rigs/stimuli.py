@@ -19,24 +19,28 @@ LAST_S = 0.8
 """A proposed train ends so long before the trial does: the muscle's relaxation is seen."""
 
 
-def pulse_widths(study: Study, shape: np.ndarray) -> np.ndarray:
-    """Pulse widths from threshold to saturation, 0 where the shape is, shape (n,), us."""
-    low = float(study.constants.get("threshold_us", 180.0))
-    high = float(study.constants.get("saturation_us", 1000.0))
-    return np.where(shape > 0, np.round(low + (high - low) * shape), 0.0)
+def shaped(study: Study, column: str, shape: np.ndarray) -> np.ndarray:
+    """Values of an input column of a shape from 0 (off) to 1, shape (n,): 0 where the shape is.
+
+    Pulse widths go from threshold to saturation, us; others are of both signs, up to the largest that the study has.
+    """
+    if column == "pulse_width_us":
+        low = float(study.constants.get("threshold_us", 180.0))
+        high = float(study.constants.get("saturation_us", 1000.0))
+        return np.where(shape > 0, np.round(low + (high - low) * shape), 0.0)
+    size = max(float(np.abs(t[column]).max()) for t in study.trials if column in t)
+    return np.where(shape > 0, size * (2.0 * shape - 1.0), 0.0)
+
+
+def recruitment_of(width: Any, threshold_us: Any, saturation_us: Any) -> Any:
+    """Recruitment by pulse widths, 0 at the threshold to 1 at saturation."""
+    return clip((width - threshold_us) / (saturation_us - threshold_us), 0.0, 1.0)
 
 
 def recruited_now(s: Signals) -> Any:
-    """Recruitment by the pulse width of this sample, 0 at the threshold to 1 at saturation."""
+    """Recruitment by the pulse width of this sample."""
     s.commanded = s.u.pulse_width_us
-    width = s.through("pulse_width", s.commanded)
-    return clip((width - s.c.threshold_us) / (s.c.saturation_us - s.c.threshold_us), 0.0, 1.0)
-
-
-def both_signs(study: Study, column: str, shape: np.ndarray) -> np.ndarray:
-    """Values of both signs up to the largest that the study has used, 0 where the shape is, shape (n,)."""
-    size = max(float(np.abs(t[column]).max()) for t in study.trials if column in t)
-    return np.where(shape > 0, size * (2.0 * shape - 1.0), 0.0)
+    return recruitment_of(s.through("pulse_width", s.commanded), s.c.threshold_us, s.c.saturation_us)
 
 
 def trains(time: np.ndarray) -> Iterator[np.ndarray]:
