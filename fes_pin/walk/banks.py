@@ -149,7 +149,7 @@ class Banks:
         return self.noise.rotated(self._columns(names))
 
     def residual(self, names: Names, values: np.ndarray) -> np.ndarray:
-        """What a set leaves of the mean stride, (1, 6, k)."""
+        """Residual of a set in the mean stride, (1, 6, k)."""
         return self.bank(names).y - self._columns(names) @ values
 
     def by_stride(self, names: Names) -> tuple[np.ndarray, np.ndarray]:

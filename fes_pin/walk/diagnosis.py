@@ -75,7 +75,7 @@ def diagnose_walk(
 
 
 def _searched(models: WalkModels, tell: Progress) -> tuple[WalkSearch, SearchResult[WalkFit]]:
-    """The search by evidence alone, and that in the noise which its best set leaves."""
+    """A search by evidence alone, then one in which the noise is known from the residual of its best set."""
     first = WalkSearch(models, lambda share, words: tell(0.3 + 0.2 * share, words), POLICY).run()
     tell(0.5, "critical values")
     models = models.with_noise_of(first.best)

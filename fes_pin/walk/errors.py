@@ -1,4 +1,4 @@
-"""Errors of sets of causes in strides that took no part: in newtons, and as evidence in units of the noise."""
+"""Errors of sets of causes in held-out strides: in newtons, and as evidence in units of the noise."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class StrideErrors:
         return held_out_gain(nominal, before, after, self.seed)
 
     def evidence(self, without: WalkFit, best: WalkFit) -> Evidence:
-        """What a set adds to the likelihood of a stride that took no part, against a smaller set, in the set's noise.
+        """What a set adds to the likelihood of a held-out stride, against a smaller set, in the set's noise.
 
         What landmarks and plates may make in a session counts for neither. The mean over strides: soft tissue moves
         alike in each, so that more strides are no more evidence.
@@ -72,7 +72,7 @@ class StrideErrors:
 
 
 def _residual_by_stride(banks: Banks, one: WalkFit, held_out: bool) -> np.ndarray:
-    """What a set leaves in every stride, its sizes fitted to all strides or to the others: (n, 6, k)."""
+    """Residual of a set in every stride, its sizes fitted to all strides or to the others: (n, 6, k)."""
     y, x = banks.by_stride(one.names)
     if not (one.names and held_out):
         return y - x @ one.fitted.values

@@ -19,7 +19,7 @@ CHANNELS = ("forward force", "leftward force", "vertical force", "moment about f
 def other_leg(banks: Banks, one: WalkFit) -> float | None:
     """Gain in percent on one leg's single supports of sizes fitted to the other's; None where a leg has none.
 
-    Channels count in units of what the set leaves in them.
+    Channels count in units of the set's residual in them.
     """
     along = [(scene, banks.signals(one.names, scene)) for scene in banks.bank(one.names).scenes]
     left = np.concatenate([scene.residual - x @ one.fitted.values for scene, x in along])

@@ -153,7 +153,7 @@ class WalkModels(FittedSets[WalkFit, None]):
         return LEVEL
 
     def near_rivals(self, found: SearchResult[WalkFit], name: str) -> list[WalkFit]:
-        """Sets with another form in the place of one that cannot be told from the best, lowest price first."""
+        """Sets with another form in the place of one whose odds against the best set are not strong, best first."""
         return [r for r in found.rivals[name] if r.price - found.best.price < STRONG_EVIDENCE]
 
     def sizes(self, one: WalkFit) -> dict[str, np.ndarray]:

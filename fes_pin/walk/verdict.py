@@ -1,4 +1,4 @@
-"""The verdict on a set of causes of a walk: what is claimed, how large, how sure, and what it cannot be told from."""
+"""The verdict on a set of causes of a walk: which are claimed, how large and certain they are, and their equivalents."""
 
 from __future__ import annotations
 
@@ -39,9 +39,10 @@ Judgement = State[WalkFit, WalkWeighed]
 class WalkVerdict(Verdict[WalkFit, WalkWeighed]):
     """How it is judged what a search over sets of forms found.
 
-    Strides that took no part in a cause's size speak for it by their likelihood, which holds as noise what soft tissue,
-    landmarks and plates make in every stride; a force in newtons is mostly that. For what belongs to neither leg the
-    other leg's stances speak as well. A single stride leaves nothing out: then only what is certain is named.
+    A cause must be supported by strides that are held out, by their likelihood: it counts as noise what soft tissue,
+    landmarks and plates make in every stride, and a force in newtons is mostly that. What belongs to neither leg must
+    also predict the stances of one leg from those of the other. Of a single stride nothing can be held out; then only a
+    cause that is certain is named.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ class WalkVerdict(Verdict[WalkFit, WalkWeighed]):
         )
 
     def unsupported(self, state: Judgement) -> list[str]:
-        """Forms that nothing which took no part speaks for."""
+        """Forms that held-out strides, or the other leg, do not support."""
         return [n for n in state.names if not self._is_supported(state, n)]
 
     def _is_supported(self, state: Judgement, name: str) -> bool:
