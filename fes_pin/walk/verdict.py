@@ -1,4 +1,4 @@
-"""The verdict on a set of causes of a walk: which are claimed, how large and certain they are, and their equivalents."""
+"""The verdict on a set of causes of a walk: which are claimed, how large and certain each is, and its equivalents."""
 
 from __future__ import annotations
 
