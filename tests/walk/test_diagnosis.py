@@ -163,8 +163,8 @@ def test_late_plates_are_found(gait, tmp_path):
     make(gait, tmp_path, wrong, 514)
     first = diagnose_walk(read_study(tmp_path)).causes[0]
     assert first.name == "clock_offset"
-    value, std, unit = first.parameters["late_s"]
-    assert unit == "s" and value == pytest.approx(wrong.size, abs=max(3 * std, 0.003))
+    late = first.parameters["late_s"]
+    assert late.unit == "s" and late.value == pytest.approx(wrong.size, abs=max(3 * late.std, 0.003))
 
 
 def test_soft_tissue_alone_names_nothing(gait, tmp_path):
