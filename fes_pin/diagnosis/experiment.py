@@ -14,6 +14,7 @@ from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import Problem, measured_columns
+from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.levels import SEPARABLE, SURE
 from fes_pin.infer.problem import Linearized, NormalEquations, normal_equations
 from fes_pin.models.nominal import rig_of
@@ -86,9 +87,8 @@ class Discrimination:
         """D(n) if the better model is true (`way` 0) or the other one (1)."""
         new, known = self.news[way], self.known[way]
         hessian, gradient = known + repeats * new.hessian, repeats * new.gradient
-        scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-        step = np.linalg.lstsq(hessian / np.outer(scale, scale), gradient / scale, rcond=1e-10)[0]
-        return float(max(repeats * (new.sse - new.local_gain) - gradient @ (step / scale), 0.0))
+        gained = gradient @ least_squares_step(hessian, gradient)
+        return float(max(repeats * (new.sse - new.local_gain) - gained, 0.0))
 
     def margin(self, repeats: int = 1) -> float:
         """How far the true model is ahead afterwards 95 times in 100, whichever of the two it is."""

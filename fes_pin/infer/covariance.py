@@ -44,9 +44,21 @@ def step_gain(system: NormalEquations, free: Sequence[bool]) -> float:
     slope, curvature = system.gradient[moving], system.hessian[np.ix_(moving, moving)]
     if not (np.isfinite(slope).all() and np.isfinite(curvature).all()):
         return 0.0
-    size = np.sqrt(np.maximum(np.diag(curvature), np.finfo(float).tiny))
-    step = np.linalg.lstsq(curvature / np.outer(size, size), slope / size, rcond=1e-12)[0]
-    return float(slope / size @ step)
+    return float(slope @ least_squares_step(curvature, slope, rcond=1e-12))
+
+
+def least_squares_step(hessian: np.ndarray, gradient: np.ndarray, rcond: float = 1e-10) -> np.ndarray:
+    """The shortest x, in parameters scaled by their information, that maximises 2 gradient' x - x' hessian x.
+
+    Parameters
+    ----------
+    hessian, gradient
+        Shape (n, n) and (n,).
+    rcond
+        Eigenvalues below this share of the largest count as zero.
+    """
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    return np.asarray(scale * np.linalg.lstsq(hessian * np.outer(scale, scale), gradient * scale, rcond=rcond)[0])
 
 
 def moved_with(covariance: np.ndarray, at: list[int], change: np.ndarray) -> np.ndarray:

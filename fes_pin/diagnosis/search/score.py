@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fes_pin.diagnosis.search.library import Probe
+from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.family import Family
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.problem import Linearized
@@ -85,9 +86,7 @@ def _each(projection: Projection, probe: Probe, partly: Sequence[np.ndarray], be
     if not after > 1e-18 * max(before, 1e-300) or not felt.any():
         return Scored(probe, 0.0, {}, 0.0)
     gram, along = gram[np.ix_(felt, felt)], along[felt]
-    scale = 1.0 / np.sqrt(np.diag(gram))
-    x = np.linalg.lstsq(gram * np.outer(scale, scale), along * scale, rcond=1e-10)[0]
-    gain = float((along * scale) @ x) - PARAMETER_PRICE * max(len(along) - count, 0)
+    gain = float(along @ least_squares_step(gram, along)) - PARAMETER_PRICE * max(len(along) - count, 0)
     return Scored(probe, gain, {}, float(np.sqrt(after / before)))
 
 
@@ -124,9 +123,7 @@ def _score(probe: Probe, gram: np.ndarray, along: np.ndarray, before: float) -> 
         return Scored(probe, 0.0, {n: probe.effect.nulls()[n] for n in names}, 0.0)
     nulls = np.array([probe.effect.nulls()[n] for n in names])
     lower, upper = np.array([[info[n].lower, info[n].upper] for n in names]).T
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    amplitudes = scale * np.linalg.lstsq(gram * np.outer(scale, scale), along * scale, rcond=1e-10)[0]
-    amplitudes = np.clip(amplitudes, lower - nulls, upper - nulls)
+    amplitudes = np.clip(least_squares_step(gram, along), lower - nulls, upper - nulls)
     gain = float(2.0 * along @ amplitudes - amplitudes @ gram @ amplitudes)
     values = dict(zip(names, (float(a) for a in amplitudes + nulls), strict=True))
     return Scored(probe, gain, values, float(np.sqrt(after / before)))
