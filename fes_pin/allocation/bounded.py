@@ -180,26 +180,15 @@ def solve_sequence(
         See `solve_once`.
     """
     count, n = F.shape
-    R = np.empty((count, n))
+    R, before = np.empty((count, n)), np.zeros(n) if previous is None else previous
     each, carries = H.ndim == 3, keep > 0.0 or rate < np.inf
-    before = np.zeros(n) if previous is None else previous
     if not count:
         return R
+    if not each and not carries:
+        return _solve_alike(H, F, lower, upper, precise)
     unit, root = scaled(H)
-    root, curvature = np.broadcast_to(root, (count, n)), np.diagonal(H, axis1=-2, axis2=-1)
-    F_unit, low, high = F / root, lower, upper
-    model = new_model(unit[0] if each else unit, F_unit[0], lower * root[0], upper * root[0])
-    if not each and not carries:  # nothing but the linear term changes
-        multipliers = np.empty((count, n))
-        for k in range(count):
-            model.update(f=F_unit[k])
-            R[k], _, flag, info = model.solve()
-            multipliers[k] = info["lam"] if flag == 1 else np.nan
-        R = held(R / root, multipliers, lower, upper)
-        wrong = ~(lone_steps(R @ H + F, R, lower, upper, curvature) <= precise)
-        for k in np.flatnonzero(wrong).tolist():
-            R[k] = exact(H, F[k], R[k], lower, upper, precise)
-        return R
+    root, low, high = np.broadcast_to(root, (count, n)), lower, upper
+    model = new_model(unit[0] if each else unit, F[0] / root[0], lower * root[0], upper * root[0])
     for k in range(count):
         changed: dict[str, Any] = {"H": unit[k]} if each else {}
         if rate < np.inf:
@@ -212,6 +201,22 @@ def solve_sequence(
         r = held(x / root[k], info["lam"], low, high) if flag == 1 else np.clip(0.0 * low, low, high)
         r = exact(H[k] if each else H, f, r, low, high, precise)
         R[k] = before = r if settle is None else settle(k, r, before, low, high)
+    return R
+
+
+def _solve_alike(H: np.ndarray, F: np.ndarray, lower: np.ndarray, upper: np.ndarray, precise: float) -> np.ndarray:
+    """`solve_sequence` where nothing but the linear term changes; conditions are checked for all samples at once."""
+    unit, root = scaled(H)
+    R, multipliers = np.empty(F.shape), np.empty(F.shape)
+    model = new_model(unit, F[0] / root, lower * root, upper * root)
+    for k, f in enumerate(F / root):
+        model.update(f=f)
+        R[k], _, flag, info = model.solve()
+        multipliers[k] = info["lam"] if flag == 1 else np.nan
+    R = held(R / root, multipliers, lower, upper)
+    wrong = ~(lone_steps(R @ H + F, R, lower, upper, H.diagonal()) <= precise)
+    for k in np.flatnonzero(wrong).tolist():
+        R[k] = exact(H, F[k], R[k], lower, upper, precise)
     return R
 
 
