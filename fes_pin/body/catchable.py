@@ -121,7 +121,7 @@ def catchable(
     inputs = Inputs.of(inputs, linear)
     plans = plans_of(linear, inputs, settle_deg, balance, rest_deg, gravity)
     still = np.zeros(len(plans.modes))
-    upright, falls = plans.program(still, still), np.diag(plans.degree)[plans.kinds == "fall"]
+    upright, falls = plans.program(still, still), np.diag(plans.modes.degree)[plans.modes.kinds == "fall"]
     rests = upright.solve().x is not None
     leans, errors = greatest_leans(upright, lambda i, sign: plans.program(sign * falls[i], still), len(falls), rests)
     return CaughtLeans(plans.modes.falling, leans, errors, rests, modal_bound(linear, inputs, gravity=gravity))

@@ -251,7 +251,7 @@ def _caught(linear: LinearBody, inputs: Inputs, asked: _Question) -> list[Demand
     """The posture, and a lean each way in each falling mode, brought to rest by inputs over time."""
     plans = plans_of(linear, inputs, asked.settle_deg, asked.balance, gravity=asked.gravity)
     still = np.zeros(len(plans.modes))
-    leans = np.diag(asked.lean_deg * plans.degree)[plans.kinds == "fall"]
+    leans = np.diag(asked.lean_deg * plans.modes.degree)[plans.modes.kinds == "fall"]
     watched: list[int] = []
     return [Demand(plans.program(start, still), plans.owner, watched) for start in [still, *leans, *-leans]]
 

@@ -70,11 +70,6 @@ class Plans:
         return self.linear.modes()
 
     @cached_property
-    def degree(self) -> np.ndarray:
-        """Modal coordinate of one degree of the mode's greatest joint: (r,)."""
-        return self.modes.degree
-
-    @cached_property
     def gains(self) -> np.ndarray:
         """Modal force per input: (r, m)."""
         return self.modes.shapes.T @ self.inputs.on(self.linear)
@@ -83,11 +78,6 @@ class Plans:
     def constant(self) -> np.ndarray:
         """Modal force of gravity: (r,)."""
         return self.modes.shapes.T @ self.linear.C * self.gravity
-
-    @cached_property
-    def kinds(self) -> np.ndarray:
-        """`fall`, `swing` or `neutral` by mode."""
-        return self.modes.kinds
 
     @cached_property
     def _edges(self) -> tuple[np.ndarray, np.ndarray]:
@@ -125,7 +115,7 @@ class Plans:
 
     @property
     def _rates(self) -> tuple[np.ndarray, np.ndarray]:
-        values = self.modes.values[self.kinds == "fall"]
+        values = self.modes.values[self.modes.kinds == "fall"]
         return np.sqrt(values), values
 
     @cached_property
@@ -137,11 +127,11 @@ class Plans:
         out = np.zeros((len(self.modes), len(times), len(begin)))
         for i, value in enumerate(self.modes.values):
             rate = np.sqrt(abs(value))
-            if self.kinds[i] == "fall":
+            if self.modes.kinds[i] == "fall":
                 decaying = np.exp(-rate * np.maximum(until, 0.0)) - np.exp(-rate * np.maximum(since, 0.0))
                 growing = np.exp(-rate * np.maximum(-since, 0.0)) - np.exp(-rate * np.maximum(-until, 0.0))
                 out[i] = -0.5 * (growing + decaying) / value
-            elif self.kinds[i] == "swing":
+            elif self.modes.kinds[i] == "swing":
                 out[i] = (np.cos(rate * np.maximum(until, 0.0)) - np.cos(rate * np.maximum(since, 0.0))) / -value
         return out
 
@@ -153,7 +143,7 @@ class Plans:
         """
         times, _ = self._looks
         out = np.zeros((len(self.modes), len(times), 2))
-        for course, kind, value in zip(out, self.kinds, self.modes.values, strict=True):
+        for course, kind, value in zip(out, self.modes.kinds, self.modes.values, strict=True):
             w = np.sqrt(abs(value))
             if kind == "fall":
                 course[:] = np.multiply.outer(0.5 * np.exp(-w * times), [1.0, -1.0 / w])
@@ -175,7 +165,7 @@ class Plans:
         modes = len(self.modes)
         nothing = np.zeros((0, self.inputs.n * len(self.pieces))), np.zeros(0), np.zeros(0), np.zeros((0, 2 * modes))
         blocks = [nothing]
-        for i in np.flatnonzero(self.kinds != "neutral"):
+        for i in np.flatnonzero(self.modes.kinds != "neutral"):
             blocks += self._near_the_posture(int(i))
         if self.balance and self.gravity:
             blocks += self._on_the_soles()
@@ -184,13 +174,12 @@ class Plans:
 
     def _near_the_posture(self, i: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
         """The block of `_limits` that keeps mode i within them, one way and the other."""
-        value, weight, count = self.modes.values[i], self.degree[i] * self.settle_deg, len(self.pieces)
-        last = np.zeros((1, count))
-        last[0, -1] = 1.0
+        value, kind, weight = self.modes.values[i], self.modes.kinds[i], self.modes.degree[i] * self.settle_deg
+        last = np.eye(len(self.pieces))[[-1]]
         along = [self._responses[i][self._later], last / -value]
         alone = [self._courses[i][self._later], np.zeros((1, 2))]
         later = len(along[0])
-        if self.kinds[i] == "swing":  # what still swings then goes on: |rest| + |offset| + |rate| within the limit
+        if kind == "swing":  # what still swings then goes on: |rest| + |offset| + |rate| within the limit
             (begin, end), w, time = self._edges, np.sqrt(-value), self._looks[0][-1]
             rate = (np.sin(w * (time - begin)) - np.sin(w * np.maximum(time - end, 0.0))) / -value
             offset, ends = self._responses[i][[-1]] - last / -value, self._courses[i][[-1]]
@@ -202,15 +191,15 @@ class Plans:
         starts[:, 2 * i : 2 * i + 2] = np.vstack(alone) / weight
         spread, still = self._spread(i, response) / weight, self.constant[i] * response.sum(axis=1) / weight
         room, about = np.ones(len(response)), 2.0 * i + (np.arange(len(response)) >= later)
-        if self.kinds[i] == "fall" and self.rest_deg is not None:
+        if kind == "fall" and self.rest_deg is not None:
             room[later] = self.rest_deg / self.settle_deg
         return [(spread, room - still, about, -starts), (-spread, room + still, about, starts)]
 
     @cached_property
     def _musts(self) -> np.ndarray:
         """Where each falling mode's growing part may start, over all inputs, in degrees: (k, m pieces)."""
-        fall = np.flatnonzero(self.kinds == "fall")
-        spread = [self._spread(i, row[None]) / self.degree[i] for i, row in zip(fall, self._starts, strict=True)]
+        fall = np.flatnonzero(self.modes.kinds == "fall")
+        spread = [self._spread(i, row[None]) / self.modes.degree[i] for i, row in zip(fall, self._starts, strict=True)]
         return np.vstack([np.zeros((0, self.inputs.n * len(self.pieces))), *spread])
 
     @cached_property
@@ -223,7 +212,8 @@ class Plans:
         times, which = self._looks
         now = np.zeros((len(times), len(self.pieces)))
         now[np.arange(len(times)), which] = 1.0
-        resting = np.where(self.kinds == "neutral", 0.0, -1.0 / np.where(self.modes.values, self.modes.values, 1.0))
+        values = self.modes.values
+        resting = np.where(self.modes.kinds == "neutral", 0.0, -1.0 / np.where(values, values, 1.0))
         shares, constant = self.ground.per_torque @ self.inputs.on(self.linear), self.ground.constant
         constant = constant + self.ground.per_torque @ self.linear.C
         blocks = []
@@ -256,12 +246,13 @@ class Plans:
         eta, rate
             Modal coordinates of the start and their rates: (r,) each.
         """
-        fall = self.kinds == "fall"
+        fall = self.modes.kinds == "fall"
         rows, limits, _, starts = self._limits
         growing = eta[fall] + rate[fall] / self._rates[0] - self.constant[fall] * self._starts.sum(axis=1)
         lower, upper = (np.tile(bound, len(self.pieces)) for bound in (self.inputs.lower, self.inputs.upper))
         limits = limits + starts @ np.column_stack([eta, rate]).ravel()
-        return LinearProgram(np.zeros(len(upper)), rows, limits, self._musts, growing / self.degree[fall], lower, upper)
+        start = growing / self.modes.degree[fall]
+        return LinearProgram(np.zeros(len(upper)), rows, limits, self._musts, start, lower, upper)
 
     def gentlest(self, eta: np.ndarray, rate: np.ndarray) -> LinearProgram:
         """The plan whose modes stray least, on the way and at the rest in the end.
@@ -280,5 +271,5 @@ class Plans:
     @cached_property
     def _reach(self) -> np.ndarray:
         """Which rows of the limits are about which mode, on the way and in the end: (rows, 2 modes) 0 or 1."""
-        places = np.flatnonzero(np.repeat(self.kinds != "neutral", 2))
+        places = np.flatnonzero(np.repeat(self.modes.kinds != "neutral", 2))
         return 1.0 * (self._limits[2][:, None] == places)

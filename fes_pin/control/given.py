@@ -38,6 +38,12 @@ Sampled = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Transition (n, n) over a pulse, what recruitment adds in it (n,), and what the sensor reads of the state (n,)."""
 
 
+def held(f: np.ndarray, g: np.ndarray, time_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Transition (n, n) over a time, and what an input that is held adds in it, (n,), for rates f x + g u."""
+    whole = scipy.linalg.expm(np.pad(np.column_stack([f, g]), ((0, 1), (0, 0))) * time_s)
+    return whole[:-1, :-1], whole[:-1, -1]
+
+
 class GivenAnkle:
     """The ankle of a model under one load, with all effects but play, which is undone, and fatigue, which is watched.
 
@@ -116,16 +122,13 @@ class GivenAnkle:
     def _sampled(self, f: np.ndarray, g: np.ndarray, seen: np.ndarray) -> Sampled:
         """Over a pulse, where each pulse acts later by some whole ones and a part of one."""
         n, whole, late = len(f), *self._late()
-        both = np.zeros((n + 1, n + 1))
-        both[:n, :n], both[:n, n] = f, g
-        first, second = (scipy.linalg.expm(both * t) for t in (late, PULSE_S - late))
+        (moved, before), (then, now) = (held(f, g, t) for t in (late, PULSE_S - late))
         a, b = np.zeros((n + whole + 1, n + whole + 1)), np.zeros(n + whole + 1)
-        a[:n, :n] = second[:n, :n] @ first[:n, :n]
-        a[:n, -1] = second[:n, :n] @ first[:n, n]  # states beyond n are past pulses, the latest first
+        a[:n, :n], a[:n, -1] = then @ moved, then @ before  # states beyond n are past pulses, the latest first
         if whole:
-            a[:n, -2] = second[:n, n]
+            a[:n, -2] = now
         else:
-            b[:n] = second[:n, n]
+            b[:n] = now
         b[n], a[n + 1 :, n:-1] = 1.0, np.eye(whole)
         return a, b, np.r_[seen, np.zeros(whole + 1)]
 

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.linalg
 
 from fes_pin.control.dynamics import PULSE_S, AnkleDynamics
-from fes_pin.control.given import GivenAnkle, Sampled
+from fes_pin.control.given import GivenAnkle, Sampled, held
 from fes_pin.control.observer import JointObserver
 from fes_pin.data.errors import InputError
 from fes_pin.data.show import frame
@@ -88,7 +88,9 @@ def plant(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray, fl
     """The joint held at an angle, from pulse to pulse, its frame at rest: transition (4, 4) of (activation, angle,
     rate, torque), input (4,), and torque that full activation makes.
     """
-    a, b = _held(dynamics.linear(q, dynamics.activation_for(q), 1.0)[:4, :4], dynamics.time_constant)
+    a, b = held(
+        dynamics.linear(q, dynamics.activation_for(q), 1.0)[:4, :4], np.eye(4)[0] / dynamics.time_constant, PULSE_S
+    )
     return a, b, dynamics.pull_nm * math.sin(q)
 
 
@@ -111,16 +113,7 @@ def swinging(dynamics: AnkleDynamics, q: float) -> tuple[np.ndarray, np.ndarray]
     f[:3, :3], f[3, 4] = joint, 1.0
     f[4] = spring - c * np.r_[joint[2], 0.0, 0.0]
     f[2] -= f[4]
-    return _held(f, dynamics.time_constant)
-
-
-def _held(f: np.ndarray, time_constant: float) -> tuple[np.ndarray, np.ndarray]:
-    """Transition over a pulse, and what recruitment adds in it, for rates f with activation first."""
-    n = len(f)
-    whole = np.zeros((n + 1, n + 1))
-    whole[:n, :n], whole[0, n] = f, 1.0 / time_constant
-    a = scipy.linalg.expm(whole * PULSE_S)
-    return a[:n, :n], a[:n, n]
+    return held(f, np.eye(5)[0] / dynamics.time_constant, PULSE_S)
 
 
 def regulator(dynamics: AnkleDynamics, q: float, boldness: float) -> np.ndarray:
@@ -189,11 +182,9 @@ class Loop(Tabulated):
 
         Where the observer has an integrator (its unknown torque), frequencies must be above 0.
         """
-        found = []
-        for z in np.exp(2j * math.pi * frequencies_hz * PULSE_S):
-            angle = self.see @ np.linalg.solve(z * np.eye(len(self.a)) - self.a, self.b)
-            found.append(-(self.law @ np.linalg.solve(z * np.eye(4) - self.own, self.seen) + self.direct) * angle)
-        return np.array(found)
+        z = np.exp(2j * math.pi * frequencies_hz * PULSE_S)[:, None, None]
+        angle = np.linalg.solve(z * np.eye(len(self.a)) - self.a, self.b[:, None])[..., 0] @ self.see
+        return -(np.linalg.solve(z * np.eye(4) - self.own, self.seen[:, None])[..., 0] @ self.law + self.direct) * angle
 
 
 def loop_at(truth: AnkleDynamics, observer: JointObserver, gains: Gains, q: float) -> Loop:

@@ -164,7 +164,7 @@ def test_a_plan_does_to_the_linear_body_what_it_says(two_links):
     """The plan's inputs in the exact discrete linear system: it ends at rest, within the limits at every look."""
     motors = Inputs.torques([ANKLE, "right_hip_adduction"], limit_nm=80.0)
     plans = plans_of(two_links, motors, 10.0)
-    eta = np.array([0.3, -0.5]) * plans.degree
+    eta = np.array([0.3, -0.5]) * plans.modes.degree
     answer = plans.program(eta, np.zeros(2)).solve()
     assert answer.x is not None
     torques = answer.x.reshape(len(plans.pieces), 2)
@@ -176,7 +176,7 @@ def test_a_plan_does_to_the_linear_body_what_it_says(two_links):
     for pulses, u in zip(plans.pieces, torques, strict=True):
         for _ in range(pulses):
             x = flow[:4, :4] @ x + flow[:4, 4:] @ (two_links.C + inputs @ u)
-            reached.append(np.abs(plans.modes.shapes.T @ two_links.A @ x[:2]) / plans.degree)
+            reached.append(np.abs(plans.modes.shapes.T @ two_links.A @ x[:2]) / plans.modes.degree)
         assert reached[-1].max() <= 10.0 + 1e-4
     assert np.max(reached) < 10.5  # between the looks a little more
     rest = -np.linalg.solve(two_links.B, two_links.C + inputs @ torques[-1])
