@@ -10,16 +10,9 @@ import numpy as np
 
 from confusion_matrix.drafts import Draft, draft, run_trials, study_of, with_noise
 from confusion_matrix.form import Form
-from confusion_matrix.noise import LEVEL
 from confusion_matrix.plan import Item
 from fes_pin.data.study import Study
-from fes_pin.identify.fit import Fit, fit_problem
-from fes_pin.identify.problem import Problem
-from fes_pin.infer.noise import Noise
-from fes_pin.models.model import Model
-from fes_pin.models.nominal import nominal_model
 
-WHITE = {name: Noise(level, (), level, 0.0) for name, level in LEVEL.items()}
 COARSE = 5
 """Integration steps per sample that the bare rigs need: 1 kHz."""
 CLOSE = 0.12
@@ -80,6 +73,8 @@ def shape(one: Draft, forms: Sequence[type[Form]], rng: Callable[[int], np.rando
 
 def size_of(one: Draft, k: int, form: type[Form], target: float) -> tuple[float, float]:
     """Size of the k-th cause, alone, at which the nominal model misses by d = `target`, and the d that it has."""
+    from confusion_matrix.refit import noncentrality  # noqa: PLC0415
+
     tried: list[tuple[float, float]] = []
     best = (np.inf, form.unit, 0.0)
     for turn in range(ROUNDS):
@@ -106,21 +101,6 @@ def _propose(tried: list[tuple[float, float]], form: type[Form], target: float, 
     size = float(np.exp(known[0][0] + np.clip((np.log(target) - known[0][1]) / slope, -4.0, 4.0)))
     size = min(size, form.cap)
     return None if any(abs(size / s - 1.0) < 1e-3 for s, _ in tried) else size
-
-
-def noncentrality(one: Draft, readings: list[np.ndarray]) -> float:
-    """Root of what noiseless readings leave after the nominal refit, in units of white noise at the true level."""
-    if not all(np.isfinite(y).all() for y in readings):
-        return float("inf")
-    fitted = nominal_fit(study_of(one, readings), one.plant.true)
-    return float(np.sqrt(fitted.sse))
-
-
-def nominal_fit(study: Study, true: Mapping[str, float], model: Model | None = None) -> Fit:
-    """Fit a study's nominal model, or one that extends it, from the true values."""
-    extended = model or nominal_model(study)
-    with np.errstate(all="ignore"):
-        return fit_problem(Problem(extended, study.trials, WHITE), {**extended.parameters(), **true})
 
 
 def true_values(one: Draft, forms: Sequence[type[Form]]) -> dict[str, float]:

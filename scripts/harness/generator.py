@@ -11,6 +11,9 @@ from typing import Any, Protocol
 
 import fes_pin as fp
 
+MISREAD = "condition_misread"
+"""What the package names a condition that a trial did not have."""
+
 
 @dataclass(frozen=True)
 class Item:

@@ -11,8 +11,7 @@ import numpy as np
 from contrast_pairs.free import free_pair
 
 import fes_pin as fp
-from fes_pin.diagnosis.misread import NAME
-from harness.generator import Item, Truth
+from harness.generator import MISREAD, Item, Truth
 
 OFF = (0.05, 0.3)
 """How far a load is stated off, as a share of what it is."""
@@ -26,7 +25,7 @@ class Misread:
     def plan(self, seed: int) -> Iterator[Item]:
         for k in count(seed):
             yield Item(f"right-{k}", k)
-            yield Item(f"misread-{k}", k, (NAME,))
+            yield Item(f"misread-{k}", k, (MISREAD,))
 
     def make(self, item: Item, folder: Path) -> tuple[fp.Study, Truth]:
         pair = free_pair("ankle", (), 80.0, item.seed, folder)
@@ -39,4 +38,4 @@ class Misread:
         true = odd.conditions["load_kg"]
         stated = true * (1.0 + float(rng.choice((-1.0, 1.0)) * rng.uniform(*OFF)))
         trials = [replace(t, conditions={**t.conditions, "load_kg": stated}) if t is odd else t for t in study.trials]
-        return replace(study, trials=tuple(trials)), Truth({f"{NAME} at {odd.name}": true})
+        return replace(study, trials=tuple(trials)), Truth({f"{MISREAD} at {odd.name}": true})

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import fes_pin as fp
-from fes_pin.diagnosis.misread import NAME as MISREAD
 from fes_pin.models.catalogue import shipped
-from harness.generator import Item, Truth
+from harness.generator import MISREAD, Item, Truth
 
 
 class Practice:

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from scipy.stats import binomtest, fisher_exact
+from scipy.stats import binomtest, fisher_exact, norm
 
-from fes_pin.infer.levels import CONFIDENCE_95
 from harness.row import KINDS, Row
 
 COLUMNS = ("studies", "right", "first", "alone", "further", "left")
 HEAD = ("hidden", "studies", "right", "named first", "alone", "further names", "something left")
+CONFIDENCE_95 = norm.ppf(0.975)
 WORSE = 0.01
 """Level at which counts are worse than those of another run."""
 
@@ -44,7 +44,7 @@ def counts(rows: Iterable[Row]) -> dict[str, Any]:
     return {
         "unanswered": len(rows) - len(good),
         "rows": lines,
-        "intervals": [sum(held), len(held)],
+        "intervals": [int(sum(held)), len(held)],
         "off": _off(good),
         "errors": _errors(good),
         "cpu_s": round(median([row.cpu_s for row in good] or [0.0]), 1),

@@ -1,6 +1,8 @@
 """What the generators make: studies that are read as they were made, with what is true of them."""
 
+import re
 from itertools import islice
+from pathlib import Path
 
 import pytest
 from confusion_matrix import stimuli
@@ -90,3 +92,21 @@ def test_frozen_answers_are_of_studies_that_there_are(shared):
 
     assert len(wanted) == len(set(wanted)) and sum(COUNTS.values()) + 71 == len(wanted)
     assert set(read(TABLE)) == set(wanted)
+
+
+ROOMS = {"body", "data", "models", "paper"}
+"""What generators may ask of the package wherever they are imported; `ENGINE` are imported where a study is made."""
+ENGINE = {"confusion_matrix/refit.py", "walking_matrix/strength.py"}
+
+
+def test_studies_that_were_made_are_answered_by_other_versions_of_the_package():
+    """Nothing that moves within it is imported but where a study is made."""
+    scripts = Path(runs.__file__).parents[1]
+    packages = ("harness", "confusion_matrix", "driven_rigs", "imposed_rigs", "contrast_pairs", "walking_matrix")
+    files = [file for package in packages for file in scripts.glob(f"{package}/*.py")]
+    assert len(files) > 30
+    for file in files:
+        if file.relative_to(scripts).as_posix() not in ENGINE:
+            found = re.findall(r"^from fes_pin\.(\w+)", file.read_text(), re.MULTILINE)
+            assert set(found) <= ROOMS, file
+            assert not re.findall(r"^(?:from|import) .*\b(refit|strength)\b", file.read_text(), re.MULTILINE)

@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
-from confusion_matrix import drafts, generator, noise, plan, stimuli
+from confusion_matrix import drafts, generator, noise, plan, refit, stimuli
 from confusion_matrix.plan import Item
 
 from fes_pin.identify.problem import Problem
@@ -32,7 +32,7 @@ def short(monkeypatch):
 def test_nominal_rigs_agree_with_the_engine(rig, short, tmp_path):
     one = drafts.draft(Item(rig, (), "null", 0, "white", 1), tmp_path)
     (readings,) = drafts.run_trials([one], [()], (), 5)
-    assert generator.noncentrality(one, readings) < 0.05
+    assert refit.noncentrality(one, readings) < 0.05
 
 
 @pytest.mark.parametrize("cause", AGREE)
@@ -50,12 +50,8 @@ def test_causes_in_the_engines_form_agree_with_it(cause, short, tmp_path):
     truth = generator.true_values(one, (form,)) | one.plant.true
     if cause in ("recruitment_hysteresis", "passive_relaxation"):
         assert set(truth) > set(one.plant.true)
-    left = whitened_sse(
-        Problem(model, study.trials, generator.WHITE).linearize({**model.parameters(), **truth}, [{}] * 9)
-    )
-    without = whitened_sse(
-        Problem(nominal_model(study), study.trials, generator.WHITE).linearize(one.plant.true, [{}] * 9)
-    )
+    left = whitened_sse(Problem(model, study.trials, refit.WHITE).linearize({**model.parameters(), **truth}, [{}] * 9))
+    without = whitened_sse(Problem(nominal_model(study), study.trials, refit.WHITE).linearize(one.plant.true, [{}] * 9))
     assert np.sqrt(left) < 0.5 and left < 0.01 * without
 
 
@@ -70,8 +66,8 @@ def test_causes_of_joints_alone_agree_with_the_engine(cause, short, tmp_path):
     (readings,) = drafts.run_trials([one], [one.sizes], (form,), 10)
     study = drafts.study_of(one, readings)
     extended = nominal_model(study) + effect_named(cause)()
-    left = generator.nominal_fit(study, generator.true_values(one, (form,)), extended)
-    assert np.sqrt(left.sse) < 0.5 < 0.05 * generator.noncentrality(one, readings)
+    left = refit.nominal_fit(study, generator.true_values(one, (form,)), extended)
+    assert np.sqrt(left.sse) < 0.5 < 0.05 * refit.noncentrality(one, readings)
 
 
 def test_a_study_is_made_again_and_has_its_size(short, tmp_path):
