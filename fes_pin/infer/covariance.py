@@ -31,15 +31,15 @@ def covariance_of(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
     return out
 
 
-def promised_gain(hessian: np.ndarray, gradient: np.ndarray, free: np.ndarray) -> float:
-    """Largest gain in twice the log-likelihood that a step of one free parameter alone still promises."""
+def single_gain(hessian: np.ndarray, gradient: np.ndarray, free: np.ndarray) -> float:
+    """Largest gain in twice the log-likelihood that a step of one free parameter alone still predicts."""
     diagonal = np.diag(hessian)
     good = free & (diagonal > 0) & np.isfinite(gradient)
     return float(np.max(gradient[good] ** 2 / diagonal[good], initial=0.0))
 
 
 def step_gain(system: NormalEquations, free: Sequence[bool]) -> float:
-    """Gain in twice the log-likelihood that a Gauss-Newton step of all parameters that may move promises."""
+    """Gain in twice the log-likelihood that a Gauss-Newton step of all parameters that may move predicts."""
     moving = np.flatnonzero(free)
     slope, curvature = system.gradient[moving], system.hessian[np.ix_(moving, moving)]
     if not (np.isfinite(slope).all() and np.isfinite(curvature).all()):
@@ -78,10 +78,10 @@ def moved_with(covariance: np.ndarray, at: list[int], change: np.ndarray) -> np.
     numpy.ndarray
         Shape (n,); `change` alone where the covariance is not finite.
     """
-    out, beside = np.zeros(len(covariance)), covariance[:, at]
+    out, moved = np.zeros(len(covariance)), covariance[:, at]
     known = np.isfinite(np.diag(covariance))
     if known[at].all():
-        out[known] = beside[known] @ np.linalg.pinv(beside[at]) @ change
+        out[known] = moved[known] @ np.linalg.pinv(moved[at]) @ change
     out[at] = change
     return out
 

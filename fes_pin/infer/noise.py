@@ -175,7 +175,7 @@ def first_order_low_pass(values: np.ndarray, pole: float) -> np.ndarray:
 
 
 def thin(values: np.ndarray, count: int) -> np.ndarray:
-    """Means of `count` samples in a row along the first axis; what is left over at the end is dropped."""
+    """Means of `count` samples in a row along the first axis; samples at the end that fill no mean are dropped."""
     if count == 1:
         return values
     end = len(values) // count * count

@@ -19,14 +19,15 @@ from fes_pin.infer.problem import (
 )
 
 TOLERANCE = 0.01
-"""A fit ends when the next step promises less than this in twice the log-likelihood: far below what any test sees."""
+"""A fit ends when the predicted gain of the next step is less than this, in twice the log-likelihood: far below what any
+test sees."""
 WORTH = 1.0
-"""Change of twice the log-likelihood that is worth more work, as where it is promised and no step keeps it: a standard
+"""Change of twice the log-likelihood that is worth more work, as where it is predicted and no step gains it: a standard
 deviation of one parameter."""
 TRIES = 12
 """Steps that are tried, each ten times as damped as the last, before a point counts as the lowest there is."""
 SHORTER = 0.5
-"""Share of what a failed step promised that a shorter one promises at most where its end is not final: in directions
+"""Share of the predicted gain of a failed step that a shorter one may predict where the end is not final: in directions
 that the data tell well, ten times the damping changes nothing at first."""
 LARGEST_DAMPING = 1e12
 """Beyond it a step is none."""
@@ -34,16 +35,16 @@ LARGEST_DAMPING = 1e12
 
 @dataclass(frozen=True)
 class _Proposal:
-    """A step that a damping leads to, and what it promises of twice the log-likelihood."""
+    """A step that a damping leads to, and its predicted gain in twice the log-likelihood."""
 
     damping: float
     x: np.ndarray
     unknowns: Unknowns
-    promised: float
+    predicted: float
 
     @property
-    def promises_little(self) -> bool:
-        return 0.0 <= self.promised < TOLERANCE
+    def predicts_little(self) -> bool:
+        return 0.0 <= self.predicted < TOLERANCE
 
 
 class Descent:
@@ -105,8 +106,8 @@ class Descent:
         if not np.isfinite(self.sse):
             return True
         first = self._proposed(self.damping)
-        if first.promises_little or self._takes(first):
-            return first.promises_little or self._gained < TOLERANCE
+        if first.predicts_little or self._takes(first):
+            return first.predicts_little or self._gained < TOLERANCE
         left, last = TRIES - 1, first
         while left > 0:
             shorter = self._shorter(last, min(left, self.problem.batch))
@@ -126,37 +127,37 @@ class Descent:
             self._system = normal_equations(self.parts, damping)
         system = self._system
         move = self._bounded_move(system, damping)
-        promised = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
-        return _Proposal(damping, self._end(move), self._moved(system.local_steps(move)), float(promised))
+        predicted = system.local_gain + 2.0 * system.gradient @ move - move @ system.hessian @ move
+        return _Proposal(damping, self._end(move), self._moved(system.local_steps(move)), float(predicted))
 
     def _shorter(self, failed: _Proposal, count: int) -> list[_Proposal]:
         """Proposals of growing damping, so many at most, to the first that is not worth a try."""
         out: list[_Proposal] = []
         last = failed
         while len(out) < count and (not out or self._is_worth(last)):
-            most = np.inf if self.problem.is_final else SHORTER * last.promised
+            most = np.inf if self.problem.is_final else SHORTER * last.predicted
             last = self._proposed(max(last.damping * 10.0, 1e-4))
-            while last.promised > most > 0.0 and last.damping < LARGEST_DAMPING:
+            while last.predicted > most > 0.0 and last.damping < LARGEST_DAMPING:
                 last = self._proposed(last.damping * 10.0)
             out.append(last)
         return out
 
     def _is_worth(self, shorter: _Proposal) -> bool:
-        return not 0.0 <= shorter.promised < (TOLERANCE if self.problem.is_final else WORTH)
+        return not 0.0 <= shorter.predicted < (TOLERANCE if self.problem.is_final else WORTH)
 
     def _takes(self, one: _Proposal) -> bool:
         """Go where a proposal leads, if that is down."""
         parts = self._linearize(one.x, one.unknowns)
         sse = whitened_sse(parts)
-        if not (one.promised > 0.0 and np.isfinite(sse) and sse <= self.sse):
+        if not (one.predicted > 0.0 and np.isfinite(sse) and sse <= self.sse):
             return False
         self._gained = self.sse - sse
         self.x, self.unknowns, self.parts, self.sse, self._system = one.x, one.unknowns, parts, sse, None
-        self.damping = max(one.damping * _relief(self._gained / one.promised), 1e-9)
+        self.damping = max(one.damping * _relief(self._gained / one.predicted), 1e-9)
         return True
 
     def _bounded_move(self, system: NormalEquations, damping: float) -> np.ndarray:
-        """Marquardt's step inside the bounds: what would leave them first stops there, and the others step anew."""
+        """Marquardt's step inside the bounds: what would leave them first stops there."""
         free, move = self.free_now(system.gradient), np.zeros(len(self.x))
         while free.any():
             gradient = system.gradient - system.hessian[:, ~free] @ move[~free]
@@ -190,7 +191,7 @@ class Descent:
 
 
 def _relief(kept: float) -> float:
-    """Factor on the damping after a step that kept this share of its promise (Nielsen, IMM-REP-1999-05, Copenhagen)."""
+    """Factor on the damping after a step that gained this share of its prediction (Nielsen, IMM-REP-1999-05)."""
     return float(np.clip(1.0 - (2.0 * kept - 1.0) ** 3, 0.2, 2.0))
 
 

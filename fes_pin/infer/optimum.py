@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fes_pin.infer.covariance import covariance_of, promised_gain
+from fes_pin.infer.covariance import covariance_of, single_gain
 from fes_pin.infer.levels import CONFIDENCE_95, PARAMETER_PRICE
 from fes_pin.infer.optimize import Descent
 from fes_pin.infer.problem import Linearized, Problem, Unknowns, normal_equations
@@ -131,7 +131,7 @@ def minimise(
     with np.errstate(all="ignore"):
         system = normal_equations(search.parts)
         free = search.free_now(system.gradient)
-        decrement = promised_gain(system.hessian, system.gradient, free)
+        decrement = single_gain(system.hessian, system.gradient, free)
     return Optimum(
         free=problem.free,
         parameters=search.values(search.x),

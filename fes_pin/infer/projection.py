@@ -104,7 +104,7 @@ class Projection:
         return joined, before, self.shared[rows].T @ joined
 
     def _left(self, partly: np.ndarray, shared: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """One trial's part of the Gram matrix of what is left, and of its inner products with the residual."""
+        """One trial's part of the Gram matrix of projected columns, and of their products with the residual."""
         left = partly - self.shared[self.trials[k]] @ shared
         return left.T @ left, left.T @ self.residual[self.trials[k]]
 

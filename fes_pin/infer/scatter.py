@@ -71,7 +71,7 @@ def as_wide_as_estimates_differ(fitted: F, other: Optimum) -> F:
     """The fit with intervals that hold another estimate of the same parameters where chance does not set both apart.
 
     Both estimate the same where the model is right, and the other no better: their difference varies by less than that
-    does. Where it is unusual beside it, the model is not right, by about as much as both are apart; either may be off
+    does. Where it is unusually large, the model is not right, by about as much as both are apart; either may be off
     by that.
 
     Source: Hausman, Specification tests in econometrics, Econometrica 46 (1978).
@@ -161,8 +161,8 @@ def in_pieces(values: np.ndarray, trials: int) -> np.ndarray:
 def at_rest(parts: Sequence[Linearized]) -> list[Linearized]:
     """The trials of a fit that has ended, without what its sensitivities have along the residual as a whole.
 
-    A slope that is left where no step keeps what it promises is roughness of the cost, as beside friction that jumps:
-    it tells nothing of a parameter.
+    A slope at an end from which no step gains is roughness of the cost, as of friction that jumps: it says nothing of a
+    parameter.
     """
     power = sum(float(p.residual @ p.residual) for p in parts)
     along = sum(p.residual @ p.jacobian for p in parts) / max(power, 1e-300)

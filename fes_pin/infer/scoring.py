@@ -26,8 +26,8 @@ from fes_pin.infer.problem import Problem, Unknowns
 LITTLE = 0.1
 """Fall of twice the log-likelihood with which alternation ends: a third of a standard deviation of one parameter."""
 STEPS = (1e-3, 0.03)
-"""Steps of the differences in logarithms: the second where the first promises what no step keeps, as where the cost is
-rough: that of a filter which takes for linear what bends sharply."""
+"""Steps of the differences in logarithms: the second where the first predicts a gain that no step has, as where the cost
+is rough: that of a filter which takes for linear what bends sharply."""
 DEVIATIONS = 10.0
 """How many deviations of a parameter, as far as it is known with gains as they are, count as one of a logarithm: a
 difference is then 0.01 of them, or 0.3."""
@@ -118,7 +118,7 @@ class _Slopes:
         """What to take away."""
         return _damped_step(self.information, self.gradient, ~self.held, damping)
 
-    def promised(self, step: np.ndarray) -> float:
+    def predicted(self, step: np.ndarray) -> float:
         """By how much a step lowers the cost, if it is the parabola that it seems to be."""
         return float(2.0 * self.gradient @ step - step @ self.information @ step)
 
@@ -225,11 +225,11 @@ class _Scoring:
     def _step(self) -> bool:
         """Go down once, or look at longer differences; True where there is nothing left to gain."""
         gradient, information = _scored(self.now, self.moved, self._widths())
-        lost = ~(np.isfinite(gradient) & np.isfinite(np.diag(information)))  # a prediction runs away beside it
+        lost = ~(np.isfinite(gradient) & np.isfinite(np.diag(information)))  # a prediction runs away there
         gradient[lost], information[lost], information[:, lost] = 0.0, 0.0, 0.0
         self.held = self.scale.held(self.z, gradient)
         slopes = _Slopes(gradient, information, self.held | lost)
-        self.left = slopes.promised(slopes.step(0.0))
+        self.left = slopes.predicted(slopes.step(0.0))
         if self.left < LITTLE:
             return True
         dampings = self.damping * 10.0 ** np.arange(1 + len(self.z))
@@ -241,7 +241,7 @@ class _Scoring:
             return done and not self._leap()
         k, end, after = found
         step, gained = self.z - end, self.now.cost - after.cost
-        self.left = abs(gained - slopes.promised(step))
+        self.left = abs(gained - slopes.predicted(step))
         self.held = self.scale.held(end, gradient - information @ step)
         self.z, self.now, self.damping = end, after, max(0.3 * float(dampings[k]), 1e-6)
         return min(gained, self.left) < LITTLE
