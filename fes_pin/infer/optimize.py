@@ -19,7 +19,7 @@ from fes_pin.infer.problem import (
 )
 
 TOLERANCE = 0.01
-"""A fit ends when the predicted gain of the next step is less than this, in twice the log-likelihood: far below what any
+"""A fit ends when the predicted gain of the next step is less than this, in twice the log-likelihood: below what any
 test sees."""
 WORTH = 1.0
 """Change of twice the log-likelihood that is worth more work, as where it is predicted and no step gains it: a standard

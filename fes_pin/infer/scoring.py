@@ -26,7 +26,7 @@ from fes_pin.infer.problem import Problem, Unknowns
 LITTLE = 0.1
 """Fall of twice the log-likelihood with which alternation ends: a third of a standard deviation of one parameter."""
 STEPS = (1e-3, 0.03)
-"""Steps of the differences in logarithms: the second where the first predicts a gain that no step has, as where the cost
+"""Steps of the differences in logarithms: the second where the first predicts a gain that no step has, as where a cost
 is rough: that of a filter which takes for linear what bends sharply."""
 DEVIATIONS = 10.0
 """How many deviations of a parameter, as far as it is known with gains as they are, count as one of a logarithm: a
