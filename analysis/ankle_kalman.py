@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from paper_ankle.consistency import chi2_band, nees
 from paper_ankle.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_twin
+from paper_ankle.regression import RegressionFilter
 from paper_ankle.twin import record, staircase
 
 import fes_pin as fp
@@ -17,7 +18,7 @@ from fes_pin.identify.fit import fit
 from fes_pin.infer.noise import Noise
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.simulate import simulate
-from fes_pin.paper.kalman import StraightRecruitment
+from fes_pin.paper.kalman import StraightRecruitment, history_of
 
 OUT = Path("out")
 OUT.mkdir(exist_ok=True)
@@ -30,8 +31,9 @@ def isometric(stimulus, seed, noise=FORCE_NOISE_N):
 
 trial = isometric(isometric_stimulus(8.0), 1)
 history = fp.track_gain(trial, twin.constants(), FORCE_NOISE_N)
-plain = fp.track_gain(isometric(isometric_stimulus(8.0), 1, 1.0), twin.constants(), 1.0, plain=True)
-ours = fp.track_gain(isometric(isometric_stimulus(8.0), 1, 1.0), twin.constants(), 1.0)
+noisy = isometric(isometric_stimulus(8.0), 1, 1.0)
+plain = history_of(RegressionFilter(noisy.dt, StraightRecruitment.of(twin.constants()), 1.0), noisy)
+ours = fp.track_gain(noisy, twin.constants(), 1.0)
 
 # %% Is its band honest? NEES over 60 trials, NIS within each
 runs, squares, innovations = 60, [], []

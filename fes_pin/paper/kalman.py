@@ -6,9 +6,7 @@ Between two samples the muscle of section II-3-1 does exactly
 
 which is linear in what is sought. `GainFilter` carries the state (F, alpha, beta): its measurement is linear, and of
 its one product, alpha F, mean and covariance are propagated exactly (for a Gaussian), not linearised. So its bands mean
-what they say, which `nees` and `nis` test. `RegressionFilter` is the plain linear filter on (alpha, beta) with the
-measured force as regressor; it is what a linear Kalman filter for these two usually is, and it takes the noise of the
-regressor for motion: its tau comes out short.
+what they say (`analysis/ankle_kalman.py`).
 
 Source: Dombre, Fournier and Coiffet, section II-3-1, figure 3; Bar-Shalom, Li and Kirubarajan, Estimation with
 Applications to Tracking and Navigation, Wiley 2001, section 5.4 (NEES, NIS).
@@ -70,37 +68,7 @@ class StraightRecruitment(LinearRecruitment):
         return float(self.recruitment(pulse_width_us))
 
 
-class _Tracker:
-    """What is known of a muscle from a mean `x` that ends with (alpha, beta), and its covariance `p`."""
-
-    x: np.ndarray
-    p: np.ndarray
-
-    def __init__(self, dt: float, recruitment: StraightRecruitment, noise_std: float) -> None:
-        self.dt, self.recruitment, self.noise_std = dt, recruitment, noise_std
-        self.nis, self.skipped = math.nan, 0
-
-    def _decay(self) -> float:
-        return min(max(float(self.x[-2]), 1e-6), 1.0 - 1e-6)
-
-    def gain_and_time_constant(self) -> tuple[float, float]:
-        """K and tau in s, from the means."""
-        alpha = self._decay()
-        gain = self.x[-1] / ((1.0 - alpha) * self.recruitment.force_scale_n)
-        return float(gain), -self.dt / math.log(alpha)
-
-    def stds(self) -> tuple[float, float]:
-        """Standard deviations of K and of tau in s, to first order."""
-        alpha = self._decay()
-        left = (1.0 - alpha) * self.recruitment.force_scale_n
-        by_alpha_and_beta = np.array(
-            [[self.x[-1] / left / (1.0 - alpha), 1.0 / left], [self.dt / (alpha * math.log(alpha) ** 2), 0.0]]
-        )
-        gain, time_constant = np.sqrt(np.diag(by_alpha_and_beta @ self.p[-2:, -2:] @ by_alpha_and_beta.T))
-        return float(gain), float(time_constant)
-
-
-class GainFilter(_Tracker):
+class GainFilter:
     """Kalman filter of (F, alpha, beta), one sample at a time.
 
     Parameters
@@ -143,8 +111,10 @@ class GainFilter(_Tracker):
         for name, value in (("dt", dt), ("noise_std", noise_std), ("greatest_gain", greatest_gain)):
             positive_number(value, name)
         between(wander, 0.0, math.inf, "wander")
-        super().__init__(dt, instance(recruitment, StraightRecruitment, "recruitment"), noise_std)
-        self.wander, alpha = wander, math.exp(-dt / START_TIME_CONSTANT_S)
+        self.recruitment = instance(recruitment, StraightRecruitment, "recruitment")
+        self.dt, self.noise_std, self.wander = dt, noise_std, wander
+        self.nis, self.skipped = math.nan, 0
+        alpha = math.exp(-dt / START_TIME_CONSTANT_S)
         beta = (1.0 - alpha) * 0.5 * greatest_gain * recruitment.force_scale_n
         self.x, self.p = np.array([0.0, alpha, beta]), np.diag([noise_std**2, START_ALPHA_STD**2, beta**2])
 
@@ -181,34 +151,24 @@ class GainFilter(_Tracker):
         self.p[2, 2] += (self.wander * beta) ** 2 * self.dt
         self.x[0] = alpha * force + fa + beta * r
 
+    def _decay(self) -> float:
+        return min(max(float(self.x[-2]), 1e-6), 1.0 - 1e-6)
 
-class RegressionFilter(_Tracker):
-    """Plain linear Kalman filter of (alpha, beta): the measured force explains the next one.
+    def gain_and_time_constant(self) -> tuple[float, float]:
+        """K and tau in s, from the means."""
+        alpha = self._decay()
+        gain = self.x[-1] / ((1.0 - alpha) * self.recruitment.force_scale_n)
+        return float(gain), -self.dt / math.log(alpha)
 
-    Same parameters as `GainFilter`; its innovation is y+ - alpha y - beta r, whose noise it takes for white.
-    """
-
-    def __init__(
-        self, dt: float, recruitment: StraightRecruitment, noise_std: float, greatest_gain: float = 2.0
-    ) -> None:
-        start = GainFilter(dt, recruitment, noise_std, greatest_gain)
-        super().__init__(dt, recruitment, noise_std)
-        self.x, self.p = start.x[1:], start.p[1:, 1:]
-        self.before: np.ndarray | None = None
-
-    def step(self, force_n: float, pulse_width_us: float) -> None:
-        """Take in one measured force (NaN: none, nor anything to explain the next one by), and the next pulse width."""
-        known = np.array([force_n, self.recruitment(pulse_width_us)])
-        if not math.isfinite(force_n):
-            self.before, self.skipped = None, self.skipped + 1
-            return
-        if self.before is not None:
-            size = float(self.before @ self.p @ self.before) + 2.0 * self.noise_std**2
-            innovation = force_n - float(self.before @ self.x)
-            gain = self.p @ self.before / size
-            self.nis = innovation**2 / size
-            self.x, self.p = self.x + gain * innovation, self.p - np.outer(gain, gain) * size
-        self.before = known
+    def stds(self) -> tuple[float, float]:
+        """Standard deviations of K and of tau in s, to first order."""
+        alpha = self._decay()
+        left = (1.0 - alpha) * self.recruitment.force_scale_n
+        by_alpha_and_beta = np.array(
+            [[self.x[-1] / left / (1.0 - alpha), 1.0 / left], [self.dt / (alpha * math.log(alpha) ** 2), 0.0]]
+        )
+        gain, time_constant = np.sqrt(np.diag(by_alpha_and_beta @ self.p[-2:, -2:] @ by_alpha_and_beta.T))
+        return float(gain), float(time_constant)
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,9 +210,7 @@ class GainHistory(Tabulated):
         return float(self.gain[k]), float(self.time_constant_s[k])
 
 
-def track_gain(
-    trial: Trial, constants: Mapping[str, float], noise_std: float, plain: bool = False, wander: float = 0.0
-) -> GainHistory:
+def track_gain(trial: Trial, constants: Mapping[str, float], noise_std: float, wander: float = 0.0) -> GainHistory:
     """Run the filter over an isometric trial.
 
     Parameters
@@ -261,8 +219,6 @@ def track_gain(
         The `[rig]` numbers of its study.
     noise_std
         N.
-    plain
-        Use `RegressionFilter`.
 
     Raises
     ------
@@ -273,15 +229,14 @@ def track_gain(
     for column in ("force_n", "pulse_width_us"):
         if column not in trial:
             raise InputError(f"trial {trial.name} has no column {column}; gain and time constant need isometric trials")
-    recruitment = StraightRecruitment.of(constants)
-    filter_: GainFilter | RegressionFilter = (
-        RegressionFilter(trial.dt, recruitment, noise_std)
-        if plain
-        else GainFilter(trial.dt, recruitment, noise_std, wander=wander)
-    )
+    return history_of(GainFilter(trial.dt, StraightRecruitment.of(constants), noise_std, wander=wander), trial)
+
+
+def history_of(tracker: GainFilter, trial: Trial) -> GainHistory:
+    """What a filter has estimated after each sample of a trial."""
     rows = []
     for force, width in zip(trial["force_n"], trial["pulse_width_us"], strict=True):
-        filter_.step(float(force), float(width))
-        (gain, tau), (gain_std, tau_std) = filter_.gain_and_time_constant(), filter_.stds()
-        rows.append((gain, gain_std, tau, tau_std, filter_.nis))
+        tracker.step(float(force), float(width))
+        (gain, tau), (gain_std, tau_std) = tracker.gain_and_time_constant(), tracker.stds()
+        rows.append((gain, gain_std, tau, tau_std, tracker.nis))
     return GainHistory(trial.time, *np.array(rows).T)

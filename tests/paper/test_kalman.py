@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from paper_ankle.consistency import chi2_band, nees
 from paper_ankle.constants import FORCE_NOISE_N, HELD_AT_RAD, isometric_stimulus, paper_study, paper_trial, paper_twin
+from paper_ankle.regression import RegressionFilter
 from paper_ankle.twin import record
 
 from fes_pin.data.errors import InputError
 from fes_pin.identify.fit import fit
 from fes_pin.infer.noise import Noise
 from fes_pin.models.nominal import nominal_model
-from fes_pin.paper.kalman import GainFilter, RegressionFilter, StraightRecruitment, track_gain
+from fes_pin.paper.kalman import GainFilter, StraightRecruitment, history_of, track_gain
 
 TWIN = paper_twin("3-23")
 CONSTANTS = TWIN.constants()
@@ -81,7 +82,8 @@ def test_nis_lies_in_its_band(runs):
 
 
 def test_plain_regression_is_biased_by_noise_and_the_filter_is_not():
-    plain = track_gain(isometric(3, noise=1.0), CONSTANTS, 1.0, plain=True).at(8.0)
+    trial = isometric(3, noise=1.0)
+    plain = history_of(RegressionFilter(trial.dt, StraightRecruitment.of(CONSTANTS), 1.0), trial).at(8.0)
     good = track_gain(isometric(3, noise=1.0), CONSTANTS, 1.0).at(8.0)
     assert plain[1] < 0.045 and good[1] == pytest.approx(0.05, rel=0.03)
 
