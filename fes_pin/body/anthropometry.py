@@ -138,8 +138,9 @@ def skeleton_of_subject(subject: Subject) -> Skeleton:
 
     hip, shoulder = 0.5 * HIP_SPACING * subject.height_m, SHOULDER_HALF_BREADTH * subject.height_m
     parts = [upright(name, 0.0, bottoms[name], column) for name in ("middle_trunk", "upper_trunk", "head")]
+    shoulder_height = bottoms["lower_trunk"] + column * _SHOULDERS_TO_HIPS[subject.sex]
     for y in (shoulder, -shoulder):
-        top = bottoms["lower_trunk"] + column * _SHOULDERS_TO_HIPS[subject.sex]
+        top = shoulder_height
         for name in ("upper_arm", "forearm", "hand"):
             top -= per_mm * table[name].length
             parts.append(upright(name, y, top, per_mm))
@@ -160,16 +161,12 @@ def skeleton_of_subject(subject: Subject) -> Skeleton:
         centres[f"{side}_mtp"] = np.array([heel + MTP_ALONG_FOOT * length, y, MTP_HEIGHT * subject.height_m])
         points[f"{side}_heel"] = np.array([heel, y, 0.0])
         points[f"{side}_toe"] = np.array([heel + length, y, 0.0])
-        points[f"{side}_shoulder"] = np.array([0.0, np.sign(y) * shoulder, top + per_mm * _arm_mm(table)])
+        points[f"{side}_shoulder"] = np.array([0.0, np.sign(y) * shoulder, shoulder_height])
         points[f"{side}_elbow"] = points[f"{side}_shoulder"] - [0.0, 0.0, per_mm * table["upper_arm"].length]
         points[f"{side}_fingers"] = np.array([0.0, np.sign(y) * shoulder, top])
         hind, fore = _split_foot(table["foot"], per_percent, length, centres[f"{side}_ankle"], centres[f"{side}_mtp"])
         segments[f"{side}_hindfoot"], segments[f"{side}_forefoot"] = hind, fore
     return Skeleton(segments, centres, points, subject.height_m)
-
-
-def _arm_mm(table: dict[str, _Row]) -> float:
-    return sum(table[name].length for name in ("upper_arm", "forearm", "hand"))
 
 
 def combined(parts: list[Segment]) -> Segment:

@@ -45,10 +45,6 @@ class GroundRows:
     at_rest: np.ndarray = field(repr=False)
 
 
-def _feet(linear: LinearBody) -> tuple[str, ...]:
-    return SIDES if linear.both_feet else (linear.body.stance,)
-
-
 def _area(linear: LinearBody, sides: tuple[str, ...]) -> SupportPolygon:
     q = linear.body.angles(linear.whole_posture, check=False)
     return support(linear.body, q, {side: f"{side}_mtp_extension" in linear.held for side in SIDES}, sides)
@@ -56,7 +52,7 @@ def _area(linear: LinearBody, sides: tuple[str, ...]) -> SupportPolygon:
 
 def soles_of(linear: LinearBody) -> SupportPolygon:
     """The area on the ground that carries a linearized body: of all feet together."""
-    return _area(linear, _feet(linear))
+    return _area(linear, SIDES if linear.both_feet else (linear.body.stance,))
 
 
 def _model(linear: LinearBody) -> tuple[pin.Model, np.ndarray]:

@@ -141,9 +141,8 @@ def modal_controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> M
     gains = found.shapes.T @ torque
     size = np.abs(gains).max(initial=0.0)
     gains = np.where(np.abs(gains) > RELATIVE_TOLERANCE * size, gains, 0.0)
-    greatest = np.abs(found.shapes).max(axis=0)
     squared = (gains**2).sum(axis=1)
-    price = mode_price(found.values, horizon) * (np.radians(1.0) / greatest) ** 2
+    price = mode_price(found.values, horizon) * found.degree**2
     controllable = independent(found.values, gains)
     with np.errstate(divide="ignore"):
         energy = np.where(controllable, price / squared, np.inf)
@@ -156,7 +155,7 @@ def modal_controllability(linear: LinearBody, inputs, horizon: float = 0.3) -> M
         controllable=controllable,
         both_ways=np.logical_and(*(push.any(axis=1) for push in inputs.pushes(gains))),
         energy=energy,
-        mode_influence=gains * greatest[:, None],
+        mode_influence=gains * (np.radians(1.0) / found.degree)[:, None],
         joint_influence=linear.mobility @ torque,
     )
 

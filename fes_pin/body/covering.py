@@ -104,7 +104,7 @@ def smallest(
     if not np.all(rows.sum(axis=1) >= needs) or any(d.shortfall(everything) is not None for d in demands):
         return []
     found: list[np.ndarray] = []
-    cover = [_tidy(row, need) for row, need in zip(rows, needs, strict=True)]
+    cover = list(np.minimum(rows / needs[:, None], 1.0))  # of a need of 1; more than enough is enough
     while len(found) < alternatives:
         chosen = _cover(count, cover, found)
         if chosen is None or (found and chosen.sum() > found[0].sum()):
@@ -115,11 +115,6 @@ def smallest(
         if not failed:
             found.append(chosen)
     return found
-
-
-def _tidy(row: np.ndarray, need: float) -> np.ndarray:
-    """A row scaled to a need of 1; more than enough is enough."""
-    return np.minimum(row / need, 1.0)
 
 
 def _lifted(demand: Demand, chosen: np.ndarray, row: np.ndarray, need: float) -> np.ndarray:

@@ -98,7 +98,7 @@ def observability(linear: LinearBody, sensors: Iterable[str]) -> ModalObservabil
 def _angles(linear: LinearBody, found: ModeSet, names: Sequence[str]) -> np.ndarray:
     """Angle that each sensor sees per degree of each mode's greatest joint: (modes, sensors)."""
     rows = found.shapes[[linear.joint_names.index(name) for name in names]].T
-    rows = rows / np.abs(found.shapes).max(axis=0)[:, None]
+    rows = rows * (found.degree / np.radians(1.0))[:, None]
     return np.where(np.abs(rows) > RELATIVE_TOLERANCE, rows, 0.0)
 
 

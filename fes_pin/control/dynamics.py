@@ -102,11 +102,9 @@ class AnkleDynamics(Tabulated):
     @cached_property
     def pieces(self) -> int:
         """Integration steps per pulse that resolve damping and stiffness up to where full activation holds."""
-        return max(2, math.ceil(PULSE_S * self._fastest() / RESOLVED))
-
-    def _fastest(self) -> float:
         stiff = max(-self.passive(self.rest_angle(share))[1] / self.inertia for share in (0.0, 1.0))
-        return max(self.damping / self.inertia, math.sqrt(max(stiff, 0.0)))
+        fastest = max(self.damping / self.inertia, math.sqrt(max(stiff, 0.0)))
+        return max(2, math.ceil(PULSE_S * fastest / RESOLVED))
 
     def passive(self, q: float) -> tuple[float, float]:
         """Torque of antagonist, load and weight at an angle, N m, and its slope, N m/rad."""

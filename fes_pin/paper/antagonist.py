@@ -17,7 +17,7 @@ import scipy.optimize
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import between, number, numbers, positive_number
 from fes_pin.data.tabulated import Tabulated
-from fes_pin.paper.equation_1 import GRAVITY, antagonist_n, halved, static_torque_nm
+from fes_pin.paper.equation_1 import antagonist_n, halved, static_torque_nm
 
 NAMES = ("f0_n", "f1_per_rad", "theta_r_rad")
 RESTS_RAD = (0.1, 3.0)
@@ -119,14 +119,7 @@ def fit_antagonist(
     def residual(x: np.ndarray) -> np.ndarray:
         return (angles - rest_angles(values(x), loads, foot_mass_kg)) / angle_std_rad
 
-    def jacobian(x: np.ndarray) -> np.ndarray:
-        p = values(x)
-        q = rest_angles(p, loads, foot_mass_kg)
-        slope = _slope(q, p)  # by theta_r it is minus that by the angle
-        rise = slope / (foot_mass_kg * GRAVITY / np.sin(q) ** 2 - slope[:, 2])[:, None]
-        return rise * [p[0], p[1], 1.0] / angle_std_rad
-
-    found = scipy.optimize.least_squares(residual, [*START, angles.min() - 0.3], jac=jacobian, x_scale="jac")
+    found = scipy.optimize.least_squares(residual, [*START, angles.min() - 0.3], jac="3-point", x_scale="jac")
     if not found.success or not np.isfinite(found.fun).all() or np.linalg.matrix_rank(found.jac) < len(NAMES):
         raise InputError("no curve fits these loads and angles: the search for F_ANT did not converge")
     to_values = np.diag([*np.exp(found.x[:2]), 1.0])
