@@ -52,7 +52,7 @@ class Ding2003(Effect):
         return s.own.tension
 
     def update(self, s: Any) -> Mapping[str, Any]:
-        pulse = s.u.stim > 0.5
+        pulse = s.u.stim > 0.0
         earlier = s.own.primed * exp(-s.c.dt / TAU_C_S)
         return {
             "weight": 1.0 + (self.half_saturation + R_0 - 1.0) * earlier,

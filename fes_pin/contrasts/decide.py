@@ -30,6 +30,9 @@ from fes_pin.contrasts.screen import ItemScore, by_unit
 from fes_pin.infer.distributions import f_tail
 from fes_pin.infer.levels import UNUSUAL_LEVEL
 
+FEWEST = 1e-3
+"""Degrees of freedom of a variance, at least."""
+
 
 @dataclass(frozen=True)
 class Spread:
@@ -117,9 +120,10 @@ def usual_spread(scored: Sequence[ItemScore]) -> Spread:
 
 def _degrees(variance: float, most: float) -> float:
     """Degrees of freedom f0 of a variance whose logarithm has trigamma(f0 / 2) as its own."""
-    if variance <= special.polygamma(1, 0.5 * most):
+
+    def missing(degrees: float) -> float:
+        return float(special.polygamma(1, 0.5 * degrees)) - variance
+
+    if missing(most) >= 0.0:
         return most
-    least = 1e-3
-    if variance >= special.polygamma(1, 0.5 * least):
-        return least
-    return float(optimize.brentq(lambda f: special.polygamma(1, 0.5 * f) - variance, least, most))
+    return float(optimize.brentq(missing, FEWEST, most)) if missing(FEWEST) > 0.0 else FEWEST

@@ -14,7 +14,7 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.starts import near_null, started
 from fes_pin.infer.family import MIN_UNITS, Family
-from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.levels import PARAMETER_PRICE, UNFELT
 from fes_pin.infer.problem import Linearized, Unknowns, completed
 from fes_pin.infer.projection import Projection
 from fes_pin.models.model import Model
@@ -23,8 +23,6 @@ from fes_pin.workers import in_parallel
 
 FEWEST_TRIALS = 6
 """Trials that alone show how much repeats differ; of fewer each is cut into pieces, as a diagnosis does."""
-UNFELT = 1e-4
-"""Share of the largest part that a unit must have in a change to say something of its spread."""
 LEAST_KEPT = 1e-6
 """Share of its norm that an item's sensitivity must keep to be scored: below it is rounding."""
 

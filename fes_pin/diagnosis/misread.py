@@ -46,6 +46,8 @@ UNFELT = 1e-7
 """Share of an answer's spread that a step of a condition moves it by where only rounding does."""
 LEAST_SCORE = 10.0
 """Drop in twice the log-likelihood under white noise that a trial must promise: three deviations."""
+ENDS = 0.01
+"""Step, in standard deviations of the value, with which its search ends."""
 STEPS = 8
 """Gauss-Newton steps of one value, which half a step of its own size usually ends."""
 SHARE = 1e-4
@@ -139,7 +141,7 @@ def takes_most(found: Misread) -> bool:
     restated = restated_trials(whole.model, whole.trials, found)
     after = fit_problem(Problem(whole.model, restated, whole.noise), whole.values)
     wrong = max(whole.sse - whole.samples, 0.0)
-    return after.sse - after.samples < 0.5 * wrong
+    return 2.0 * (after.sse - after.samples) < wrong
 
 
 def _sizes(model: Model, trials: Sequence[Trial]) -> dict[str, float]:
@@ -264,7 +266,7 @@ def _step(
         shift = column @ j / power
         std = math.sqrt(1.0 / power + max(float(shift @ covariance @ shift), 0.0))
         now = rig.restated(now, name, rig.stated(now)[name] + move)
-        if abs(move) < 0.01 * std:
+        if abs(move) < ENDS * std:
             break
     r = without_locals(part, _residual(fitted.model, now, fitted, noise).residual[:, None])[:, 0]
     return _Step(rig.stated(now)[name] - begun, std, float(r @ r) / max(len(r), 1))

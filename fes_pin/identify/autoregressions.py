@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from fes_pin.infer.levels import PARAMETER_PRICE
+from fes_pin.infer.noise import SAMPLES_EACH
 from fes_pin.models.foretold import ForetoldTrial
 
 MOST = 8
@@ -32,7 +33,7 @@ def autoregressions(run: Sequence[ForetoldTrial], orders: Mapping[str, Sequence[
     for name, own in orders.items():
         left = [_left(one, name) for one in run if name in one.outputs]
         if left:
-            out[name] = _likeliest(left, [p for p in own if p <= min(MOST, min(map(len, left)) // 10)] or [0])
+            out[name] = _likeliest(left, [p for p in own if p <= min(MOST, min(map(len, left)) // SAMPLES_EACH)] or [0])
     return out
 
 

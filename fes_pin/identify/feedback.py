@@ -13,6 +13,8 @@ from fes_pin.infer.distributions import chi2_tail, f_tail
 from fes_pin.infer.levels import CERTAIN_LEVEL
 from fes_pin.models.rigs.base import Rig
 
+SHORTEST = 20
+"""Samples for each lag below which nothing is tested."""
 LAGS = 4
 """Samples that a controller's answer is sought in: it acts in the sample in which it reads, or a few later."""
 ANSWERED = 1.0 / 6.0
@@ -73,7 +75,7 @@ def _granger(effort: np.ndarray, reading: np.ndarray) -> tuple[float, float]:
     """p-value of the readings' part in what foretells the effort, and its share of what past efforts do not."""
     u, y = (_without_jumps(np.diff(x, 2)) for x in (effort, reading))
     n = len(u) - LAGS
-    if n < 20 * LAGS or not u.any() or not y.any():
+    if n < SHORTEST * LAGS or not u.any() or not y.any():
         return 1.0, 0.0
     past = np.stack([u[LAGS - k : LAGS - k + n] for k in range(1, LAGS + 1)], axis=1) / u.std()
     read = np.stack([y[LAGS - k : LAGS - k + n] for k in range(LAGS + 1)], axis=1) / y.std()

@@ -8,6 +8,8 @@ import numpy as np
 
 from fes_pin.infer.problem import NormalEquations
 
+LOST = 1e-3
+"""Part of a parameter in a direction that is not identified from which on neither is the parameter."""
 UNIDENTIFIED = 1e-10
 """Eigenvalue of the scaled information matrix, relative to the largest, below which a direction is not identified."""
 
@@ -25,7 +27,7 @@ def covariance_of(hessian: np.ndarray, free: np.ndarray) -> np.ndarray:
     weak = values <= UNIDENTIFIED * max(values.max(initial=0.0), 1e-300)
     inverse = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, values))
     covariance = (vectors * inverse) @ vectors.T / np.outer(scale, scale)
-    lost = ~seen | (np.abs(vectors[:, weak]) > 1e-3).any(axis=1)
+    lost = ~seen | (np.abs(vectors[:, weak]) > LOST).any(axis=1)
     covariance[np.diag_indices_from(covariance)] = np.where(lost, np.inf, np.diag(covariance))
     out[np.ix_(free, free)] = covariance
     return out

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fes_pin.infer.distributions import chi2_tail, f_tail
+from fes_pin.infer.levels import UNFELT
 
 DRAWS = 4000
 """Simulated score vectors; the 5 % quantile of the smallest p-value then has a standard error of 7 %."""
@@ -96,7 +97,7 @@ def coherence_p_value(few: Sequence[np.ndarray], many: Sequence[np.ndarray], gai
         for less, more in zip(few, many, strict=True)
         for x, r in _pieces(less - more, more, len(many), degrees)
     ]
-    felt = [(size, along) for size, along in units if size > 1e-4 * max(u[0] for u in units)]
+    felt = [(size, along) for size, along in units if size > UNFELT * max(u[0] for u in units)]
     free = len(felt) - degrees
     if free < 1 or gain <= 0:
         return 1.0

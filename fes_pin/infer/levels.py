@@ -28,6 +28,9 @@ SMALL_SHARE = 0.1
 """Part of a whole that is small beside it, in amplitude: a random effort beside what drives a rig, an error beside the
 motion, noise from sample to sample beside all that is left, what an innovation has in common with the next. A tenth of
 an error that is small anyway is nothing. A low pass must take as much of the power of what is new in a sample."""
+UNFELT = 1e-4
+"""Share of the largest of several squares, or eigenvalues, below which one says nothing: a hundredth in amplitude, a
+tenth of what is small (`SMALL_SHARE`)."""
 RUNAWAY = 10.0
 """A prediction is lost where it is so many times as far off as readings ever are, or enlarges an error of its beginning
 so many times: where it goes to says nothing, and it counts as no farther off."""

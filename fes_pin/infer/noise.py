@@ -17,6 +17,8 @@ ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 """Orders tried. Sensor noise is whitened by a few; random torque under white sensor noise is slow and needs 24 to 48:
 on the ankle, order 12 leaves 2.2 times too much power below 0.5 Hz, order 24 none; a test would take it for a cause."""
 
+SAMPLES_EACH = 10
+"""Samples of the shortest trial for each coefficient, at least (Box and Jenkins)."""
 WHITE_SHARE = 0.003
 """Share of the residual's variance that is taken for white on top of it. It keeps a filter from becoming a resonator
 that swallows whatever a model gets wrong; slow noise weighs as before. It is no bound on the range of the spectrum: a
@@ -129,7 +131,7 @@ def estimate_noise(
 
 def _orders(shortest: int, longest: int, least: int) -> list[int]:
     """Orders that are tried for trials of at least so many samples."""
-    possible = [p for p in ORDERS if p <= min(longest, shortest // 10)]
+    possible = [p for p in ORDERS if p <= min(longest, shortest // SAMPLES_EACH)]
     return [p for p in possible if p >= least] or possible[-1:]
 
 

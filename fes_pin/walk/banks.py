@@ -24,6 +24,8 @@ TISSUE_DRAWS, WHITE_DRAWS = 40, 64
 TAKEN = 0.3
 """Share of a wave of the required reaction that errors in the motion may make, as a standard deviation: soft tissue
 moves by 10 mm and more where a trunk moves by 20 to 40 (A. Leardini et al., Gait Posture 21:212, 2005)."""
+SHIFT_ENDS_S = 5e-4
+"""Step of a shift with which following it ends, s."""
 SHIFT_ROUNDS = 4
 """Of following a shift of the clock."""
 
@@ -136,7 +138,7 @@ class Banks:
             later = float(np.clip(later + step, -0.2, 0.2))
             scenes = [scene_of(r, self.cutoff_hz, later) for r in self.recordings]
             y, rate = self._residual(scenes), self.strides.mean([form.columns(s) for s in scenes])
-            if abs(step) < 5e-4:
+            if abs(step) < SHIFT_ENDS_S:
                 break
         return self._bank(scenes, later)
 

@@ -14,6 +14,9 @@ from fes_pin.data.numbers import in_full
 from fes_pin.walk.effect import central
 from fes_pin.walk.models import WalkFit, WalkModels
 
+ROUNDED = 1e-3
+"""Share by which rounded moments of inertia may miss the triangle inequality."""
+
 
 def extended_body(models: WalkModels, best: WalkFit) -> Body:
     """The body with the segments' masses, centres and inertias of a set of causes; the same where it has none.
@@ -51,7 +54,7 @@ def with_segments(body: Body, parameters: dict[str, np.ndarray]) -> Body:
             continue
         mass, centre, inertia = central(parameters[name])
         moments = np.linalg.eigvalsh(inertia)
-        if mass <= 0.0 or moments[0] <= 0.0 or moments[2] > 1.001 * (moments[0] + moments[1]):
+        if mass <= 0.0 or moments[0] <= 0.0 or moments[2] > (moments[0] + moments[1]) * (1.0 + ROUNDED):
             raise InputError(
                 f"no body has a {name} of {mass:.3g} kg with moments {np.round(moments, 5).tolist()} kg m2"
             )

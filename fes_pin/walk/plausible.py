@@ -20,6 +20,8 @@ NEARER = 0.6
 """Share of its distance to one ankle at which a centre of pressure is the other foot's; one who stands may share it."""
 FULLY = 0.9
 """Share of what they carry in a stretch's middle that plates carry all through it; else a foot beside them carries."""
+NEARLY_ALL = 0.95
+"""Share of a trial that plates carry from which on all of it is used."""
 ENOUGH_S = 0.3
 """Most of a single support, s: less is no record of walking."""
 MEAN_S = 0.15
@@ -84,7 +86,7 @@ def carried_along(motion: Motion, plates: Plates) -> slice:
     needed, up = (uniform_filter1d(x[:, 2], size, mode="nearest") for x in (required(motion), plates.total))
     whole = up > np.maximum(CARRIED * needed, LOADED_N)
     whole |= needed < LOADED_N  # in the air nothing is to be carried
-    if whole.mean() > 0.95:
+    if whole.mean() > NEARLY_ALL:
         return slice(0, len(whole))
     ends = np.flatnonzero(np.diff(np.r_[False, whole, False].astype(int)))
     start, stop = max(zip(ends[::2], ends[1::2], strict=True), key=lambda e: e[1] - e[0], default=(0, 0))

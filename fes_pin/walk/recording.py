@@ -18,6 +18,11 @@ from fes_pin.walk.motion import Motion, motion_of, pelvis_to_hip
 from fes_pin.walk.plates import Plates, plates_of
 from fes_pin.walk.plausible import carried_along, check_together
 
+MASS_SHARE = 0.01
+"""Share by which the mass that a study states may differ from that of its segments."""
+FEWEST = 10
+"""Samples of motion and reaction together, at least."""
+
 
 @dataclass(frozen=True)
 class WalkRecording:
@@ -90,7 +95,7 @@ def _as_heavy(body: Body, study: Study) -> Body:
         The masses differ by more than 1 %.
     """
     mass = study.constants.get("mass_kg", body.mass_kg)
-    if abs(mass - body.mass_kg) > 0.01 * body.mass_kg:
+    if abs(mass - body.mass_kg) > MASS_SHARE * body.mass_kg:
         raise InputError(f"its segments weigh {body.mass_kg:.2f} kg, and the study says mass_kg = {mass:g}")
     return body
 
@@ -123,7 +128,7 @@ def _recording(trial: Trial, body: Body, hip: np.ndarray, cutoff_hz: float) -> W
     filtered = not all(f"qdd_{n[2:]}" in columns for n in columns if n.startswith("q_"))
     edge = 0.5 / cutoff_hz if filtered else 0.0
     inside = (time >= max(raw_time[0], time[0] + edge)) & (time <= min(raw_time[-1], time[-1] - edge))
-    if inside.sum() < 10:
+    if inside.sum() < FEWEST:
         raise InputError(f"trial {trial.name} has {inside.sum()} samples of motion and reaction together", file=source)
     try:
         whole = motion_of(body, time, columns, hip, cutoff_hz=cutoff_hz, belt_speed_mps=belt)

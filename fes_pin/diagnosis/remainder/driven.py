@@ -20,6 +20,7 @@ from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.problem import limits_of
 from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.levels import UNFELT
 from fes_pin.infer.projection import Projection
 from fes_pin.infer.result import Remainder
 from fes_pin.models.features import EffortFeatures, ForceFeatures, ReadingFeatures
@@ -67,7 +68,7 @@ def _features_left(fitted: LikelihoodFit, seed: int) -> Remainder:
     left = left[:, good] / after[good]
     by_trial = trial_shares(left, projection.residual, fitted)
     values, vectors = np.linalg.eigh(left.T @ left)
-    kept = values > 1e-4 * values.max()
+    kept = values > UNFELT * values.max()
     shares = by_trial @ vectors[:, kept] / np.sqrt(values[kept])
     rank, statistic = int(kept.sum()), float(np.sum(shares.sum(axis=0) ** 2))
     inflation = inflation_by_signs(shares, rank, seed)

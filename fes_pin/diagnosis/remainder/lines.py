@@ -63,7 +63,7 @@ def _lines(rows: Sequence[tuple[Innovations, np.ndarray | None]]) -> tuple[float
         begun = len(one.trial) * one.trial.dt - len(one.values) * dt
         f = np.fft.rfft(np.clip(one.values, -CLIP, CLIP) * g, size) * np.exp(-2j * np.pi * frequency * begun)
         together, apart, power = together + f, apart + 2.0 * np.abs(f) ** 2 / own, power + own
-    inside = (frequency > LOWEST_HZ) & (frequency < HIGHEST * 0.5 / dt)
+    inside = (frequency > LOWEST_HZ) & (frequency < HIGHEST / (2.0 * dt))
     if inside.sum() < NEIGHBOURS:
         return ()
     degrees = 2 * len(used)

@@ -9,7 +9,7 @@ import numpy as np
 from fes_pin.diagnosis.remainder.innovations import Stretch, stretches
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.distributions import f_tail
-from fes_pin.infer.levels import ABSORBED_BELOW
+from fes_pin.infer.levels import ABSORBED_BELOW, UNFELT
 from fes_pin.infer.projection import Projection
 from fes_pin.models.simulate import Simulator
 
@@ -73,7 +73,7 @@ def _one(column: np.ndarray, projection: Projection, group: list[Stretch]) -> fl
         taken = sum(float(np.sum((b.T @ c) ** 2)) for b in projection.taken(rows))
         units.append((float(c @ projection.residual[rows]), float(c @ c), taken))
     x, n, taken = np.array(units).T
-    felt = n > 1e-4 * n.max()
+    felt = n > UNFELT * n.max()
     x, n, taken = x[felt], n[felt], taken[felt]
     degrees = float(np.sum(1.0 - taken / n)) - 1.0
     if degrees < 1.0:

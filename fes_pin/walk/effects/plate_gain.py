@@ -27,16 +27,20 @@ class PlateGain(WalkEffect):
     def forms(cls) -> Iterator[Form]:
         for site in ("both plates", *(f"{side} plate" for side in SIDES)):
             sides = SIDES if site == "both plates" else (site.split()[0],)
-            yield Form(cls.name, site, ("share",), ("",), (0.1,), partial(_scaled, sides=sides, axes=(0, 1, 2)))
+            yield Form(cls.name, site, ("share",), ("",), (0.1,), partial(_scaled, sides=sides, axes=AXES))
             for axis, word in ((2, "vertical"), (0, "forward"), (1, "sideways")):
                 columns = partial(_scaled, sides=sides, axes=(axis,))
                 yield Form(cls.name, f"{site}, {word}", ("share",), ("",), (0.1,), columns)
 
 
+AXES = (0, 1, 2)
+"""Forward, left and vertical."""
+
+
 def _scaled(scene: Scene, sides: tuple[str, ...], axes: tuple[int, ...]) -> np.ndarray:
     total = np.zeros((len(scene.centre), 6, 1))
     for side in sides:
-        if len(axes) == 3:
+        if axes == AXES:
             total[:, :, 0] += scene.true_feet[side]
             continue
         force = np.zeros((len(scene.centre), 3))

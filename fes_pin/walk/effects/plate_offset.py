@@ -73,7 +73,7 @@ def _unloaded(scene: Scene, sides: tuple[str, ...], axis: int) -> tuple[np.ndarr
 
 def near(loaded: np.ndarray, reach: int) -> np.ndarray:
     """Samples that are loaded, or up to so many away from one that is."""
-    return np.convolve(loaded, np.ones(2 * reach + 1), mode="same") > 0.5
+    return np.convolve(loaded, np.ones(2 * reach + 1), mode="same") > 0.0
 
 
 def _displaced(scene: Scene, sides: tuple[str, ...], axis: int) -> np.ndarray:
