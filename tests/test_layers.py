@@ -29,8 +29,8 @@ ALLOWED = {
     "muscles": {"body", "models", "data"},
     "allocation": {"muscles", "body", "data"},
     "control": {"paper", "allocation", "muscles", "identify", "models", "data"},
-    "verdict": {"view", "walk", "diagnosis", "models", "data"},
-    "cohort": {"verdict", "view", "walk", "diagnosis", "identify", "models", "data"},
+    "verdict": {"walk", "diagnosis", "models", "data"},
+    "cohort": {"verdict", "view", "identify", "models", "data"},
     "view": {
         *("paper", "contrasts", "diagnosis", "identify", "models", "data"),
         *("control", "allocation", "muscles", "body", "walk"),

@@ -9,7 +9,9 @@ import typer
 
 from fes_pin.cli.group import python_names
 from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study_of
-from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
+from fes_pin.cli.progress import catalogue_with, print_result, progress, say_whose_code
+
+FILE = "compare.json"
 
 
 @python_names(horizon_s="--horizon", given_s="--given", library="--library")
@@ -35,7 +37,6 @@ def compare(
 ) -> None:
     """Rank models from the literature by their errors on whole trials left out."""
     from fes_pin.comparison.compare import compare as find
-    from fes_pin.comparison.record import FILE, comparison_json
     from fes_pin.data.outputs import Outputs
 
     catalogue = catalogue_with(library)
@@ -48,6 +49,6 @@ def compare(
     with progress() as tell:
         found = find(measured, names, extended=own, horizon_s=horizon, given_s=given, library=catalogue, progress=tell)
     if out is not None:
-        outputs.write(out, {FILE: comparison_json(found)})
+        outputs.write(out, {FILE: found.to_json()})
     say_whose_code(catalogue)
-    typer.echo(str(found))
+    print_result(found)

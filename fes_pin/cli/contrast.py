@@ -9,7 +9,7 @@ import typer
 
 from fes_pin.cli.group import needs
 from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study_of
-from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
+from fes_pin.cli.progress import catalogue_with, print_result, progress, say_whose_code
 
 
 @needs(by="not after", trials="not after", exclude="not after")
@@ -32,20 +32,21 @@ def contrast(
 ) -> None:
     """Say what differs between groups of trials, by how much, and what did not change."""
     from fes_pin.contrasts.contrast import contrast as find
-    from fes_pin.contrasts.record import FILE, contrast_json
     from fes_pin.data.outputs import Outputs
-    from fes_pin.view.contrast_report import contrast_html
+    from fes_pin.data.provenance import this_command
+    from fes_pin.view.report import answer_files
 
     catalogue = catalogue_with(library)
     before = study_of(study, catalogue, trials, exclude)
     now = None if after is None else study_of(after, catalogue)
     outputs = Outputs("contrast", force)
-    outputs.check(out, (FILE, "report.html"))  # what cannot be read or written is said before any work
+    outputs.check(out, ("contrast.json", "report.html"))  # what cannot be read or written is said before any work
     wanted = [g.strip() for g in groups.split(",") if g.strip()] if groups is not None else None
     with progress() as tell:
         found = find(
             before, now, by=by or "group", groups=wanted, library=catalogue, seed=seed, limit=limit, progress=tell
         )
-    outputs.write(out, {FILE: contrast_json(found), "report.html": contrast_html(found)})
+    outputs.write(out, answer_files(found.by_command(this_command())))
     say_whose_code(catalogue)
-    typer.echo(f"{found}\nreport: {out / 'report.html'}")
+    print_result(found)
+    typer.echo(f"report: {out / 'report.html'}")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -19,11 +18,8 @@ from fes_pin.cli.options import Exclude, Force, Libraries, Trials, output, study
 from fes_pin.cli.out import pulses, urdf
 from fes_pin.cli.own import check, new_study
 from fes_pin.cli.predict import predict
-from fes_pin.cli.progress import catalogue_with, progress, say_whose_code
+from fes_pin.cli.progress import catalogue_with, print_result, progress, say_whose_code
 from fes_pin.data.errors import InputError
-
-if TYPE_CHECKING:
-    from fes_pin.diagnosis.result import Diagnosis
 
 app = App(pretty_exceptions_enable=False)
 app.add_typer(body, name="body")
@@ -85,7 +81,8 @@ def diagnose(
     from fes_pin.diagnosis.result import Diagnosis
     from fes_pin.diagnosis.trajectories import trajectories
     from fes_pin.verdict.ask import diagnose as find
-    from fes_pin.verdict.files import NEXT_FILE, REPORT_FILE, answer_files, answer_names
+    from fes_pin.verdict.files import NEXT_FILE, REPORT_FILE, answer_names
+    from fes_pin.view.report import answer_files
 
     catalogue = catalogue_with(library)
     measured = study_of(study, catalogue, trials, exclude)
@@ -110,17 +107,14 @@ def diagnose(
         brought = None if measured.schema.owner is None else catalogue
         found = find(measured, library=brought, seed=seed, limit=limit, progress=told)
         tell(DIAGNOSING, "report")
-        files = answer_files(found, this_command())
+        files = answer_files(found.by_command(this_command()))
         if table is not None and isinstance(found, Diagnosis):
             trial, columns = trajectories(found)
             files[table] = table_bytes({"trial": trial, **columns}, table)
         tell(1.0, "done")
     old = {NEXT_FILE, *(f"trajectories{suffix}" for suffix in SUFFIXES)}
     outputs.write(out, files, without=old - set(files))  # what an earlier diagnosis proposed is not this one's
-    if isinstance(found, Diagnosis):
-        _print_verdict(found)
-    else:
-        typer.echo(str(found))
+    print_result(found)
     typer.echo(f"report: {out / REPORT_FILE}")
 
 
@@ -140,24 +134,6 @@ def effects(library: Libraries = None) -> None:
     for cause in EFFECTS:
         sizes = {n: u for form in cause.forms() for n, u in zip(form.parameters, form.units, strict=True)}
         typer.echo(described(cause, STAGE, {n: f"[{unit or '1'}], absent at 0" for n, unit in sizes.items()}))
-
-
-def _print_verdict(diagnosis: Diagnosis) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    title, head, rows, notes = diagnosis.as_table()
-    console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=not sys.stdout.isatty(), highlight=False)
-    console.print(Text(title, style="bold"))
-    if rows:
-        table = Table(*head, box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
-        for row in rows:
-            table.add_row(*map(Text, row))
-        console.print(table)
-    for note in notes:
-        console.print(Text(note))
 
 
 def main() -> None:

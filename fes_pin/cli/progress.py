@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from fes_pin.cli.group import VOICE, remark
 
 if TYPE_CHECKING:
+    from fes_pin.data.results import Saveable
     from fes_pin.models.catalogue import Catalogue
 
 
@@ -40,3 +41,22 @@ def progress() -> Iterator[Callable[[float, str], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=1.0)
         yield lambda share, words: bar.update(task, completed=share, description=words)
+
+
+def print_result(found: Saveable) -> None:
+    """Print a result as a table, as wide as the terminal."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    title, head, rows, notes = found.as_table()
+    console = Console(width=None if sys.stdout.isatty() else 120, soft_wrap=not sys.stdout.isatty(), highlight=False)
+    console.print(Text(title, style="bold"))
+    if rows:
+        table = Table(*head, box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+        for row in rows:
+            table.add_row(*map(Text, row))
+        console.print(table)
+    for note in notes:
+        console.print(Text(note))

@@ -18,7 +18,7 @@ from fes_pin.data.provenance import hashes, versions
 from fes_pin.data.sources import code_hash
 from fes_pin.data.study import read_study
 from fes_pin.verdict.ask import diagnose
-from fes_pin.verdict.files import answer_files
+from fes_pin.view.report import answer_files
 
 
 @dataclass(frozen=True)
@@ -99,4 +99,5 @@ def _files(work: Work) -> dict[str, str | bytes]:
     catalogue = load_library(*work.library)
     study = read_study(work.folder, rigs=catalogue.schemas())
     brought = None if study.schema.owner is None else catalogue
-    return answer_files(diagnose(study, library=brought, seed=work.seed, limit=work.limit), work.command)
+    found = diagnose(study, library=brought, seed=work.seed, limit=work.limit)
+    return answer_files(found.by_command(work.command))

@@ -8,18 +8,29 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fes_pin.cohort.pool import pooled
-from fes_pin.data.provenance import today, versions
+from fes_pin.data.provenance import Provenance, today, versions
 from fes_pin.identify.error_measures import E_WORDS
+from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.infer.text import percent, probability
-from fes_pin.view.chart import Panel, svg
-from fes_pin.view.drawing import Drawing, rows_csv
-from fes_pin.view.page import Content, Markup, element, figure, folded, html_table, joined, page, section, value_text
-from fes_pin.view.report_causes import stage_mark
+from fes_pin.view.drawing import Drawing
+from fes_pin.view.intervals import intervals_drawing
+from fes_pin.view.page import (
+    Content,
+    Markup,
+    document,
+    element,
+    figure,
+    folded,
+    html_table,
+    joined,
+    section,
+    value_text,
+)
+from fes_pin.view.sections import answers, provenance_parts, stage_mark
 
 PageRow = Mapping[str, Any]
 FOREST = 40
 """Studies of one forest plot; of more only the pooled value is drawn."""
-ROW, NAMES, WIDE = 20.0, 150.0, 420.0
 MODELS = (
     "Of the nominal, then of the extended model, on trials held out where there are such. Free: from the inputs alone; "
     "ahead: each sample from what was measured up to the study's horizon before it. Of walking E is that of the ground "
@@ -43,9 +54,9 @@ def cohort_html(
         section("Which causes, and in how many studies", *_prevalence(prevalence, len(good))),
         section("How large they are in the population", *_pooled(causes, pooled_)),
         section("Studies", *_studies(studies)),
-        section("Where this comes from", *_provenance(seed, command)),
+        section("Where this comes from", *provenance_parts(Provenance(today(), versions(), {}, seed, command))),
     ]
-    return page("Cohort", parts)
+    return document("Cohort", parts)
 
 
 def _head(studies: Sequence[PageRow], good: Sequence[PageRow], prevalence: Sequence[PageRow]) -> Markup:
@@ -66,12 +77,11 @@ def _head(studies: Sequence[PageRow], good: Sequence[PageRow], prevalence: Seque
         rows.append(("The search was stopped", f"in {counts['stopped']}: the causes are the best set so far"))
     if failed:
         rows.append(("Could not be diagnosed", f"{failed}: see the table of studies"))
-    made = [element("div", element("dt", q), element("dd", a)) for q, a in rows]
     return element(
         "header",
         element("p", f"cohort of {len(studies)} studies", class_="eyebrow"),
         element("h1", title, class_="verdict causes_found"),
-        element("dl", joined(made), class_="answers"),
+        answers(rows),
     )
 
 
@@ -128,7 +138,7 @@ def _pooled(causes: Sequence[PageRow], rows: Sequence[PageRow]) -> list[Markup]:
     for (cause, parameter), many in values.items():
         if len(many) > 1 and cause not in shown:
             shown.add(cause)  # the first parameter is what gives a cause its size
-            drawn.append(figure(_forest(cause, parameter, many), f"{cause}, {parameter}", file=f"{cause}_{parameter}"))
+            drawn.append(figure(_forest(parameter, many), f"{cause}, {parameter}", file=f"{cause}_{parameter}"))
     return [*out, element("div", joined(drawn), class_="grid")] if drawn else out
 
 
@@ -147,33 +157,18 @@ def _pooled_cells(r: PageRow) -> list[Content]:
     ]
 
 
-def _forest(cause: str, parameter: str, rows: Sequence[PageRow]) -> Drawing:
-    """Values of a parameter study by study with their 95 % intervals, and the pooled mean beneath."""
+def _forest(parameter: str, rows: Sequence[PageRow]) -> Drawing:
+    """Values of a parameter study by study with their 95 % intervals, and the pooled mean below."""
     known = [r for r in rows if math.isfinite(r["value"])]
     drawn = [r for r in known if math.isfinite(r["std"])] if len(known) <= FOREST else []
+    lines = []
+    for r in drawn:
+        half = CONFIDENCE_95 * r["std"]
+        lines.append((r["study"], r["value"], r["value"] - half, r["value"] + half, "measured"))
     mean = pooled([r["value"] for r in known], [r["std"] for r in known])
-    lines = [(r["study"], r["value"], r["value"] - 1.96 * r["std"], r["value"] + 1.96 * r["std"]) for r in drawn]
     if mean is not None:
-        lines.append(("pooled", mean.mean, mean.low, mean.high))
-    low, high = min(x[2] for x in lines), max(x[3] for x in lines)
-    room = 0.05 * (high - low) or 1.0
-    count = len(lines)
-    panel = Panel(NAMES, 6, WIDE - NAMES - 12, ROW * count, (low - room, high + room), (0.5 - count, 0.5))
-    for k, (name, value, least, most) in enumerate(lines):
-        is_mean = name == "pooled" and k == count - 1 and mean is not None
-        colour = "extended" if is_mean else "measured"
-        panel.text(NAMES - 8, 6 + ROW * (k + 0.5) + 4, name[-22:], "end")
-        panel.line([least, most], [-k, -k], colour, 3.0 if is_mean else 1.2)
-        panel.dot(value, -k, colour, hollow=not is_mean)
-    panel.x_axis(parameter)
-    last = lines[-1]
-    words = (
-        f"{parameter} of {cause} in {len(known)} studies; {last[0]} {last[1]:.4g} from {last[2]:.4g} to {last[3]:.4g}."
-    )
-    return Drawing(
-        svg([panel], WIDE, 6 + ROW * count + 38, words),
-        rows_csv(("study", "value", "std"), [(r["study"], r["value"], r["std"]) for r in known]),
-    )
+        lines.append(("pooled", mean.mean, mean.low, mean.high, "extended"))
+    return intervals_drawing(lines, parameter)
 
 
 def _studies(rows: Sequence[PageRow]) -> list[Markup]:
@@ -198,10 +193,3 @@ def _errors(row: PageRow, name: str) -> str:
     """E of the nominal and of the extended model; of one alone where both are the same."""
     pair = [percent(row[f"{model}_{name}_percent"]) for model in ("nominal", "extended")]
     return " \u2192 ".join(dict.fromkeys(pair))
-
-
-def _provenance(seed: int, command: str) -> list[Markup]:
-    told = ", ".join(f"{n} {v}" for n, v in versions().items())
-    rows: list[list[Content]] = [["made", today()], ["seed", str(seed)], ["versions", told]]
-    rows += [["command", element("code", command)]] if command else []
-    return [element("div", html_table(("what", "value"), rows, prose=True), class_="provenance")]

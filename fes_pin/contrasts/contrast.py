@@ -192,6 +192,7 @@ class _Work:
             driven=models.driven,
             repeats=best.repeats,
             warnings=tuple(said),
+            catalogue=self.catalogue,
         )
 
 

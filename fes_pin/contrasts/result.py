@@ -9,7 +9,11 @@ from typing import Any, ClassVar
 from fes_pin.data.results import Result
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.result import Change, Named, ParameterEstimate, shown
-from fes_pin.infer.text import listed, probability
+from fes_pin.infer.text import listed, percent, probability
+from fes_pin.models.catalogue import Catalogue, installed
+from fes_pin.models.stage import Effect
+
+SEEN = "(would have been seen in 95 of 100 beyond)"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -45,6 +49,8 @@ class Contrast(Result):
     fit: Fit
     driven: bool
     repeats: Mapping[str, float] = field(default_factory=dict)
+    catalogue: Catalogue = field(default_factory=installed)
+    FILE: ClassVar[str] = "contrast.json"
     KIND: ClassVar[type[Named]] = Change
 
     @property
@@ -52,20 +58,15 @@ class Contrast(Result):
         """What changed, surest first."""
         return self.causes
 
-    def headline(self) -> str:
-        """The answer in one sentence."""
+    def title(self) -> str:
+        """The answer in a few words."""
         between = listed(list(self.groups))
-        begun = "stopped: best set so far: " if self.is_stopped else ""
         if self.verdict == "unexplained":
-            return f"something differs between {between}, and nothing in the library explains it."
-        if not self.changes:
-            return (
-                f"{begun}no change between {between}."
-                if begun
-                else f"nothing changed between {between} that these data show."
-            )
-        many = "one thing" if len(self.changes) == 1 else f"{len(self.changes)} things"
-        return f"{begun}{many} changed between {between}."
+            return f"something differs between {between}, and nothing in the library explains it"
+        many = {0: "nothing", 1: "one thing"}.get(len(self.changes), f"{len(self.changes)} things")
+        begun = "stopped: best set so far: " if self.is_stopped else ""
+        shown = "" if self.changes or self.is_stopped else " that these data show"
+        return f"{begun}{many} changed between {between}{shown}"
 
     def head(self) -> tuple[str, ...]:
         """Titles of the table of changes."""
@@ -83,25 +84,34 @@ class Contrast(Result):
             "judged_by": "predictions" if self.driven else "simulations",
         }
 
-    def notes(self) -> list[str]:
-        """What is said below the changes."""
-        lines = []
-        if self.common:
-            lines.append(f"in all groups alike, so no change: {', '.join(self.common)}")
-        if self.repeats:
-            sizes = ", ".join(f"{n} by {100.0 * v:.2g} %" for n, v in self.repeats.items())
-            lines.append(f"repeats scatter by themselves: {sizes} (standard deviation)")
-        if self.unchanged:
-            sizes = ", ".join(f"{n} by {100.0 * v:.2g} %" for n, v in self.unchanged.items())
-            lines.append(f"did not change; would have been seen in 95 of 100: {sizes}")
-        if self.excluded:
-            sizes = ", ".join(f"{n} {p.value:.2g} {p.unit}".strip() for n, p in self.excluded.items())
-            lines.append(f"did not come; would have been seen in 95 of 100: {sizes}")
-        if self.untestable:
-            lines.append(f"could have changed unseen: {', '.join(self.untestable)}")
+    def effect(self, name: str) -> type[Effect] | None:
+        """The class that describes a cause; None of a nominal parameter and of a trial that was misread."""
+        return next((e for e in self.catalogue.effects if e.name == name), None)
+
+    def notes(self) -> list[tuple[str, str]]:
+        """What is said besides the changes, by topic."""
         left = self.remainder
-        if left.unexplained:
-            lines.append(f"something is left unexplained in one group alone ({probability(left.p_value)})")
-        else:  # what every group leaves is the model's error, and is a warning
-            lines.append("nothing is left unexplained in one group alone")
-        return [*lines, *(f"warning: {words}" for words in self.warnings)]
+        state = f"in one group alone ({probability(left.p_value)})" if left.unexplained else "none in one group alone"
+        sizes = [f"{n} {p.value:.2g} {p.unit}".strip() for n, p in self.excluded.items()]
+        told = [
+            ("in all groups alike, so no change", ", ".join(self.common)),
+            ("repeats scatter by (standard deviation)", _shares(self.repeats)),
+            (f"did not change {SEEN}", _shares(self.unchanged)),
+            (f"did not come {SEEN}", ", ".join(sizes)),
+            ("could have changed unseen", ", ".join(self.untestable)),
+            ("fitted by", "predictions one sample ahead" if self.driven else "simulations from the inputs"),
+            ("lack of fit", state),  # what every group lacks is the model's error, and is a warning
+        ]
+        return [(topic, words) for topic, words in told if words] + super().notes()
+
+    def advice(self) -> str:
+        """What to do next."""
+        if self.is_stopped or self.next_experiment is not None:
+            return super().advice()
+        if self.verdict == "unexplained":
+            return "look at the trials of the group that differs, or write the cause that you suspect as your own"
+        return "take each group's own values" if self.changes else "use one model for all groups"
+
+
+def _shares(shares: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {percent(100.0 * share)}" for name, share in shares.items())

@@ -15,6 +15,7 @@ from typing import Any
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import inside, read_bytes
+from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.study import Study
 from fes_pin.settings import source_date
 
@@ -23,7 +24,7 @@ PACKAGES = ("fes-pin", "pin", "casadi", "numpy", "scipy", "llvmlite")
 
 
 @dataclass(frozen=True)
-class Provenance:
+class Provenance(ReadOnly):
     """Where a result comes from.
 
     Attributes

@@ -5,9 +5,9 @@ from __future__ import annotations
 import html
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_json, write_text
@@ -15,8 +15,8 @@ from fes_pin.data.provenance import Provenance
 from fes_pin.data.read_only import ReadOnly, as_dicts
 from fes_pin.data.show import by_columns, frame, table_html, table_text
 from fes_pin.data.study import Study
-from fes_pin.infer.result import STOPPED, Cause, Explained, Named, Remainder, shown
-from fes_pin.infer.text import listed
+from fes_pin.infer.result import ON, STOPPED, Cause, Explained, Named, Remainder, shown
+from fes_pin.infer.text import listed, percent
 
 if TYPE_CHECKING:
     import pandas
@@ -83,6 +83,21 @@ class Saveable(Recorded):
         return table_html(*self.as_table())
 
 
+class Plan(Protocol):
+    """An experiment that would tell two causes apart, or the reason why none does."""
+
+    @property
+    def why(self) -> str:
+        """In words."""
+
+    @property
+    def separates(self) -> tuple[str, str]:
+        """The two."""
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it."""
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(Saveable):
     """What an inference says of a study: base of diagnoses and contrasts.
@@ -101,6 +116,8 @@ class Result(Saveable):
     reason
         Why something is unexplained, where it is no test of the residuals that says so: nothing could be fitted, or an
         error stays that is no noise.
+    next_experiment
+        What would tell the first cause from what it cannot be told from.
     provenance
         When, by which versions, from which files it was made.
     """
@@ -112,9 +129,11 @@ class Result(Saveable):
     warnings: tuple[str, ...] = ()
     wall_s: float = 0.0
     reason: str | None = None
+    next_experiment: Plan | None = None
     provenance: Provenance | None = None
     KIND: ClassVar[type[Named]] = Cause
     """Of what is named."""
+    FILE: ClassVar[str] = "diagnosis.json"
     MODEL: ClassVar[str] = "the model"
     """What is diagnosed, in words."""
 
@@ -128,25 +147,56 @@ class Result(Saveable):
         """What all causes together gain, and against what that is measured."""
         return None
 
+    def title(self) -> str:
+        """The verdict in a few words."""
+        begun = "stopped: best set so far: " if self.is_stopped else ""
+        lacks = [one.name.replace("_", " ") for one in self.causes if one.trial is None]
+        said = [one.words for one in self.causes if one.trial is not None]
+        said += [f"{self.MODEL} lacks {listed(lacks)}"] if lacks else []
+        nothing = {
+            STOPPED: "no cause, and no claim about causes that were not tried",
+            "adequate": f"{self.MODEL} is adequate: these data justify no extension of it",
+            "unexplained": f"{self.MODEL} misses something, and nothing in the library explains it",
+        }
+        more = ", and something more" if self.causes and self.remainder.unexplained else ""
+        return f"{begun}{listed(said) if said else nothing[self.verdict]}{more}"
+
     def headline(self) -> str:
         """The verdict in one sentence, with what is explained, and against what that is measured."""
-        begun = "stopped: best set so far: " if self.is_stopped else ""
-        if not self.causes:
-            said = {
-                STOPPED: "no cause, and no claim about causes that were not tried",
-                "adequate": f"{self.MODEL} is adequate: these data justify no extension of it",
-                "unexplained": f"{self.MODEL} misses something, and nothing in the library explains it",
-            }
-            return f"{begun}{said[self.verdict]}" + (f": {self.reason}." if self.reason else ".")
-        names, found = listed([one.name for one in self.causes]), self.explained
-        verb = "explains" if len(self.causes) == 1 else "explain"
-        size = "" if found is None else f" {found.of(found.nominal):.0f} % of the {found.measure}: {found}"
-        left = "; something is left unexplained" if self.remainder.unexplained else ""
-        return f"{begun}{names} {verb}{size}{left}."
+        told = f": that explains {self.explained}" if self.explained and self.causes else ""
+        return f"{self.title()}{told}{f': {self.reason}' if self.reason else ''}."
 
-    def notes(self) -> list[str]:
-        """What is said below the table of what is named."""
-        raise NotImplementedError
+    def error_rows(self) -> list[tuple[str, str, float | None, float | None]]:
+        """Errors E in percent: on what data, of which prediction, of the nominal and of the extended model."""
+        return []
+
+    def notes(self) -> list[tuple[str, str]]:
+        """What is said besides the table of what is named, by topic."""
+        return [*self.judged(), ("next", self.advice()), *(("warning", words) for words in self.warnings)]
+
+    def effect(self, name: str) -> type | None:
+        """The class that describes a cause, with its equation; None of what has none."""
+        return None
+
+    def advice(self) -> str:
+        """What to do next."""
+        if self.is_stopped:
+            return "diagnose again without a limit of time, or with a longer one, before this answer is used"
+        if self.next_experiment is not None and self.causes:
+            return f"to separate {listed(list(self.next_experiment.separates))}: {self.next_experiment.why}"
+        if self.causes:
+            return "use the extended model" + (", with care: it lacks something" if self.remainder.unexplained else "")
+        if self.remainder.unexplained:
+            return "check the sensors and conditions of what is missed most, or write a cause of your own"
+        return "keep the model; to look for causes that these data cannot show, record other ones"
+
+    def judged(self) -> list[tuple[str, str]]:
+        """By which measure, and on what data, each is judged that is named, with its gain by that."""
+        gains: dict[str, list[str]] = {}
+        for one in self.causes:
+            if (gain := one.judged) is not None:
+                gains.setdefault(f"{gain.measure}, {ON[gain.on]}", []).append(f"{one.name} {gain}")
+        return [(f"judged by {measure}", ", ".join(names)) for measure, names in gains.items()]
 
     def own_record(self) -> dict[str, Any]:
         """What the record has that those of others have not."""
@@ -154,7 +204,8 @@ class Result(Saveable):
 
     def head(self) -> tuple[str, ...]:
         """Titles of the table of what is named."""
-        return ("cause", "where", "parameters", "gain [95 %]", "cannot be told from")
+        held_out = any(one.gain_held_out.is_held_out for one in self.causes if isinstance(one, Cause))
+        return "cause", "where", "parameters", f"{'held-out' if held_out else 'fitted'} gain", "cannot be told from"
 
     def record(self) -> dict[str, Any]:
         """The JSON file as a dictionary, without the text and the table that a saved result has as well."""
@@ -176,7 +227,22 @@ class Result(Saveable):
 
     def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         """Title, head, rows and notes of the table that is printed."""
-        return f"{self.study.name}: {self.headline()}", self.head(), [one.row() for one in self.causes], self.notes()
+        errors: dict[str, list[str]] = {}
+        for on, what, *pair in self.error_rows():
+            told = " -> ".join(dict.fromkeys(percent(e) for e in pair))
+            errors.setdefault(f"error E {on}", []).append(f"{what} {told}")
+        lines = [(topic, "; ".join(many)) for topic, many in errors.items()] + self.notes()
+        title, rows = f"{self.study.name}: {self.headline()}", [one.row() for one in self.causes]
+        return title, self.head(), rows, [f"{topic}: {words}" for topic, words in lines]
+
+    def files(self) -> dict[str, str | bytes]:
+        """Content of every file of the answer but the report, by name."""
+        return {self.FILE: self.to_json()}
+
+    def by_command(self, command: str) -> Self:
+        """The same with a command line in its provenance."""
+        made = self.provenance
+        return self if made is None else replace(self, provenance=replace(made, command=command))
 
     def __repr__(self) -> str:
         names = f" ({', '.join(one.name for one in self.causes)})" if self.causes else ""

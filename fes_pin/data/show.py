@@ -49,21 +49,3 @@ def frame(columns: Mapping[str, Any], index: str | None = None) -> pandas.DataFr
     """
     made = optional_library("pandas", "pandas", "frames need pandas").DataFrame(dict(columns))
     return made.set_index(index) if index is not None else made
-
-
-def explaining(count: int) -> str:
-    """The words "one cause explains", or "2 causes explain"."""
-    return "one cause explains" if count == 1 else f"{count} causes explain"
-
-
-def from_to(before: Sequence[float | None], after: Sequence[float | None], where: Sequence[str]) -> str:
-    """Errors before and after, in percent, of those places that have both."""
-    pairs = zip(before, after, where, strict=True)
-    return ", ".join(f"{b:.2f} -> {a:.2f} % {w}" for b, a, w in pairs if a is not None and b is not None)
-
-
-def last_notes(absorbed: Sequence[str], plan: Any, warnings: Sequence[str]) -> list[str]:
-    """What the notes of a diagnosis end with: what these data could not show, what to do next, what to beware of."""
-    lines = [f"not testable here: {', '.join(absorbed)}"] if absorbed else []
-    lines += [f"next experiment: {plan.why}"] if plan else []
-    return [*lines, *(f"warning: {words}" for words in warnings)]

@@ -94,7 +94,7 @@ def diagnose_joint(
     warnings += diagnosis.warnings
     warnings += few_trials(len(split(measured.study)[0])) if diagnosis.causes else []
     if stops:
-        warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far, gains on fitted trials")
+        warnings.append(f"the search was stopped at its limit of {limit:g} s: best set so far")
         diagnosis = replace(diagnosis, verdict=STOPPED)
     found = replace(diagnosis, left_out=measured.left_out, warnings=tuple(warnings), catalogue=catalogue)
     return replace(found, provenance=made, wall_s=time.perf_counter() - began)

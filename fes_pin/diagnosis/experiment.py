@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +18,11 @@ from fes_pin.identify.problem import Problem, measured_columns
 from fes_pin.infer.covariance import least_squares_step
 from fes_pin.infer.levels import SEPARABLE, SURE
 from fes_pin.infer.problem import Linearized, NormalEquations, normal_equations
+from fes_pin.infer.result import shown
 from fes_pin.models.nominal import rig_of
 from fes_pin.models.simulate import Simulator
 
+NEXT_FILE = "next_trial.csv"
 MOST_REPEATS = 50
 """A proposal that must be run more often than this is none."""
 SECONDS = 8.0
@@ -55,6 +58,13 @@ class NextExperiment:
     separates: tuple[str, str]
     trial: Trial | None
     promised: tuple[float, float] = (0.0, 0.0)
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it; the inputs are in `NEXT_FILE`."""
+        trial, one = None, self.trial
+        if one is not None:
+            trial = {"file": NEXT_FILE, "kind": one.kind, **{n: shown(v) for n, v in one.conditions.items()}}
+        return {"why": self.why, "separates": list(self.separates), "trial": trial}
 
 
 @dataclass(frozen=True)

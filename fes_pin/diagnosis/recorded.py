@@ -7,12 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
-from fes_pin.diagnosis.experiment import NextExperiment
 from fes_pin.identify.fit import Fit
 from fes_pin.infer.result import ParameterEstimate, shown
 from fes_pin.models.catalogue import Catalogue
-
-NEXT_FILE = "next_trial.csv"
 
 
 def left_out_record(left_out: Mapping[str, Mapping[str, Sequence[int]]]) -> dict[str, Any]:
@@ -60,13 +57,3 @@ def ahead_record(ahead: AheadErrors | None, driven: bool, random: Sequence[Rando
     }
     told = ahead.extended_held_out or ahead.extended
     return {**horizon, "horizon_ceiling_percent": shown(told.noise), "random": parts}
-
-
-def experiment_record(plan: NextExperiment | None) -> dict[str, Any] | None:
-    """The next experiment; its inputs are in `NEXT_FILE`."""
-    if plan is None:
-        return None
-    trial = None
-    if plan.trial is not None:
-        trial = {"file": NEXT_FILE, "kind": plan.trial.kind, **{n: shown(v) for n, v in plan.trial.conditions.items()}}
-    return {"why": plan.why, "separates": list(plan.separates), "trial": trial}

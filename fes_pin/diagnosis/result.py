@@ -9,18 +9,21 @@ from typing import Any
 
 from fes_pin.data.log import Log
 from fes_pin.data.results import Result
-from fes_pin.data.show import from_to, last_notes
+from fes_pin.data.trial import trial_csv
 from fes_pin.diagnosis import recorded
 from fes_pin.diagnosis.errors_ahead import AheadErrors, RandomPart
-from fes_pin.diagnosis.experiment import NextExperiment
-from fes_pin.diagnosis.text import ahead_notes, left_out_text
+from fes_pin.diagnosis.experiment import NEXT_FILE, NextExperiment
+from fes_pin.diagnosis.text import in_words, left_out_text
+from fes_pin.identify.error_measures import FREE, ONE_STEP
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.likelihood_fit import LikelihoodFit
-from fes_pin.identify.stored import log_table
+from fes_pin.identify.stored import log_table, stored_tables
 from fes_pin.infer.result import FITTED, STOPPED, Cause, Explained, Ranked, shown
 from fes_pin.infer.text import percent, probability
 from fes_pin.models.catalogue import Catalogue, installed
 from fes_pin.models.model import Model
+from fes_pin.models.stage import Effect
+from fes_pin.models.store import model_toml
 
 EACH_TRIAL = (
     "size and phase are each trial's own; in a held-out trial its other parts tell them, and a prediction from inputs "
@@ -62,7 +65,7 @@ class Diagnosis(Result):
     nominal_error: tuple[float | None, float | None]
     extended_error: tuple[float | None, float | None]
     ceiling_percent: float
-    next_experiment: NextExperiment | None
+    next_experiment: NextExperiment | None = None
     ranking: Mapping[str, tuple[Ranked, ...]]
     held_out_by: str
     left_out: Mapping[str, Mapping[str, tuple[int, ...]]]
@@ -75,6 +78,11 @@ class Diagnosis(Result):
     def is_driven(self) -> bool:
         """True of a rig whose effort answers what is read: it is judged by predictions one sample ahead."""
         return isinstance(self.extended, LikelihoodFit)
+
+    @property
+    def is_falling(self) -> bool:
+        """True of a driven rig that falls over by itself: a free simulation of it says nothing of the model."""
+        return self.is_driven and self.ahead is not None and self.ahead.extended.free is None
 
     @property
     def over_horizon(self) -> AheadErrors | None:
@@ -99,34 +107,53 @@ class Diagnosis(Result):
         on, one, other = next((o, b, a) for o, b, a in pairs if b is not None and a is not None)
         return Explained("squared error of a free simulation", on, one, other, self.ceiling_percent)
 
-    def head(self) -> tuple[str, ...]:
-        """Titles of the table of causes."""
-        held_out = any(c.gain_held_out.is_held_out for c in self.causes)
-        name = "held-out gain" if held_out else "fitted gain"
-        return "cause", "where", "parameters", name, "cannot be told from"
+    def effect(self, name: str) -> type[Effect] | None:
+        """The class that describes a cause; None of a trial that was misread."""
+        return next((e for e in self.catalogue.effects if e.name == name), None)
 
-    def notes(self) -> list[str]:
-        """What is said below the table."""
-        pairs = from_to(self.nominal_error, self.extended_error, ("fitted", "held out"))
-        lines = [f"free error E {pairs}; noise floor {percent(self.ceiling_percent)}"] if pairs else []
-        lines += ahead_notes(self.ahead, self.random, self.model.rig.units().get("effort", ""))
-        left = self.remainder
+    def error_rows(self) -> list[tuple[str, str, float | None, float | None]]:
+        """Errors E in percent: on what data, of which prediction, of the nominal and of the extended model."""
+        if (ahead := self.ahead) is None:
+            pairs = zip(("fitted", "held out"), self.nominal_error, self.extended_error, strict=True)
+            return [(on, FREE, b, a) for on, b, a in pairs if b is not None]
+        found = [("fitted", ahead.nominal, ahead.extended)]
+        if ahead.nominal_held_out and ahead.extended_held_out:
+            found.append(("held out", ahead.nominal_held_out, ahead.extended_held_out))
+        kinds = {ONE_STEP: "one_step", f"{ahead.horizon_s:g} s ahead": "horizon", FREE: "free"}
+        return [(on, what, getattr(b, n), getattr(a, n)) for on, b, a in found for what, n in kinds.items()]
+
+    def notes(self) -> list[tuple[str, str]]:
+        """What is said besides the table, by topic."""
+        left, unit = self.remainder, self.model.rig.units().get("effort", "")
+        state = "more than noise" if left.unexplained else "none found"
         where = f", most on {left.where}" if left.where else ""
-        if self.reason is None:
-            state = "something is" if left.unexplained else "nothing"
-            lines.append(f"{state} left unexplained ({probability(left.p_value)}{where})")
-        elif self.causes:
-            lines.append(f"something is left unexplained: {self.reason}")
-        if self.left_out:
-            lines.append(f"left out as spikes: {left_out_text(self.left_out, self.study.trials)}")
-        some = {c.name: c.chosen_in_some for c in self.causes}
-        lines += [f"{n} is chosen in {k[0]} of {k[1]} folds without their trials" for n, k in some.items() if k]
         own = [e.name for e in self.model.effects if e.each_trial]
-        if own:
-            lines.append(f"{', '.join(own)}: {EACH_TRIAL}")
-        for where, names in self.catalogue.origins().items():
-            lines.append(f"looked for as well: {', '.join(names)}, code of {Path(where).name}")
-        return [*lines, *last_notes(self.absorbed, self.next_experiment, self.warnings)]
+        told = [
+            ("noise of the readings alone", f"E {percent(self.ceiling_percent)}"),
+            ("falls", "by itself: free errors are meaningless" if self.is_falling else ""),
+            *((f"random {r.name}", in_words(r, unit)) for r in self.random),
+            ("lack of fit", self.reason or f"{state} ({probability(left.p_value)}{where})"),
+            ("left out as spikes", left_out_text(self.left_out, self.study.trials) if self.left_out else ""),
+            *(
+                (f"{c.name} chosen again", f"in {k[0]} of {k[1]} folds, each without its trials")
+                for c in self.causes
+                if (k := c.chosen_in_some)
+            ),
+            (", ".join(own), EACH_TRIAL if own else ""),
+            *(
+                ("looked for as well", f"{', '.join(names)}, code of {Path(where).name}")
+                for where, names in self.catalogue.origins().items()
+            ),
+            ("not testable here", ", ".join(self.absorbed)),
+        ]
+        return [(topic, words) for topic, words in told if words] + super().notes()
+
+    def files(self) -> dict[str, str | bytes]:
+        """Content of every file of the diagnosis but the report, by name: with the extended model."""
+        files = super().files() | {"model.toml": model_toml(self.model, stored_tables(self.extended, self.log))}
+        if self.next_experiment and self.next_experiment.trial is not None:
+            files[NEXT_FILE] = trial_csv(self.next_experiment.trial)
+        return files
 
     def own_record(self) -> dict[str, Any]:
         """What `diagnosis.json` has of a rig."""
@@ -136,7 +163,7 @@ class Diagnosis(Result):
             "extended": self._model("extended"),
             "noise": {n: {"std": shown(m.std), "ar": [shown(a) for a in m.ar]} for n, m in self.extended.noise.items()},
             "ceiling_percent": shown(self.ceiling_percent),
-            "next_experiment": recorded.experiment_record(self.next_experiment),
+            "next_experiment": self.next_experiment.record() if self.next_experiment else None,
             **recorded.left_out_record(self.left_out),
             **({"reason": self.reason} if self.reason else {}),
             **({"log": log_table(self.log)} if self.log != Log() else {}),

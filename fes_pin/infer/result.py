@@ -150,6 +150,11 @@ class Gain:
         return f"{self.percent:.0f} % [{self.low:.0f}, {self.high:.0f}]{further}"
 
     @property
+    def measure(self) -> str:
+        """What it is counted in."""
+        return ERROR
+
+    @property
     def is_none(self) -> bool:
         """Whether none was computed."""
         return math.isnan(self.percent)
@@ -167,7 +172,7 @@ class Gain:
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
         size = {"percent": shown(self.percent), "low": shown(self.low), "high": shown(self.high)}
-        return {"measure": ERROR, "on": self.on, **size}
+        return {"measure": self.measure, "on": self.on, **size}
 
 
 NO_GAIN = Gain(math.nan, math.nan, math.nan)
@@ -208,10 +213,23 @@ class Evidence:
     def __add__(self, other: Evidence) -> Evidence:
         return Evidence(self.added + other.added, self.squares + other.squares, self.on)
 
+    @property
+    def measure(self) -> str:
+        """What it is counted in."""
+        return LIKELIHOOD
+
+    @property
+    def high(self) -> float:
+        """Upper end of the 95 % interval."""
+        return 2.0 * self.added - self.low
+
+    def __str__(self) -> str:
+        return f"{self.added:.0f} [{self.low:.0f}, {self.high:.0f}]"
+
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
-        size = {"added": shown(self.added), "low": shown(self.low), "high": shown(2.0 * self.added - self.low)}
-        return {"measure": LIKELIHOOD, "on": self.on, **size}
+        size = {"added": shown(self.added), "low": shown(self.low), "high": shown(self.high)}
+        return {"measure": self.measure, "on": self.on, **size}
 
 
 @dataclass(frozen=True)
@@ -268,8 +286,12 @@ class Explained:
         return 100.0 * gone / max(self.nominal - (self.noise or 0.0), gone, 1e-300)
 
     def __str__(self) -> str:
-        alone = "" if self.noise is None else f"; noise alone leaves {percent(self.noise)}"
-        return f"E {percent(self.nominal)} -> {percent(self.extended)}, {ON[self.on]}{alone}"
+        above, alone = "", ""
+        if self.noise is not None:
+            above = f" ({self.above_noise:.0f} % of what is above the noise)"
+            alone = f"; noise alone leaves {percent(self.noise)}"
+        share = f"{self.of(self.nominal):.0f} % of the {self.measure}{above}"
+        return f"{share}: E {percent(self.nominal)} -> {percent(self.extended)}, {ON[self.on]}{alone}"
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
@@ -327,6 +349,8 @@ class Named:
         The only trial that it concerns, if it is not the rig's.
     words
         What happened, in plain words, where the name alone does not say it.
+    evidence
+        By how much the likelihood of data that took no part grows with it; None where a likelihood says little.
     """
 
     name: str
@@ -336,6 +360,7 @@ class Named:
     site: str = ""
     trial: str | None = None
     words: str = ""
+    evidence: Evidence | None = None
     PLACE: ClassVar[tuple[str, ...]] = ("stage", "site")
     """What says where it acts."""
     CELL: ClassVar[tuple[str, ...]] = ("parameter",)
@@ -346,6 +371,11 @@ class Named:
     def __post_init__(self) -> None:
         own = {n: Held(v) if isinstance(v, Mapping) else v for n, v in self.parameters.items()}
         object.__setattr__(self, "parameters", Held(own))
+
+    @property
+    def judged(self) -> Gain | Evidence | None:
+        """The gain that it is named by, which states its measure; None where it is named by its p-value alone."""
+        return self.evidence
 
     def estimates(self) -> list[tuple[tuple[str, ...], ParameterEstimate]]:
         """Every estimate of it, with what `CELL` says of it."""
@@ -374,7 +404,7 @@ class Named:
         raise NotImplementedError
 
     def _gains(self) -> dict[str, Any]:
-        return {}
+        return {"judged_by": self.judged.record()} if self.judged else {}
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
@@ -401,8 +431,6 @@ class Cause(Named):
         In percent, on the data that were fitted.
     gain_held_out
         On data that took no part; on those that were fitted where nothing could be held out.
-    evidence
-        By how much the likelihood of held-out data grows with it.
     chosen_again
         In how many folds it, or an equivalent, was chosen without the data that were held out there, and of how many.
     elsewhere
@@ -416,7 +444,6 @@ class Cause(Named):
     stage: str
     gain_fit: float
     gain_held_out: Gain
-    evidence: Evidence | None = None
     chosen_again: tuple[int, int] | None = None
     elsewhere: tuple[str, ...] = ()
     further: Mapping[str, float | None] = field(default_factory=dict)
@@ -465,7 +492,7 @@ class Cause(Named):
                 **({"ahead_s": shown(gain.ahead_s)} if gain.ahead_s is not None else {}),
                 **{n: shown(value) for n, value in self.further.items()},
             },
-            "judged_by": self.judged.record(),
+            **super()._gains(),
         }
 
 
@@ -481,14 +508,11 @@ class Change(Named):
         The group that has a value of its own.
     parameters
         By name and group: of a group that does not have the cause its null, without deviation.
-    evidence
-        By how much the likelihood of held-out trials grows with it; None where none could be held out.
     """
 
     parameters: Mapping[str, Mapping[str, ParameterEstimate]]
     kind: str
     group: str
-    evidence: Evidence | None = None
     PLACE: ClassVar[tuple[str, ...]] = ("kind", "group", "site")
     CELL: ClassVar[tuple[str, ...]] = ("parameter", "group")
 
@@ -498,9 +522,6 @@ class Change(Named):
 
     def _parameters(self) -> dict[str, Any]:
         return {n: {g: one.record() for g, one in groups.items()} for n, groups in self.parameters.items()}
-
-    def _gains(self) -> dict[str, Any]:
-        return {"judged_by": self.evidence.record()} if self.evidence is not None else {}
 
     def row(self) -> tuple[str, ...]:
         """Name, what happened, values by group, p, what it cannot be told from."""

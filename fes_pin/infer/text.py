@@ -21,7 +21,8 @@ def percent(value: float | None) -> str:
         return "-"
     if 0.0 <= value < LEAST_PERCENT:
         return f"below {LEAST_PERCENT:g} %"
-    return f"{value:.3g} %" if value >= 1.0 else f"{value:.2g} %"
+    digits = 2 if value < 1.0 else 3
+    return f"{value:.0f} %" if value >= 100.0 else f"{value:.{digits}g} %"
 
 
 def quantity(value: float, std: float, unit: str) -> str:

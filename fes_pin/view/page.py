@@ -32,8 +32,10 @@ Content = Markup | str
 
 
 def safe(content: Content) -> str:
-    """Content as HTML: markup as it is, text escaped."""
-    return content.text if isinstance(content, Markup) else html.escape(content, quote=True)
+    """Content as HTML: markup as it is, text escaped, with signs for what is typed in their place."""
+    if isinstance(content, Markup):
+        return content.text
+    return html.escape(content.replace("->", "\N{RIGHTWARDS ARROW}").replace("+-", "\N{PLUS-MINUS SIGN}"), quote=True)
 
 
 def element(tag: str, *contents: Content, **attributes: str) -> Markup:
@@ -100,7 +102,7 @@ def folded(summary: Content, *contents: Markup) -> Markup:
     return element("details", element("summary", summary), joined(contents))
 
 
-def page(title: str, parts: Sequence[Markup], residual: str = "") -> str:
+def document(title: str, parts: Sequence[Markup], residual: str = "") -> str:
     """A whole document with its style inside: its parts, and a footer that says what a residual is."""
     footer = element("footer", f"Made by fes-pin. {residual}Intervals are 95 %. SI units.")
     body = joined([p for p in (*parts, footer) if p.text])
@@ -131,8 +133,8 @@ def value_text(value: float, std: float) -> str:
 
 
 def unit_text(unit: str) -> str:
-    """A unit as printed: with its exponents and the micro sign; "-" for a pure number."""
-    return unit.replace("m2", "m²").replace("us", "µs") or "-"
+    """A unit as printed: with its exponents and the micro sign."""
+    return unit.replace("m2", "m²").replace("us", "µs")
 
 
 def key(*entries: tuple[str, str]) -> Markup:

@@ -16,7 +16,7 @@ from fes_pin.infer.text import percent
 from fes_pin.view.chart import Panel, svg, tick_text
 from fes_pin.view.drawing import Drawing, csv_of, every, rows_csv
 from fes_pin.view.missing import Missing, binned, explained, smoothed
-from fes_pin.view.style import label, milli, thin_curve, unit_of
+from fes_pin.view.style import WIDTHS, label, milli, thin_curve, unit_of
 
 DOTS = 500
 """Dots of one panel."""
@@ -128,10 +128,9 @@ def _limits(one: Replay, name: str, extended: bool) -> tuple[float, float]:
 def _curves(panel: Panel, one: Replay, name: str, extended: bool, points: int) -> None:
     """Simulations behind, the measurement in front."""
     time = one.measured.time
-    if extended:
-        panel.line(*thin_curve(time, one.extended[name], points), "extended", 4.0)
-    panel.line(*thin_curve(time, one.nominal[name], points), "nominal", 1.8)
-    panel.line(*thin_curve(time, one.measured[name], points), "measured", 0.9)
+    for of, width in WIDTHS.items():
+        if extended or of != "extended":
+            panel.line(*thin_curve(time, getattr(one, of)[name], points), of, width)
 
 
 def _residuals(one: Replay, name: str, extended: bool, factor: float, points: int, top: float) -> Panel:

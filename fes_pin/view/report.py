@@ -1,262 +1,171 @@
-"""The report of a diagnosis: one page that holds everything it shows."""
+"""The report of a result: one page of sections, the same for every front end, and what each front end adds."""
 
 from __future__ import annotations
 
-from collections import Counter
+import math
+from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from fes_pin.data.files import write_text
-from fes_pin.data.log import Log
 from fes_pin.data.numbers import instance
-from fes_pin.diagnosis.errors_ahead import Ahead
-from fes_pin.diagnosis.recorded import NEXT_FILE
-from fes_pin.diagnosis.replay import replayed_trials
-from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.diagnosis.text import left_out_text
-from fes_pin.identify.error_measures import E_WORDS, FREE, ONE_STEP
-from fes_pin.infer.result import ParameterEstimate
+from fes_pin.data.results import Result
+from fes_pin.identify.error_measures import E_WORDS
+from fes_pin.infer.result import Cause, Change, Named
 from fes_pin.infer.text import percent, probability
-from fes_pin.models.describe import sentence
-from fes_pin.models.outside import origin
-from fes_pin.view.page import (
-    Content,
-    Markup,
-    element,
-    figure,
-    folded,
-    html_table,
-    page,
-    section,
-    unit_text,
-)
-from fes_pin.view.plots import stimulus_drawing
-from fes_pin.view.report_causes import causes_section, stage_mark, value_and_interval
-from fes_pin.view.report_trials import missing_section, position_unit, trials_section
-from fes_pin.view.style import unit_of
-from fes_pin.view.words import answers, title
+from fes_pin.models.describe import equation, remark, sentence
+from fes_pin.view.intervals import intervals_drawing, rivals_drawing
+from fes_pin.view.mathml import equations_mathml
+from fes_pin.view.page import Content, Markup, document, element, figure, html_table, section, unit_text
+from fes_pin.view.sections import UNIT_IN_NAME, Parts, answers, provenance_parts, stage_mark, value_and_interval
 
-if TYPE_CHECKING:
-    from fes_pin.walk.result import WalkDiagnosis
+OWN = {"Diagnosis": "report_rig", "WalkDiagnosis": "report_walk", "Contrast": "report_groups"}
+"""Modules that hold what each front end adds, as `PARTS`."""
+STYLES = {"nothing_changed": "adequate", "changed": "causes_found"}
+"""Verdicts that look like others."""
+RIVALS = 7
+"""Rivals shown of each cause."""
 
 
-def report(diagnosis: Diagnosis | WalkDiagnosis, path: str | Path) -> None:
-    """Write the report of a diagnosis, of a rig's or of walking's, whole or not at all.
+def report(result: Result, path: str | Path) -> None:
+    """Write the report of a result of `diagnose` or `contrast`, whole or not at all.
 
     Raises
     ------
     InputError
-        It is no diagnosis; or the file cannot be written, or was read.
+        It is no such result; or the file cannot be written, or was read.
     """
-    if isinstance(diagnosis, Diagnosis):
-        write_text(path, report_html(diagnosis))
-        return
-    from fes_pin.view.walk_report import walk_report_html  # noqa: PLC0415
-    from fes_pin.walk.result import WalkDiagnosis  # noqa: PLC0415
-
-    write_text(path, walk_report_html(instance(diagnosis, WalkDiagnosis, "diagnosis")))
+    write_text(path, report_html(instance(result, Result, "diagnosis")))
 
 
-def report_html(diagnosis: Diagnosis) -> str:
-    """The report of a diagnosis as one HTML page that needs nothing else: no network."""
-    replays = replayed_trials(diagnosis)
+def answer_files(result: Result) -> dict[str, str | bytes]:
+    """Content of every file of an answer by name: its record, its model, its report and what else there is to see."""
+    further = {name: make(result) for name, make in _own(result).files.items()}
+    return {**result.files(), "report.html": report_html(result), **further}
+
+
+def _own(result: Result) -> Parts:
+    """What its front end adds."""
+    own: Parts = import_module(f"fes_pin.view.{OWN[type(result).__name__]}").PARTS
+    return own
+
+
+def report_html(result: Result) -> str:
+    """The report as one HTML page that needs nothing else: no network."""
+    own = _own(result)
+    names = f"{type(result).KIND.__name__}s"
     parts = [
-        _head(diagnosis),
-        section("Errors", *_errors(diagnosis)),
-        section("Causes", *causes_section(diagnosis)),
-        section("What is left", *_left(diagnosis)),
-        section("Next experiment", *(_next(diagnosis) if diagnosis.causes else [])),
-        section("Missing torque and force", *missing_section(diagnosis, replays)),
-        section("Trials", *trials_section(diagnosis, replays)),
-        section("Parameters and noise", *_parameters(diagnosis)),
-        section("The model, to be used", *_use(diagnosis)),
-        section("Where this comes from", *_provenance(diagnosis)),
+        _header(result, own.counts(result), own.shown),
+        section("Errors", *_errors(result)),
+        section(names, *_named(result)),
+        *own.sections(result),
+        section("Where this comes from", *provenance_parts(result.provenance)),
     ]
-    return page(f"{diagnosis.study.name} - diagnosis", parts, "Residual = measured - simulated. ")
+    return document(f"{result.study.name} - {result.FILE.removesuffix('.json')}", parts, own.residual)
 
 
-def _head(diagnosis: Diagnosis) -> Markup:
-    study = diagnosis.study
-    kinds = " and ".join(f"{n} {kind}" for kind, n in Counter(t.kind for t in study.trials).items())
-    trials = "trial" if len(study.trials) == 1 else "trials"
-    seconds = sum(t.duration for t in study.trials)
-    partly = " partly" if diagnosis.causes and diagnosis.remainder.unexplained else ""
+def _header(result: Result, counts: str, elsewhere: tuple[str, ...]) -> Markup:
+    """The verdict, and the questions that a reader has, each with its answer."""
+    partly = " partly" if result.causes and result.remainder.unexplained else ""
+    style = f"verdict {STYLES.get(result.verdict, result.verdict)}{partly}"
+    rows = [(_heading(one), _answer(result, one)) for one in result.causes]
+    told = [("explained", str(result.explained))] if result.explained and result.causes else []
+    told += [note for note in result.notes() if not note[0].startswith(elsewhere)]
     return element(
         "header",
-        element("p", f"{study.name} · rig {study.rig} · {kinds} {trials}, {seconds:.4g} s", class_="eyebrow"),
-        element("h1", title(diagnosis), class_=f"verdict {diagnosis.verdict}{partly}"),
-        answers(diagnosis),
-        *(element("p", element("strong", "Warning: "), f"{words}.") for words in diagnosis.warnings),
+        element("p", f"{result.study.name} · rig {result.study.rig} · {counts}", class_="eyebrow"),
+        element("h1", _upper(result.title()), class_=style),
+        answers([*rows, *((element("span", _upper(topic)), said) for topic, said in told)]),
     )
 
 
-def _errors(diagnosis: Diagnosis) -> list[Markup]:
-    """Errors of both models, in sample and held out; of a driven rig over three spans of time."""
-    both, rows = bool(diagnosis.causes), _error_rows(diagnosis)
-    head = ["trials", "prediction", "E nominal"] + ["E extended"] * both
-    out = [element("p", E_WORDS), html_table(head, [r[: len(head)] for r in rows], (2, 3))]
-    floor = f"The noise of the readings alone is {percent(diagnosis.ceiling_percent)} of E: no model can be better."
-    notes = [floor, f"Held out: {diagnosis.held_out_by}."]
-    ahead = diagnosis.ahead
-    if ahead is not None:
-        spans = (
-            "One sample ahead any model is right where sampling is fast; free, a rig whose effort answers what is read "
-            "drifts away with the best of models. What counts is the horizon between."
-        )
-        notes.append(spans)
-        if diagnosis.is_driven and ahead.extended.free is None:
-            notes.append("This rig falls over by itself: its free error is meaningless, and is not given.")
-        unit = diagnosis.model.rig.units().get("effort", "")
-        notes += [
-            f"A random {r.name} of {r.std:.3g} {unit} acts all the time: {100.0 * r.share:.2g} % of what drives the "
-            f"rig, changing within {r.time_constant_s:.2g} s."
-            for r in diagnosis.random
-        ]
-    if diagnosis.left_out:
-        count = sum(len(k) for columns in diagnosis.left_out.values() for k in columns.values())
-        notes.append(
-            f"{count} samples were left out as spikes: {left_out_text(diagnosis.left_out, diagnosis.study.trials)}."
-        )
-    for where, names in diagnosis.catalogue.origins().items():
-        notes.append(f"Looked for as well: {', '.join(names)}, code of {Path(where).name}.")
-    return [*out, *(element("p", words, class_="soft") for words in notes)]
+def _heading(one: Named) -> Markup:
+    stage = getattr(one, "stage", "")
+    return element("code", one.name) + Markup(" ") + (stage_mark(stage) if stage else Markup(""))
 
 
-def _error_rows(diagnosis: Diagnosis) -> list[list[Content]]:
-    ahead = diagnosis.ahead
-    if ahead is None:
-        pairs = zip(("fitted", "held out"), diagnosis.nominal_error, diagnosis.extended_error, strict=True)
-        return [[where, FREE, percent(b), percent(a)] for where, b, a in pairs if b is not None]
-    rows: list[list[Content]] = []
-    for where, before, after in (
-        ("fitted", ahead.nominal, ahead.extended),
-        ("held out", ahead.nominal_held_out, ahead.extended_held_out),
-    ):
-        if before is not None and after is not None:
-            rows += [[where, what, old, new] for what, old, new in _spans(ahead.horizon_s, before, after)]
-    return rows
+def _answer(result: Result, one: Named) -> Content:
+    """What it is, how large, how sure."""
+    kind = result.effect(one.name)
+    what = one.words or (sentence(kind) if kind else one.name)
+    where = f" At {one.site}." if one.site else ""
+    return f"{_upper(what).removesuffix('.')}.{where} {', '.join(_sizes(one))}. {told_apart(one)}"
 
 
-def _spans(horizon_s: float, before: Ahead, after: Ahead) -> list[tuple[str, str, str]]:
-    def free(value: float | None) -> str:
-        return "meaningless: it falls" if value is None else percent(value)
+def _sizes(one: Named) -> list[str]:
+    """Its values in words, without units in their names."""
+    names = [[UNIT_IN_NAME.sub("", name).replace("_", " "), *group] for (name, *group), _ in one.estimates()]
+    sizes = [str(replace(estimate, unit=unit_text(estimate.unit))) for _, estimate in one.estimates()]
+    return [" ".join([*name, size]) for name, size in zip(names, sizes, strict=True)]
 
-    return [
-        (ONE_STEP, percent(before.one_step), percent(after.one_step)),
-        (f"{horizon_s:g} s ahead", percent(before.horizon), percent(after.horizon)),
-        (FREE, free(before.free), free(after.free)),
+
+def _upper(words: str) -> str:
+    return words[:1].upper() + words[1:]
+
+
+def told_apart(one: Named) -> str:
+    """How sure it is, and what these data cannot tell it from."""
+    others = f"cannot tell it from {', '.join(one.equivalents)}: read them as one set"
+    told = others if one.equivalents else f"tell it apart from every other {type(one).__name__.lower()} in the library"
+    return f"By chance alone over the whole library: {probability(one.p_value)}. These data {told}."
+
+
+def _errors(result: Result) -> list[Markup]:
+    """Errors of both models, in sample and held out."""
+    head = ["data", "prediction", "E nominal"] + ["E extended"] * bool(result.causes)
+    rows = [[on, what, percent(b), percent(a)][: len(head)] for on, what, b, a in result.error_rows()]
+    return [element("p", E_WORDS), html_table(head, rows, (2, 3))] if rows else []
+
+
+def _named(result: Result) -> list[Markup]:
+    """What is named: a table, their gains, and a card for each."""
+    if not result.causes:
+        open_ = "; the search ended before it had tried all" if result.is_stopped else ""
+        return [element("p", f"None is named{open_}.")]
+    _, head, rows, _ = result.as_table()
+    gains = [(c.name, c.gain_held_out, c.stage) for c in result.causes if isinstance(c, Cause)]
+    table = html_table(head, [[element("code", row[0]), *row[1:]] for row in rows])
+    drawn = intervals_drawing([(n, g.percent, g.low, g.high, s) for n, g, s in gains], f"{head[3]} (%)", (0.0, 100.0))
+    caption = "Gain with its 95 % interval: percent of the nominal model's squared error above the noise."
+    cards = [_card(result, one) for one in result.causes]
+    return [table, *([figure(drawn, caption, "narrow", "gains")] if gains else []), *cards]
+
+
+def _card(result: Result, one: Named) -> Markup:
+    """What is said of a cause or a change, in a frame in the colour of its stage."""
+    kind, stage = result.effect(one.name), getattr(one, "stage", "")
+    rows: list[list[Content]] = [
+        [*(element("code", n) for n in cell), *value_and_interval(estimate)] for cell, estimate in one.estimates()
     ]
+    about = [equations_mathml(equation(kind)), element("p", f"Tell-tale: {remark(kind, 'Tell-tale:')}")] if kind else []
+    table = html_table((*one.CELL, "value", "unit", "95 % interval"), rows, (len(one.CELL), len(one.CELL) + 2))
+    drawn = [table, _by_group(one) if isinstance(one, Change) else _rivals(result, one)]
+    return element("article", element("div", element("h3", _heading(one)), *about, *drawn), class_=f"cause {stage}")
 
 
-def _left(diagnosis: Diagnosis) -> list[Markup]:
-    left = diagnosis.remainder
-    where = f" It depends most on {left.where}." if left.where else ""
-    told = (
-        f"Something is left that the {'extended' if diagnosis.causes else 'nominal'} model does not explain "
-        f"({probability(left.p_value)}).{where}"
-        if left.unexplained
-        else "Nothing that depends smoothly on the motion, comes in bursts or waves, repeats with the angle or from "
-        "trial to trial, grows with the stimulus, jumps once in a trial or lags where the motion turns "
-        f"({probability(left.p_value)})."
-    )
-    out = [element("p", told)]
-    if diagnosis.absorbed:
-        why = "what the nominal parameters take up, or no input of these trials drives."
-        out.append(element("p", f"Not testable here, which is not the same as absent: {why}"))
-        unseen = [diagnosis.catalogue.effect(n) for n in diagnosis.absorbed]
-        rows: list[list[Content]] = [[element("code", e.name), stage_mark(str(e.stage)), sentence(e)] for e in unseen]
-        out.append(html_table(("cause", "stage", "what it is"), rows, prose=True))
-    else:
-        out.append(
-            element(
-                "p",
-                f"Every {'other ' if diagnosis.causes else ''}cause in the library could be seen in these data.",
-                class_="soft",
-            )
-        )
-    return out
-
-
-def _next(diagnosis: Diagnosis) -> list[Markup]:
-    plan = diagnosis.next_experiment
-    if plan is None:
-        return [element("p", "None is needed to tell causes apart.", class_="soft")]
-    if plan.trial is None:
-        return [element("p", f"{plan.why[0].upper()}{plan.why[1:]}.")]
-    out = [element("p", f"To separate {' and '.join(plan.separates)}: {plan.why}.")]
-    conditions = "".join(f", {n} = {v:g}" for n, v in plan.trial.conditions.items())
-    out.append(
-        element("p", f"Its kind: {plan.trial.kind}{conditions}; its inputs are in ", element("code", NEXT_FILE), ".")
-    )
-    if plan.trial.columns:
-        drawn = stimulus_drawing(plan.trial, position_unit(diagnosis))
-        out.append(figure(drawn, "Inputs of the next trial.", "narrow", "next_trial"))
-    return out
-
-
-def _parameters(diagnosis: Diagnosis) -> list[Markup]:
-    fits = [diagnosis.nominal, diagnosis.extended] if diagnosis.causes else [diagnosis.nominal]
-    info = diagnosis.model.parameter_info()
-    rows: list[list[Content]] = []
-    for name in fits[-1].free:
-        start = f"{diagnosis.study.start[name]:.4g}" if name in diagnosis.study.start else "-"
-        cells = [value_and_interval(ParameterEstimate.of(f, name, "")) if name in f.free else ("-", "-") for f in fits]
-        rows.append(
-            [element("code", name), unit_text(info[name].unit), start, *(text for pair in cells for text in pair)]
-        )
-    head = ("parameter", "unit", "start", "nominal", "95 % interval", "extended", "95 % interval")
-    unit = position_unit(diagnosis)
-    noise: list[list[Content]] = [
-        [element("code", n), f"{m.std:.3g}", unit_of(n, unit) or "-", str(len(m.ar)) if m.ar else "white"]
-        for n, m in diagnosis.extended.noise.items()
-    ]
-    return [
-        html_table(head[: 3 + 2 * len(fits)], rows, range(2, 7)),
-        html_table(("noise of", "standard deviation", "unit", "autoregressive order"), noise, (1,)),
-    ]
-
-
-def _use(diagnosis: Diagnosis) -> list[Markup]:
-    rig = diagnosis.model.rig
-    libraries = sorted({Path(where).name for one in (rig, *diagnosis.model.effects) if (where := origin(type(one)))})
-    options = "".join(f" --library {name}" for name in libraries)
-    lines = [
-        f"fes-pin predict model.toml TRIAL.csv {one}{options} --out PREDICTED.csv".replace("  ", " ")
-        for one in rig.settings
-    ]
-    columns = " and ".join(("time_s", *rig.input_columns(diagnosis.study.trials[0])))
-    first = f" {rig.begins}" if rig.begins else ""
-    which = "extended" if diagnosis.causes else "fitted nominal"
-    words = f" beside this page is the {which} model, whole. TRIAL.csv needs {columns}.{first}"
-    library = f", library={libraries}".replace("'", '"') if libraries else ""
-    python = _in_python(library, logged=diagnosis.log != Log())
-    return [
-        element("p", "The file ", element("code", "model.toml"), words),
-        element("pre", "\n".join(lines)),
-        element("pre", python),
-    ]
-
-
-def _in_python(library: str, *, logged: bool) -> str:
-    """How a trial is predicted; `logged` says that its log must be undone before."""
-    given = 'load_log("model.toml").applied(trial)' if logged else "trial"
-    lines = ["import fes_pin as fp", *["from fes_pin.identify.stored import load_log"] * logged, ""]
-    return "\n".join(
-        [*lines, f'model = fp.load_model("model.toml"{library})', f"predicted = fp.predict(model, {given})"]
+def _by_group(change: Change) -> Markup:
+    """The first parameter of a change in each group."""
+    name, groups = next(iter(change.parameters.items()))
+    rows = [(g, e.value, *e.interval, "") for g, e in groups.items()]
+    unit = unit_text(next(iter(groups.values())).unit)
+    return figure(
+        intervals_drawing(rows, f"{name} ({unit})" if unit else name), f"{name} in each group.", "narrow", change.name
     )
 
 
-def _provenance(diagnosis: Diagnosis) -> list[Markup]:
-    made = diagnosis.provenance
-    if made is None:
-        return []
-    rows: list[list[Content]] = [["made", made.date], ["seed", str(made.seed)]]
-    if made.command:
-        rows.append(["command", element("code", made.command)])
-    rows.append(["versions", ", ".join(f"{n} {v}" for n, v in made.versions.items())])
-    files: list[list[Content]] = [[element("code", n), element("code", digest)] for n, digest in made.inputs.items()]
-    out = [element("div", html_table(("what", "value"), rows, prose=True), class_="provenance")]
-    if files:
-        hashes = element("div", html_table(("file of the study", "SHA-256"), files, prose=True), class_="provenance")
-        out.append(folded(f"Hashes of the {len(files)} files that were read", hashes))
-    return out
+def _rivals(result: Result, cause: Named) -> Markup:
+    """The nearest rivals that would stand in the place of one cause."""
+    others, found = {c.name for c in result.causes} - {cause.name}, dict[str, float]()
+    for one in getattr(result, "ranking", {}).get(cause.name, ()):
+        instead = sorted(set(one.names) - others)
+        if instead and instead != [cause.name]:
+            found[" + ".join(instead)] = min(one.shortfall, found.get(" + ".join(instead), math.inf))
+    if not found:
+        return Markup("")
+    near = sorted(found.items(), key=lambda pair: pair[1])[:RIVALS]
+    rows = [(n, v, str(getattr(result.effect(n.partition(" + ")[0]), "stage", ""))) for n, v in near]
+    caption = (
+        f"Rivals in place of {cause.name}: by how much twice the log-likelihood of the whole fit falls. Hollow: not "
+        "told apart; the grey band is what chance alone makes. Colours are the stages of the signal path."
+    )
+    return figure(rivals_drawing(cause, rows), caption, "narrow", f"rivals_{cause.name}")

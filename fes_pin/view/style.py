@@ -23,6 +23,8 @@ COLOURS = {
     "stimulus": STIMULUS,
 }
 """Every colour that a figure uses, by name."""
+WIDTHS = {"extended": 4.0, "nominal": 1.8, "measured": 0.9}
+"""Widths of curves: simulations behind, the measurement in front."""
 
 LABELS = {
     "angle_rad": ("angle", "rad"),

@@ -7,13 +7,12 @@ import pinocchio as pin
 
 from fes_pin.view.arrows import Arrow
 from fes_pin.view.viewer import FRAMES_A_SECOND, BodyScene
-from fes_pin.view.walk_report import PLAYBACK_FILE, walk_report_html
 from fes_pin.walk.dynamics import centre_of_mass, required
 from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import LOADED_N, Plates, pressure_and_free_moment
-from fes_pin.walk.record import walk_files
 from fes_pin.walk.result import WalkDiagnosis
 
+PLAYBACK_FILE = "playback.html"
 METRES_A_NEWTON = 2e-3
 """An arrow of 1 m is a force of 500 N."""
 SEEN_THROUGH = 0.35
@@ -22,12 +21,10 @@ READ, REQUIRED = 0x17191C, 0xD55E00
 LONGEST_S = 4.0
 
 
-def walk_answer_files(diagnosis: WalkDiagnosis) -> dict[str, str | bytes]:
-    """Every file of a diagnosis of walking by name: its record, model and body, its report, and the first trial as a
-    playback."""
+def playback_html(diagnosis: WalkDiagnosis) -> str:
+    """The first trial of a diagnosis of walking as a page that plays it."""
     first = diagnosis.models.banks.recordings[0]
-    scene = show_reactions(first.motion, first.plates, f"{diagnosis.study.name}, {first.name}")
-    return {**walk_files(diagnosis), "report.html": walk_report_html(diagnosis), PLAYBACK_FILE: scene.html()}
+    return show_reactions(first.motion, first.plates, f"{diagnosis.study.name}, {first.name}").html()
 
 
 def show_reactions(motion: Motion, plates: Plates, caption: str = "") -> BodyScene:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from fes_pin.walk.motion import Motion
 from fes_pin.walk.plates import Plates
 from fes_pin.walk.scene import Scene
 
+NEXT_FILE = "next_trial.csv"
 CARRIED_KG = 10.0
 SLOWER = 0.6
 
@@ -40,6 +42,13 @@ class NextWalk(ReadOnly):
     separates: tuple[str, str]
     conditions: dict[str, float] | None
     coordinates: dict[str, np.ndarray] | None
+
+    def record(self) -> dict[str, Any]:
+        """As JSON files have it; the motion is in `NEXT_FILE`."""
+        trial = None
+        if self.conditions is not None:
+            trial = {"coordinates": NEXT_FILE, "file": NEXT_FILE, "kind": "motion", **self.conditions}
+        return {"why": self.why, "separates": list(self.separates), "trial": trial}
 
 
 def next_walk(models: WalkModels, found: SearchResult[WalkFit], cause: str) -> NextWalk | None:

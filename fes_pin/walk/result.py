@@ -6,19 +6,22 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+import tomli_w
 
 from fes_pin.body.build import Body
 from fes_pin.data.results import Result
-from fes_pin.data.show import from_to, last_notes
 from fes_pin.data.smooth import CUTOFF_HZ
+from fes_pin.data.table import format_csv
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, Cause, Explained, shown
-from fes_pin.infer.text import probability
-from fes_pin.walk.experiment import NextWalk
+from fes_pin.infer.text import percent, probability
+from fes_pin.walk.effect import WalkEffect
+from fes_pin.walk.effects import EFFECTS
+from fes_pin.walk.experiment import NEXT_FILE, NextWalk
 from fes_pin.walk.extended import extended_body
 from fes_pin.walk.judge import CHANNELS
 from fes_pin.walk.models import WalkFit, WalkModels
 
-NEXT_FILE = "next_trial.csv"
+BODY_FILE = "body.urdf"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -42,7 +45,7 @@ class WalkDiagnosis(Result):
     nominal_error: tuple[float, float | None]
     extended_error: tuple[float, float | None]
     ceiling_percent: float
-    next_experiment: NextWalk | None
+    next_experiment: NextWalk | None = None
     models: WalkModels
     best: WalkFit
     cutoff_hz: float = CUTOFF_HZ
@@ -60,12 +63,20 @@ class WalkDiagnosis(Result):
         on, before, after = next((o, b, a) for o, b, a in pairs if b is not None and a is not None)
         return Explained("squared error of the ground reaction", on, before, after, self.ceiling_percent or None)
 
+    def files(self) -> dict[str, str | bytes]:
+        """Content of every file of the diagnosis but the report and the playback, by name: with the extended body."""
+        causes = [
+            {"name": c.name, "site": c.site, "parameters": {n: one.value for n, one in c.parameters.items()}}
+            for c in self.causes
+        ]
+        model = {"model": {"rig": "body", "urdf": BODY_FILE, "cutoff_hz": self.cutoff_hz}, "effect": causes}
+        files = super().files() | {"model.toml": tomli_w.dumps(model), BODY_FILE: self.model.urdf}
+        if self.next_experiment and self.next_experiment.coordinates is not None:
+            files[NEXT_FILE] = format_csv(self.next_experiment.coordinates)
+        return files
+
     def own_record(self) -> dict[str, Any]:
         """What `diagnosis.json` has of a walk."""
-        plan = self.next_experiment
-        trial = None
-        if plan and plan.conditions is not None:
-            trial = {"coordinates": NEXT_FILE, "file": NEXT_FILE, "kind": "motion", **plan.conditions}
         parameters = {
             f"{c.name}.{n}": {"value": shown(one.value), "std": shown(one.std)}
             for c in self.causes
@@ -80,7 +91,7 @@ class WalkDiagnosis(Result):
             "extended": {"parameters": parameters, "error_percent": extended},
             "noise": self._noise(),
             "ceiling_percent": shown(self.ceiling_percent),
-            "next_experiment": {"why": plan.why, "separates": list(plan.separates), "trial": trial} if plan else None,
+            "next_experiment": self.next_experiment.record() if self.next_experiment else None,
             "cutoff_hz": self.cutoff_hz,
         }
 
@@ -92,16 +103,28 @@ class WalkDiagnosis(Result):
             name.replace(" ", "_"): {"std": shown(float(s)), "ar": []} for name, s in zip(CHANNELS, size, strict=True)
         }
 
-    def notes(self) -> list[str]:
-        """What is said below the table."""
-        errors = from_to(self.nominal_error, self.extended_error, ("fitted", "strides held out"))
-        lines = [f"error E {errors}; stride to stride {self.ceiling_percent:.2f} %; low pass {self.cutoff_hz:g} Hz"]
+    def effect(self, name: str) -> type[WalkEffect] | None:
+        """The class that describes a cause."""
+        return next((e for e in EFFECTS if e.name == name), None)
+
+    def error_rows(self) -> list[tuple[str, str, float | None, float | None]]:
+        """Errors E in percent: on what strides, of the ground reaction, of the nominal and of the extended model."""
+        pairs = zip(("all strides", "strides held out"), self.nominal_error, self.extended_error, strict=True)
+        return [(on, "ground reaction", b, a) for on, b, a in pairs if b is not None]
+
+    def notes(self) -> list[tuple[str, str]]:
+        """What is said besides the table, by topic."""
         where = f", most in {self.remainder.where}" if self.remainder.where else ""
-        state = "something comes" if self.remainder.unexplained else "nothing more comes"
-        lines.append(f"{state} again in every stride ({probability(self.remainder.p_value)}{where})")
+        state = "comes again in every stride" if self.remainder.unexplained else "nothing comes again in every stride"
+        told = [
+            ("noise from stride to stride alone", f"E {percent(self.ceiling_percent)}"),
+            ("low pass", f"{self.cutoff_hz:g} Hz"),
+            ("lack of fit", f"{state} ({probability(self.remainder.p_value)}{where})"),
+        ]
         for cause in self.causes:
             if (gain := cause.further.get("other_leg")) is not None:
-                lines.append(f"{cause.name}: fitted to one leg's stances it gains {gain:.0f} % on the other's")
+                words = f"{gain:.0f} % of its squared error, in single supports"
+                told.append((f"{cause.name} of one leg's size gains on the other", words))
             if cause.elsewhere:
-                lines.append(f"{cause.name}: as well at {'; '.join(cause.elsewhere[:4])}")
-        return [*lines, *last_notes(self.absorbed, self.next_experiment, self.warnings)]
+                told.append((f"{cause.name} as well at", "; ".join(cause.elsewhere[:4])))
+        return [*told, *([("not testable here", ", ".join(self.absorbed))] if self.absorbed else []), *super().notes()]

@@ -25,6 +25,7 @@ from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import write_trial
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.store import save_model
+from fes_pin.view import report
 
 EXAMPLES = 200
 ENDS = Counter()
@@ -161,16 +162,10 @@ def stubs(monkeypatch, inputs):
 
     monkeypatch.setattr("fes_pin.diagnosis.diagnosis.diagnose_joint", diagnose_joint)
     monkeypatch.setattr("fes_pin.cohort.run.run_cohort", cohort)
-    for chapter, texts in (
-        (
-            "contrasts.contrast.contrast",
-            ("contrasts.record.contrast_json", "view.contrast_report.contrast_html"),
-        ),
-        ("comparison.compare.compare", ("comparison.record.comparison_json",)),
-    ):
-        monkeypatch.setattr(f"fes_pin.{chapter}", told)
-        for text in texts:
-            monkeypatch.setattr(f"fes_pin.{text}", str)
+    for name in ("contrasts.contrast.contrast", "comparison.compare.compare"):
+        monkeypatch.setattr(f"fes_pin.{name}", lambda *given, **named: Told(told(*given, **named)))
+    files = report.answer_files
+    monkeypatch.setattr(report, "answer_files", lambda one: one.files() if isinstance(one, Told) else files(one))
     monkeypatch.setattr("fes_pin.data.datasets.download", told)
     monkeypatch.setattr(
         "fes_pin.cli.allocate.walk_table", lambda folder, nerves, passive: f"{folder} {nerves} {passive}"
@@ -179,6 +174,22 @@ def stubs(monkeypatch, inputs):
     monkeypatch.setattr("fes_pin.body.minimal_sets.minimal_sets", lambda *_, **named: [str(sorted(named.items()))])
     monkeypatch.setattr("fes_pin.body.minimal_sets.pareto", lambda found: found)
     monkeypatch.setattr("fes_pin.body.observability.fewest_goniometers", lambda *_, **named: [named])
+
+
+class Told(str):
+    """A result that says how it was asked for."""
+
+    def as_table(self):
+        return self, (), (), ()
+
+    def to_json(self):
+        return str(self)
+
+    def files(self):
+        return {"contrast.json": str(self), "report.html": str(self)}
+
+    def by_command(self, command):
+        return self
 
 
 def value_of(parameter, words, rng):

@@ -18,7 +18,7 @@ from fes_pin.data.outputs import Outputs
 from fes_pin.data.study import read_study, write_study
 from fes_pin.data.trial import read_trial, write_trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.record import NEXT_FILE, diagnosis_files, diagnosis_record
+from fes_pin.diagnosis.experiment import NEXT_FILE
 from fes_pin.identify.stored import load_random
 from fes_pin.infer.noise import estimate_noise
 from fes_pin.models.effects import EFFECTS
@@ -87,11 +87,11 @@ def test_the_answer_does_not_depend_on_threads(made):
 
 
 def test_the_library_says_the_same(made, diagnosis):
-    by_library = json.loads(json.dumps(diagnosis_record(diagnosis)))
+    by_library = json.loads(json.dumps(diagnosis.record()))
     by_library.pop("wall_s")
     by_library.pop("provenance")
     assert by_library == record(made / "one")
-    assert diagnosis_files(diagnosis)["model.toml"] == (made / "one/model.toml").read_text()
+    assert diagnosis.files()["model.toml"] == (made / "one/model.toml").read_text()
 
 
 def test_what_the_command_wrote_is_loaded(made, diagnosis):
@@ -101,7 +101,7 @@ def test_what_the_command_wrote_is_loaded(made, diagnosis):
 
 
 def test_the_seed_changes_only_what_is_simulated(made):
-    found = diagnosis_record(diagnose_joint(read_study(made / "study"), seed=7))
+    found = diagnose_joint(read_study(made / "study"), seed=7).record()
     usual = record(made / "one")
     for key in ("study", "verdict", "absorbed", "nominal", "extended", "noise", "ceiling_percent"):
         assert json.loads(json.dumps(found[key])) == usual[key], key

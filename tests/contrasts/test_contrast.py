@@ -11,12 +11,11 @@ from contrast_pairs.practice import practice_pair
 from data import studies
 
 import fes_pin as fp
-from fes_pin.contrasts.record import contrast_record
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.infer.levels import CONFIDENCE_95
-from fes_pin.view.contrast_report import contrast_html
+from fes_pin.view.report import report_html
 
 
 def test_nothing_changed(tmp_path):
@@ -69,11 +68,11 @@ def test_a_nominal_parameter_is_told_in_plain_words(tmp_path):
     assert (change.name, change.kind, change.group) == ("inertia_scale", "nominal", "after")
     assert change.words.startswith(("inertia was added, 0.299 kg m2", "inertia was added, 0.3 kg m2"))
     assert change.parameters["inertia_scale"]["before"].value == pytest.approx(1.0, abs=0.02)
-    record = contrast_record(found)
+    record = found.record()
     json.dumps(record, allow_nan=False)
     assert record["changes"][0]["parameters"]["inertia_scale"]["after"]["std"] > 0.0
     assert record["unchanged"]["damping"]["at_most"] < 0.5
-    page = contrast_html(found)
+    page = report_html(found)
     assert "Inertia was added" in page
     assert "inertia_scale" in page
 
@@ -125,8 +124,8 @@ def test_a_misread_trial_is_told_as_such(shared, changes):
     assert (one.group, one.trial) == ("after", odd)
     value = one.parameters["load_kg"]["after"]
     assert value.value == pytest.approx(load, abs=2.0 * CONFIDENCE_95 * value.std)
-    assert contrast_record(found)["changes"]
-    assert "condition_misread" in contrast_html(found)
+    assert found.record()["changes"]
+    assert "condition_misread" in report_html(found)
 
 
 STAND = """<?xml version="1.0"?>

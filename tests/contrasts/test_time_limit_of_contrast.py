@@ -7,8 +7,7 @@ from contrast_pairs.free import free_pair
 
 import fes_pin as fp
 from fes_pin.contrasts.models import ContrastSearch
-from fes_pin.contrasts.record import contrast_json
-from fes_pin.view.contrast_report import contrast_html
+from fes_pin.view.report import report_html
 from fes_pin.workers import OutOfTime
 
 
@@ -21,9 +20,9 @@ def test_without_time_nothing_is_claimed(study):
     found = fp.contrast(study, limit=0.0)
     assert found.verdict == "stopped" and not found.changes
     assert not found.unchanged and not found.excluded
-    assert "stopped: best set so far: no change" in str(found)
-    assert "Stopped: best set so far" in contrast_html(found)
-    assert json.loads(contrast_json(found))["verdict"] == "stopped"
+    assert "stopped: best set so far: nothing changed" in str(found)
+    assert "Stopped: best set so far" in report_html(found)
+    assert json.loads(found.to_json())["verdict"] == "stopped"
     assert any("limit of 0 s" in words for words in found.warnings)
 
 

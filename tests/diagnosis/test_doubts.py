@@ -8,7 +8,6 @@ from diagnosis.hidden import study_of
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.decide.doubts import with_error
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.record import diagnosis_files, diagnosis_record
 from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.identify.fit import fit
 from fes_pin.infer.result import Remainder
@@ -23,8 +22,8 @@ def test_a_model_that_cannot_be_simulated_stops_with_the_reason():
     assert diagnosis.verdict == "stopped" and not diagnosis.causes
     assert "leaves the floating-point numbers" in diagnosis.reason
     assert diagnosis.reason in str(diagnosis).splitlines()[0]
-    assert diagnosis_record(diagnosis)["reason"] == diagnosis.reason
-    assert "floating-point numbers from its start values on" in report_html(diagnosis) and diagnosis_files(diagnosis)
+    assert diagnosis.record()["reason"] == diagnosis.reason
+    assert "floating-point numbers from its start values on" in report_html(diagnosis) and diagnosis.files()
 
 
 def test_a_missing_input_does_not_end_as_noise():
@@ -42,7 +41,9 @@ def test_a_missing_input_does_not_end_as_noise():
 def test_the_headline_says_how_much_is_explained():
     study = study_of("joint", ("coulomb_friction",), seed=1)
     diagnosis = diagnose_joint(study)
-    assert "one cause explains 100 % of what the model gets wrong, 0 % stays" in str(diagnosis).splitlines()[0]
+    first, gain = str(diagnosis).splitlines()[0], diagnosis.explained
+    assert first.startswith(f"{study.name}: the model lacks coulomb friction: that explains ")
+    assert f"{100.0 * (1.0 - gain.extended / gain.nominal):.0f} % of the {gain.measure}" in first
     assert any("rest on 4 trials" in w for w in diagnosis.warnings)
 
 

@@ -8,7 +8,6 @@ import pytest
 from diagnosis.hidden import named, slide, study_of
 
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.record import diagnosis_record
 from fes_pin.view.report import report
 
 NOISE = {"angle_rad": 2e-3, "force_n": 0.2, "position": 2e-3}
@@ -41,7 +40,7 @@ def test_spikes_change_no_verdict(rig, names, seed, tmp_path):
     study = study_of(rig, names, "white", seed)
     bad, count = spiked(study, seed)
     sound, diagnosis = diagnose_joint(study), diagnose_joint(bad)
-    assert sound.left_out == {} and "left_out_samples" not in diagnosis_record(sound)
+    assert sound.left_out == {} and "left_out_samples" not in sound.record()
     assert named(diagnosis) == named(sound) == [{n} for n in names], str(diagnosis)
     assert diagnosis.verdict == sound.verdict
     for name, noise in sound.extended.noise.items():
@@ -49,7 +48,7 @@ def test_spikes_change_no_verdict(rig, names, seed, tmp_path):
     for name in sound.extended.free:
         assert abs(diagnosis.extended.values[name] - sound.extended.values[name]) < 1.5 * sound.extended.std(name)
         assert diagnosis.extended.std(name) == pytest.approx(sound.extended.std(name), rel=0.25)
-    record = json.loads(json.dumps(diagnosis_record(diagnosis)))
+    record = json.loads(json.dumps(diagnosis.record()))
     told = sum(n for columns in record["left_out_samples"].values() for n in columns.values())
     assert 0.85 * count <= told <= count + 3
     assert "left out as spikes" in str(diagnosis)

@@ -10,7 +10,6 @@ from scipy.signal import butter, sosfiltfilt
 import fes_pin as fp
 from fes_pin.data.smooth import low_pass
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.record import diagnosis_files
 from fes_pin.identify.recording import low_pass_of
 from fes_pin.identify.stored import load_log
 from fes_pin.models.nominal import nominal_model
@@ -53,7 +52,7 @@ def test_nothing_hidden_is_adequate_after_a_low_pass(tmp_path):
     found = diagnose_joint(stored(study_of("ankle", seed=43), 6.0))
     assert found.verdict == "adequate", str(found)
     assert "low-passed at 4.8 Hz" in " ".join(found.warnings)
-    (tmp_path / "model.toml").write_text(diagnosis_files(found)["model.toml"])
+    (tmp_path / "model.toml").write_text(found.files()["model.toml"])
     log = load_log(tmp_path / "model.toml")
     assert log == found.log and log.low_pass_hz == pytest.approx(4.8, rel=0.05)
 

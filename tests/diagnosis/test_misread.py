@@ -9,7 +9,6 @@ from oracle import TYPICAL, make_study
 
 import fes_pin as fp
 from fes_pin.diagnosis.misread import find_misread
-from fes_pin.diagnosis.record import diagnosis_record
 from fes_pin.infer.levels import CONFIDENCE_95
 from fes_pin.view.report import report_html
 
@@ -78,7 +77,7 @@ def test_a_diagnosis_names_the_trial_and_everything_else_is_told_with_its_value(
     assert cause.gain_held_out.low > 90.0
     assert diagnosis.nominal_error[0] > 3.0 * diagnosis.extended_error[0]
     assert diagnosis.model.effects == ()
-    record = json.loads(json.dumps(diagnosis_record(diagnosis), allow_nan=False))
+    record = json.loads(json.dumps(diagnosis.record(), allow_nan=False))
     assert record["causes"][0]["trial"] == name
     assert f"trial {name}" in str(diagnosis)
     assert "was not run as it states" in report_html(diagnosis)

@@ -9,7 +9,6 @@ import scipy.integrate
 from fes_pin.data.study import Study, read_study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.record import diagnosis_record
 from fes_pin.infer.result import FITTED
 from fes_pin.view.report import report_html
 
@@ -57,7 +56,7 @@ def test_friction_is_found_beneath_a_random_torque(tmp_path):
     assert abs(estimate.value - 0.02) < 4.0 * estimate.std < 0.02
     assert not found.causes[0].gain_held_out.is_held_out and found.explained.on == FITTED
     assert "fitted gain" in str(found) and "held" not in str(found)
-    gains = diagnosis_record(found)["causes"][0]["gain_percent"]
+    gains = found.record()["causes"][0]["gain_percent"]
     assert gains["held_out"] is None and gains["ci95"][0] <= gains["ci95"][1]
     page = report_html(found)
     assert "gain on held-out trials" not in page.lower() and "there was nothing to hold out" in page

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from diagnosis.hidden import SHORT, diagnosed, named, study_of
 
-from fes_pin.diagnosis.record import diagnosis_record
 from fes_pin.identify.problem import limits_of
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
@@ -57,7 +56,7 @@ def test_a_phase_of_each_trials_own(row):
     assert got.std < 0.15 * size
     assert cause.gain_held_out.low > 50.0
     assert "each trial" in str(diagnosis)
-    assert set(diagnosis_record(diagnosis)["causes"][0]["parameters"]) == {"amplitude", "frequency_hz"}
+    assert set(diagnosis.record()["causes"][0]["parameters"]) == {"amplitude", "frequency_hz"}
     assert "each_trial = true" in model_toml(diagnosis.model)
 
 

@@ -15,7 +15,6 @@ from fes_pin.data.plausibility import ToPredict
 from fes_pin.diagnosis.checked import check
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.plausibility import check_study
-from fes_pin.diagnosis.record import diagnosis_record
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.models.nominal import nominal_model
 from fes_pin.view.report import report_html
@@ -173,7 +172,7 @@ def test_a_warning_stands_in_all_that_is_written():
     diagnosis = diagnose_joint(study)
     (words,) = diagnosis.warnings
     assert words == "pulse_width_us is never above the threshold of 180 us in trial 02"
-    assert diagnosis_record(diagnosis)["warnings"] == [words]
+    assert diagnosis.record()["warnings"] == [words]
     assert f"warning: {words}" in str(diagnosis)
     assert words in report_html(diagnosis)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.errors_ahead import Ahead, AheadErrors, RandomPart
-from fes_pin.diagnosis.text import ahead_notes, left_out_text
+from fes_pin.diagnosis.errors_ahead import RandomPart
+from fes_pin.diagnosis.text import in_words, left_out_text
 from fes_pin.infer.text import quantity
 
 
@@ -26,20 +26,9 @@ def test_a_quantity_is_rounded_to_what_it_means(value, std, words):
     assert quantity(value, std, "N") == words
 
 
-def test_a_driven_rigs_errors_and_what_acts_at_random_are_told():
-    before, after = Ahead(0.5, 20.0, 80.0), Ahead(0.1, 2.0, 5.0)
+def test_what_acts_at_random_is_told_in_units_of_the_effort():
     wind = RandomPart("effort", 0.12, 0.3, 0.04)
-    notes = ahead_notes(AheadErrors(0.3, before, after, before, Ahead(0.2, 4.0, 9.0)), (wind,), "N m")
-    assert notes == [
-        "error E 0.3 s ahead 20 -> 2 %, one sample ahead 0.5 -> 0.1 % fitted",
-        "error E 0.3 s ahead 20 -> 4 %, one sample ahead 0.5 -> 0.2 % held out",
-        "a random effort of 0.12 N m acts, 4 % of what drives the rig, changing within 0.3 s",
-    ]
-    falling = ahead_notes(AheadErrors(0.3, Ahead(0.5, 20.0, None), Ahead(0.1, 2.0, None), None, None), (), "N m")
-    noisy = ahead_notes(AheadErrors(0.3, before, Ahead(0.1, 2.0, 5.0, 1.9), None, None), (), "N m")
-    assert noisy == ["error E 0.3 s ahead 20 -> 2 % (noise alone 1.9 %), one sample ahead 0.5 -> 0.1 % fitted"]
-    assert falling[1:] == ["the rig falls by itself: a free simulation of it says nothing of the model"]
-    assert ahead_notes(None, (wind,), "N m") == []
+    assert in_words(wind, "N m") == "0.12 N m, 4 % of what drives the rig, changing within 0.3 s"
 
 
 def test_spikes_are_counted_by_column_and_trials_are_named_if_they_are_few():

@@ -7,7 +7,6 @@ import pytest
 from diagnosis.hidden import study_of
 
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.record import diagnosis_files
 from fes_pin.diagnosis.search.simulation_search import SimulationSearch
 from fes_pin.view.report import report_html
 from fes_pin.workers import OutOfTime, check_limit, in_parallel, time_limit
@@ -34,9 +33,9 @@ def test_without_time_nothing_is_claimed(study):
     assert stopped.verdict == "stopped" and not stopped.causes and stopped.reason is None
     assert "stopped: best set so far" in str(stopped) and "nothing in the library explains it" not in str(stopped)
     assert "Stopped: best set so far" in report_html(stopped)
-    assert json.loads(diagnosis_files(stopped)["diagnosis.json"])["verdict"] == "stopped"
+    assert json.loads(stopped.files()["diagnosis.json"])["verdict"] == "stopped"
     assert any("limit of 0 s" in w for w in stopped.warnings)
-    assert report_html(stopped) and diagnosis_files(stopped)
+    assert report_html(stopped) and stopped.files()
 
 
 def test_what_has_earned_its_place_is_told(study, monkeypatch):
@@ -48,6 +47,6 @@ def test_what_has_earned_its_place_is_told(study, monkeypatch):
     monkeypatch.setattr(SimulationSearch, "_extend_beam", out_of_time)
     stopped = diagnose_joint(study, limit=1e3)
     assert [c.name for c in stopped.causes] == ["coulomb_friction"] and stopped.verdict == "stopped"
-    assert "stopped: best set so far: coulomb_friction explains" in stopped.headline()
+    assert "stopped: best set so far: the model lacks coulomb friction" in stopped.headline()
     assert stopped.nominal_error[1] is None and any("limit of 1000 s" in w for w in stopped.warnings)
-    assert report_html(stopped) and diagnosis_files(stopped)
+    assert report_html(stopped) and stopped.files()

@@ -9,7 +9,6 @@ from driven_rigs.draw import BASES, draw
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
 from fes_pin.diagnosis.driven_refused import UNMOVED
-from fes_pin.diagnosis.record import diagnosis_record
 
 
 def found_in(causes, seed, folder, size=0.3):
@@ -36,7 +35,7 @@ def test_dry_friction_is_named_alone_with_its_size(tmp_path):
     assert cause.parameters["torque_nm"].value == pytest.approx(drawn.truth["coulomb_friction"], rel=0.15)
     assert cause.gain_held_out.low > 50.0
     assert found.extended.values["inertia_scale"] == pytest.approx(1.0, abs=0.02)
-    record = diagnosis_record(found)
+    record = found.record()
     before, after = (record[which]["error_percent"] for which in ("nominal", "extended"))
     assert set(after) == {"fit", "held_out", "one_step", "horizon", "free"}
     assert after["one_step"] < after["horizon"] < 0.2 * before["horizon"]

@@ -13,7 +13,6 @@ from fes_pin.data.recorded.text import read_csv
 from fes_pin.data.study import read_study
 from fes_pin.data.trial import Trial, trial_csv
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.record import diagnosis_files
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.identify.ahead import foretell
 from fes_pin.identify.effort_timing import lateness_of
@@ -53,7 +52,7 @@ def test_an_effort_that_was_written_down_late_is_moved(causes, request, tmp_path
 
 def check_that_a_prediction_knows(diagnosis, trial, folder):
     """A later trial of the same log is foretold with its effort where it acted, from the files alone."""
-    for name, text in diagnosis_files(diagnosis).items():
+    for name, text in diagnosis.files().items():
         (folder / name).write_text(text)
     assert load_log(folder / "model.toml") == diagnosis.log
     assert json.loads((folder / "diagnosis.json").read_text())["log"] == log_table(diagnosis.log)

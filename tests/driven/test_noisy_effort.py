@@ -10,7 +10,6 @@ from driven_rigs.swing_up import SwingUp, draw_swing_up
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.record import diagnosis_files
 from fes_pin.identify.stored import load_log
 
 NOISY = (1830000, 1830006)
@@ -39,7 +38,7 @@ def test_the_noise_of_an_effort_is_no_friction(seed, acted, tmp_path):
     assert found.verdict == "adequate", str(found)
     assert found.log.effort_noise == pytest.approx(noise, rel=0.1)
     assert any("recorded with noise" in said for said in found.warnings)
-    for name, text in diagnosis_files(found).items():
+    for name, text in found.files().items():
         (tmp_path / name).write_text(text)
     assert load_log(tmp_path / "model.toml") == found.log
     assert json.loads((tmp_path / "diagnosis.json").read_text())["log"]["effort_noise"] > 0.0

@@ -7,7 +7,6 @@ from driven_rigs.draw import draw
 
 from fes_pin.data.study import read_study
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.record import diagnosis_files
 from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem
@@ -35,7 +34,7 @@ def test_without_time_nothing_is_claimed(study):
     stopped = diagnose_joint(study, limit=0.0)
     assert stopped.verdict == "stopped" and not stopped.causes
     assert any("limit of 0 s" in w for w in stopped.warnings)
-    assert report_html(stopped) and diagnosis_files(stopped)
+    assert report_html(stopped) and stopped.files()
 
 
 def test_what_has_earned_its_place_is_told(study, monkeypatch):
@@ -51,4 +50,4 @@ def test_what_has_earned_its_place_is_told(study, monkeypatch):
     stopped = diagnose_joint(study, limit=1e3)
     assert [c.name for c in stopped.causes] == ["coulomb_friction"] and stopped.verdict == "stopped"
     assert any("limit of 1000 s" in w for w in stopped.warnings)
-    assert report_html(stopped) and diagnosis_files(stopped)
+    assert report_html(stopped) and stopped.files()

@@ -12,13 +12,12 @@ import fes_pin as fp
 from fes_pin.body.build import Body
 from fes_pin.cohort.one import Work, diagnose_one
 from fes_pin.data.study import read_study
-from fes_pin.view.walk_report import walk_report_html
+from fes_pin.view.report import report_html
 from fes_pin.walk.diagnosis import diagnose_walk
 from fes_pin.walk.dynamics import required, segment_parameters
 from fes_pin.walk.extended import extended_body, with_segments
 from fes_pin.walk.likelihood import WalkNoise, fit_walk
 from fes_pin.walk.motion import motion_of
-from fes_pin.walk.record import walk_files
 from fes_pin.walk.white_noise import white_level
 
 pytestmark = pytest.mark.shared
@@ -45,7 +44,7 @@ def test_a_heavy_trunk_is_in_the_first_set(heavy):
 
 
 def test_files_are_as_the_contract_says(heavy):
-    files = walk_files(heavy)
+    files = heavy.files()
     record = json.loads(files["diagnosis.json"])
     keys = {"study", "verdict", "causes", "remainder", "absorbed", "nominal", "extended", "noise", "ceiling_percent",
             "next_experiment", "wall_s"}  # fmt: skip
@@ -69,7 +68,7 @@ def test_the_body_is_saved_as_urdf_and_a_model_that_is_none_is_refused(heavy, tm
     assert not (tmp_path / "model.toml").exists()
     heavy.model.write(tmp_path / "body.urdf")
     assert fp.Body.from_urdf(tmp_path / "body.urdf").mass_kg == pytest.approx(heavy.model.mass_kg)
-    (tmp_path / "model.toml").write_text(walk_files(heavy)["model.toml"])
+    (tmp_path / "model.toml").write_text(heavy.files()["model.toml"])
     with pytest.raises(fp.InputError, match=r"Body\.from_urdf reads the URDF"):
         fp.load_model(tmp_path / "model.toml")
     with pytest.raises(fp.InputError, match="found a dict"):
@@ -86,17 +85,17 @@ def test_a_cohort_stops_a_walk_at_its_limit_and_writes_its_playback(heavy):
 
 def test_the_report_has_a_style_for_all_that_it_shows(heavy):
     """A class without a rule in the style sheet is shown as plain text."""
-    page = walk_report_html(heavy)
+    page = report_html(heavy)
     style = page[page.index("<style>") : page.index("</style>")]
     for name in set(re.findall(r'<(?:p|h1|dl|div|span|figure|section|article|table) class="(\w+)', page)):
         assert f".{name}" in style, name
-    assert 'class="facts"' in page
+    assert 'class="answers"' in page
 
 
 def test_the_data_of_the_ground_reaction_stand_behind_its_figure(heavy):
-    page = walk_report_html(heavy)
-    assert page.count("<svg") == len(heavy.study.trials)
-    csv = unquote(re.search(r'href="data:text/csv,([^"]*)"', page)[1]).splitlines()
+    page = report_html(heavy)
+    assert page.count("<svg") == len(heavy.study.trials) + 1  # and one of the gains
+    csv = unquote(re.search(r'download="coords.csv" href="data:text/csv,([^"]*)"', page)[1]).splitlines()
     scene = heavy.models.banks.as_read.scenes[0]
     head = csv[0].split(",")
     assert head[0] == "time_s" and len(head) == 1 + 3 * 6
@@ -113,7 +112,7 @@ def test_one_question_for_every_study_and_its_limit_of_time_holds(heavy, tmp_pat
     assert found.warnings == ("the search was stopped at its limit of 0 s: best set so far",)
     assert not found.causes and not heavy.warnings
     assert found.verdict == "stopped" and "stopped: best set so far" in found.headline()
-    assert json.loads(walk_files(found)["diagnosis.json"])["warnings"] == list(found.warnings)
+    assert json.loads(found.files()["diagnosis.json"])["warnings"] == list(found.warnings)
     assert "stopped at its limit" in str(found)
     assert heavy.model.mass_kg > found.model.mass_kg
     assert heavy.remainder.p_value <= 1.0 and heavy.causes[0].gain_fit > 0.0
@@ -126,9 +125,7 @@ def test_one_question_for_every_study_and_its_limit_of_time_holds(heavy, tmp_pat
 
 
 def test_the_report_is_a_whole_page(heavy):
-    from fes_pin.view.walk_report import walk_report_html
-
-    text = walk_report_html(heavy)
+    text = report_html(heavy)
     assert text.startswith("<!DOCTYPE html>") and text.endswith("</html>\n")
     assert heavy.causes[0].name in text and "<svg" in text and "<script src" not in text
 

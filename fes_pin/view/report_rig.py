@@ -1,0 +1,103 @@
+"""What the report of a rig shows besides what every report does: missing torque, trials, parameters, the model."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from fes_pin.data.log import Log
+from fes_pin.diagnosis.experiment import NEXT_FILE
+from fes_pin.diagnosis.replay import replayed_trials
+from fes_pin.diagnosis.result import Diagnosis
+from fes_pin.infer.result import ParameterEstimate
+from fes_pin.models.outside import origin
+from fes_pin.view.page import Content, Markup, element, figure, html_table, section, unit_text
+from fes_pin.view.plots import stimulus_drawing
+from fes_pin.view.report_trials import missing_section, position_unit, trials_section
+from fes_pin.view.sections import Parts, not_testable, value_and_interval
+from fes_pin.view.style import unit_of
+
+
+def _counts(diagnosis: Diagnosis) -> str:
+    """How many trials there are, and how long they are."""
+    trials = diagnosis.study.trials
+    kinds = " and ".join(f"{n} {kind}" for kind, n in Counter(t.kind for t in trials).items())
+    return f"{kinds} trial{'s' * (len(trials) > 1)}, {sum(t.duration for t in trials):.4g} s"
+
+
+def _sections(diagnosis: Diagnosis) -> list[Markup]:
+    """Its own sections."""
+    replays = replayed_trials(diagnosis)
+    why = "the nominal parameters take them up, or no input of these trials drives them"
+    return [
+        not_testable(diagnosis, diagnosis.absorbed, why),
+        section("Next experiment", *_next(diagnosis)),
+        section("Missing torque and force", *missing_section(diagnosis, replays)),
+        section("Trials", *trials_section(diagnosis, replays)),
+        section("Parameters and noise", *_parameters(diagnosis)),
+        section("The model, to be used", *_use(diagnosis)),
+    ]
+
+
+def _next(diagnosis: Diagnosis) -> list[Markup]:
+    plan = diagnosis.next_experiment
+    if plan is None or plan.trial is None:
+        return []
+    conditions = "".join(f", {n} = {v:g}" for n, v in plan.trial.conditions.items())
+    said = element("p", f"A {plan.trial.kind} trial{conditions}; its inputs are in ", element("code", NEXT_FILE), ".")
+    if not plan.trial.columns:
+        return [said]
+    drawn = stimulus_drawing(plan.trial, position_unit(diagnosis))
+    return [said, figure(drawn, "Inputs of the next trial.", "narrow", "next_trial")]
+
+
+def _parameters(diagnosis: Diagnosis) -> list[Markup]:
+    fits = [diagnosis.nominal, diagnosis.extended] if diagnosis.causes else [diagnosis.nominal]
+    info, start = diagnosis.model.parameter_info(), diagnosis.study.start
+    rows: list[list[Content]] = []
+    for name in fits[-1].free:
+        cells = [
+            value_and_interval(ParameterEstimate.of(f, name, ""))[::2] if name in f.free else ("-", "-") for f in fits
+        ]
+        begun = f"{start[name]:.4g}" if name in start else "-"
+        rows.append(
+            [element("code", name), unit_text(info[name].unit), begun, *(text for pair in cells for text in pair)]
+        )
+    head = ("parameter", "unit", "start", "nominal", "95 % interval", "extended", "95 % interval")
+    unit = position_unit(diagnosis)
+    noise: list[list[Content]] = [
+        [element("code", n), f"{m.std:.3g}", unit_of(n, unit) or "-", str(len(m.ar)) if m.ar else "white"]
+        for n, m in diagnosis.extended.noise.items()
+    ]
+    return [
+        html_table(head[: 3 + 2 * len(fits)], rows, range(2, 7)),
+        html_table(("noise of", "standard deviation", "unit", "autoregressive order"), noise, (1,)),
+    ]
+
+
+def _use(diagnosis: Diagnosis) -> list[Markup]:
+    rig = diagnosis.model.rig
+    libraries = sorted({Path(where).name for one in (rig, *diagnosis.model.effects) if (where := origin(type(one)))})
+    options = "".join(f" --library {name}" for name in libraries)
+    lines = [
+        f"fes-pin predict model.toml TRIAL.csv {one}{options} --out PREDICTED.csv".replace("  ", " ")
+        for one in rig.settings
+    ]
+    columns = " and ".join(("time_s", *rig.input_columns(diagnosis.study.trials[0])))
+    which = "extended" if diagnosis.causes else "fitted nominal"
+    words = f"model.toml next to this page is the {which} model, whole. TRIAL.csv needs {columns}. {rig.begins}"
+    library = f", library={libraries}".replace("'", '"') if libraries else ""
+    python = _in_python(library, logged=diagnosis.log != Log())
+    return [element("p", words), element("pre", "\n".join(lines)), element("pre", python)]
+
+
+def _in_python(library: str, *, logged: bool) -> str:
+    """How a trial is predicted; `logged` says that its log must be undone before."""
+    given = 'load_log("model.toml").applied(trial)' if logged else "trial"
+    lines = ["import fes_pin as fp", *["from fes_pin.identify.stored import load_log"] * logged, ""]
+    return "\n".join(
+        [*lines, f'model = fp.load_model("model.toml"{library})', f"predicted = fp.predict(model, {given})"]
+    )
+
+
+PARTS = Parts(_counts, _sections, ("not testable",))

@@ -1,0 +1,93 @@
+"""What the report of a walk shows besides what every report does: the ground reaction, the body to be used."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fes_pin.view.chart import Panel, svg
+from fes_pin.view.drawing import Drawing, csv_of, every
+from fes_pin.view.page import Markup, element, figure, key, section
+from fes_pin.view.sections import Parts, not_testable
+from fes_pin.view.style import thin_curve
+from fes_pin.view.walk_playback import PLAYBACK_FILE, playback_html
+from fes_pin.walk.judge import CHANNELS
+from fes_pin.walk.result import BODY_FILE, WalkDiagnosis
+
+SHOWN_S = 4.0
+"""Of each trial, s."""
+WIDE, ROW, AXIS = 420.0, 160.0, 66.0
+"""Width of a figure's half and height of a channel, room for the axis on the left."""
+PYTHON = f'import fes_pin as fp\n\nbody = fp.Body.from_urdf("{BODY_FILE}")\nlinear = fp.linearize(body, "mid_stance")'
+
+
+def _counts(diagnosis: WalkDiagnosis) -> str:
+    """How many strides there are."""
+    return f"{diagnosis.models.banks.strides.count} strides"
+
+
+def _sections(diagnosis: WalkDiagnosis) -> list[Markup]:
+    """Its own sections."""
+    words = f"The extended body stands next to this page, the walk to be watched in {PLAYBACK_FILE}."
+    return [
+        section("Ground reaction", *_trials(diagnosis)),
+        not_testable(diagnosis, diagnosis.absorbed, "soft tissue and noise hide these at their usual size"),
+        section("The body, to be used", element("p", words), element("pre", PYTHON)),
+    ]
+
+
+def _trials(diagnosis: WalkDiagnosis) -> list[Markup]:
+    banks, best = diagnosis.models.banks, diagnosis.best
+    extended = [("extended", "required by the extended model")] if best.names else []
+    out = [key(("measured", "measured"), ("nominal", "required"), *extended)]
+    for number, scene in enumerate(banks.as_read.scenes):
+        curves = {"nominal": scene.needed, "measured": scene.measured}
+        if best.names:
+            with_it = banks.bank(best.names).scenes[number]
+            made = scene.measured - (with_it.residual - banks.signals(best.names, with_it) @ best.fitted.values)
+            curves = {"extended": made, **curves}
+        single = scene.plates.loaded["left"] ^ scene.plates.loaded["right"]
+        drawn = _drawing(scene.name, scene.motion.time, curves, single)
+        words = f"Trial {scene.name}, at most {SHOWN_S:g} s of it; single supports are shaded."
+        out.append(figure(drawn, words, file=scene.name))
+    return out
+
+
+def _drawing(trial: str, time: np.ndarray, curves: Mapping[str, np.ndarray], single: np.ndarray) -> Drawing:
+    """Six channels about the centre of mass, forces on the left and moments on the right.
+
+    Parameters
+    ----------
+    curves
+        Each of shape (n, 6), by the name of its colour, the last in front.
+    single
+        Shape (n,): whether one foot alone is on the ground.
+    """
+    shown = time <= time[0] + SHOWN_S
+    time, edges = time[shown], np.flatnonzero(np.diff(single[shown], prepend=False, append=False))
+    panels, columns, words = [], {"time_s": time}, []
+    for channel, name in enumerate(CHANNELS):
+        unit = "N" if channel < 3 else "N m"
+        own = {of: values[shown, channel] for of, values in curves.items()}
+        columns |= {f"{name.replace(' ', '_')}_{of}": values for of, values in own.items()}
+        low, high = min(v.min() for v in own.values()), max(v.max() for v in own.values())
+        room = 0.05 * (high - low) or 1.0
+        left, top, inner = AXIS + (channel // 3) * WIDE, 8.0 + (channel % 3) * ROW, WIDE - AXIS - 8.0
+        panel = Panel(left, top, inner, ROW - 16.0, (time[0], time[-1]), (low - room, high + room))
+        for begin, end in edges.reshape(-1, 2).tolist():
+            panel.box((time[begin], time[end - 1]), panel.y, "band")
+        for of, values in own.items():
+            panel.line(*thin_curve(time, values), of, 2.4 if of == "extended" else 1.2)
+        panel.y_axis(f"{name} ({unit})".replace(" about", "\nabout"), title_at=left - AXIS + 26.0)
+        if channel % 3 == 2:
+            panel.x_axis("time (s)")
+        panels.append(panel)
+        words.append(f"{name} from {own['measured'].min():.3g} to {own['measured'].max():.3g} {unit}")
+    step = every(len(time))
+    note = f"one sample in {step}" if step > 1 else ""
+    drawn = svg(panels, 2.0 * WIDE, 3.0 * ROW + 30.0, f"Ground reaction of trial {trial}: {', '.join(words)}.")
+    return Drawing(drawn, csv_of(columns, step), note)
+
+
+PARTS = Parts(_counts, _sections, ("not testable",), {PLAYBACK_FILE: playback_html}, "Residual = measured - required. ")

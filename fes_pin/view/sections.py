@@ -1,0 +1,90 @@
+"""Parts of pages that several of them show."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from fes_pin.data.provenance import Provenance
+from fes_pin.data.results import Result
+from fes_pin.infer.result import ParameterEstimate
+from fes_pin.models.describe import sentence
+from fes_pin.view.page import Content, Markup, element, folded, html_table, joined, section, unit_text, value_text
+
+UNIT_IN_NAME = re.compile(r"(?<=.)(_(nms|nm|us|s|hz|n|kg|rad))?(_per_(rad[23]?|s))?$")
+"""What a parameter's name says of its unit, which stands next to the value: of a slide it is another."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a front end adds to the page of its results.
+
+    Attributes
+    ----------
+    counts
+        What was measured, in a few words.
+    sections
+        Its own sections.
+    shown
+        Beginnings of the topics of notes that these show.
+    files
+        Further files of the answer, by name.
+    residual
+        What a residual is.
+    """
+
+    counts: Callable[[Any], str]
+    sections: Callable[[Any], list[Markup]]
+    shown: tuple[str, ...]
+    files: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
+    residual: str = "Residual = measured - simulated. "
+
+
+def answers(rows: Sequence[tuple[Content, Content]]) -> Markup:
+    """Questions, or topics, and what is said of them."""
+    made = [element("div", element("dt", question), element("dd", answer)) for question, answer in rows]
+    return element("dl", joined(made), class_="answers")
+
+
+def stage_mark(stage: str) -> Markup:
+    """A stage of the signal path, in its colour."""
+    return element("span", stage, class_=f"stage {stage}")
+
+
+def value_and_interval(one: ParameterEstimate) -> tuple[str, str, str]:
+    """Value, unit and interval of a parameter as printed."""
+    unit, (low, high) = unit_text(one.unit), one.interval
+    if one.at_bound:
+        return f"{one.value:.4g}", unit, f"{one.one_sided()}, at its bound"
+    if one.std == 0.0 or not math.isfinite(one.std):
+        return f"{one.value:.4g}", unit, "fixed" if one.std == 0.0 else "not identified"
+    return value_text(one.value, one.std), unit, f"[{value_text(low, one.std)}, {value_text(high, one.std)}]"
+
+
+def not_testable(result: Result, names: Sequence[str], why: str) -> Markup:
+    """A section of the causes that these data could not show, with what each is."""
+    rows: list[list[Content]] = [
+        [element("code", n), sentence(e)] for n in names if (e := result.effect(n)) is not None
+    ]
+    said = element("p", f"Not testable is not the same as absent: {why}.")
+    return section(
+        "Not testable here", *([said, html_table(("cause", "what it is"), rows, prose=True)] if rows else [])
+    )
+
+
+def provenance_parts(made: Provenance | None) -> list[Markup]:
+    """When it was made, by which versions, from which files."""
+    if made is None:
+        return []
+    rows: list[list[Content]] = [["made", made.date], ["seed", str(made.seed)]]
+    rows += [["command", element("code", made.command)]] if made.command else []
+    rows.append(["versions", ", ".join(f"{n} {v}" for n, v in made.versions.items())])
+    files: list[list[Content]] = [[element("code", n), element("code", digest)] for n, digest in made.inputs.items()]
+    out = [element("div", html_table(("what", "value"), rows, prose=True), class_="provenance")]
+    if files:
+        hashes = element("div", html_table(("file of the study", "SHA-256"), files, prose=True), class_="provenance")
+        out.append(folded(f"Hashes of the {len(files)} files that were read", hashes))
+    return out
