@@ -9,7 +9,7 @@ within limits of u and of its changes. PIQP is a proximal interior-point method 
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -127,15 +127,15 @@ class HorizonProgram:
         InputError
             Numbers beyond what double precision can tell apart.
         """
-        near, iterations = self._interior(f, low, high)
+        near = self._interior(f, low, high)
         limits = Limits(low, high, self.steps, self.tied, NO_ROOM)
         exact = make_exact(self.curvature, f, limits, near.u, near.y)
         if exact is None:
-            return Solution(limits.met(near.u, near.y), near.y, iterations, 0)
+            return replace(near, u=limits.met(near.u, near.y))
         u, y, rounds = exact
-        return Solution(u, y, iterations, rounds)
+        return Solution(u, y, near.iterations, rounds)
 
-    def _interior(self, f: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[Solution, int]:
+    def _interior(self, f: np.ndarray, low: np.ndarray, high: np.ndarray) -> Solution:
         steps, large = self.steps, max(1.0, float(np.abs(f).max(initial=0.0)))
         narrow = np.where(high[:steps] - low[:steps] <= NO_ROOM, NO_ROOM, 0.0)
         least, most = (self._spread(a, s * np.inf) for a, s in ((low[:steps] - narrow, -1), (high[:steps] + narrow, 1)))
@@ -158,7 +158,7 @@ class HorizonProgram:
             iterations = int(found.info.iter)
         if not (np.isfinite(x).all() and np.isfinite(box).all()):
             raise InputError("no plan can be found: torques or moment arms of too different sizes")
-        return Solution(x.reshape(steps, self.n), self._multipliers(box, ties), iterations, 0), iterations
+        return Solution(x.reshape(steps, self.n), self._multipliers(box, ties), iterations, 0)
 
     def _multipliers(self, box: np.ndarray, ties: np.ndarray) -> np.ndarray:
         y = np.zeros((2 * self.steps - 1, self.n))

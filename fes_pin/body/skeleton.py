@@ -131,18 +131,16 @@ def skeleton_of_table(table: Mapping) -> Skeleton:
     segments, centres = {}, {}
     for name in SEGMENT_NAMES:
         side, _, part = name.partition("_")
-        key = f"{part}_{side}" if side in SIDES else name
-        row = _entry(table, "ten_segments", key)
-        inertia = _numbers(row, "inertia_com", key, (3, 3))
+        place = "ten_segments", f"{part}_{side}" if side in SIDES else name
         segments[name] = Segment(
-            mass=float(_numbers(row, "mass", key, ())),
-            com=_TO_WORLD @ _numbers(row, "com_ground_neutral", key, (3,)),
-            inertia=_TO_WORLD @ inertia @ _TO_WORLD.T,
+            mass=float(_numbers(table, *place, "mass", ())),
+            com=_TO_WORLD @ _numbers(table, *place, "com_ground_neutral", (3,)),
+            inertia=_TO_WORLD @ _numbers(table, *place, "inertia_com", (3, 3)) @ _TO_WORLD.T,
         )
     for joint in JOINTS:
         side, _, part = joint.name.partition("_")
         key = f"{part}_{side[0]}" if side in SIDES else "back"
-        centres[joint.name] = _TO_WORLD @ _numbers(_entry(table, "joints", key), "centre_neutral_ground", key, (3,))
+        centres[joint.name] = _TO_WORLD @ _numbers(table, "joints", key, "centre_neutral_ground", (3,))
     return Skeleton(segments, centres, _foot_points(segments, centres))
 
 
@@ -160,21 +158,19 @@ def _foot_points(segments: Mapping[str, Segment], centres: Mapping[str, np.ndarr
     return points
 
 
-def _entry(table: Mapping, group: str, key: str) -> Mapping:
+def _numbers(table: Mapping, group: str, key: str, field: str, shape: tuple[int, ...]) -> np.ndarray:
+    """Numbers of one segment or joint: `table[group][key][field]`.
+
+    Raises
+    ------
+    InputError
+        There is no such entry, or it does not hold finite numbers of that shape.
+    """
     try:
-        row = table[group][key]
+        given = table[group][key][field]
     except (KeyError, TypeError, IndexError):
-        raise InputError("is missing in the table of segments", column=f"{group}.{key}") from None
-    if not isinstance(row, Mapping):
-        raise InputError("must be a table", column=f"{group}.{key}")
-    return row
-
-
-def _numbers(row: Mapping, field: str, key: str, shape: tuple[int, ...]) -> np.ndarray:
-    try:
-        values = numbers(row[field], f"{key}.{field}")
-    except KeyError:
-        raise InputError("is missing in the table of segments", column=f"{key}.{field}") from None
+        raise InputError("is missing in the table of segments", column=f"{group}.{key}.{field}") from None
+    values = numbers(given, f"{key}.{field}")
     if values.shape != shape or not np.all(np.isfinite(values)):
         raise InputError(f"must be finite numbers of shape {shape}, got {values.shape}", column=f"{key}.{field}")
     return values

@@ -44,7 +44,7 @@ def nerve_names(names: Iterable[str]) -> tuple[str, ...]:
     return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Nerves(ReadOnly):
     """A choice of nerves (or of single muscles): the channels of a stimulator.
 
@@ -109,10 +109,6 @@ class Nerves(ReadOnly):
         object.__setattr__(self, "members", members.astype(float))
         truth(self.force_length, "force_length")
         self._freeze()
-
-    def __hash__(self) -> int:
-        left = tuple(sorted(self.fatigue.items()))
-        return hash((self.names, self.strength, self.length, self.force_length, self.size, left))
 
     @classmethod
     def of_subject(
