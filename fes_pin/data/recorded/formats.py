@@ -22,7 +22,7 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes, what_is_at
 from fes_pin.data.libraries import optional_library
-from fes_pin.data.markers import read_c3d, read_markers
+from fes_pin.data.markers import TIME, c3d_points, trc_points
 from fes_pin.data.motion import read_motion
 from fes_pin.data.recorded.text import TextForm, read_text_recording, without_twins
 from fes_pin.data.table import MIN_ROWS, Table
@@ -36,8 +36,6 @@ REFUSED = {
     **dict.fromkeys((".zip", ".gz", ".7z"), "an archive; unpack it first"),
 }
 """Suffixes of files that are not read, and what to do instead."""
-TIME = "time"
-"""What the times of a format are called that has no column of them."""
 
 
 def is_text(path: Path) -> bool:
@@ -169,8 +167,9 @@ def _vectors(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
 
 def _c3d(path: Path, wanted: Sequence[str] | None) -> Table:
     """Analog channels at their rate; where only points are wanted, `<marker>_x`, `_y`, `_z` in m at theirs."""
-    content = read_c3d(path)
+    ezc3d = _library("ezc3d", "c3d", path)
     try:
+        content = ezc3d.c3d(str(path))
         about = content["parameters"]["ANALOG"]
         labels = without_twins([str(n).strip() for n in about.get("LABELS", {}).get("value", [])])
         units = [str(u).strip() for u in about.get("UNITS", {}).get("value", [])]
@@ -179,7 +178,7 @@ def _c3d(path: Path, wanted: Sequence[str] | None) -> Table:
     except Exception as error:
         raise _unreadable(path, "C3D", error) from None
     analog = dict(zip(labels, values, strict=False)) if values.size else {}
-    points = _points(path) if content["data"]["points"].size else {}
+    points = c3d_points(content, path) if content["data"]["points"].size else {}
     names = (TIME, *analog, *(n for n in points if n != TIME))
     if analog and (wanted is None or set(wanted) & set(analog)):
         columns = {TIME: np.arange(values.shape[1]) / rate, **analog}
@@ -189,14 +188,8 @@ def _c3d(path: Path, wanted: Sequence[str] | None) -> Table:
     return replace(_made(path, columns, wanted, units=stated), names=names)
 
 
-def _points(path: Path) -> dict[str, np.ndarray]:
-    markers = read_markers(path)
-    axes = {f"{n}_{c}": xyz[:, k] for n, xyz in markers.places.items() for k, c in enumerate("xyz")}
-    return {TIME: markers.time, **axes}
-
-
 def _trc(path: Path, wanted: Sequence[str] | None) -> Table:
-    columns = _points(path)
+    columns = trc_points(path)
     return _made(path, columns, wanted, units=dict.fromkeys(columns, "m") | {TIME: "s"})
 
 
