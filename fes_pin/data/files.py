@@ -49,8 +49,8 @@ def read_bytes(path: str | Path) -> bytes:
     try:
         if not path.exists():
             raise InputError(missing(path), file=path)
-        if not path.is_file():
-            raise InputError(f"expected a file, found {'a folder' if path.is_dir() else 'a special file'}", file=path)
+        if (found := what_is_at(path)) != "a file":
+            raise InputError(f"expected a file, found {found}", file=path)
         if path.stat().st_size > MAX_BYTES:
             raise InputError("expected at most 1 GiB", file=path)
         note_read(path)

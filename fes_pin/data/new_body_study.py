@@ -8,8 +8,8 @@ from fes_pin.data.errors import InputError, fault_at
 from fes_pin.data.motion import coordinates_of, ground_reaction_of, read_motion
 from fes_pin.data.new_study import NewStudy, placed
 from fes_pin.data.schema import BODY, check_known
-from fes_pin.data.study_text import HEADER, quoted
-from fes_pin.data.wanted import Wanted, label_lines, number_set
+from fes_pin.data.study_text import HEADER, toml_table
+from fes_pin.data.wanted import Wanted, labels_of, number_set
 
 
 def new_body_study(wanted: Wanted) -> NewStudy:
@@ -36,16 +36,15 @@ def new_body_study(wanted: Wanted) -> NewStudy:
     if missing:
         raise InputError(f"the files do not say everything; please add {', '.join(missing)}")
     contents: dict[str, str | bytes] = {}
-    rig = [f"{key} = {number_set(key, settings[key], BODY.constants[key])!r}" for key in BODY.either]
-    text = [*HEADER, "", "[study]", f"name = {quoted(wanted.name)}", 'rig = "body"', "", "[rig]", *rig]
+    rig = {key: number_set(key, settings[key], BODY.constants[key]) for key in BODY.either}
+    text = [*HEADER, *toml_table("study", {"name": wanted.name, "rig": BODY.name}), *toml_table("rig", rig)]
     given = {key: number_set(key, settings[key], n) for key, n in BODY.conditions.items() if key in settings}
-    conditions = [f"{key} = {value!r}" for key, value in given.items()]
     origins: dict[str, Path] = {}
     for move, push in zip(moves, pushes, strict=True):
         places = [placed(path, folder, contents) for path in (move, push)]
         origins.update(zip(places, (move, push), strict=True))
-        text += ["", "[[trial]]", f"coordinates = {quoted(places[0])}", f"ground_reaction = {quoted(places[1])}"]
-        text += [*label_lines(wanted, move, push), *conditions]
+        named = dict(zip(BODY.recordings, places, strict=True))
+        text += toml_table("[trial]", {**named, **labels_of(wanted, move, push), **given})
     contents["study.toml"] = "\n".join(text) + "\n"
     return NewStudy(contents, (), origins, ("motion",))
 

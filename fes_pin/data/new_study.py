@@ -27,10 +27,9 @@ from fes_pin.data.study_text import (
     source_from_option,
     source_in_words,
     toml_table,
-    toml_value,
 )
 from fes_pin.data.units import known_unit, own_unit, quantities_of
-from fes_pin.data.wanted import Wanted, label_lines, number_set, of_files
+from fes_pin.data.wanted import Wanted, labels_of, number_set, of_files
 
 
 @dataclass(frozen=True)
@@ -103,14 +102,7 @@ class _Making:
             *self._columns(sources),
         ]
         for path, place, kind, conditions in zip(self.wanted.files, places, kinds, trials, strict=True):
-            text += [
-                "",
-                "[[trial]]",
-                f"file = {quoted(place)}",
-                f"kind = {quoted(kind)}",
-                *label_lines(self.wanted, path),
-            ]
-            text += [f"{key} = {toml_value(value)}" for key, value in conditions.items()]
+            text += toml_table("[trial]", {"file": place, "kind": kind, **labels_of(self.wanted, path), **conditions})
         contents["study.toml"] = "\n".join([*HEADER, *text]) + "\n"
         taken = tuple(
             (c, s.get("name", "from its rate"), source_in_words(s, c, self.wanted.revolute)) for c, s in sources.items()

@@ -88,7 +88,8 @@ def implausible(study: Study | ToPredict) -> list[str]:
     for trial in study.trials if isinstance(study, ToPredict) else ():  # those of a study were checked with it
         check_trial(trial, study.schema, inputs_only=True, threshold_us=-math.inf)
     _check_rows(study)
-    warnings = [*_read(study), *_inputs(study), *_units(study), *_imposed(study)]
+    done = [(t, remark) for t in study.trials for remark in t.remarks]  # to samples, when they were read
+    warnings = [*_told("", done), *_inputs(study), *_units(study), *_imposed(study)]
     outputs = tuple(dict.fromkeys((*study.schema.outputs.values(), "velocity")))
     measured = [(t, n) for t in study.trials for n in outputs if n in t and n not in _driving(study, t)]
     constant = [(t, n) for t, n in measured if not np.ptp(t[n]) > 0.0]
@@ -120,15 +121,6 @@ def _check_counts(study: Study | ToPredict, moving: Sequence[tuple[Trial, str]])
         )
 
 
-def _read(study: Study | ToPredict) -> list[str]:
-    """What was done to samples when they were read: the same of many trials in one line."""
-    by_remark: dict[str, list[str]] = {}
-    for trial in study.trials:
-        for remark in trial.remarks:
-            by_remark.setdefault(remark, []).append(trial.name)
-    return [f"{remark} in {trials_named(names)}" for remark, names in by_remark.items()]
-
-
 def _driving(study: Study | ToPredict, trial: Trial) -> tuple[str, ...]:
     """Columns that a trial has as inputs."""
     schema = study.schema
@@ -144,8 +136,8 @@ def _told(what: str, found: Sequence[tuple[Trial, str]]) -> list[str]:
     """One warning for each column, however many trials have it."""
     by_column: dict[str, list[str]] = {}
     for trial, name in found:
-        by_column.setdefault(name, []).append(trial.name)
-    return [f"{name} {what} in {trials_named(names)}" for name, names in by_column.items()]
+        by_column.setdefault(f"{name} {what}".rstrip(), []).append(trial.name)
+    return [f"{words} in {trials_named(names)}" for words, names in by_column.items()]
 
 
 def trials_named(names: Sequence[str]) -> str:

@@ -41,7 +41,7 @@ from fes_pin.data.schema import (
     known_rigs,
     schema_of,
 )
-from fes_pin.data.show import frame, table_html
+from fes_pin.data.show import by_columns, frame, table_html
 from fes_pin.data.study_tables import HORIZON, StudyTables, check_files
 from fes_pin.data.table import format_csv
 from fes_pin.data.toml import Document, read_toml
@@ -279,16 +279,11 @@ class Study(ReadOnly):
     def to_frame(self) -> pandas.DataFrame:
         """One row a trial, with its conditions, as a frame of pandas; see `data.show.frame`."""
         conditions = dict.fromkeys(n for t in self.trials for n in t.conditions)
-        told: dict[str, list[Any]] = {
-            "trial": [t.name for t in self.trials],
-            "kind": [t.kind for t in self.trials],
-            "role": [t.role for t in self.trials],
-            "group": [t.group for t in self.trials],
-            "samples": [len(t) for t in self.trials],
-            "duration_s": [t.duration for t in self.trials],
-        }
-        given = {n: [t.conditions.get(n, math.nan) for t in self.trials] for n in conditions}
-        return frame({**told, **given}, index="trial")
+        head = ("trial", "kind", "role", "group", "samples", "duration_s", *conditions)
+        known = ((t.name, t.kind, t.role, t.group, len(t), t.duration) for t in self.trials)
+        given = ((t.conditions.get(n, math.nan) for n in conditions) for t in self.trials)
+        rows = [(*one, *more) for one, more in zip(known, given, strict=True)]
+        return frame(by_columns(head, rows), index="trial")
 
 
 def _rows(table: Any, schema: RigSchema) -> dict[str, dict[str, Any]]:

@@ -11,7 +11,6 @@ from pathlib import Path
 from fes_pin.data.errors import InputError
 from fes_pin.data.numbers import number_in
 from fes_pin.data.schema import ROLES, NumberKey, RigSchema, one_of
-from fes_pin.data.study_text import quoted
 
 Ask = Callable[[str], str]
 """Puts a question to a person and gives the answer."""
@@ -105,19 +104,19 @@ def of_files(files: Sequence[Path], option: str, said: Mapping[str, str]) -> dic
     return out
 
 
-def label_lines(wanted: Wanted, *files: Path) -> list[str]:
-    """Role and group of the trial that files make, as lines of its table.
+def labels_of(wanted: Wanted, *files: Path) -> dict[str, str]:
+    """Role and group of the trial that files make, where they were said.
 
     Raises
     ------
     InputError
         As `of_files`; a role that is none.
     """
-    lines = []
+    labels: dict[str, str] = {}
     for key, said in wanted.labels.items():
         found = of_files(wanted.files, f"--{key}", said)
         for label in [found[path, ""] for path in files if (path, "") in found][:1]:
             if key == "role":
                 one_of(label, ROLES, partial(InputError, column="--role"))
-            lines.append(f"{key} = {quoted(label)}")
-    return lines
+            labels[key] = label
+    return labels

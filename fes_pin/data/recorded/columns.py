@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -15,7 +14,7 @@ from fes_pin.data.errors import KeyFault
 from fes_pin.data.recorded.formats import read_recording
 from fes_pin.data.recorded.regular import check_steps, filled, resampled
 from fes_pin.data.recorded.text import DECIMALS, DELIMITERS, ENCODINGS, TextForm
-from fes_pin.data.schema import RigSchema, check_known, one_of, unknown
+from fes_pin.data.schema import RigSchema, any_number, check_known, one_of, positive, unknown
 from fes_pin.data.table import Table
 from fes_pin.data.units import factor_of, unit_in_name
 
@@ -206,7 +205,8 @@ def _source(column: str, value: Any, revolute: bool | None, error: KeyFault) -> 
     if not isinstance(given, dict):
         raise error(column, 'expected the name of a column, or a table like { name = "Angle", unit = "deg" }')
     check_known(given, SOURCE_KEYS, lambda key, message: error(f"{column}.{key}", message))
-    numbers = {k: _number(f"{column}.{k}", given[k], error) for k in ("scale", "zero", "edge", "rate_hz") if k in given}
+    keys = [k for k in ("scale", "zero", "edge", "rate_hz") if k in given]
+    numbers = {k: any_number("").check(given[k], partial(error, f"{column}.{k}")) for k in keys}
     rate = numbers.get("rate_hz")
     if rate is not None and (column != "time_s" or not rate > 0.0 or len(given) > 1):
         raise error(f"{column}.rate_hz", "expected a rate above 0, alone, and of time_s only")
@@ -226,12 +226,6 @@ def _source(column: str, value: Any, revolute: bool | None, error: KeyFault) -> 
     return ColumnSource(name, factor, **numbers)
 
 
-def _number(key: str, value: Any, error: KeyFault) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise error(key, "expected a finite number")
-    return float(value)
-
-
 def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> Columns:
     """With what `[columns.file]` says of how the files are written."""
     form: dict[str, Any] = {}
@@ -246,9 +240,7 @@ def _with_file(columns: Columns, about: Mapping[str, Any], error: KeyFault) -> C
                 raise error(where, "expected what a comment begins with")
             form[key] = value.strip()
         elif key == "resample_hz":
-            form[key] = _number(where, value, error)
-            if not form[key] > 0.0:
-                raise error(where, "expected a rate above 0 Hz")
+            form[key] = positive("Hz").check(value, partial(error, where))
         elif isinstance(value, bool) or not isinstance(value, int) or value < (key == "first_row"):
             raise error(where, "expected the number of a line, from 1" + (" (0: no header)" * (key == "header_row")))
         else:

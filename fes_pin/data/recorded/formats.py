@@ -43,6 +43,18 @@ def is_text(path: Path) -> bool:
     return path.suffix.lower() not in {*_READERS, *REFUSED}
 
 
+def check_suffix(path: Path) -> None:
+    """Refuse a file of a kind that is not read, by its suffix.
+
+    Raises
+    ------
+    InputError
+        With what to do instead.
+    """
+    if why := REFUSED.get(path.suffix.lower()):
+        raise InputError(f"this is {why}", file=path)
+
+
 def read_recording(path: str | Path, form: TextForm | None = None, wanted: Sequence[str] | None = None) -> Table:
     """Read some columns of a recording by its suffix; what is none of those above is text.
 
@@ -60,8 +72,7 @@ def read_recording(path: str | Path, form: TextForm | None = None, wanted: Seque
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix in REFUSED:
-        raise InputError(f"this is {REFUSED[suffix]}", file=path)
+    check_suffix(path)
     if suffix not in _READERS:
         return read_text_recording(path, form or TextForm(), wanted)
     found = what_is_at(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fes_pin.data.errors import InputError
-from fes_pin.data.recorded.formats import REFUSED, is_text
+from fes_pin.data.recorded.formats import check_suffix, is_text
 from fes_pin.data.recorded.sniff import sniff
 from fes_pin.data.recorded.text import read_csv
 from fes_pin.data.table import Table
@@ -22,8 +22,7 @@ def read_csv_or_hint(path: str | Path) -> Table:
         As `read_csv`.
     """
     path = Path(path)
-    if path.suffix.lower() in REFUSED:
-        raise InputError(f"this is {REFUSED[path.suffix.lower()]}", file=path)
+    check_suffix(path)
     if not is_text(path):
         raise InputError(f"expected CSV, found {path.suffix}; {NEW_STUDY}", file=path)
     try:
