@@ -65,7 +65,7 @@ def _of_a_body(command: Callable) -> Callable:
     def run(**given):
         return command(_body_options(**{name: given.pop(name) for name in common}), **given)
 
-    run.__signature__ = Signature([*own, *common.values()])  # type: ignore[attr-defined]
+    vars(run)["__signature__"] = Signature([*own, *common.values()])
     run.__annotations__ = {p.name: p.annotation for p in (*own, *common.values())}
     return run
 

@@ -170,7 +170,7 @@ def _run_by_group(command: Callable[..., Any]) -> Callable[..., Any]:
 
     each = [p for one in (command, _shared) for p in signature(one, eval_str=True).parameters.values()]
     parameters = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in each]
-    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    vars(run)["__signature__"] = Signature(parameters)
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
 

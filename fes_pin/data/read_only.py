@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Set
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class ReadOnly:
     """Base of a frozen dataclass: its mappings, lists and arrays are read-only, also in copies and after pickling.
 
@@ -59,7 +60,7 @@ def as_dicts(value: Any) -> Any:
 def key_of(value: Any) -> Any:
     """What an object is compared and hashed by: of 0.0 and -0.0 one, of numbers that are none one."""
     if isinstance(value, ReadOnly) and type(value).__eq__ is ReadOnly.__eq__:
-        return (type(value), *(key_of(getattr(value, f.name)) for f in fields(value) if f.compare))  # type: ignore[arg-type]
+        return (type(value), *(key_of(getattr(value, f.name)) for f in fields(value) if f.compare))
     if isinstance(value, np.ndarray):
         plain = np.asarray(value) + 0.0 if value.dtype.kind == "f" else np.asarray(value)
         return (value.shape, value.dtype.str, getattr(value, "names", None), plain.tobytes())

@@ -36,7 +36,7 @@ class Tabulated(ReadOnly):
     _index: ClassVar[str | None] = None
 
     def __post_init__(self) -> None:
-        for item in dataclasses.fields(self):  # type: ignore[arg-type] # every subclass is a dataclass
+        for item in dataclasses.fields(self):
             value = getattr(self, item.name)
             if item.name in self.along or (type(value) is np.ndarray and value.dtype != bool):
                 vars(self)[item.name] = numbers(value, item.name)
@@ -47,7 +47,7 @@ class Tabulated(ReadOnly):
         self._freeze()
 
     def _values(self) -> dict[str, Any]:
-        return {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}  # type: ignore[arg-type]
+        return {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
 
     def _table(self) -> Mapping[str, Sequence[Any]]:
         """The columns of `to_frame`; those with an `_index` are shown whole, others by their ranges."""

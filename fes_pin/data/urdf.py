@@ -13,22 +13,27 @@ from defusedxml.common import DefusedXmlException
 
 from fes_pin.data.errors import InputError
 from fes_pin.data.files import read_bytes
+from fes_pin.data.numbers import in_full
 
 MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
 ONE_JOINT = ("revolute", "continuous", "prismatic")
 SMALLEST, LARGEST = 1e-9, 1e6
 """Round figures far outside any rig, in SI units: masses and lengths of directions lie between, all else below."""
-LINK_NUMBERS = {
-    "origin": {"xyz": 3, "rpy": 3},
-    "mass": {"value": 1},
-    "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
+Numbers = Mapping[str, tuple[int, float | None]]
+PLACE: Numbers = {"xyz": (3, 0.0), "rpy": (3, 0.0)}
+LINK_NUMBERS: Mapping[str, Numbers] = {
+    "origin": PLACE,
+    "mass": {"value": (1, None)},
+    "inertia": {**dict.fromkeys(("ixx", "iyy", "izz"), (1, None)), **dict.fromkeys(("ixy", "ixz", "iyz"), (1, 0.0))},
 }
-JOINT_NUMBERS = {
-    "origin": {"xyz": 3, "rpy": 3},
-    "axis": {"xyz": 3},
-    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
+JOINT_NUMBERS: Mapping[str, Numbers] = {
+    "origin": PLACE,
+    "axis": {"xyz": (3, None)},
+    "limit": {"lower": (1, 0.0), "upper": (1, 0.0), "effort": (1, None), "velocity": (1, None)},
 }
-"""Elements that bear on the motion, and how many numbers each of their attributes holds."""
+MIMIC_NUMBERS: Mapping[str, Numbers] = {"mimic": {"multiplier": (1, 1.0), "offset": (1, 0.0)}}
+"""Elements that bear on the motion, how many numbers each of their attributes holds, and what it is where it is absent;
+None where it must be there."""
 
 
 def moving_joints(path: str | Path) -> list[tuple[str, str]]:
@@ -154,22 +159,19 @@ class _Urdf:
         inertial = link.find("inertial")
         if inertial is None:
             return 0.0
-        mass = inertial.find("mass")
-        value = math.nan if mass is None else self._numbers(mass, "value", 1, name)[0]
+        numbers = self._read(inertial, LINK_NUMBERS, name)
+        (value,) = numbers.get("mass", {}).get("value", (math.nan,))
         if not value > 0:
-            raise self.error(f"expected a mass above 0 kg, found {'none' if mass is None else f'{value:g}'}", name)
+            raise self.error(f"expected a mass above 0 kg, found {f'{value:g}' if 'mass' in numbers else 'none'}", name)
         if not SMALLEST <= value <= LARGEST:
             raise self.error(f"expected a mass between {SMALLEST:g} and {LARGEST:g} kg, found {value:g}", name)
-        self._origin(inertial, name)
-        self._check_inertia(inertial, name)
+        if "inertia" not in numbers:
+            raise self.error("expected an <inertia> beside the mass", name)
+        self._check_inertia(numbers["inertia"], name)
         return value
 
-    def _check_inertia(self, inertial: Element, name: str) -> None:
-        inertia = inertial.find("inertia")
-        if inertia is None:
-            raise self.error("expected an <inertia> beside the mass", name)
-        xx, yy, zz = (self._numbers(inertia, key, 1, name)[0] for key in ("ixx", "iyy", "izz"))
-        xy, xz, yz = (self._numbers(inertia, key, 1, name, 0.0)[0] for key in ("ixy", "ixz", "iyz"))
+    def _check_inertia(self, inertia: Mapping[str, tuple[float, ...]], name: str) -> None:
+        xx, yy, zz, xy, xz, yz = (values[0] for values in inertia.values())
         principal = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
         if principal[0] < -1e-9 * abs(principal).max():
             raise self.error(f"expected an inertia that is positive, found a principal one of {principal[0]:g}", name)
@@ -188,11 +190,11 @@ class _Urdf:
         if ends[1] in self.parent or ends[0] == ends[1]:
             raise self.error(f"expected a tree, but link {ends[1]!r} has several parents or is its own", name)
         self.parent[ends[1]] = ends[0]
-        self._origin(joint, name)
-        axis = joint.find("axis")
-        if kind in (*ONE_JOINT, "planar") and axis is not None:
-            self._check_axis(self._numbers(axis, "xyz", 3, name), name)
-        self._check_limits(joint, name)
+        numbers = self._read(joint, JOINT_NUMBERS, name)
+        if kind in (*ONE_JOINT, "planar") and "axis" in numbers:
+            self._check_axis(numbers["axis"]["xyz"], name)
+        if kind in ("revolute", "prismatic") and "limit" not in numbers:
+            raise self.error(f"expected a <limit>, as this joint is {kind}", name)
         self._check_mimic(joint, name)
 
     def _check_axis(self, xyz: tuple[float, ...], name: str) -> None:
@@ -201,17 +203,6 @@ class _Urdf:
         if not SMALLEST <= math.hypot(*xyz) <= LARGEST:
             raise self.error(f"expected an <axis> of length 1, found {math.hypot(*xyz):g}", name)
 
-    def _check_limits(self, joint: Element, name: str) -> None:
-        limit, needed = joint.find("limit"), joint.get("type") in ("revolute", "prismatic")
-        if limit is None:
-            if needed:
-                raise self.error(f"expected a <limit>, as this joint is {joint.get('type')}", name)
-            return
-        for key in ("lower", "upper"):
-            self._numbers(limit, key, 1, name, 0.0)
-        for key in ("effort", "velocity"):
-            self._numbers(limit, key, 1, name)
-
     def _check_mimic(self, joint: Element, name: str) -> None:
         mimic = joint.find("mimic")
         if mimic is None:
@@ -219,14 +210,15 @@ class _Urdf:
         leader = mimic.get("joint", "")
         if leader == name or not any(other.get("name") == leader for other in self.joints):
             raise self.error(f"expected a <mimic> of another joint of this file, found {leader[:40]!r}", name)
-        self._numbers(mimic, "multiplier", 1, name, 1.0)
-        self._numbers(mimic, "offset", 1, name, 0.0)
+        self._read(joint, MIMIC_NUMBERS, name)
 
     def mechanics(self) -> str:
         """Links and joints as text; see the function of this name."""
         robot = Element("robot", name=self.root.get("name") or "robot")
         for name, link in self.links.items():
-            self._write_link(SubElement(robot, "link", name=name), link, name)
+            one = SubElement(robot, "link", name=name)
+            if (inertial := link.find("inertial")) is not None:
+                self._write(SubElement(one, "inertial"), inertial, LINK_NUMBERS, name)
         for joint in self.joints:
             name = joint.get("name", "")
             kind = "fixed" if joint.find("mimic") is not None else joint.get("type", "")
@@ -234,43 +226,34 @@ class _Urdf:
             for tag in ("parent", "child"):
                 end = joint.find(tag)
                 SubElement(one, tag, link="" if end is None else end.get("link", ""))
-            for tag, keys in JOINT_NUMBERS.items():
-                self._write_numbers(one, joint, tag, keys, name)
+            self._write(one, joint, JOINT_NUMBERS, name)
         return tostring(robot, encoding="unicode")
 
-    def _write_link(self, one: Element, link: Element, name: str) -> None:
-        inertial = link.find("inertial")
-        if inertial is not None:
-            kept = SubElement(one, "inertial")
-            for tag, keys in LINK_NUMBERS.items():
-                self._write_numbers(kept, inertial, tag, keys, name)
+    def _write(self, parent: Element, source: Element, table: Mapping[str, Numbers], name: str) -> None:
+        """Elements of a table with those of its attributes that are in the source; an inertia with all."""
+        for tag, numbers in self._read(source, table, name).items():
+            there = source.find(tag)
+            given = [key for key in numbers if tag == "inertia" or (there is not None and key in there.attrib)]
+            SubElement(parent, tag, {key: in_full(*numbers[key]) for key in given})
 
-    def _write_numbers(self, parent: Element, source: Element, tag: str, keys: Mapping[str, int], name: str) -> None:
-        element = source.find(tag)
-        if element is None:
-            return
-        kept = SubElement(parent, tag)
-        for key, count in keys.items():
-            if element.get(key) is not None or tag == "inertia":
-                kept.set(key, " ".join(map(repr, self._numbers(element, key, count, name, 0.0))))
-
-    def _origin(self, element: Element, name: str) -> None:
-        origin = element.find("origin")
-        if origin is not None:
-            for key in ("xyz", "rpy"):
-                self._numbers(origin, key, 3, name, 0.0)
+    def _read(
+        self, parent: Element, table: Mapping[str, Numbers], name: str
+    ) -> dict[str, dict[str, tuple[float, ...]]]:
+        """Numbers of the elements of a table that are there, by element and attribute."""
+        found = {tag: parent.find(tag) for tag in table}
+        return {
+            tag: {key: self._numbers(element, key, name, *about) for key, about in table[tag].items()}
+            for tag, element in found.items()
+            if element is not None
+        }
 
     def _check_tree(self) -> None:
         roots = [name for name in self.links if name not in self.parent]
         if len(roots) != 1:
             raise InputError(f"expected one root link, found {len(roots)}", file=self.path, column="link")
         for link in self.links:
-            seen = {link}
-            while link in self.parent:
-                link = self.parent[link]  # noqa: PLW2901
-                if link in seen:
-                    raise self.error("expected a tree of links, found a loop", link)
-                seen.add(link)
+            if roots[0] not in self._ancestry(link):
+                raise self.error("expected a tree of links, found a loop", link)
 
     def moved_mass(self, joint: str) -> float:
         """Mass of all links beyond a joint, kg."""
@@ -279,15 +262,13 @@ class _Urdf:
         return sum(mass for link, mass in self.masses.items() if first in self._ancestry(link))
 
     def _ancestry(self, link: str) -> set[str]:
-        found = {link}
-        while link in self.parent:
-            link = self.parent[link]
+        found = set[str]()
+        while link not in found:
             found.add(link)
+            link = self.parent.get(link, link)
         return found
 
-    def _numbers(
-        self, element: Element, key: str, count: int, name: str, default: float | None = None
-    ) -> tuple[float, ...]:
+    def _numbers(self, element: Element, key: str, name: str, count: int, default: float | None) -> tuple[float, ...]:
         text = element.get(key)
         if text is None and default is not None:
             return (default,) * count
