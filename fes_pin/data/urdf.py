@@ -19,19 +19,19 @@ MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
 ONE_JOINT = ("revolute", "continuous", "prismatic")
 SMALLEST, LARGEST = 1e-9, 1e6
 """Round figures far outside any rig, in SI units: masses and lengths of directions lie between, all else below."""
-Numbers = Mapping[str, tuple[int, float | None]]
-PLACE: Numbers = {"xyz": (3, 0.0), "rpy": (3, 0.0)}
-LINK_NUMBERS: Mapping[str, Numbers] = {
+NumbersOf = Mapping[str, tuple[int, float | None]]
+PLACE: NumbersOf = {"xyz": (3, 0.0), "rpy": (3, 0.0)}
+LINK_NUMBERS: Mapping[str, NumbersOf] = {
     "origin": PLACE,
     "mass": {"value": (1, None)},
     "inertia": {**dict.fromkeys(("ixx", "iyy", "izz"), (1, None)), **dict.fromkeys(("ixy", "ixz", "iyz"), (1, 0.0))},
 }
-JOINT_NUMBERS: Mapping[str, Numbers] = {
+JOINT_NUMBERS: Mapping[str, NumbersOf] = {
     "origin": PLACE,
     "axis": {"xyz": (3, None)},
     "limit": {"lower": (1, 0.0), "upper": (1, 0.0), "effort": (1, None), "velocity": (1, None)},
 }
-MIMIC_NUMBERS: Mapping[str, Numbers] = {"mimic": {"multiplier": (1, 1.0), "offset": (1, 0.0)}}
+MIMIC_NUMBERS: Mapping[str, NumbersOf] = {"mimic": {"multiplier": (1, 1.0), "offset": (1, 0.0)}}
 """Elements that bear on the motion, how many numbers each of their attributes holds, and what it is where it is absent;
 None where it must be there."""
 
@@ -229,7 +229,7 @@ class _Urdf:
             self._write(one, joint, JOINT_NUMBERS, name)
         return tostring(robot, encoding="unicode")
 
-    def _write(self, parent: Element, source: Element, table: Mapping[str, Numbers], name: str) -> None:
+    def _write(self, parent: Element, source: Element, table: Mapping[str, NumbersOf], name: str) -> None:
         """Elements of a table with those of its attributes that are in the source; an inertia with all."""
         for tag, numbers in self._read(source, table, name).items():
             there = source.find(tag)
@@ -237,7 +237,7 @@ class _Urdf:
             SubElement(parent, tag, {key: in_full(*numbers[key]) for key in given})
 
     def _read(
-        self, parent: Element, table: Mapping[str, Numbers], name: str
+        self, parent: Element, table: Mapping[str, NumbersOf], name: str
     ) -> dict[str, dict[str, tuple[float, ...]]]:
         """Numbers of the elements of a table that are there, by element and attribute."""
         found = {tag: parent.find(tag) for tag in table}
