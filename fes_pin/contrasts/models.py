@@ -29,6 +29,10 @@ MOST_ITEMS = 5
 FITTED, FITTED_DRIVEN = 10, 6
 """Items that are fitted with a set, those of largest score; on driven rigs a fit is some five times as long."""
 
+import os
+POLICY = Policy(beam=int(os.environ.get("CBEAM", "1")), fitted=None, pairs=0)
+"""Candidates themselves are those of largest score."""
+
 Found = SearchResult[Grouped]
 """What a search of what differs found."""
 
@@ -51,6 +55,7 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
     """
 
     most_candidates: int | None = MOST_ITEMS
+    converged_sets = 3
 
     def __init__(
         self,
@@ -105,6 +110,21 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
     def converged(self, fits: Sequence[Grouped]) -> list[Grouped]:
         """Fits once they have converged."""
         return in_parallel(self.maxima.go_on, fits)
+
+    def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
+        """Sets of a size that come near the best, best first; beside some that were not accepted, such as may be."""
+        near = super().near(size, without)
+        return [n for n in near if self._may_be_accepted(n)] if without else near
+
+    def converge(self, size: int, without: Sequence[Names] = ()) -> None:
+        """Let the best sets of a size converge, but for some; nothing where no other may be accepted."""
+        if not without or self.near(size, without):
+            super().converge(size, without)
+
+    def _may_be_accepted(self, names: Names) -> bool:
+        """Whether a set gains enough over the best smaller one to stand out of the noise."""
+        larger, smaller = self.fits[names], self.fits[self.ranked(len(names) - 1)[0]]
+        return self.noise_p_value(smaller.sse - larger.sse, more_degrees(larger, smaller)) < CLAIM_LEVEL
 
     def step_gain(self, fitted: Grouped) -> float:
         """What a further step of a fit gains, by its slope and curvature; 0 where it has converged."""
@@ -209,7 +229,7 @@ class ContrastSearch(Search[Grouped]):
     models: ContrastModels
 
     def __init__(self, models: ContrastModels, progress: Progress) -> None:
-        super().__init__(models, progress, Policy())
+        super().__init__(models, progress, POLICY)
 
     def _search(self) -> Found:
         self._forward()

@@ -15,9 +15,6 @@ from fes_pin.infer.search import Fitted, Names
 F = TypeVar("F", bound=Fitted)
 S = TypeVar("S")
 
-CONVERGED_SETS = 4
-"""Best sets of a size that go on until they converge."""
-
 
 @dataclass(frozen=True)
 class Candidate(Generic[S]):
@@ -46,11 +43,14 @@ class FittedSets(ABC, Generic[F, S]):
         By names in alphabetical order; `()` is the nominal model.
     most_candidates
         Candidates in a set, at most; None for no bound.
+    converged_sets
+        Best sets of a size that go on until they converge.
     family
         Of the tests of all candidates.
     """
 
     most_candidates: int | None = 3
+    converged_sets = 4
     family: Family
 
     def __init__(self) -> None:
@@ -179,7 +179,7 @@ class FittedSets(ABC, Generic[F, S]):
     def _hopeful(self, size: int, without: Sequence[Names]) -> list[Names]:
         """The sets of a size that a further step would make the best, and those that come near the best."""
         near, ranked = self.near(size, without), [n for n in self.ranked(size) if n not in without]
-        first = sorted(ranked, key=lambda n: self.fits[n].price - self._step_gain(n))[:CONVERGED_SETS]
+        first = sorted(ranked, key=lambda n: self.fits[n].price - self._step_gain(n))[: self.converged_sets]
         return [n for n in ranked if n in first or n in near]
 
     def _step_gain(self, names: Names) -> float:

@@ -123,11 +123,14 @@ class Policy:
         all are.
     pairs
         Pairs that the score test proposes, for candidates that show nothing alone.
+    judged
+        Sets of a size that are judged, lowest price first, until one is accepted.
     """
 
     beam: int = 3
     fitted: int | None = 8
     pairs: int = 4
+    judged: int = 3
 
 
 @dataclass(frozen=True)
@@ -245,7 +248,7 @@ class Search(Generic[F]):
     def _first_accepted(self, size: int, best: Names) -> Names | None:
         """The set of a size of lowest price that is accepted; those near it are judged without those that are not."""
         tried: list[Names] = []
-        while len(tried) < self.policy.beam and (ranked := self._in_better_forms(size, tried, best)):
+        while len(tried) < self.policy.judged and (ranked := self._in_better_forms(size, tried, best)):
             if self._is_accepted(ranked[0], best):
                 return ranked[0]
             tried.append(ranked[0])
@@ -254,10 +257,10 @@ class Search(Generic[F]):
 
     def _in_better_forms(self, size: int, without: Sequence[Names], best: Names) -> list[Names]:
         """The best sets of a size but for some, lowest price first, once each has the form that the data demand."""
-        beam = self.policy.beam
-        while rough := [n for n in self.models.near(size, without)[:beam] if self._is_rough(n, best)]:
+        most = self.policy.judged
+        while rough := [n for n in self.models.near(size, without)[:most] if self._is_rough(n, best)]:
             self._reform(rough[0])
-        return self.models.near(size, without)[:beam]
+        return self.models.near(size, without)[:most]
 
     def _is_rough(self, names: Names, best: Names) -> bool:
         """Whether a set has not had another form yet, and half of what it must gain: a form may give the other half."""
