@@ -61,7 +61,7 @@ def contrast(
     groups
         Those that are compared, in this order; by default all, in the order of the study.
     library
-        Causes beside those written here and installed; see `diagnose`.
+        Causes besides those written here and installed; see `diagnose`.
     seed
         Of simulated critical values.
     limit
@@ -136,7 +136,7 @@ class _Work:
         return self._judged(search, found, made, said)
 
     def _noise_of_efforts(self) -> float:
-        """Noise that the efforts of all groups were recorded with, in their unit; 0 where nothing speaks for it."""
+        """Noise that efforts were recorded with in all groups, in their unit; 0 where the likelihood supports none."""
         if not self.fed_back or not all(EFFORT in self.nominal.rig.input_columns(t) for t in self.study.trials):
             return 0.0
         faults = LogFaults(self.study.trials, lambda trials: self._searched(trials)[0], self.end)
@@ -175,7 +175,7 @@ class _Work:
         changes += [misread_change(models, misread)] if misread is not None else []
         unchanged, excluded, untestable = not_changed(models, best)
         said += [*state.weighed.said, *_smoothed(best), *(UNCONFIRMED.format(n) for n in state.refused)]
-        if left.unexplained:  # sizes that would have been seen are those beside a model that is right
+        if left.unexplained:  # sizes that would have been seen hold for a model that is right
             unchanged, excluded = {}, {}
             said.append("beside what is left unexplained it cannot be said what did not change")
         return Contrast(

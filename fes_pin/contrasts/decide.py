@@ -41,7 +41,7 @@ class Spread:
     phi: float
     free: float
 
-    def beside(self, usual: Spread) -> Spread:
+    def pooled(self, usual: Spread) -> Spread:
         """What this and the usual spread say together, as far as they agree."""
         if not usual.free > 0.0:
             return self
@@ -77,7 +77,7 @@ def inflation(larger: Grouped, smaller: Grouped, usual: Spread) -> Spread:
     free = int(felt.sum()) - 1 - max(1, len(larger.changes))
     if free < 1:
         return Spread(1.0, free)
-    both = _clustered(sizes, along).beside(usual)
+    both = _clustered(sizes, along).pooled(usual)
     share = _leaning(larger, moved) / float(sizes.sum())
     return Spread(both.phi, 1.0 / (1.0 / both.free + share**2 / free))
 
@@ -88,8 +88,8 @@ def _clustered(sizes: np.ndarray, along: np.ndarray) -> Spread:
     """
     shares = sizes / sizes.sum()
     weights = shares / np.maximum(1.0 - shares, 1e-9)
-    beside = np.eye(len(shares)) - np.sqrt(np.outer(shares, shares))
-    form = beside * weights @ beside
+    others = np.eye(len(shares)) - np.sqrt(np.outer(shares, shares))
+    form = others * weights @ others
     return Spread(
         float(np.sum(weights * along**2 / np.maximum(sizes, 1e-300))), float(np.trace(form) ** 2 / np.sum(form**2))
     )

@@ -53,7 +53,7 @@ class GroupConditions(Conditions[ContrastSearch, Found]):
 def late_in_groups(models: ContrastModels, found: Found) -> float | None:
     """How late the efforts of a driven rig were written down, s, in the mean over groups; None where one is in time.
 
-    What was found in all groups may stand for it: then the nominal model is asked.
+    A cause of all groups may be mistaken for it: then the nominal model is asked as well.
     """
     rig, trials = models.nominal_model.rig, [t for many in models.trials.values() for t in many]
     if not models.driven or not all(EFFORT in rig.input_columns(t) for t in trials):
@@ -63,7 +63,7 @@ def late_in_groups(models: ContrastModels, found: Found) -> float | None:
 
 
 def _late_beside(models: ContrastModels, one: Grouped) -> float | None:
-    """How late efforts are beside a set, each group with nominal values of its own; None where one is in time."""
+    """How late efforts are by a set, each group with nominal values of its own; None where one is in time."""
 
     def late_in(group: str) -> float:
         part = models.maxima.part(one, group)

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight
-from fes_pin.contrasts.repeats import Repeats, scatter, without_locals, without_scatter
+from fes_pin.contrasts.repeats import Repeats, scatter, without_scatter
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.identify.fit import Fit, ended, fit_multistart, fit_problem, noise_of, rough_noise
@@ -25,6 +25,7 @@ from fes_pin.infer.maximise import alternate
 from fes_pin.infer.noise import Noise, as_white
 from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
 from fes_pin.infer.problem import Unknowns
+from fes_pin.infer.projection import without_locals
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
@@ -157,7 +158,7 @@ class PredictedGroups(GroupedFits):
     def converged(
         self, model: GroupedModel, items: Collection[Item], weights: Mapping[str, Weight], unknowns: Unknowns | None
     ) -> Grouped:
-        """Fit a grouped model and what is random by turns."""
+        """Fit a grouped model and its noise by alternating maximisation."""
         problem = GroupedProblem(model, self.trials, weights)
         fitted = _fit_of(problem, alternate(problem, model.parameters(), unknowns, ROUNDS, LOOK_DRIVEN))
         return Grouped(frozenset(items), fitted, {g: p.noise for g, p in problem.parts.items()})
@@ -196,7 +197,7 @@ class SimulatedGroups(GroupedFits):
         return min(fitted, key=lambda f: f.sse)
 
     def _rich(self, group: str) -> tuple[dict[str, float], Repeats]:
-        """A group's own nominal values, and its noise beside everything that the library could explain in it alone."""
+        """A group's own nominal values, and its noise without what the library could explain in it alone."""
         trials, library = self.trials[group], Library(self.nominal, self.trials[group], self._effects)
         library.measured = self._measured
         alone = fit_multistart(
@@ -219,7 +220,7 @@ class SimulatedGroups(GroupedFits):
         return one
 
     def _repeats(self, one: Grouped) -> dict[str, Repeats]:
-        """The noise of each group with how much repeats scatter beside a set."""
+        """The noise of each group, with how much repeats scatter by the model of a set."""
         names, cut, parts = self.nominal.fitted_parameters(), self.by_group(one.fit.parts), []
         columns: dict[str, list[np.ndarray]] = {}
         weights = {g: w for g, w in one.weights.items() if isinstance(w, Repeats)}

@@ -52,7 +52,7 @@ def reweigh(problem: Any, weight: Weight) -> None:
 
 @dataclass(frozen=True)
 class Item:
-    """Something that a grouped model has beside the nominal one.
+    """Something that a grouped model has and the nominal one has not.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class GroupedModel:
     def having(self, items: Collection[Item], new: Sequence[Effect] = ()) -> GroupedModel:
         """The same rig with these items alone.
 
-        A group that has a cause beside the other groups has all its parameters for itself; where all groups have the
+        A group that has a cause of its own has all its parameters for itself; where all groups have the
         cause, its amplitudes alone.
 
         Parameters

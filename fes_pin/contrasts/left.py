@@ -18,7 +18,7 @@ from fes_pin.workers import in_parallel
 
 
 def left_in_groups(models: ContrastModels, best: Grouped, seed: int) -> tuple[Remainder, list[str]]:
-    """What is left in some groups alone; what is left in all is an error of the model, and is said."""
+    """Lack of fit in some groups alone; where all groups have one it is an error of the model, and is reported."""
     parts = in_parallel(lambda g: models.maxima.part(best, g), list(models.trials))
     each = dict(zip(models.trials, in_parallel(lambda f: _left_by(f, seed), parts), strict=True))
     each = {g: _in_single_trials(models, best, g, r, seed) if r.unexplained else r for g, r in each.items()}
@@ -41,7 +41,7 @@ def _left_by(fitted: Fit, seed: int) -> Remainder:
 def _in_single_trials(models: ContrastModels, best: Grouped, group: str, left: Remainder, seed: int) -> Remainder:
     """What is left in a group, if half of its trials leave something, each with nominal values of its own.
 
-    Trials whose strength or friction differs, of whatever group, leave something beside values that they share.
+    Trials whose strength or friction differs, of whatever group, have a lack of fit by values that they share.
     """
     alone = in_parallel(lambda k: models.maxima.part(best, group, k), range(len(models.trials[group])))
     p = min(1.0, 2.0 * float(np.median([_left_by(one, seed).p_value for one in alone])))

@@ -12,13 +12,10 @@ from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.likelihood_forms import demanded_form
 from fes_pin.diagnosis.search.starts import STARTS, forms_beside, refinements
-from fes_pin.infer.covariance import step_gain
 from fes_pin.infer.distributions import chi2_tail
 from fes_pin.infer.fits import Candidate, FittedSets, more_degrees
 from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL
-from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.scatter import excess_scatter
-from fes_pin.infer.scoring import LITTLE
 from fes_pin.infer.search import Names, Policy, Search, SearchResult
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
@@ -29,9 +26,8 @@ MOST_ITEMS = 5
 FITTED, FITTED_DRIVEN = 10, 6
 """Items that are fitted with a set, those of largest score; on driven rigs a fit is some five times as long."""
 
-import os
-POLICY = Policy(beam=int(os.environ.get("CBEAM", "1")), fitted=None, pairs=0)
-"""Candidates themselves are those of largest score."""
+POLICY = Policy(fitted=None, pairs=0)
+"""`candidates` are those of largest score."""
 
 Found = SearchResult[Grouped]
 """What a search of what differs found."""
@@ -112,8 +108,8 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return in_parallel(self.maxima.go_on, fits)
 
     def near(self, size: int, without: Sequence[Names] = ()) -> list[Names]:
-        """Sets of a size that come near the best, best first; beside some that were not accepted, such as may be."""
-        near = super().near(size, without)
+        """The best sets of a size that come near the best; after some that were not accepted, those that may be."""
+        near = super().near(size, without)[: self.converged_sets]
         return [n for n in near if self._may_be_accepted(n)] if without else near
 
     def converge(self, size: int, without: Sequence[Names] = ()) -> None:
@@ -125,13 +121,6 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         """Whether a set gains enough over the best smaller one to stand out of the noise."""
         larger, smaller = self.fits[names], self.fits[self.ranked(len(names) - 1)[0]]
         return self.noise_p_value(smaller.sse - larger.sse, more_degrees(larger, smaller)) < CLAIM_LEVEL
-
-    def step_gain(self, fitted: Grouped) -> float:
-        """What a further step of a fit gains, by its slope and curvature; 0 where it has converged."""
-        fit = fitted.fit
-        if fit.gradient_norm < LITTLE:
-            return 0.0
-        return step_gain(normal_equations(fit.parts), [n not in fit.at_bound for n in fit.free])
 
     def form_of(self, fitted: Grouped) -> frozenset[tuple[str, str, tuple[str, ...]]]:
         """Of each cause of each group its name, and which refinements it has."""

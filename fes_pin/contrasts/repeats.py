@@ -20,11 +20,11 @@ from functools import cached_property
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.noise_floor import span
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.noise import NoiseModel
 from fes_pin.infer.problem import Linearized, Unknowns
+from fes_pin.infer.projection import without_locals
 from fes_pin.models.model import Model
 
 SMALLEST, LARGEST = -1.0, 12.0
@@ -209,9 +209,3 @@ class _Scatter:
         usable = np.isfinite(hessian).all(axis=(1, 2)) & np.isfinite(gradient).all(axis=1) & np.isfinite(own)
         inverse = np.linalg.pinv(np.where(usable[:, None, None], hessian, 0.0), rcond=1e-12, hermitian=True)
         return np.where(usable, own - np.einsum("gp,gpq,gq->g", gradient, inverse, gradient), np.inf)
-
-
-def without_locals(part: Linearized, columns: np.ndarray) -> np.ndarray:
-    """Columns less what a step of the trial's own unknowns makes of them, shape as `columns`."""
-    own = span(part.local)
-    return columns - own @ (own.T @ columns)

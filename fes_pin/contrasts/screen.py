@@ -237,12 +237,12 @@ def _own(base: Grouped, item: Item, rows: slice) -> _Column:
 
 
 def _score(one: _Column, gram: np.ndarray, along: np.ndarray, spread: tuple[float, int]) -> ItemScore:
-    """The score of an item from what a set leaves of its columns.
+    """The score of an item from its columns without what the set takes up.
 
     Parameters
     ----------
     gram, along
-        Inner products of what is left, with itself and with the residual.
+        Inner products of the projected columns, with each other and with the residual.
     spread
         Of what single trials say of it, with its degrees of freedom.
     """

@@ -1,4 +1,4 @@
-"""How it is judged what a search of what differs found: by trials that took no part, and by what is left."""
+"""How it is judged what a search of what differs found: by trials that took no part, and by tests of lack of fit."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ContrastWeighed(Weighed):
     Attributes
     ----------
     said
-        Of what is left in groups.
+        Of the lack of fit of groups.
     """
 
     lack_of_fit: Remainder

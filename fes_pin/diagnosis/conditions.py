@@ -116,7 +116,7 @@ class Conditions(ABC, Generic[S, R]):
             return None
 
     def _restated(self, trials: Sequence[Trial], misread: Misread) -> Restated[S, R]:
-        """A search of the restated trials; once more with the value beside the causes that it finds."""
+        """A search of the restated trials; once more with the value by the causes that it finds."""
         other = restated_trials(self.nominal, trials, misread)
         search, searched = self.run(other)
         if self.has_causes(searched) and not search.was_stopped:

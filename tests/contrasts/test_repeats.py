@@ -9,11 +9,12 @@ from contrast_pairs.free import free_pair
 import fes_pin as fp
 from fes_pin.contrasts.decide import Spread, usual_spread
 from fes_pin.contrasts.grouped import Item
-from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, scatter, without_locals, without_scatter
+from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, scatter, without_scatter
 from fes_pin.contrasts.screen import ItemScore
 from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.problem import Linearized
+from fes_pin.infer.projection import without_locals
 from fes_pin.models.nominal import nominal_model
 
 
@@ -91,14 +92,14 @@ def test_a_spread_that_all_causes_share_stands_behind_each():
     usual = usual_spread(spreads(2.0 * rng.chisquare(4, 200) / 4.0))
     assert usual.phi == pytest.approx(2.0, rel=0.2)
     assert usual.free > 30.0
-    assert Spread(1.0, 4.0).beside(usual).free == pytest.approx(usual.free + 4.0)
-    assert Spread(1.0, 4.0).beside(usual).phi == pytest.approx(2.0, rel=0.25)
+    assert Spread(1.0, 4.0).pooled(usual).free == pytest.approx(usual.free + 4.0)
+    assert Spread(1.0, 4.0).pooled(usual).phi == pytest.approx(2.0, rel=0.25)
 
 
 def test_a_spread_of_its_own_stands_alone():
     """Repeats that differ in one thing say nothing of it by what they share."""
     usual = Spread(1.0, 30.0)
-    odd = Spread(30.0, 4.0).beside(usual)
+    odd = Spread(30.0, 4.0).pooled(usual)
     assert odd.phi == 30.0
     assert odd.free == pytest.approx(4.0, abs=0.1)
 
@@ -114,4 +115,4 @@ def test_a_change_shows_through_trials_that_scatter(tmp_path):
     (change,) = found.changes
     assert change.name == "threshold_shift"
     assert found.repeats["gain"] == pytest.approx(0.003, rel=1.0)
-    assert "repeats scatter by themselves: gain" in str(found)
+    assert "repeats scatter by (standard deviation): gain" in str(found)
