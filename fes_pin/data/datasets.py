@@ -129,14 +129,18 @@ def fetch(name: str) -> Path:
     )
 
 
-def download(name: str, folder: str | Path | None = None, unverified: bool = False, force: bool = False) -> Path:
-    """Fetch a data set from its repository, and make a study of it.
+def download_all(
+    names: Iterable[str], folder: str | Path | None = None, unverified: bool = False, force: bool = False
+) -> dict[str, Path]:
+    """Fetch data sets from their repositories, and make studies of them: nothing is written where one of them fails.
 
     Each upstream file must have its checksum, where one is known; where none is, the converted trials must have
     theirs. Nothing is kept of what does not.
 
     Parameters
     ----------
+    names
+        Of the data sets.
     folder
         To make `<name>` in; without it the first of `folders`.
     unverified
@@ -147,21 +151,14 @@ def download(name: str, folder: str | Path | None = None, unverified: bool = Fal
 
     Returns
     -------
-    Path
-        Of the study.
+    dict of Path
+        Of each study, by name.
 
     Raises
     ------
     InputError
         Unknown name, a set that cannot be fetched, no pooch, no answer, a wrong checksum, files that were changed.
     """
-    return download_all([name], folder, unverified, force)[name]
-
-
-def download_all(
-    names: Iterable[str], folder: str | Path | None = None, unverified: bool = False, force: bool = False
-) -> dict[str, Path]:
-    """Fetch several data sets, as `download`: nothing is written where one of them fails."""
     outputs = Outputs("datasets", force)
     places = {name: Path(folder or folders()[0]) / name for name in names}
     made = {name: _fetched(name, place, unverified, outputs) for name, place in places.items()}

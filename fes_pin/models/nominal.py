@@ -30,8 +30,8 @@ def nominal_model(study: Study) -> Model:
     kind = rig_of(study)
     check_known(study.start, kind.parameters(), fault_at("start.{}", study.folder))
     rig = kind.of_study(study)
-    stimulated = [t for t in study.trials if rig.recruited(t) is not None]
-    return Model(replace(rig, session=session_of(stimulated, rig.recruited)))  # type: ignore[arg-type]
+    recruited = {t: known for t in study.trials if (known := rig.recruited(t)) is not None}
+    return Model(replace(rig, session=session_of(list(recruited), recruited.__getitem__)))
 
 
 def rig_of(study: Study) -> type[Rig]:

@@ -16,7 +16,12 @@ import numpy as np
 from fes_pin.data.errors import InputError
 from fes_pin.data.schema import unknown
 from fes_pin.models.maths import where
-from fes_pin.models.parameters import ParameterInfo, check_parameters, parameters_of
+from fes_pin.models.parameters import (  # noqa: F401 - what the file of a cause needs is imported from here
+    ParameterInfo,
+    check_parameters,
+    parameter,
+    parameters_of,
+)
 
 Measured = Mapping[str, np.ndarray]
 """Every measured column, all trials end to end, by name; `time` since each trial began, s."""

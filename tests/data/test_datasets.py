@@ -13,9 +13,14 @@ import pytest
 
 from fes_pin.cli import main
 from fes_pin.data import conversions, datasets
-from fes_pin.data.datasets import DATASETS, download, fetch
+from fes_pin.data.datasets import DATASETS, download_all, fetch
 from fes_pin.data.errors import InputError
 from fes_pin.data.study import read_study
+
+
+def _fetched(name, **more):
+    return download_all([name], **more)[name]
+
 
 pytest.importorskip("pooch")
 TIME = np.arange(0.0, 2.0, 1.0 / 1024)
@@ -104,7 +109,7 @@ def with_checksums(monkeypatch, root, name, **other):
 @pytest.mark.parametrize("name", sorted(PUT - {"friction_damper"}))
 def test_a_data_set_with_its_checksums_becomes_a_study(server, here, monkeypatch, name):
     with_checksums(monkeypatch, server[0], name)
-    assert download(name) == here / name == fetch(name)
+    assert _fetched(name) == here / name == fetch(name)
     study = read_study(here / name)
     assert len(study.trials) == {"servo_pendulum": 16, "free_pendulum": 5}[name]
     assert {t.role for t in study.trials} == {"fit", "held_out"}
@@ -139,34 +144,34 @@ def test_a_wrong_checksum_keeps_nothing(server, here, monkeypatch):
     with_checksums(monkeypatch, server[0], "servo_pendulum", **{place: "0" * 64})
     for unverified in (False, True):
         with pytest.raises(InputError, match=rf"{place}: cannot be fetched: its checksum is another"):
-            download("servo_pendulum", unverified=unverified)
+            _fetched("servo_pendulum", unverified=unverified)
     assert not list(here.iterdir())
 
 
 def test_without_checksums_of_the_origin_the_conversion_must_have_its_own(here):
     with pytest.raises(InputError, match=r"12 of 12 trials differ from those .*unverified=True keeps them"):
-        download("friction_damper")
+        _fetched("friction_damper")
     assert not list(here.iterdir())
-    assert (download("friction_damper", unverified=True) / "trials" / "d1_20lb_1hz.csv").is_file()
+    assert (_fetched("friction_damper", unverified=True) / "trials" / "d1_20lb_1hz.csv").is_file()
 
 
 def test_a_server_that_does_not_have_it(here, monkeypatch):
     monkeypatch.setitem(DATASETS, "free_pendulum", replace(DATASETS["free_pendulum"], commit="0" * 40))
     with pytest.raises(InputError, match="cannot be fetched: HTTPError: 404"):
-        download("free_pendulum")
+        _fetched("free_pendulum")
     monkeypatch.setattr(datasets, "SOURCE_URL", "http://127.0.0.1:9")
     with pytest.raises(InputError, match="cannot be fetched: ConnectionError"):
-        download("free_pendulum")
+        _fetched("free_pendulum")
     assert not list(here.iterdir())
 
 
 def test_what_cannot_be_fetched_says_why(here):
     with pytest.raises(InputError, match="pickle, which runs code"):
-        download("biceps_fes")
+        _fetched("biceps_fes")
     with pytest.raises(InputError, match="`fes-pin datasets free_pendulum` fetches it"):
         fetch("free_pendulum")
     with pytest.raises(InputError, match="did you mean free_pendulum"):
-        download("free_pendulums")
+        _fetched("free_pendulums")
 
 
 def test_they_are_looked_for_in_the_named_folder_and_its_data(tmp_path, monkeypatch):

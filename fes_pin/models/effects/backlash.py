@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.maths import play
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, least_step, span
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, least_step, parameter, span
 
 WIDTHS = (0.003, 0.03)
 """Half widths that a fit begins with beside those that slopes lead to, as shares of the range of the motion."""

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.maths import TURN, cos, sin
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter
 
 FEWEST, MOST = 1.5, 30.0
 """Waves within the measured range: one is a spring that hardens, or gravity; of one and a half, half comes again. More

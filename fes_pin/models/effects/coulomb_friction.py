@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.maths import exp, fabs, lag, log, play, power, sqrt
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, parameter
 
 STIFFEST = 2.5
 """Largest rate of decay times step that it may show; RK4 is stable to 2.78: Hairer, Wanner, Solving ODEs II, IV.2."""

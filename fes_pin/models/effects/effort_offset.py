@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, Effect, Measured, Stage
+from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter
 
 
 @dataclass(frozen=True)

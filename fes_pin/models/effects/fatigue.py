@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.parameters import parameter
 from fes_pin.models.session import after_the_past
-from fes_pin.models.stage import ByName, Effect, Stage
+from fes_pin.models.stage import ByName, Effect, Stage, parameter
 
 FLOOR = 0.35
 """Share of the force that never tires; Riener and Fuhr fit 0.3 to 0.4 to quadriceps."""

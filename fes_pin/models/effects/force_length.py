@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import exp
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, span
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter, span
 
 
 @dataclass(frozen=True)

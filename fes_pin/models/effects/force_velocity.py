@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import sqrt, where
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter
 
 PLATEAU = 2.0
 """1 / (1.5 - 1): a stretched muscle bears half more than its isometric force at most, until data show another: van

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.maths import ramp
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter
 
 
 @dataclass(frozen=True)

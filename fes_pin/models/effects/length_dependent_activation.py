@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import exp, power
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, Effect, Measured, Stage, span
+from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter, span
 
 LEAST = 1e-3
 """Activation below which a power of it is not told from a straight line: it keeps derivatives finite."""

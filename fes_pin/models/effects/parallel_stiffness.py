@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.maths import exp, ramp, sqrt
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter
 
 FLAT = 1e-6
 """Squared rate of the exponential that stands for a straight line, 1/m2."""

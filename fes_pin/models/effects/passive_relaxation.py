@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import ByName, Effect, Stage
+from fes_pin.models.stage import ByName, Effect, Stage, parameter
 
 NOTHING = 1e-30
 """Below any square of a motion: a rig that begins at rest has 0 / 0."""

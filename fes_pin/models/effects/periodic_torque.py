@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.maths import TURN, cos, sin
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage
+from fes_pin.models.stage import Bounds, Effect, Grids, Measured, Stage, parameter
 
 FASTEST_HZ = 0.8
 """The fastest breathing that is looked for; see the source below."""

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import power
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Effect, Stage, parameter
 
 LEAST = 1e-3
 """Activation below which powers of it are not told from a straight line: it keeps derivatives finite."""

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import exp, log, maximum
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Effect, Stage
+from fes_pin.models.stage import Effect, Stage, parameter
 
 R_SMALL = 1e-6
 """Recruitment below which its power is linear: a millionth of the muscle."""

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import ramp
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, ByName, Effect, Measured, Stage, span
+from fes_pin.models.stage import Bounds, ByName, Effect, Measured, Stage, parameter, span
 
 LOST_S = 0.1
 """Time constant with which it is lost where the muscle is not activated, s: it does not outlast deactivation

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, Effect, Measured, Stage, reading_range, symmetric
+from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter, reading_range, symmetric
 
 
 @dataclass(frozen=True)

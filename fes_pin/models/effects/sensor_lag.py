@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import lag, lag_time
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import ByName, Effect, Measured, Stage, least_step
+from fes_pin.models.stage import ByName, Effect, Measured, Stage, least_step, parameter
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import FromAPlace, Stage, counted_from
+from fes_pin.models.stage import FromAPlace, Stage, counted_from, parameter
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, Effect, Measured, Stage, reading_range, symmetric
+from fes_pin.models.stage import Bounds, Effect, Measured, Stage, parameter, reading_range, symmetric
 
 
 @dataclass(frozen=True)

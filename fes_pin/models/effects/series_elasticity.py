@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from fes_pin.models.maths import exp
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, span
+from fes_pin.models.stage import Bounds, ByName, Effect, Grids, Measured, Stage, parameter, span
 
 RIGID = 1e-16
 """Compliance that stands for none, m/N."""

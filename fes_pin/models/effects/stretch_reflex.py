@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fes_pin.models.maths import ramp
-from fes_pin.models.parameters import parameter
-from fes_pin.models.stage import ByName, Effect, Stage
+from fes_pin.models.stage import ByName, Effect, Stage, parameter
 
 
 @dataclass(frozen=True)

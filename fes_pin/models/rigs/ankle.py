@@ -16,11 +16,10 @@ from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.maths import cos, exp, ramp, sin, where
-from fes_pin.models.parameters import parameter
 from fes_pin.models.rigs.base import GRAVITY, IMPOSED_STOPPING, Rig, imposed_now
 from fes_pin.models.rigs.rigid import gravity_coefficients, point_foot
 from fes_pin.models.rigs.stimuli import recruited_now, recruitment_of
-from fes_pin.models.stage import Signals
+from fes_pin.models.stage import Signals, parameter
 
 UPRIGHT = 1.5707963267948966
 """The angle of the largest lever, pi/2 rad, where the muscle's length counts as its reference."""
