@@ -180,7 +180,7 @@ def test_the_command_line_lists_ones_own_and_says_whose_code_it_runs(own, monkey
 CAUSE = files_of_the_document()["door_closer.py"]
 BAD = {
     "no_file": (None, "no such file"),
-    "not_python": (CAUSE.replace("class DoorCloser", "clas DoorCloser"), "row 11: cannot be run: SyntaxError"),
+    "not_python": (CAUSE.replace("class DoorCloser", "clas DoorCloser"), "row 10: cannot be run: SyntaxError"),
     "raises": (CAUSE + "\nprint(1 / 0)\n", "cannot be run: ZeroDivisionError: division by zero"),
     "ends": (CAUSE + "\nraise SystemExit(0)\n", "cannot be run: SystemExit: 0"),
     "empty": ("", "holds no cause and no rig"),
