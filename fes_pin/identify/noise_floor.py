@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from fes_pin.identify.fit import Fit
 from fes_pin.identify.problem import Problem
@@ -35,7 +36,7 @@ def rich_noise(
     problem = Problem(fitted.model, fitted.trials, white, fitted.free)
     parts = problem.linearize(fitted.values, fitted.unknowns)
     residual = np.concatenate([p.residual for p in parts])
-    explain = [np.concatenate([p.jacobian for p in parts]), *columns, _local_columns(parts)]
+    explain = [np.concatenate([p.jacobian for p in parts]), *columns, block_diag(*(p.local for p in parts))]
     basis = span(np.concatenate([c for c in explain if c.shape[1]], axis=1))
     left = residual - basis @ (basis.T @ residual)
     for shapes in varying:
@@ -69,17 +70,6 @@ def _of_each_trial(left: np.ndarray, shapes: Sequence[np.ndarray], counts: Seque
         if worth > most:
             best, most = explained, worth
     return best
-
-
-def _local_columns(parts: Sequence) -> np.ndarray:
-    """Each trial's unknowns as columns of their own, shape (m, all unknowns)."""
-    rows, width = sum(len(p.residual) for p in parts), sum(p.local.shape[1] for p in parts)
-    out, row, column = np.zeros((rows, width)), 0, 0
-    for part in parts:
-        n, k = part.local.shape
-        out[row : row + n, column : column + k] = part.local
-        row, column = row + n, column + k
-    return out
 
 
 def span(columns: np.ndarray) -> np.ndarray:

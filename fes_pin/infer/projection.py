@@ -17,6 +17,9 @@ from fes_pin.workers import in_parallel
 LARGEST = float(np.finfo(float).max) ** 0.25
 """Largest entry of a column: products of inner products stay floating-point numbers. What runs away says nothing."""
 
+DEPENDENT = 1e-10
+"""Eigenvalue of the Gram matrix of scaled columns, relative to the largest, below which one depends on the others."""
+
 
 @dataclass(frozen=True)
 class Products:
@@ -125,12 +128,12 @@ def _scaled(columns: np.ndarray) -> np.ndarray:
     return np.asarray(columns / np.where(norms > 0, norms, 1.0))
 
 
-def _basis(columns: np.ndarray, tolerance: float = 1e-7) -> np.ndarray:
+def _basis(columns: np.ndarray) -> np.ndarray:
     """Orthonormal basis of the span of columns, shape (m, rank)."""
     if not columns.shape[1]:
         return columns
     scaled = _scaled(columns)
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    good = values > tolerance**2 * max(values[-1], 1e-300) * 1e4
+    good = values > DEPENDENT * max(values[-1], 1e-300)
     rough = (scaled @ vectors[:, good]) / np.sqrt(values[good])
     return np.asarray(np.linalg.qr(rough)[0]) if good.any() else columns[:, :0]
