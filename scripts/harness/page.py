@@ -61,7 +61,7 @@ def tables(data: Mapping[str, Any]) -> str:
 
 def _measured(found: Mapping[str, Any]) -> list[str | int]:
     held, count = found["intervals"]
-    errors = found["errors"].get("horizon") or found["errors"].get("held_out")
+    errors = found["errors"].get("held_out") or found["errors"].get("horizon")
     return [
         found["unanswered"],
         interval(held, count) if count else "",

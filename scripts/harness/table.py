@@ -11,7 +11,7 @@ from scipy.stats import binomtest, fisher_exact, norm
 from harness.row import KINDS, Row
 
 COLUMNS = ("studies", "right", "first", "alone", "further", "left")
-HEAD = ("hidden", "studies", "right", "named first", "alone", "further names", "something left")
+HEAD = ("hidden", "right", "named first", "alone", "further names", "something left")
 CONFIDENCE_95 = norm.ppf(0.975)
 WORSE = 0.01
 """Level at which counts are worse than those of another run."""
@@ -37,7 +37,8 @@ def counts(rows: Iterable[Row]) -> dict[str, Any]:
     for kind in KINDS:
         own = [row for row in good if row.kind == kind]
         parts = sorted({row.part for row in own if row.part}, key=lambda part: (len(part), part))
-        for name, some in [(kind, own), *((f"{kind}: {p}", [r for r in own if r.part == p]) for p in parts)]:
+        divided = [(f"{kind}: {p}", [r for r in own if r.part == p]) for p in parts]
+        for name, some in [(kind, own), *(divided if len(parts) > 1 else [])]:
             if some:
                 lines[name] = [len(some), *(sum(getattr(row, column) for row in some) for column in COLUMNS[1:])]
     held = [abs(x - true) < CONFIDENCE_95 * std for r in good if r.exact for _, true, _, x, std in r.estimates]
@@ -89,7 +90,7 @@ def lines_of(found: Counts) -> list[list[Any]]:
         kind, _, part = name.partition(": ")
         first, alone, further, left = others
         told = [first, alone] if kind in ("one", "two") else ["", ""]
-        out.append([f"{kind}, {part}" if part else kind, count, interval(right, count), *told, further, left])
+        out.append([f"{kind}, {part}" if part else kind, interval(right, count), *told, further, left])
     return out
 
 

@@ -85,7 +85,7 @@ ROWS = [
     row("d", hidden=(), sets=(), verdict="adequate"),
     row("e", hidden=(), cpu_s=6.0),
     row("f", hidden=("fatigue", "cogging"), sets=(("fatigue",), ("cogging", "load_error"), ("base_tilt",))),
-    row("g", hidden=("spasms",), outside=True, sets=(), left=True),
+    row("g", hidden=("spasms",), part="d = 40", outside=True, sets=(), left=True),
     row("h", error="E: x"),
 ]
 
@@ -103,7 +103,7 @@ def test_what_is_counted():
     }
     assert found["intervals"] == [1, 2]  # where the causes are right alone
     assert found["off"] == {"gain": [40.0, 3.0]} and found["errors"] == {"held_out": [5.0, 1.0]}
-    assert lines_of(found)[2] == ["one, d = 15", 1, interval(0, 1), 0, 0, 0, 0]
+    assert lines_of(found)[2] == ["one, d = 15", interval(0, 1), 0, 0, 0, 0]
     assert "hold the truth: 1 of 2" in notes(found)[0] and "4" not in notes(found)[-1]
     assert [line.split()[0] for line in wrong(ROWS)] == ["b:", "e:", "f:", "h:"]
     assert json.loads(json.dumps(found)) == found
@@ -209,7 +209,7 @@ def test_the_command_line_says_what_it_does_not_know_and_reads_a_store(fake, tmp
     monkeypatch.setattr(harness.__main__, "generator_of", lambda name: SimpleNamespace(plan=lambda seed: iter(ITEMS)))
     asked = [str(tmp_path / "mine"), "--store", str(tmp_path / "now"), "--workers", "1"]
     first = command.invoke(app, asked)
-    assert first.exit_code == 0 and "| one | 1 | 1 of 1" in first.output and Fake.made == 2
+    assert first.exit_code == 0 and "| one | 1 of 1" in first.output and Fake.made == 2
     again = command.invoke(app, [*asked, "--stored", "--compare", str(tmp_path / "now"), "--nulls"])
     assert again.exit_code == 0 and Fake.made == 2
     assert "1 of 1 studies were answered by both" in again.output and "b: nothing -> causes_found" in again.output
