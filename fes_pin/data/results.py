@@ -143,9 +143,18 @@ class Result(Saveable):
         return self.verdict == STOPPED
 
     @property
+    def judged_on(self) -> str:
+        """Of which predictions the errors count, in words."""
+        return ""
+
+    def errors(self) -> list[Explained]:
+        """Errors of every kind of prediction, on data that were fitted and, last, on data that took no part."""
+        return []
+
+    @property
     def explained(self) -> Explained | None:
         """What all causes together gain, and against what that is measured."""
-        return None
+        return next((one for one in reversed(self.errors()) if one.what == self.judged_on), None)
 
     def title(self) -> str:
         """The verdict in a few words."""
@@ -165,10 +174,6 @@ class Result(Saveable):
         """The verdict in one sentence, with what is explained, and against what that is measured."""
         told = f": that explains {self.explained}" if self.explained and self.causes else ""
         return f"{self.title()}{told}{f': {self.reason}' if self.reason else ''}."
-
-    def error_rows(self) -> list[tuple[str, str, float | None, float | None]]:
-        """Errors E in percent: on what data, of which prediction, of the nominal and of the extended model."""
-        return []
 
     def notes(self) -> list[tuple[str, str]]:
         """What is said besides the table of what is named, by topic."""
@@ -228,10 +233,10 @@ class Result(Saveable):
     def as_table(self) -> tuple[str, Sequence[str], Sequence[Sequence[str]], Sequence[str]]:
         """Title, head, rows and notes of the table that is printed."""
         errors: dict[str, list[str]] = {}
-        for on, what, *pair in self.error_rows():
-            told = " -> ".join(dict.fromkeys(percent(e) for e in pair))
-            errors.setdefault(f"error E {on}", []).append(f"{what} {told}")
-        lines = [(topic, "; ".join(many)) for topic, many in errors.items()] + self.notes()
+        for one in self.errors():
+            told = " -> ".join(dict.fromkeys([percent(one.nominal), percent(one.extended)]))
+            errors.setdefault(f"error E {ON[one.on]}", []).append(f"{one.what} {told}")
+        lines = [(topic, ", ".join(many)) for topic, many in errors.items()] + self.notes()
         title, rows = f"{self.study.name}: {self.headline()}", [one.row() for one in self.causes]
         return title, self.head(), rows, [f"{topic}: {words}" for topic, words in lines]
 

@@ -77,6 +77,11 @@ class AheadErrors:
     nominal_held_out: Ahead | None
     extended_held_out: Ahead | None
 
+    @property
+    def words(self) -> str:
+        """What is predicted."""
+        return f"predictions {self.horizon_s:g} s ahead"
+
 
 def random_parts(fitted: LikelihoodFit) -> tuple[RandomPart, ...]:
     """The random efforts that act in a fit, with their share of what drives the rig."""

@@ -95,32 +95,28 @@ class Diagnosis(Result):
         return self.extended.model
 
     @property
-    def explained(self) -> Explained:
-        """What all causes gain: of errors over the horizon if the rig is driven, else of those of free simulations."""
-        fitted = STOPPED if self.is_stopped else FITTED
-        if (ahead := self.over_horizon) is not None:
-            on = self.held_out_by if ahead.nominal_held_out else fitted
-            before, after = ahead.nominal_held_out or ahead.nominal, ahead.extended_held_out or ahead.extended
-            measure = f"squared error {ahead.horizon_s:g} s ahead"
-            return Explained(measure, on, before.horizon, after.horizon, after.noise)
-        pairs = zip((self.held_out_by, fitted), self.nominal_error[::-1], self.extended_error[::-1], strict=True)
-        on, one, other = next((o, b, a) for o, b, a in pairs if b is not None and a is not None)
-        return Explained("squared error of a free simulation", on, one, other, self.ceiling_percent)
+    def judged_on(self) -> str:
+        """Of which predictions the errors count: of a driven rig those over the horizon."""
+        return FREE if (ahead := self.over_horizon) is None else ahead.words
+
+    def errors(self) -> list[Explained]:
+        """Errors of every kind of prediction, on data that were fitted and, last, on data that took no part."""
+        out, ahead, none = [], self.ahead, (None, None)
+        fitted = (ahead.nominal, ahead.extended) if ahead else none
+        held_out = (ahead.nominal_held_out, ahead.extended_held_out) if ahead else none
+        on = (STOPPED if self.is_stopped else FITTED, self.held_out_by)
+        for k, (before, after) in enumerate((fitted, held_out)):
+            if ahead and before and after:
+                out.append(Explained(ONE_STEP, on[k], before.one_step, after.one_step))
+                out.append(Explained(ahead.words, on[k], before.horizon, after.horizon, after.noise))
+            free, extended = self.nominal_error[k], self.extended_error[k]
+            if free is not None and extended is not None:
+                out.append(Explained(FREE, on[k], free, extended, self.ceiling_percent))
+        return out
 
     def effect(self, name: str) -> type[Effect] | None:
         """The class that describes a cause; None of a trial that was misread."""
         return next((e for e in self.catalogue.effects if e.name == name), None)
-
-    def error_rows(self) -> list[tuple[str, str, float | None, float | None]]:
-        """Errors E in percent: on what data, of which prediction, of the nominal and of the extended model."""
-        if (ahead := self.ahead) is None:
-            pairs = zip(("fitted", "held out"), self.nominal_error, self.extended_error, strict=True)
-            return [(on, FREE, b, a) for on, b, a in pairs if b is not None]
-        found = [("fitted", ahead.nominal, ahead.extended)]
-        if ahead.nominal_held_out and ahead.extended_held_out:
-            found.append(("held out", ahead.nominal_held_out, ahead.extended_held_out))
-        kinds = {ONE_STEP: "one_step", f"{ahead.horizon_s:g} s ahead": "horizon", FREE: "free"}
-        return [(on, what, getattr(b, n), getattr(a, n)) for on, b, a in found for what, n in kinds.items()]
 
     def notes(self) -> list[tuple[str, str]]:
         """What is said besides the table, by topic."""

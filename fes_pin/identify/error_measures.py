@@ -20,7 +20,7 @@ E_WORDS = (
     "E is the squared error of a model, in percent of the measurement's squares about its mean (equation 2 of the "
     "paper): 0 % is a perfect model, 100 % no better than the mean."
 )
-FREE, ONE_STEP = "free, from the inputs", "one sample ahead"
+FREE, ONE_STEP = "free simulations", "predictions one sample ahead"
 """What a prediction is called in tables."""
 MEASURES = ("fit", "held_out", "horizon")
 """Errors that every record has of both models, and tables of many studies show."""

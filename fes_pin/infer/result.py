@@ -254,13 +254,13 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Explained:
-    """What all causes together gain: errors of a constant, of the fitted nominal and of the extended model.
+    """What all causes together gain: squared errors of a constant, of the fitted nominal and of the extended model.
 
     Errors are E: squares in percent of those of the measurement about its mean. So a constant has 100.
 
     Attributes
     ----------
-    measure
+    what
         What is predicted, in words.
     on
         What data: a key of `ON`.
@@ -268,7 +268,7 @@ class Explained:
         What noise alone leaves; None where that is not known.
     """
 
-    measure: str
+    what: str
     on: str
     nominal: float
     extended: float
@@ -290,14 +290,14 @@ class Explained:
         if self.noise is not None:
             above = f" ({self.above_noise:.0f} % of what is above the noise)"
             alone = f"; noise alone leaves {percent(self.noise)}"
-        share = f"{self.of(self.nominal):.0f} % of the {self.measure}{above}"
+        share = f"{self.of(self.nominal):.0f} % of the squared error of {self.what}{above}"
         return f"{share}: E {percent(self.nominal)} -> {percent(self.extended)}, {ON[self.on]}{alone}"
 
     def record(self) -> dict[str, Any]:
         """As JSON files have it."""
         errors = {n: shown(getattr(self, n)) for n in ("constant", "nominal", "extended", "noise")}
         gains = {"constant": self.of(self.constant), "nominal": self.of(self.nominal), "above_noise": self.above_noise}
-        told = {"measure": self.measure, "on": self.on, "error_percent": errors}
+        told = {"measure": f"squared error of {self.what}", "on": self.on, "error_percent": errors}
         return {**told, "gain_percent": {n: shown(value) for n, value in gains.items()}}
 
 

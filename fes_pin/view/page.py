@@ -6,6 +6,7 @@ import base64
 import hashlib
 import html
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -134,7 +135,7 @@ def value_text(value: float, std: float) -> str:
 
 def unit_text(unit: str) -> str:
     """A unit as printed: with its exponents and the micro sign."""
-    return unit.replace("m2", "m²").replace("us", "µs")
+    return re.sub(r"(?<=[a-z])[23]", lambda power: "²" if power[0] == "2" else "³", unit).replace("us", "µs")
 
 
 def key(*entries: tuple[str, str]) -> Markup:

@@ -11,7 +11,7 @@ from fes_pin.data.files import write_text
 from fes_pin.data.numbers import instance
 from fes_pin.data.results import Result
 from fes_pin.identify.error_measures import E_WORDS
-from fes_pin.infer.result import Cause, Change, Named
+from fes_pin.infer.result import ON, Cause, Change, Named
 from fes_pin.infer.text import percent, probability
 from fes_pin.models.describe import equation, remark, sentence
 from fes_pin.view.intervals import intervals_drawing, rivals_drawing
@@ -89,14 +89,17 @@ def _answer(result: Result, one: Named) -> Content:
     kind = result.effect(one.name)
     what = one.words or (sentence(kind) if kind else one.name)
     where = f" At {one.site}." if one.site else ""
-    return f"{_upper(what).removesuffix('.')}.{where} {', '.join(_sizes(one))}. {told_apart(one)}"
+    return f"{_upper(what).removesuffix('.')}.{where} Size: {', '.join(_sizes(one))}. {told_apart(one)}"
 
 
 def _sizes(one: Named) -> list[str]:
-    """Its values in words, without units in their names."""
-    names = [[UNIT_IN_NAME.sub("", name).replace("_", " "), *group] for (name, *group), _ in one.estimates()]
-    sizes = [str(replace(estimate, unit=unit_text(estimate.unit))) for _, estimate in one.estimates()]
-    return [" ".join([*name, size]) for name, size in zip(names, sizes, strict=True)]
+    """Its values in words, without units in their names, and without groups that do not have it."""
+    sizes = []
+    for (name, *group), estimate in one.estimates():
+        if estimate.std != 0.0 or not group:
+            words = [UNIT_IN_NAME.sub("", name).replace("_", " "), *group]
+            sizes.append(" ".join([*words, str(replace(estimate, unit=unit_text(estimate.unit)))]))
+    return sizes
 
 
 def _upper(words: str) -> str:
@@ -112,9 +115,9 @@ def told_apart(one: Named) -> str:
 
 def _errors(result: Result) -> list[Markup]:
     """Errors of both models, in sample and held out."""
-    head = ["data", "prediction", "E nominal"] + ["E extended"] * bool(result.causes)
-    rows = [[on, what, percent(b), percent(a)][: len(head)] for on, what, b, a in result.error_rows()]
-    return [element("p", E_WORDS), html_table(head, rows, (2, 3))] if rows else []
+    head = ["error E of", "data", "E nominal"] + ["E extended"] * bool(result.causes)
+    rows = [[one.what, ON[one.on], percent(one.nominal), percent(one.extended)] for one in result.errors()]
+    return [element("p", E_WORDS), html_table(head, [r[: len(head)] for r in rows], (2, 3))] if rows else []
 
 
 def _named(result: Result) -> list[Markup]:

@@ -57,11 +57,19 @@ class WalkDiagnosis(Result):
         return extended_body(self.models, self.best)
 
     @property
-    def explained(self) -> Explained:
-        """What all causes gain of the errors of the ground reaction that the motion requires."""
-        pairs = zip((CROSS_VALIDATED, FITTED), self.nominal_error[::-1], self.extended_error[::-1], strict=True)
-        on, before, after = next((o, b, a) for o, b, a in pairs if b is not None and a is not None)
-        return Explained("squared error of the ground reaction", on, before, after, self.ceiling_percent or None)
+    def judged_on(self) -> str:
+        """Of what the errors count: of the ground reaction that the motion requires."""
+        return "the ground reaction"
+
+    def errors(self) -> list[Explained]:
+        """Errors of the ground reaction, on all strides and on strides held out."""
+        pairs = zip((FITTED, CROSS_VALIDATED), self.nominal_error, self.extended_error, strict=True)
+        noise = self.ceiling_percent or None
+        return [
+            Explained(self.judged_on, on, before, after, noise)
+            for on, before, after in pairs
+            if before is not None and after is not None
+        ]
 
     def files(self) -> dict[str, str | bytes]:
         """Content of every file of the diagnosis but the report and the playback, by name: with the extended body."""
@@ -106,11 +114,6 @@ class WalkDiagnosis(Result):
     def effect(self, name: str) -> type[WalkEffect] | None:
         """The class that describes a cause."""
         return next((e for e in EFFECTS if e.name == name), None)
-
-    def error_rows(self) -> list[tuple[str, str, float | None, float | None]]:
-        """Errors E in percent: on what strides, of the ground reaction, of the nominal and of the extended model."""
-        pairs = zip(("all strides", "strides held out"), self.nominal_error, self.extended_error, strict=True)
-        return [(on, "ground reaction", b, a) for on, b, a in pairs if b is not None]
 
     def notes(self) -> list[tuple[str, str]]:
         """What is said besides the table, by topic."""

@@ -39,7 +39,7 @@ def test_a_heavy_trunk_is_in_the_first_set(heavy):
     first = heavy.causes[0]
     assert heavy.verdict == "causes_found"
     assert "segment_mass" in (first.name, *first.equivalents)
-    assert first.gain_held_out.low > 0.0
+    assert first.gain_held_out.low > 0.0 and all(c.judged.low > 0.0 for c in heavy.causes)
     assert heavy.wall_s < 120.0
 
 
