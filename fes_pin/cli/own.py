@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from fes_pin.data.new_study import NewStudy
+    from fes_pin.data.schema import RigSchema
     from fes_pin.data.study import Study
     from fes_pin.data.wanted import Wanted
     from fes_pin.models.catalogue import Catalogue
@@ -189,26 +190,18 @@ def _wanted(
     fill: bool,
     given: Mapping[str, Mapping[str, str]],
 ) -> Wanted:
-    from fes_pin.data.new_study import common_folder
-    from fes_pin.data.schema import known_rigs, one_of
     from fes_pin.data.urdf import is_revolute
     from fes_pin.data.wanted import Wanted
 
-    rigs = known_rigs(catalogue.schemas())
-    schema = rigs[one_of(rig or "joint", tuple(rigs), partial(InputError, column="--rig"))]
+    schema = _schema(rig, catalogue, urdf_file)
     if schema.owner is None and (urdf is not None or given["columns"] or resample or fill or catalogue.origins()):
         raise InputError("expected no URDF, --column, --resample, --fill or --library for walking", column="--rig")
     if resample == 0.0:
         raise InputError("expected a rate above 0 Hz", column="--resample")
-    if schema.owner is not None and ("urdf" in schema.files) != (urdf is not None):
-        told = "--urdf FILE, or --pendulum LENGTH MASS, --rod or --slide" if urdf is None else "no URDF"
-        raise InputError(f"expected {told} for rig {schema.name}", column="--urdf")
-    if urdf_file is not None and schema.check_files is not None:
-        schema.check_files({"urdf": urdf_file})
     doubles = [f for k, f in enumerate(files) if f.absolute() in [g.absolute() for g in files[:k]]]
     if doubles:
         raise InputError("was named twice", file=doubles[0])
-    folder = out or common_folder(files)
+    folder = out or Path(os.path.commonpath([file.absolute().parent for file in files]))
     settings = dict(given["settings"])
     return Wanted(
         files=tuple(files),
@@ -225,6 +218,20 @@ def _wanted(
         fill=fill,
         ask=_ask if sys.stdin.isatty() and sys.stdout.isatty() else None,
     )
+
+
+def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None) -> RigSchema:
+    """What is known of the rig, whose URDF is there where it needs one."""
+    from fes_pin.data.schema import known_rigs, one_of
+
+    rigs = known_rigs(catalogue.schemas())
+    schema = rigs[one_of(rig or "joint", tuple(rigs), partial(InputError, column="--rig"))]
+    if schema.owner is not None and ("urdf" in schema.files) != (urdf is not None):
+        told = "--urdf FILE, or --pendulum LENGTH MASS, --rod or --slide" if urdf is None else "no URDF"
+        raise InputError(f"expected {told} for rig {schema.name}", column="--urdf")
+    if urdf is not None and schema.check_files is not None:
+        schema.check_files({"urdf": urdf})
+    return schema
 
 
 def _ask(question: str) -> str:

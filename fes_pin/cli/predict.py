@@ -81,10 +81,7 @@ def predict(
     is_study = trial.is_dir() or trial.suffix.lower() == ".toml"
     _refuse_ignored(is_study, setting=setting, columns_of=columns_of, trials=trials, exclude=exclude)
     if is_study:
-        study = study_of(trial, catalogue, trials, exclude)
-        if study.rig != loaded.rig.name:
-            raise InputError(f"expected a study of the rig {loaded.rig.name}, found {study.rig}", file=trial)
-        measured: Sequence[Trial] = study.trials
+        measured = _trials(trial, loaded, trials, exclude, catalogue)
     else:
         measured = [_trial(trial, loaded, setting, columns_of, catalogue, horizon is None)]
     outputs = Outputs("predict", force)
@@ -121,6 +118,14 @@ def _refuse_ignored(is_study: bool, **given: object) -> None:
             raise InputError(
                 f"goes only with {what}", column="--set" if name == "setting" else f"--{name}".replace("_", "-")
             )
+
+
+def _trials(path: Path, model: Model, trials: str | None, exclude: str | None, catalogue: Catalogue) -> Sequence[Trial]:
+    """The trials of a study to predict."""
+    study = study_of(path, catalogue, trials, exclude)
+    if study.rig != model.rig.name:
+        raise InputError(f"expected a study of the rig {model.rig.name}, found {study.rig}", file=path)
+    return study.trials
 
 
 def _trial(

@@ -5,7 +5,7 @@ What the files do not say is taken from options, or asked of a person at a termi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -318,12 +318,3 @@ def placed(path: Path, folder: Path, contents: dict[str, str | bytes], below: st
         raise InputError(f"would be copied to {place}, where there is another file already", file=path)
     contents[place] = content
     return place
-
-
-def common_folder(files: Iterable[Path]) -> Path:
-    """The folder that all files lie in or below."""
-    parents = [path.absolute().parent for path in files]
-    shared = parents[0]
-    while not all(p.is_relative_to(shared) for p in parents):
-        shared = shared.parent
-    return shared

@@ -194,23 +194,26 @@ def _body(lines: list[str], form: TextForm) -> tuple[list[str], np.ndarray]:
 
 def _fast(body: list[str], form: TextForm, places: list[int], count: int) -> np.ndarray | None:
     """All numbers at once; None where something in the file must be looked at cell by cell."""
-    odd = '".' if form.decimal == "," else '"'  # a point among decimal commas may part thousands
-    if any(sign in line for line in body for sign in odd):
-        return None
-    if form.delimiter != " ":
-        cuts = {line.count(form.delimiter) for line in body}
-        if not cuts <= {count - 1, count - form.strict} or len(cuts) > 1:
-            return None
-    elif any(len(line.split()) != count for line in body):
+    is_whole = form.strict and len(places) == count  # then NumPy refuses what is odd itself
+    if not is_whole and not _is_regular(body, form, count):
         return None
     lines = [line.replace(",", ".") for line in body] if form.decimal == "," else body
-    delimiter = None if form.delimiter == " " else form.delimiter
+    delimiter, chosen = None if form.delimiter == " " else form.delimiter, None if is_whole else places
     try:
-        values = np.loadtxt(lines, dtype=float, delimiter=delimiter, comments=None, ndmin=2, usecols=places)
+        values = np.loadtxt(lines, dtype=float, delimiter=delimiter, comments=None, ndmin=2, usecols=chosen)
     except ValueError:
         return None
-    whole = len(values) == len(body) and not (form.strict and np.isnan(values).any())
-    return values if whole and not np.isinf(values).any() else None
+    there = np.isfinite(values) if form.strict else ~np.isinf(values)
+    return values if values.shape == (len(body), len(places)) and there.all() else None
+
+
+def _is_regular(body: list[str], form: TextForm, count: int) -> bool:
+    """True of lines of as many cells as there are names, without quotes or points that part thousands."""
+    odd = '".' if form.decimal == "," else '"'
+    delimiter = None if form.delimiter == " " else form.delimiter
+    cells = {len(line.split(delimiter)) for line in body}
+    most = count if form.strict or delimiter is None else count + 1  # a delimiter at the end begins no cell
+    return len(cells) == 1 and cells <= {count, most} and not any(sign in line for line in body for sign in odd)
 
 
 def _slowly(
