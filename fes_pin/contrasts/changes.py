@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from fes_pin.contrasts.grouped import Grouped, Item
 from fes_pin.contrasts.models import ContrastModels, Found
+from fes_pin.contrasts.screen import ItemScore
 from fes_pin.contrasts.words import of_cause, of_nominal
 from fes_pin.diagnosis.misread import NAME, Misread
 from fes_pin.infer.distributions import normal_quantile
 from fes_pin.infer.levels import ABSORBED_BELOW, CLAIM_LEVEL, SEPARABLE
 from fes_pin.infer.result import Change, Evidence, ParameterEstimate
 from fes_pin.models.catalogue import Catalogue
+from fes_pin.models.stage import Effect
 
 SEEN = 0.95
 """Power at which a change that was not found is called excluded."""
@@ -83,33 +83,42 @@ def _equivalents(found: Found, item: Item) -> tuple[str, ...]:
 def not_changed(
     models: ContrastModels, best: Grouped
 ) -> tuple[dict[str, float], dict[str, ParameterEstimate], tuple[str, ...]]:
-    """How large a change would have been seen: of what the model has as a share, of other causes in their units."""
-    changed = {i.name for i in best.items}
+    """How large a change would have been seen: of what the model has as a share, of other causes in their units.
+
+    Returns
+    -------
+    tuple
+        Both by name, and the names of what could have changed unseen.
+    """
     single = 1.0 - (1.0 - CLAIM_LEVEL) ** (1.0 / models.family.tests)
-    reach = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN)
-    unchanged: dict[str, float] = {}
-    sizes: dict[str, list[tuple[float, str, float]]] = {}
-    model, info = best.model, best.model.parameter_info()
-    for one in models.screen.scores(best).scored:
-        if one.item.group is None:
-            continue
-        size = reach * one.deviation * math.sqrt(max(one.spread, 1.0))
-        if one.effect is None:
-            path = one.item.name
-            if path in info and path not in changed and model.parameters()[path]:
-                unchanged[path] = max(unchanged.get(path, 0.0), size / abs(model.parameters()[path]))
-        elif one.item.name not in changed:
-            name = one.effect.amplitudes()[0]
-            unit = one.effect.parameters()[name].in_units(model.rig.units()).unit
-            sizes.setdefault(one.item.name, []).append((size, unit, one.kept))
-    excluded = {
-        n: ParameterEstimate(max(s for s, _, _ in many), 0.0, many[0][1])
-        for n, many in sizes.items()
-        if max(k for _, _, k in many) >= ABSORBED_BELOW and np.isfinite(max(s for s, _, _ in many))
-    }
-    unseen = [n for n in sizes if n not in excluded]
-    unseen += [n for n, v in unchanged.items() if not v < 1.0]
-    return {n: v for n, v in unchanged.items() if v < 1.0}, excluded, tuple(sorted(unseen))
+    reach, changed = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN), {i.name for i in best.items}
+    others = [s for s in models.screen.scores(best).scored if s.item.group is not None and s.item.name not in changed]
+    sizes = [(s, reach * s.deviation * math.sqrt(max(s.spread, 1.0))) for s in others]
+    shares = _largest([(s, size / abs(v)) for s, size in sizes if s.effect is None and (v := _value(best, s))])
+    largest = _largest([(s, size) for s, size in sizes if s.effect is not None])
+    units = {s.item.name: _unit(best, s.effect) for s in others if s.effect is not None}
+    felt = {s.item.name for s in others if s.kept >= ABSORBED_BELOW}
+    excluded = {n: ParameterEstimate(v, 0.0, units[n]) for n, v in largest.items() if n in felt and math.isfinite(v)}
+    unchanged = {n: v for n, v in shares.items() if v < 1.0}
+    return unchanged, excluded, tuple(sorted({*largest, *shares} - {*excluded, *unchanged}))
+
+
+def _largest(sizes: list[tuple[ItemScore, float]]) -> dict[str, float]:
+    """The largest size of each name."""
+    out: dict[str, float] = {}
+    for one, size in sizes:
+        out[one.item.name] = max(out.get(one.item.name, size), size)
+    return out
+
+
+def _value(best: Grouped, one: ItemScore) -> float:
+    """What a parameter is in groups that share it."""
+    return best.model.parameters()[one.item.name]
+
+
+def _unit(best: Grouped, effect: Effect) -> str:
+    """Of the first amplitude of a cause."""
+    return effect.parameters()[effect.amplitudes()[0]].in_units(best.model.rig.units()).unit
 
 
 def misread_change(models: ContrastModels, misread: Misread) -> Change:

@@ -6,7 +6,7 @@ import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Ite
 from fes_pin.contrasts.repeats import Repeats, scatter, without_scatter
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
-from fes_pin.identify.fit import Fit, ended, fit_multistart, fit_problem, noise_of, rough_noise
+from fes_pin.identify.fit import Fit, fit_multistart, fit_problem, noise_of, rough_noise
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
@@ -23,7 +23,7 @@ from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import first_guess
 from fes_pin.infer.maximise import alternate
 from fes_pin.infer.noise import Noise, as_white
-from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
+from fes_pin.infer.optimum import MAX_ITERATIONS, minimise
 from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.projection import without_locals
 from fes_pin.models.model import Model
@@ -103,7 +103,7 @@ class GroupedFits(ABC):
         weights = {g: w if isinstance(w, Doubt) else w.of_trials(kept[g]) for g, w in one.weights.items()}
         problem = GroupedProblem(one.model, trials, weights)
         unknowns = [u for k, u in enumerate(one.fit.unknowns) if k not in held]
-        return Grouped(one.items, _fit_of(problem, minimise(problem, one.fit.values, unknowns)), weights)
+        return Grouped.of(one.items, problem, minimise(problem, one.fit.values, unknowns), weights)
 
     def part(self, one: Grouped, group: str, alone: int | None = None) -> Fit:
         """A group's part of a fit as a fit of that group's own, to its own trials, or to one of them `alone`."""
@@ -125,8 +125,7 @@ class GroupedFits(ABC):
         steps: int = MAX_ITERATIONS,
     ) -> Grouped:
         problem = GroupedProblem(model, self.trials, weights)
-        found = minimise(problem, model.parameters(), unknowns, steps)
-        return Grouped(frozenset(items), _fit_of(problem, found), weights)
+        return Grouped.of(items, problem, minimise(problem, model.parameters(), unknowns, steps), weights)
 
 
 class PredictedGroups(GroupedFits):
@@ -160,8 +159,8 @@ class PredictedGroups(GroupedFits):
     ) -> Grouped:
         """Fit a grouped model and its noise by alternating maximisation."""
         problem = GroupedProblem(model, self.trials, weights)
-        fitted = _fit_of(problem, alternate(problem, model.parameters(), unknowns, ROUNDS, LOOK_DRIVEN))
-        return Grouped(frozenset(items), fitted, {g: p.noise for g, p in problem.parts.items()})
+        found = alternate(problem, model.parameters(), unknowns, ROUNDS, LOOK_DRIVEN)
+        return Grouped.of(items, problem, found, {g: p.noise for g, p in problem.parts.items()})
 
     def go_on(self, one: Grouped) -> Grouped:
         """Let a set converge; also from little that is random, and from what is in each group alone.
@@ -243,11 +242,6 @@ class SimulatedGroups(GroupedFits):
             white = as_white(noise)
             out[group] = Repeats(rich_noise(part, white, (), [[_slopes(part, white)]]) if one.repeats else noise)
         return out
-
-
-def _fit_of(problem: Any, found: Optimum) -> Fit:
-    """The fit of a grouped problem that has ended."""
-    return Fit(**ended(problem.model, found), trials=problem.trials, noise=problem.noise)
 
 
 def _slopes(fitted: Fit, white: dict[str, Noise]) -> np.ndarray:

@@ -12,11 +12,12 @@ import numpy as np
 
 from fes_pin.contrasts.repeats import RepeatedProblem, Repeats
 from fes_pin.data.trial import Trial
-from fes_pin.identify.fit import Fit
+from fes_pin.identify.fit import Fit, ended
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.problem import products_of
 from fes_pin.infer.levels import PARAMETER_PRICE, SEPARABLE
 from fes_pin.infer.noise import Noise, NoiseModel
+from fes_pin.infer.optimum import Optimum
 from fes_pin.infer.problem import Linearized, Unknowns
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point
 from fes_pin.models.model import Model
@@ -292,20 +293,25 @@ class Grouped:
     ----------
     items
         What it has besides the nominal model.
+    model
+        Fitted.
     fit
-        Its `model` is the grouped one; `sse` twice the negative log-likelihood, but for a constant.
+        Of `model`; its `sse` is twice the negative log-likelihood, but for a constant.
     weights
         By group.
     """
 
     items: frozenset[Item]
+    model: GroupedModel
     fit: Fit
     weights: Mapping[str, Weight]
 
-    @property
-    def model(self) -> GroupedModel:
-        """The grouped model, fitted."""
-        return self.fit.model  # type: ignore[return-value]
+    @classmethod
+    def of(cls, items: Collection[Item], problem: Any, found: Optimum, weights: Mapping[str, Weight]) -> Grouped:
+        """The fit of a grouped problem that has ended."""
+        fitted = ended(problem.model, found)
+        fit = Fit(**fitted, trials=problem.trials, noise=problem.noise)
+        return cls(frozenset(items), fitted["model"], fit, weights)
 
     @property
     def sse(self) -> float:

@@ -24,7 +24,18 @@ def grouped_study(study: Study, other: Study | None, by: str, chosen: Sequence[s
     if study.rig == "body":
         raise InputError("expected a rig whose trials are simulated; walking has no contrast", file=study.folder)
     labelled = _labelled(study, by) if other is None else _joined(study, instance(other, Study, "after"))
-    groups = list(in_groups(labelled.trials))
+    order = _order(labelled, chosen)
+    trials = [t for g in order for t in labelled.trials if t.group == g]
+    fitted = {t.group for t in trials if t.role != "held_out"}
+    for group in order:
+        if group not in fitted:
+            raise InputError(f"group {group!r} has no trial to fit: all have role = held_out", file=study.folder)
+    return replace(labelled, trials=tuple(trials))
+
+
+def _order(study: Study, chosen: Sequence[str] | None) -> list[str]:
+    """The groups that are compared, in their order: those that were chosen, or all."""
+    groups = list(in_groups(study.trials))
     if chosen is not None:
         instance(chosen, Sequence, "groups")
     chosen = (chosen,) if isinstance(chosen, str) else chosen
@@ -35,11 +46,7 @@ def grouped_study(study: Study, other: Study | None, by: str, chosen: Sequence[s
     if len(order) < 2:
         found = f"only {order[0]!r}" if order else "none"
         raise InputError(f"expected at least two groups to contrast, found {found}", file=study.folder)
-    trials = [t for g in order for t in labelled.trials if t.group == g]
-    for group in order:
-        if not any(t.group == group and t.role != "held_out" for t in trials):
-            raise InputError(f"group {group!r} has no trial to fit: all have role = held_out", file=study.folder)
-    return replace(labelled, trials=tuple(trials))
+    return order
 
 
 def in_groups(trials: Sequence[Trial]) -> dict[str, list[Trial]]:

@@ -96,12 +96,14 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         return dict(zip(starts, looks, strict=True))
 
     def _look(self, base: Grouped, scores: Sequence[ItemScore]) -> Grouped:
+        """A first fit of a set; one that converges where the scatter of a parameter hides that it changed."""
         out = []
         for one in scores:
             items = base.items | {one.item}
             model = base.model.having(items, () if one.effect is None else (one.effect,)).with_parameters(one.start)
             out.append(self.maxima.look(model, items, base))
-        return min(out, key=lambda f: f.price)
+        best = min(out, key=lambda f: f.price)
+        return self.maxima.go_on(best) if scores[0].item.name in base.repeats else best
 
     def converged(self, fits: Sequence[Grouped]) -> list[Grouped]:
         """Fits once they have converged."""

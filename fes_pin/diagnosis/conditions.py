@@ -98,15 +98,23 @@ class Conditions(ABC, Generic[S, R]):
             return made.search, made.searched, made
         search, searched = self.run(list(trials))
         if made is None and not search.was_stopped:
-            misread = self._misread(trials, searched) if self.has_causes(searched) else first
-            made = None if misread is None else self._restated(trials, misread)
-            made = made if made is not None and self.is_explained(made) else None
-        if made is None or search.was_stopped or made.search.was_stopped:
-            return search, searched, None
-        price = PARAMETER_PRICE + 2.0 * math.log(sum(len(self.nominal.rig.stated(t)) for t in trials))
-        if not self.saved(searched, trials, made) > price + SEPARABLE:
+            made = self._by_causes(trials, searched, first)
+        if made is None or not self._is_cheaper(search, searched, trials, made):
             return search, searched, None
         return made.search, made.searched, made
+
+    def _by_causes(self, trials: Sequence[Trial], searched: R, first: Misread | None) -> Restated[S, R] | None:
+        """A search with the trial restated that stands out by the causes that were found, if it explains that."""
+        misread = self._misread(trials, searched) if self.has_causes(searched) else first
+        made = None if misread is None else self._restated(trials, misread)
+        return made if made is not None and self.is_explained(made) else None
+
+    def _is_cheaper(self, search: S, searched: R, trials: Sequence[Trial], made: Restated[S, R]) -> bool:
+        """Whether the price falls by more than that of a condition, of all that are stated."""
+        if search.was_stopped or made.search.was_stopped:
+            return False
+        price = PARAMETER_PRICE + 2.0 * math.log(sum(len(self.nominal.rig.stated(t)) for t in trials))
+        return self.saved(searched, trials, made) > price + SEPARABLE
 
     def _misread(self, trials: Sequence[Trial], searched: R | None) -> Misread | None:
         """A misreading; none where time is over, or where the model cannot be calculated with."""
