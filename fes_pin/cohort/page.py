@@ -88,22 +88,15 @@ def _head(studies: Sequence[PageRow], good: Sequence[PageRow], prevalence: Seque
 def _prevalence(rows: Sequence[PageRow], studies: int) -> list[Markup]:
     if not rows:
         return [element("p", "None.")]
-    head = (
-        "cause",
-        "stage",
-        "studies",
-        "share [95 %]",
-        "median gain",
-        "told apart in",
-        "false discovery rate below 5 % in",
-    )
+    found = ("share [95 %]", "median gain", "told apart in", "false discovery rate below 5 % in")
+    head = ("cause", "stage", "studies", *found)
     cells: list[list[Content]] = [
         [
             element("code", r["cause"]),
             stage_mark(r["stage"]),
             f"{r['studies']} of {studies}",
             f"{r['share_percent']:.0f} % [{r['share_low']:.0f}, {r['share_high']:.0f}]",
-            _percent(r["median_gain_percent"]),
+            percent(r["median_gain_percent"]),
             str(r["alone"]),
             str(r["certain"]),
         ]
@@ -114,10 +107,6 @@ def _prevalence(rows: Sequence[PageRow], studies: int) -> list[Markup]:
         "discovery rate is over all causes that were looked for in all studies."
     )
     return [html_table(head, cells, (2, 3, 4, 5, 6)), element("p", words, class_="soft")]
-
-
-def _percent(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.0f} %"
 
 
 def _pooled(causes: Sequence[PageRow], rows: Sequence[PageRow]) -> list[Markup]:

@@ -20,22 +20,9 @@ GREEK = {
     **{"pi": "π", "rho": "ρ", "sigma": "σ", "tau": "τ", "phi": "φ", "omega": "ω"},
 }
 RELATIONS = {"=": "=", "->": "→", "<": "<", ">": ">", ",": ",", "<=": "≤", ">=": "≥"}
-WORDS = {
-    "where",
-    "replaced",
-    "by",
-    "replaces",
-    "shortens",
-    "the",
-    "muscle",
-    "from",
-    "up",
-    "for",
-    "at",
-    "if",
-    "else",
-    "and",
-}
+WORDS = set(
+    ["where", "replaced", "by", "replaces", "shortens", "the", "muscle", "from", "up", "for", "at", "if", "else", "and"]
+)
 """Words of a sentence, which are no names of quantities."""
 _TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:e-?\d+)?)|([^\W\d]\w*)('*)|(->|<=|>=|[-+*/^()|,=<>]))")
 _NEXT = re.compile(r"([^\W\d]\w*)\+(?=\s*(?:=|$))")

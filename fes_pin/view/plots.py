@@ -5,7 +5,7 @@ Each takes results and returns a `Drawing`. No text of the study stands in a fig
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -264,11 +264,3 @@ def stimulus_drawing(trial: Trial, position_unit: str = "rad") -> Drawing:
     step = every(len(trial))
     columns = {"time_s": trial.time, **trial.columns}
     return Drawing(drawn, csv_of(columns, step), f"one sample in {step}" if step > 1 else "")
-
-
-def by_kind(many: Sequence[Missing]) -> Mapping[str, list[int]]:
-    """Which of them can share a figure, by kind."""
-    out: dict[str, list[int]] = {}
-    for k, one in enumerate(many):
-        out.setdefault(one.kind, []).append(k)
-    return out

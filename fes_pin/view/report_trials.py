@@ -12,11 +12,12 @@ from fes_pin.infer.text import percent
 from fes_pin.models.model import Model
 from fes_pin.models.tracking import can_track
 from fes_pin.view.missing import Missing, missing_along, missing_input
-from fes_pin.view.page import Content, Markup, element, figure, folded, html_table, joined, key
-from fes_pin.view.plots import by_kind, missing_drawing, points_of, share, trial_drawing
+from fes_pin.view.page import Markup, element, figure, folded, joined, key
+from fes_pin.view.plots import missing_drawing, points_of, share, trial_drawing
 
 OPEN = 4
 """Trials that are drawn at once, those that the nominal model misses most; the others are folded."""
+FLAG = element("strong", "worse", class_="worse")
 WORSE = 0.01
 """Share by which a trial's error must grow to count as worse: less is the noise of one trial's fit."""
 
@@ -31,11 +32,10 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
     before = _missing(diagnosis, diagnosis.nominal.model, [r.nominal for r in replays], replays)
     after = _missing(diagnosis, diagnosis.model, [r.extended for r in replays], replays) if diagnosis.causes else []
     unit = position_unit(diagnosis)
-    along = diagnosis.over_horizon is not None and any(_is_tracked(diagnosis.model, r.measured) for r in replays)
     how = (
         "the effort of a stiff servo that keeps the model on the measured motion. No free simulation takes part, for "
         "this rig's would run away"
-        if along
+        if _is_tracked(diagnosis)
         else "the smoothed residual, taken through the inertia, damping and stiffness of the rig"
     )
     text = (
@@ -48,14 +48,13 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
         element("p", text),
         key(("nominal", "nominal, instants"), ("measured", "nominal, median"), *extended),
     ]
-    for kind, chosen in by_kind(before).items():
-        first, second = [before[k] for k in chosen], [after[k] for k in chosen if after]
+    for kind in dict.fromkeys(one.kind for one in before):
+        first, second = ([one for one in many if one.kind == kind] for many in (before, after))
         drawn = [
             figure(missing_drawing(first, second, n, unit), file=f"missing_{kind}_against_{n}")
             for n in sorted(first[0].against, key=lambda n: -share(first, n))
         ]
-        count = f"{len(chosen)} trial{'s' if len(chosen) > 1 else ''}"
-        out.append(element("h3", f"Missing {kind}, {count}"))
+        out.append(element("h3", f"Missing {kind}, {len(first)} trial{'s' * (len(first) > 1)}"))
         out.append(element("div", joined(drawn), class_="grid three"))
     return out
 
@@ -63,22 +62,22 @@ def missing_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mar
 def _missing(
     diagnosis: Diagnosis, model: Model, simulated: Sequence[Trial], replays: Sequence[Replay]
 ) -> list[Missing]:
-    runs_away = diagnosis.over_horizon is not None
+    tracked = _is_tracked(diagnosis)
     return [
         missing_along(model, r.measured)
-        if runs_away and _is_tracked(model, r.measured)
+        if tracked and r.measured.kind != IMPOSED
         else missing_input(model, r.measured, one)
         for r, one in zip(replays, simulated, strict=True)
     ]
 
 
-def _is_tracked(model: Model, trial: Trial) -> bool:
-    """True where a servo can keep the model on the motion: an imposed one needs none."""
-    return can_track(model) and trial.kind != IMPOSED
+def _is_tracked(diagnosis: Diagnosis) -> bool:
+    """True where a servo can keep the model on the motion, which a free simulation would run away from."""
+    return diagnosis.over_horizon is not None and can_track(diagnosis.model)
 
 
 def trials_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Markup]:
-    """The trials: a table and a figure of each, those with small errors folded."""
+    """A figure of each trial, those with small errors folded."""
     extended = bool(diagnosis.causes)
     noise, unit, points = diagnosis.extended.noise, position_unit(diagnosis), points_of(len(replays))
 
@@ -106,7 +105,7 @@ def trials_section(diagnosis: Diagnosis, replays: Sequence[Replay]) -> list[Mark
         few = f"the other {len(others)} trials, which" if len(others) > 1 else "the other trial, which"
         rest = element("div", joined([drawn(k) for k in others]), class_="grid")
         out.append(folded(f"Show {few} the nominal model misses less", rest))
-    return [*out, _trial_table(replays, extended)]
+    return out
 
 
 def got_worse(one: Replay) -> bool:
@@ -116,36 +115,14 @@ def got_worse(one: Replay) -> bool:
 
 def _worse_note(replays: Sequence[Replay], extended: bool) -> list[Markup]:
     worse = [r.measured.name for r in replays if extended and got_worse(r)]
-    if not worse:
-        return []
     which = f"{len(worse)} of {len(replays)} trials" if len(worse) > 1 else "One trial"
-    return [element("p", _flag(), f" {which} got worse with the extended model: {', '.join(worse)}.")]
-
-
-def _flag() -> Markup:
-    return element("strong", "worse", class_="worse")
-
-
-def _conditions(one: Replay) -> str:
-    trial = one.measured
-    values = "".join(f", {n} = {v:g}" for n, v in trial.conditions.items())
-    return f"{trial.kind}{values}{', held out' if trial.role == 'held_out' else ''}"
+    return [element("p", FLAG, f" {which} got worse with the extended model: {', '.join(worse)}.")] if worse else []
 
 
 def _trial_caption(one: Replay, extended: bool) -> Markup:
-    after = f" → {percent(one.extended_error)}" if extended else ""
-    name = element("strong", one.measured.name)
-    said = element("span", f" · {_conditions(one)} · E {percent(one.nominal_error)}{after} ")
-    return name + said + (_flag() if extended and got_worse(one) else Markup(""))
-
-
-def _trial_table(replays: Sequence[Replay], extended: bool) -> Markup:
-    head = ["trial", "conditions", "duration (s)", "E nominal"] + ["E extended"] * extended
-    rows: list[list[Content]] = []
-    for r in replays:
-        row: list[Content] = [r.measured.name, _conditions(r), f"{r.measured.duration:.4g}", percent(r.nominal_error)]
-        if extended:
-            shown = element("span", percent(r.extended_error), " ")
-            row.append(shown + (_flag() if got_worse(r) else Markup("")))
-        rows.append(row)
-    return html_table(head, rows, (2, 3, 4))
+    trial, after = one.measured, f" -> {percent(one.extended_error)}" if extended else ""
+    conditions = "".join(f", {n} = {v:g}" for n, v in trial.conditions.items())
+    held_out = ", held out" if trial.role == "held_out" else ""
+    said = f"{trial.kind}{conditions}{held_out}, {trial.duration:.4g} s \u00b7 E {percent(one.nominal_error)}{after}"
+    flag = FLAG if extended and got_worse(one) else Markup("")
+    return element("strong", trial.name) + element("span", f" \u00b7 {said} ") + flag
