@@ -14,29 +14,30 @@ from fes_pin.data.derived import without_derived
 from fes_pin.data.errors import InputError
 from fes_pin.data.log import EFFORT, Log
 from fes_pin.data.provenance import provenance_now
+from fes_pin.data.schema import IMPOSED
 from fes_pin.data.spikes import without_spikes
 from fes_pin.data.stuck import without_stuck
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.doubts import few_trials
 from fes_pin.diagnosis.driven import driven_diagnosis
-from fes_pin.diagnosis.free import judge_free, unfitted
+from fes_pin.diagnosis.form_errors import searched
 from fes_pin.diagnosis.logged import LogFaults, likelier, with_timing_of, with_words
 from fes_pin.diagnosis.long_records import searched_part, thinned
 from fes_pin.diagnosis.misread import NAME as MISREAD
 from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.plausibility import check_study
-from fes_pin.diagnosis.restate import StudyConditions, restated_study, with_misread
+from fes_pin.diagnosis.restate import Run, StudyConditions, restated_study, with_misread
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
-from fes_pin.diagnosis.search.simulation_search import NominalFitError, SimulationSearch
-from fes_pin.diagnosis.searches import Result, Search, Searches
+from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS
+from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodModels, LikelihoodSearch, NominalFitError
+from fes_pin.diagnosis.stopped import unfitted
 from fes_pin.diagnosis.testable import given_away
 from fes_pin.identify.feedback import is_fed_back, is_stimulus_fed_back
-from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.recording import earns, low_pass_of
 from fes_pin.infer.result import STOPPED
 from fes_pin.models.catalogue import Catalogue, Source, catalogue_of
+from fes_pin.models.model import Model
 from fes_pin.models.nominal import nominal_model
 from fes_pin.models.rigs.base import Rig
 from fes_pin.workers import OutOfTime, Progress, noting_stops, one_thread_each, time_limit
@@ -126,7 +127,7 @@ class _Work:
         found = self._logged(study, log)
         if not self.stops and (passed := _low_passed(found, self.end)) is not None:
             found = _likelier(self.diagnosis(passed), found)
-        if not isinstance(found.extended, LikelihoodFit) or not logged:
+        if not (driven and logged):
             return found
         if not self.stops and (noise := faults.noise_beside(found)) != found.log.effort_noise:
             found = likelier(self._logged(study, replace(found.log, effort_noise=noise)), found)
@@ -146,34 +147,35 @@ class _Work:
         """Search the causes of one study, and judge what is found."""
         nominal = nominal_model(study)
         train, test = split(study)
-        driven = _is_answered(nominal.rig, train)
-        train, spared, said = searched_part(train, study.schema, driven)
+        answered = _is_answered(nominal.rig, train)
+        train, spared, said = searched_part(train, study.schema, answered)
         test = test or spared
-        recorded = train if said else [t for t in study.trials if t.role != "held_out"]
         effects = self.catalogue.effects_for(nominal.rig)
-        searches = Searches(nominal, train, recorded, test, driven, effects, self.seed, self.tell, study.horizon_s)
+        ran: list[LikelihoodSearch] = []
+
+        def run(trials: Sequence[Trial]) -> tuple[LikelihoodSearch, Found]:
+            noise = PROCESS if answered or any(t.kind == IMPOSED for t in trials) else MEASUREMENT
+            own = (effects, answered, self.seed, study.horizon_s, noise)
+            ran.append(LikelihoodSearch(LikelihoodModels(nominal, in_parts(nominal.rig, trials), *own), self.tell))
+            return searched(ran[-1])
+
         try:
-            found = self._judged(study, searches, train, test)
+            found = self._judged(study, nominal, run, train, test)
         except NominalFitError as problem:
             found = unfitted(study, problem.nominal, str(problem), test)
         except (ArithmeticError, np.linalg.LinAlgError) as problem:
             reason = f"the search met numbers that cannot be calculated with ({problem})"
-            assert searches.last is not None
-            found = unfitted(study, searches.last.nominal(), reason, test)
+            found = unfitted(study, ran[-1].nominal(), reason, test)
         return replace(found, warnings=(*said, *found.warnings))
 
-    def _judged(self, study: Study, searches: Searches, train: list[Trial], test: list[Trial]) -> Diagnosis:
+    def _judged(self, study: Study, nominal: Model, run: Run, train: list[Trial], test: list[Trial]) -> Diagnosis:
         with time_limit(self.end - time.perf_counter()):
-            search, searched, again = StudyConditions(searches.nominal, searches.run).search(train)
+            search, found, again = StudyConditions(nominal, run).search(train)
         self.tell(0.88, "held-out gain")
         whole, stated = study, train
         if again is not None:
-            train, whole = again.trials, restated_study(study, searches.nominal, again.misread)
-        diagnosis = _judged(whole, search, searched, (train, test), self.seed)
-        if _may_be_driven(diagnosis, search, train):
-            with time_limit(self.end - time.perf_counter()):
-                search, searched = searches.by_likelihood(train, answered=True)  # hidden by what smoothed the record
-            diagnosis = _judged(whole, search, searched, (train, test), self.seed)
+            train, whole = again.trials, restated_study(study, nominal, again.misread)
+        diagnosis = driven_diagnosis(whole, search, found, (train, test), self.seed)
         return diagnosis if again is None else with_misread(diagnosis, again, stated, test, self.seed)
 
 
@@ -195,7 +197,7 @@ def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
     how long noise lasts instead.
     """
     restated = any(c.name == MISREAD for c in diagnosis.causes)
-    if not diagnosis.remainder.unexplained or isinstance(diagnosis.extended, LikelihoodFit) or restated:
+    if not diagnosis.remainder.unexplained or diagnosis.is_driven or restated:
         return None
     nominal, study = diagnosis.nominal, diagnosis.study
     try:
@@ -210,33 +212,13 @@ def _low_passed(diagnosis: Diagnosis, end: float) -> Study | None:
 def _likelier(passed: Diagnosis, recorded: Diagnosis) -> Diagnosis:
     """The diagnosis of readings as low-passed, if what it leaves is the likelier noise by what a low pass must earn."""
     fits = passed.extended, recorded.extended
-    if isinstance(passed.extended, LikelihoodFit) or not earns(*fits):
+    if not earns(*fits):
         return recorded
     trials = passed.extended.trials
     names = " and ".join(dict.fromkeys(n for t in trials for n in passed.extended.model.rig.outputs(t.kind) if n in t))
     cutoff = trials[0].low_pass_hz
     said = f"{names} seems low-passed at {cutoff:.2g} Hz: what is simulated was low-passed there as well"
     return replace(passed, log=replace(passed.log, low_pass_hz=cutoff), warnings=(said, *passed.warnings))
-
-
-def _judged(
-    study: Study, search: Search, searched: Result, trials: tuple[list[Trial], list[Trial]], seed: int
-) -> Diagnosis:
-    """The verdict on what a search found."""
-    if isinstance(search, LikelihoodSearch):
-        return driven_diagnosis(study, search, searched, trials, seed)  # type: ignore[arg-type]
-    return judge_free(study, search, searched, trials[1], seed)  # type: ignore[arg-type]
-
-
-def _may_be_driven(diagnosis: Diagnosis, search: Search, trials: Sequence[Trial]) -> bool:
-    """True where free simulation explains nothing of a rig that an effort drives.
-
-    A controller's answer is not seen where a record was smoothed or interpolated before it was stored. Before it is
-    said that no cause of the library explains the rig, the likelihood is asked, which takes such an answer for what it
-    is.
-    """
-    free = isinstance(search, SimulationSearch) and not search.was_stopped
-    return free and diagnosis.verdict == "unexplained" and diagnosis.nominal.model.rig.is_driven(trials)
 
 
 @dataclass(frozen=True)

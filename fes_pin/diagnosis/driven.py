@@ -15,9 +15,8 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.chosen_again import ChosenAgain, is_chosen, share_of
-from fes_pin.diagnosis.decide.claims import FORM_SHARE
+from fes_pin.diagnosis.decide.folds import folds_of
 from fes_pin.diagnosis.decide.gains_ahead import Fold, gains_of
-from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.decide.rivals import absorbed, alternatives, estimates, experiment, ranking
 from fes_pin.diagnosis.driven_held_out import (
     Again,
@@ -28,24 +27,27 @@ from fes_pin.diagnosis.driven_held_out import (
     make_folds,
     with_choices,
 )
-from fes_pin.diagnosis.driven_refused import UNMOVED, is_moved_by_what_is_recorded, with_refused_causes
+from fes_pin.diagnosis.driven_refused import UNMOVED, is_moved_by_what_is_recorded, no_noise, with_refused_causes
 from fes_pin.diagnosis.errors_ahead import (
     Ahead,
     AheadErrors,
     RandomPart,
     are_large,
     errors_ahead,
+    free_errors,
+    noise_that_is_small,
     random_parts,
 )
-from fes_pin.diagnosis.form_errors import FRESH, beside_what_is_new, judged_again
+from fes_pin.diagnosis.form_errors import FRESH, beside_what_is_new, judged_again, least_error
 from fes_pin.diagnosis.remainder.driven import driven_remainder
 from fes_pin.diagnosis.result import Diagnosis
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
-from fes_pin.diagnosis.search.simulation_search import Searched
 from fes_pin.identify.ahead import falls
 from fes_pin.identify.lasting import words_of_reading
+from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.result import CROSS_VALIDATED, FITTED, HELD_OUT, Cause, Remainder
 from fes_pin.infer.scatter import as_wide_as_estimates_differ, as_wide_as_trials_differ, with_honest_intervals
 from fes_pin.infer.verdict import State, Verdict, Weighed, share_in, word_of
@@ -62,11 +64,14 @@ class DrivenWeighed(Weighed):
         Trials that are held out, and fits without them; none where none can be.
     random
         What acts at random beside the set.
+    no_noise
+        Why the error of a simulation is no noise of a reading, if it is none.
     """
 
     lack_of_fit: Remainder
     folds: Sequence[Fold]
     random: tuple[RandomPart, ...]
+    no_noise: str | None
 
 
 Judgement = State[LikelihoodFit, DrivenWeighed]
@@ -91,7 +96,6 @@ class DrivenVerdict(Verdict[LikelihoodFit, DrivenWeighed]):
     def __init__(self, search: LikelihoodSearch, test: Sequence[Trial], seed: int) -> None:
         super().__init__(search)
         self.models, self.test, self.seed = search.models, tuple(test), seed
-        self.horizon_s = self.models.horizon_s
         self.again, self._alike = Again(afresh), Again(as_random_as_in_all)
         self._chosen: dict[int, tuple[Found, list[LikelihoodFit]]] = {}
 
@@ -100,11 +104,12 @@ class DrivenVerdict(Verdict[LikelihoodFit, DrivenWeighed]):
         folds = make_folds(found, self.models.trials, self.test, self.again)
         within = folds or [Fold(found.nominal, found.best, found.without, self.models.trials)]
         return DrivenWeighed(
-            gains=gains_of(within, found.without, self.horizon_s, self.seed),
+            gains=gains_of(within, found.without, self.models.judged_s, self.seed),
             evidence=evidence_of(folds, found, self._alike) if folds else {},
             lack_of_fit=driven_remainder(found.best, self.seed),
             folds=folds,
             random=random_parts(found.best),
+            no_noise=no_noise(found.best),
         )
 
     def unsupported(self, state: Judgement) -> list[str]:
@@ -120,7 +125,9 @@ class DrivenVerdict(Verdict[LikelihoodFit, DrivenWeighed]):
     def lack_of_fit(self, state: Judgement) -> Remainder:
         """What is left: by the features, or a random effort that is too large, or a cause that was refused."""
         stages = {e.name: str(e.stage) for e in self.models.library.effects}
-        return with_refused_causes(state.weighed.lack_of_fit, state.weighed.random, state.refused, stages)
+        left = with_refused_causes(state.weighed.lack_of_fit, state.weighed.random, state.refused, stages)
+        wrong = not left.unexplained and state.weighed.no_noise is not None
+        return replace(left, unexplained=True, where="time") if wrong else left
 
     def is_rarely_chosen(self, state: Judgement, name: str) -> bool:
         """Whether most folds choose neither a cause nor what cannot be told from it."""
@@ -155,7 +162,9 @@ class Judged:
     chosen
         For each fold, the fit to all trials of the set that is chosen without its own.
     reason
-        Why no cause may be named, if none may.
+        Why something is unexplained, where no test of lack of fit says so.
+    is_free
+        Whether it is judged by free simulations.
     """
 
     state: Judgement
@@ -165,6 +174,7 @@ class Judged:
     horizon_s: float
     chosen: tuple[LikelihoodFit, ...]
     reason: str | None
+    is_free: bool
 
     @property
     def found(self) -> Found:
@@ -193,20 +203,25 @@ def judge_driven(search: LikelihoodSearch, found: Found, test: Sequence[Trial], 
     verdict = DrivenVerdict(search, test, seed)
     state = verdict.of(search.result(()) if reason else found)
     found, train = state.found, search.models.trials
-    falling = falls(found.best.model, train)
+    falling = search.models.answered and falls(found.best.model, train)
     chosen = [] if reason else verdict.chosen(state)
     folds = (
         with_choices(state.weighed.folds, chosen, verdict.again) if chosen and found.without else state.weighed.folds
     )
-    one, other = (errors_ahead([(f, train)], verdict.horizon_s, falling) for f in (found.nominal, found.best))
+    horizon_s, pair = search.models.horizon_s, (found.nominal, found.best)
+    one, other = (errors_ahead([(f, found.best, train)], horizon_s, falling) for f in pair)
+    left = verdict.lack_of_fit(state)
+    if reason is None and left.unexplained and left.where == "time" and not state.weighed.lack_of_fit.unexplained:
+        reason = state.weighed.no_noise
     return Judged(
         state=state,
-        left=verdict.lack_of_fit(state),
+        left=left,
         ahead=(one, other),
-        held_out_ahead=held_errors_ahead(folds, verdict.horizon_s, falling),
-        horizon_s=verdict.horizon_s,
+        held_out_ahead=held_errors_ahead(folds, horizon_s, falling),
+        horizon_s=horizon_s,
         chosen=tuple(chosen),
         reason=reason,
+        is_free=search.models.judged_s is None,
     )
 
 
@@ -216,7 +231,9 @@ def _alike(found: Found, name: str) -> tuple[str, ...]:
 
 
 def _ceiling(fitted: LikelihoodFit) -> float:
-    """E of the reading noise alone, percent."""
+    """E of the reading noise alone, percent: of a simulation where there is no process noise."""
+    if is_simulated(fitted.noise, fitted.trials):
+        return free_errors(fitted.model, fitted.trials, noise_that_is_small(fitted)).ceiling_percent()
     rig = fitted.model.rig
     columns = [(t[rig.output(t.kind)], fitted.noise.white[rig.output(t.kind)] ** 2) for t in fitted.trials]
     noise = sum(float(np.isfinite(y).sum()) * variance for y, variance in columns)
@@ -230,23 +247,15 @@ def driven_diagnosis(
     judged = likeliest = judge_driven(search, found, trials[1], seed)
     fresh = beside_what_is_new(search, judged.found)
     again = None if fresh is None else judged_again(search, judged.found, fresh)
+    if judged.left.unexplained and again is None:
+        again = least_error(search)
     if again is not None:
-        judged = _foretelling_more(judge_driven(*again, trials[1], seed), judged)
+        judged = _predicting_better(judge_driven(*again, trials[1], seed), judged)
     found, left = judged.found, judged.left
     best = as_wide_as_trials_differ(with_honest_intervals(found.best), judged.again)
     other = fresh if judged.found is likeliest.found else likeliest.found.best
     if other is not None and names_of(other) == names_of(best):
         best = as_wide_as_estimates_differ(best, other)
-    searched = Searched(
-        nominal=found.nominal,
-        best=best,
-        p_values=found.p_values,
-        rivals=found.rivals,
-        judged=best,
-        without=found.without,
-        scored=search.models.scored(found),
-        floor=best.noise,
-    )
     fitted, held = judged.ahead, judged.held_out_ahead
     on = HELD_OUT if trials[1] else CROSS_VALIDATED if held else FITTED
     causes = [_cause(judged, one, best, on) for one in best.model.effects]
@@ -256,19 +265,20 @@ def driven_diagnosis(
         verdict=word_of(bool(causes), left),
         causes=tuple(causes),
         remainder=left,
-        absorbed=absorbed(searched, search.models.library.silent()),
+        absorbed=absorbed(best, search.models.scored(found), search.models.library.silent()),
         nominal=found.nominal,
         extended=best,
         nominal_error=(fitted[0].free, held[0].free if held else None),
         extended_error=(fitted[1].free, held[1].free if held else None),
         ceiling_percent=_ceiling(found.best),
-        next_experiment=experiment(searched, causes, study),
-        ranking=ranking(searched),
+        next_experiment=experiment(best, found.rivals, causes, study),
+        ranking=ranking(best, found.rivals),
         held_out_by=on,
         left_out={},
         wall_s=0.0,
         warnings=_words(best, trials[0]),
         random=judged.state.weighed.random,
+        is_driven=search.models.judged_s is not None,
         reason=judged.reason,
         ahead=AheadErrors(judged.horizon_s, *fitted, *(held or (None, None))),
     )
@@ -280,18 +290,20 @@ def _words(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[str, ...]:
     return (*said, FRESH) if fitted.noise.timed else said
 
 
-def _foretelling_more(other: Judged, one: Judged) -> Judged:
-    """What errs less over the horizon, on trials held out where there are such; what is left by either is left.
+def _predicting_better(other: Judged, one: Judged) -> Judged:
+    """What errs less, on trials held out where there are such; what is left by either is left.
 
-    Beside efforts that are new in every sample little of what is left stands out: it is not what they say is random.
+    Of a rig that a controller drives by errors over the horizon, of others by those of free simulations. Beside efforts
+    that are new in every sample little of what is left stands out: it is not what they say is random.
     """
 
     def error(judged: Judged) -> float:
-        return (judged.held_out_ahead or judged.ahead)[1].horizon
+        ahead = (judged.held_out_ahead or judged.ahead)[1]
+        return ahead.horizon if ahead.free is None or not judged.is_free else ahead.free
 
     if not error(other) < error(one):
         return one
-    return other if other.left.unexplained else replace(other, left=one.left)
+    return other if other.left.unexplained else replace(other, left=one.left, reason=one.reason)
 
 
 def _cause(judged: Judged, one: Effect, best: LikelihoodFit, on: str) -> Cause:

@@ -6,14 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.decide.folds import folds_of
 from fes_pin.diagnosis.decide.gains_ahead import Fold
-from fes_pin.diagnosis.decide.held_out import folds_of
 from fes_pin.diagnosis.errors_ahead import Ahead, errors_ahead
 from fes_pin.diagnosis.search.likelihood_models import Found
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.infer.held_out import marginal_cost
 from fes_pin.infer.maximise import together
+from fes_pin.infer.optimum import minimise
 from fes_pin.infer.problem import Unknowns
 from fes_pin.infer.result import Evidence
 from fes_pin.workers import in_parallel
@@ -78,8 +79,9 @@ def afresh(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
 def as_random_as_in_all(fitted: LikelihoodFit, trials: Sequence[Trial]) -> LikelihoodFit:
     """A fit again, to other trials, at what was random in its own."""
     problem, unknowns = _problem(fitted, trials)
-    found = together(problem, fitted.values, unknowns, with_noise=False)
-    return fit_of(problem, found)
+    if problem.is_simulated:
+        return fit_of(problem, minimise(problem, fitted.values, unknowns))
+    return fit_of(problem, together(problem, fitted.values, unknowns, with_noise=False))
 
 
 def _problem(fitted: LikelihoodFit, trials: Sequence[Trial]) -> tuple[LikelihoodProblem, Unknowns]:
@@ -116,6 +118,6 @@ def held_errors_ahead(folds: Sequence[Fold], horizon_s: float, falling: bool) ->
     if not folds:
         return None
     return (
-        errors_ahead([(f.nominal, f.test) for f in folds], horizon_s, falling),
-        errors_ahead([(f.chosen or f.best, f.test) for f in folds], horizon_s, falling),
+        errors_ahead([(f.nominal, f.best, f.test) for f in folds], horizon_s, falling),
+        errors_ahead([(f.chosen or f.best, f.best, f.test) for f in folds], horizon_s, falling),
     )

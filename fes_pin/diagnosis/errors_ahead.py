@@ -9,20 +9,25 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fes_pin.data.trial import Trial
-from fes_pin.identify.ahead import SquaredErrors, forecast_errors, forecasts, one_step, own_noise, reach_of
-from fes_pin.identify.fit import Fit
+from fes_pin.diagnosis.decide.folds import FOLDS
+from fes_pin.identify.ahead import SquaredErrors, forecasts, one_step, reach_of
+from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import predictions
-from fes_pin.identify.process_noise import driving_size
-from fes_pin.infer.held_out import Errors, percent_of_spread
-from fes_pin.infer.levels import SMALL_SHARE
+from fes_pin.identify.process_noise import driving_size, first_guess
+from fes_pin.infer.held_out import Errors, joined_errors, percent_of_spread, within
+from fes_pin.infer.levels import RUNAWAY, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
+from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import in_parallel
 
 AVERAGED_S = 0.05
 """Time over which a random effort is averaged before it is compared, s: what is faster moves no limb, and of what is
 much faster than the rig data tell the intensity 2 std^2 time alone, not deviation and time one by one."""
+
+TENTHS = 10
+"""Pieces of a trial that is simulated freely, where there are fewer than `FOLDS` trials."""
 
 _Told = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
@@ -104,40 +109,51 @@ def _averaged(std: float, time: float) -> float:
     return std * float(np.sqrt(max(2.0 * x * (1.0 - x * (1.0 - np.exp(-1.0 / x))), 0.0)))
 
 
-def free_errors(
-    nominal: Fit,
-    extended: Fit,
-    floor: NoiseModel,
-    horizon_s: float,
-    held_out: tuple[SquaredErrors, SquaredErrors] | None,
-) -> AheadErrors:
-    """Errors over time of two models that are simulated freely.
-
-    Parameters
-    ----------
-    floor
-        Noise whose deviations weigh the channels.
-    held_out
-        Squared errors of both on trials that took no part, if there are such.
-    """
-    inside = [Ahead.of(forecast_errors(f.model, f.trials, own_noise(f), floor, horizon_s)) for f in (nominal, extended)]
-    outside = [Ahead.of(total) for total in held_out] if held_out else [None, None]
-    return AheadErrors(horizon_s, inside[0], inside[1], outside[0], outside[1])
-
-
-def errors_over_horizon(
-    pairs: Sequence[tuple[LikelihoodFit, LikelihoodFit, Sequence[Trial]]], horizon_s: float
+def squared_errors(
+    pairs: Sequence[tuple[LikelihoodFit, LikelihoodFit, Sequence[Trial]]], ahead_s: float | None
 ) -> Errors:
-    """Squared errors over the horizon, by seconds of each trial.
+    """Squared errors over a horizon, by seconds of each trial; or of free simulations, by trials.
 
     Parameters
     ----------
     pairs
         A fit, the one whose white noise is the unit of its errors, so that models can be compared, and trials.
+    ahead_s
+        The horizon; None for free simulations, whose errors are alike through all of a trial: where there are few
+        trials tenths of each are taken.
     """
+    if ahead_s is None:
+        return joined_errors([free_errors(f.model, trials, noise_that_is_small(floor)) for f, floor, trials in pairs])
     work = [(fitted, floor, trial) for fitted, floor, trials in pairs for trial in trials]
-    found = in_parallel(lambda w: _squares(*w, horizon_s), work)
+    found = in_parallel(lambda w: _squares(*w, ahead_s), work)
     return Errors(*np.concatenate(found, axis=1))
+
+
+def free_errors(model: Model, trials: Sequence[Trial], noise: NoiseModel) -> Errors:
+    """Squared errors of a model that is simulated from the inputs of each trial alone, by trials.
+
+    Where there are few trials tenths of each are taken. What is each trial's own is estimated from other parts of it
+    than those that it is judged on: see `identify.per_trial`.
+
+    Parameters
+    ----------
+    noise
+        Whose variances are the unit, by output column.
+    """
+    pieces = 1 if len(trials) >= FOLDS else TENTHS
+    found = in_parallel(lambda t: _free_squares(model, t, noise, pieces), trials)
+    return Errors(*np.concatenate(found, axis=1))
+
+
+def _free_squares(model: Model, trial: Trial, noise: NoiseModel, pieces: int) -> np.ndarray:
+    """Squares, spread and number of readings of a trial that is simulated freely, shape (3, pieces)."""
+    lines = np.zeros((3, len(trial)))
+    for name, missed in free_residuals(model, trial, noise).items():
+        variance = noise[name].std ** 2
+        lines[0] += np.nan_to_num(missed) ** 2 / variance
+        lines[1] += np.nan_to_num(trial[name] - np.nanmean(trial[name])) ** 2 / variance
+        lines[2] += np.isfinite(missed)
+    return np.array([p.sum(axis=1) for p in np.array_split(lines, pieces, axis=1)]).T
 
 
 def _squares(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
@@ -189,25 +205,30 @@ def noise_that_is_small(fitted: LikelihoodFit) -> Doubt:
     """What is random about a rig and its readings that is noise.
 
     A random effort as far as it is small beside what drives the rig: what is more than `SMALL_SHARE` of that, is
-    something that the model misses.
+    something that the model misses. White noise of a simulation as far as it is new in each sample.
     """
+    if is_simulated(fitted.noise, fitted.trials) and not any(fitted.noise.ar.values()):
+        rough = first_guess(fitted.model, fitted.trials).white
+        return replace(fitted.noise, white={n: float(np.fmin(v, rough[n])) for n, v in fitted.noise.white.items()})
     less = {r.name: SMALL_SHARE / r.share for r in random_parts(fitted) if r.share > SMALL_SHARE}
     std = {n: value * less.get(n, 1.0) for n, value in fitted.noise.std.items()}
     return replace(fitted.noise, std=std) if less else fitted.noise
 
 
-def errors_ahead(pairs: Sequence[tuple[LikelihoodFit, Sequence[Trial]]], horizon_s: float, falling: bool) -> Ahead:
-    """E of the first output one sample ahead, over the horizon, and free."""
-    work = [(fitted, trial) for fitted, trials in pairs for trial in trials]
+def errors_ahead(
+    pairs: Sequence[tuple[LikelihoodFit, LikelihoodFit, Sequence[Trial]]], horizon_s: float, falling: bool
+) -> Ahead:
+    """E of the first output one sample ahead, over the horizon, and free; `pairs` as of `squared_errors`."""
+    work = [(fitted, floor, trial) for fitted, floor, trials in pairs for trial in trials]
     missed, around = np.sum(in_parallel(lambda one: _sums(*one, horizon_s), work), axis=0)
     one_step, horizon, free, noise = (float(v) for v in 100.0 * missed / np.maximum(around, 1e-300))
     return Ahead(one_step, horizon, None if falling else free, noise)
 
 
-def _sums(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
+def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
     """Squared errors of the first output of a trial, and what it varies where they are judged, shape (2, 4).
 
-    One sample ahead, over the horizon, free, and over the horizon by noise alone.
+    One sample ahead, over the horizon, free, and over the horizon by noise alone; in units of the noise of `floor`.
     """
     name = fitted.model.rig.output(trial.kind)
     measured, (told, noise) = trial[name], _told(fitted, trial, horizon_s)
@@ -215,10 +236,24 @@ def _sums(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> np.ndarray:
     errors = (
         one_step(fitted.model, trial, fitted.noise)[name],
         np.where(begun, np.nan, measured - told[name]),
-        measured - predictions(fitted.model, [trial], fitted.noise)[0][:, 0],
+        free_residuals(fitted.model, trial, fitted.noise)[name],
         np.where(begun, np.nan, np.sqrt(noise[name])),
     )
     spread = (measured - np.nanmean(measured)) ** 2
     with np.errstate(all="ignore"):
         around = [float(np.nansum(spread if k in (0, 2) else spread[~begun])) for k in range(len(errors))]
-        return np.array([[float(np.nansum(e**2)) for e in errors], around])
+        return np.array([[float(np.nansum(e**2)) for e in errors], around]) / floor.noise.white[name] ** 2
+
+
+def free_residuals(model: Model, trial: Trial, noise: NoiseModel) -> dict[str, np.ndarray]:
+    """Measured minus simulated from the inputs alone, shape (n,), by output column of a trial; NaN where unmeasured.
+
+    A simulation that runs away counts as `RUNAWAY` times the largest reading off.
+    """
+    (readings,) = predictions(model, [trial], noise)
+    out = {}
+    for k, name in enumerate(model.rig.outputs(trial.kind)):
+        if name in trial.columns and name in noise:
+            most = RUNAWAY * float(np.nanmax(np.abs(trial[name]), initial=0.0))
+            out[name] = np.where(np.isfinite(trial[name]), within(trial[name] - readings[:, k], most), np.nan)
+    return out

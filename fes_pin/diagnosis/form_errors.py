@@ -7,11 +7,12 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from fes_pin.data.schema import IMPOSED
+from fes_pin.diagnosis.decide.by_prediction import best_predicting
 from fes_pin.diagnosis.decide.rivals import not_excluded
-from fes_pin.diagnosis.errors_ahead import errors_over_horizon
+from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.search.cause_sets import Names, names_of
-from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
-from fes_pin.diagnosis.search.simulation_search import NominalFitError
+from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE
+from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch, NominalFitError
 from fes_pin.identify.likelihood_fit import LikelihoodFit, beside_fresh_efforts
 from fes_pin.identify.process_noise import step_s
 from fes_pin.infer.held_out import held_out_gain
@@ -42,9 +43,56 @@ class FreshSearch(LikelihoodSearch):
         return self.result(names)
 
 
+def searched(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found]:
+    """A search that has run: without process noise first where no controller answers, with it where that improves.
+
+    Of a set without process noise every prediction is a free simulation, which takes a third of the time. Process noise
+    must improve the penalised likelihood of the best set; else nothing of it is needed.
+    """
+    found = search.run()
+    if search.was_stopped or search.models.noise != MEASUREMENT:
+        return search, found
+    try:
+        with time_limit(search.seconds_left):
+            acting = search.models.with_process_noise(found.best)
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
+        return search, found
+    if not acting.price < found.best.price:
+        return search, found
+    return _run_with(search, PROCESS) or (search, found)
+
+
+def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | None:
+    """The same causes searched by the least error of free simulations, every error weighed alike; None if time is up.
+
+    Where a model is not right, a likelihood with process noise or autoregressive measurement noise takes what it misses
+    for noise. Least squares give the model that predicts best from the inputs alone (Ljung, System Identification,
+    2nd ed., section 8.3).
+    """
+    if search.models.answered or search.was_stopped or (made := _run_with(search, WHITE)) is None:
+        return None
+    other, found = made
+    try:
+        with time_limit(search.seconds_left):
+            return other, other.result(best_predicting(other, names_of(found.best)))
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
+        return None
+
+
+def _run_with(search: LikelihoodSearch, noise: str) -> tuple[LikelihoodSearch, Found] | None:
+    """The same causes searched with another noise; None if that did not end."""
+    other = LikelihoodSearch(search.models.with_noise(noise), search.progress)
+    try:
+        with time_limit(search.seconds_left):
+            found = other.run()
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime, NominalFitError):
+        return None
+    return None if other.was_stopped else (other, found)
+
+
 def beside_what_is_new(search: LikelihoodSearch, found: Found) -> LikelihoodFit | None:
     """What was found, beside random efforts that are new in every sample; None where none that lasts acts."""
-    if search.was_stopped or not _may_last(found.best):
+    if search.was_stopped or not search.models.answered or not _may_last(found.best):
         return None
     try:
         with time_limit(search.seconds_left):
@@ -79,7 +127,7 @@ def judged_again(search: LikelihoodSearch, found: Found, fresh: LikelihoodFit) -
 def _foretells_more(fresh: LikelihoodFit, search: LikelihoodSearch, found: Found) -> bool:
     """Whether errors over the horizon are less beside efforts that are new."""
     many = [[(f, found.best, f.trials)] for f in (found.nominal, found.best, fresh)]
-    nominal, lasting, new = (errors_over_horizon(one, search.models.horizon_s) for one in many)
+    nominal, lasting, new = (squared_errors(one, search.models.horizon_s) for one in many)
     return held_out_gain(nominal, lasting, new, search.models.seed).percent > NOTHING_PERCENT
 
 
@@ -101,4 +149,4 @@ def _may_last(fitted: LikelihoodFit) -> bool:
     return lasts and all(t.kind != IMPOSED and fitted.model.rig.unknowns(t.kind) for t in fitted.trials)
 
 
-__all__ = ["FRESH", "beside_what_is_new", "judged_again"]
+__all__ = ["FRESH", "beside_what_is_new", "judged_again", "least_error", "searched"]

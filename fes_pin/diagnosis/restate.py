@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,16 +10,16 @@ import numpy as np
 from fes_pin.data.study import Study
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.conditions import Conditions, Restated
-from fes_pin.diagnosis.decide.held_out import cross_validate, errors_of, separate
-from fes_pin.diagnosis.errors_ahead import Ahead
+from fes_pin.diagnosis.decide.folds import folds_of
+from fes_pin.diagnosis.driven_held_out import afresh
+from fes_pin.diagnosis.errors_ahead import errors_ahead, free_errors
 from fes_pin.diagnosis.misread import NAME, Misread, find_misread, restated_trials
+from fes_pin.diagnosis.parts import in_parts
 from fes_pin.diagnosis.remainder.driven import driven_remainder
 from fes_pin.diagnosis.result import Diagnosis
-from fes_pin.diagnosis.search.simulation_search import Searched
-from fes_pin.diagnosis.searches import Result, Search
-from fes_pin.identify.ahead import forecast_errors, own_noise
-from fes_pin.identify.fit import fit_multistart, fit_problem, noise_of, rough_noise
-from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.diagnosis.search.likelihood_models import Found, LikelihoodSearch
+from fes_pin.identify.fit import fit_multistart, rough_noise
+from fes_pin.identify.likelihood_fit import LikelihoodFit, maximum_from
 from fes_pin.identify.per_trial import halves
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.held_out import Errors, held_out_gain
@@ -27,40 +27,33 @@ from fes_pin.infer.result import Cause, ParameterEstimate
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Stage
 
+Run = Callable[[list[Trial]], tuple[LikelihoodSearch, Found]]
+"""Searches trials."""
+Made = Restated[LikelihoodSearch, Found]
 
-class StudyConditions(Conditions[Search, Result]):
+
+class StudyConditions(Conditions[LikelihoodSearch, Found]):
     """Conditions of the trials of a diagnosis."""
 
-    def misread(self, trials: Sequence[Trial], searched: Result | None) -> Misread | None:
+    def misread(self, trials: Sequence[Trial], searched: Found | None) -> Misread | None:
         """The trial that stands out under what was found, or under the nominal model."""
         return find_misread(Model(self.nominal.rig) if searched is None else searched.best.model, trials)
 
-    def has_causes(self, searched: Result) -> bool:
+    def has_causes(self, searched: Found) -> bool:
         """Whether any cause was found."""
         return bool(searched.best.model.effects)
 
-    def leaves_noise(self, made: Restated[Search, Result]) -> bool:
-        """Whether simulations of the restated trials leave noise alone."""
-        return isinstance(made.searched, Searched) and made.searched.complete and not made.search.was_stopped
+    def leaves_noise(self, made: Made) -> bool:
+        """Whether the restated trials have no lack of fit."""
+        return not made.search.was_stopped and made.search.models.leaves_noise(made.searched.best)
 
-    def is_explained(self, made: Restated[Search, Result]) -> bool:
-        """Whether nothing that was looked for stands out of what the restated trials leave."""
-        if isinstance(made.searched, Searched):
-            return made.searched.complete
+    def is_explained(self, made: Made) -> bool:
+        """Whether no test finds a lack of fit in the restated trials."""
         return not driven_remainder(made.searched.best).unexplained
 
-    def saved(self, searched: Result, trials: Sequence[Trial], made: Restated[Search, Result]) -> float:
-        """By how much the price falls.
-
-        Simulations are compared under one noise, that of the restated trials; likelihoods hold their own.
-        """
-        one, other = searched.best, made.searched.best
-        if isinstance(one, LikelihoodFit) and isinstance(other, LikelihoodFit):
-            return one.price - other.price
-        noise = noise_of(other)
-        pairs = ((one, trials), (other, made.trials))
-        before, after = (fit_problem(Problem(f.model, many, noise), f.values).price for f, many in pairs)
-        return before - after
+    def saved(self, searched: Found, trials: Sequence[Trial], made: Made) -> float:
+        """By how much the price falls."""
+        return searched.best.price - made.searched.best.price
 
 
 def restated_study(study: Study, nominal: Model, misread: Misread) -> Study:
@@ -69,7 +62,7 @@ def restated_study(study: Study, nominal: Model, misread: Misread) -> Study:
 
 
 def with_misread(
-    diagnosis: Diagnosis, made: Restated[Search, Result], trials: Sequence[Trial], test: Sequence[Trial], seed: int
+    diagnosis: Diagnosis, made: Made, trials: Sequence[Trial], test: Sequence[Trial], seed: int
 ) -> Diagnosis:
     """The diagnosis of the restated study with the misreading as its first cause.
 
@@ -78,29 +71,34 @@ def with_misread(
     trials, test
         As they were stated: the errors of the nominal model are those on these.
     """
-    before = made.misread.whole
+    before, best = made.misread.whole, made.searched.best
     if before.model.effects:
         bare = Model(before.model.rig)
         before = fit_multistart(Problem(bare, trials, before.noise), bare.parameters())
     floor = rough_noise(before.model, trials)
-    pair = (errors_of(before.model, trials, floor), errors_of(diagnosis.nominal.model, made.trials, floor))
+    pair = (free_errors(before.model, trials, floor), free_errors(diagnosis.nominal.model, made.trials, floor))
     cause = _cause(made, held_out_gain(pair[0], *pair, seed).percent, trials, seed)
     told = replace(diagnosis, causes=(cause, *diagnosis.causes), verdict="causes_found")
-    if isinstance(before, LikelihoodFit) or diagnosis.ahead is None:
+    if diagnosis.ahead is None:
         return told
-    horizon = diagnosis.ahead.horizon_s
-    held = (
-        separate(before, before, {}, test, floor, horizon)
-        if test
-        else cross_validate(before, before, {}, lambda _: before, floor, horizon)
-    )
-    assert held.ahead is not None
-    inside = Ahead.of(forecast_errors(before.model, trials, own_noise(before), floor, horizon))
-    ahead = replace(diagnosis.ahead, nominal=inside, nominal_held_out=Ahead.of(held.ahead[0]))
-    return replace(told, nominal_error=(pair[0].error_percent(), held.nominal.error_percent()), ahead=ahead)
+    parts = in_parts(before.model.rig, trials)
+    nominal = maximum_from(made.searched.nominal, parts)
+    held = [(nominal, best, test)] if test else [_without(nominal, best, out) for out in folds_of(parts)]
+    horizon, falling = diagnosis.ahead.horizon_s, diagnosis.ahead.nominal.free is None
+    inside, outside = (errors_ahead(some, horizon, falling) for some in ([(nominal, best, parts)], held))
+    ahead = replace(diagnosis.ahead, nominal=inside, nominal_held_out=outside)
+    return replace(told, nominal_error=(inside.free, outside.free), ahead=ahead)
 
 
-def _cause(made: Restated[Search, Result], gain_fit: float, trials: Sequence[Trial], seed: int) -> Cause:
+def _without(
+    fitted: LikelihoodFit, floor: LikelihoodFit, out: Sequence[int]
+) -> tuple[LikelihoodFit, LikelihoodFit, list[Trial]]:
+    """A fit without some of its trials, the fit whose noise is the unit of its errors, and those trials."""
+    others = [t for i, t in enumerate(fitted.trials) if i not in out]
+    return afresh(fitted, others), floor, [fitted.trials[i] for i in out]
+
+
+def _cause(made: Made, gain_fit: float, trials: Sequence[Trial], seed: int) -> Cause:
     misread = made.misread
     unit = made.misread.whole.model.rig.schema.conditions.get(misread.condition)
     trial = next(t for t in trials if t.name == misread.trial)
@@ -120,12 +118,12 @@ def _cause(made: Restated[Search, Result], gain_fit: float, trials: Sequence[Tri
     )
 
 
-def _errors_of_halves(made: Restated[Search, Result], trial: Trial) -> tuple[Errors, Errors]:
+def _errors_of_halves(made: Made, trial: Trial) -> tuple[Errors, Errors]:
     """Errors on the trial of the model that was fitted to the others: as stated, and as its other half tells it."""
     misread, others = made.misread, made.misread.others
-    plain = errors_of(others.model, [trial], others.noise)
+    plain = free_errors(others.model, [trial], others.noise)
     by_half = [
-        errors_of(others.model, [others.model.rig.restated(trial, misread.condition, v)], others.noise)
+        free_errors(others.model, [others.model.rig.restated(trial, misread.condition, v)], others.noise)
         for v in misread.halves
     ]
     pieces = len(plain.squares)

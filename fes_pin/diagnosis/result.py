@@ -16,7 +16,6 @@ from fes_pin.diagnosis.experiment import NEXT_FILE, NextExperiment
 from fes_pin.diagnosis.text import in_words, left_out_text
 from fes_pin.identify.error_measures import FREE, ONE_STEP
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.stored import log_table, stored_tables
 from fes_pin.infer.result import FITTED, STOPPED, Cause, Explained, Ranked, shown
 from fes_pin.infer.text import percent, probability
@@ -56,6 +55,9 @@ class Diagnosis(Result):
         Of a rig that a recorded effort drives: what acts on it at random, and its errors over time.
     log
         What was found that the log of the study does to its trials; in `study` it is undone, where it can be.
+    is_driven
+        Whether a controller answers the reading, or imposes the motion: then errors are judged over the horizon, else
+        those of free simulations.
     """
 
     causes: tuple[Cause, ...]
@@ -73,11 +75,7 @@ class Diagnosis(Result):
     random: tuple[RandomPart, ...] = ()
     ahead: AheadErrors | None = None
     log: Log = field(default_factory=Log)
-
-    @property
-    def is_driven(self) -> bool:
-        """True of a rig whose effort answers what is read: it is judged by predictions one sample ahead."""
-        return isinstance(self.extended, LikelihoodFit)
+    is_driven: bool = False
 
     @property
     def is_falling(self) -> bool:

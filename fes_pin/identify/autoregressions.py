@@ -37,6 +37,24 @@ def autoregressions(run: Sequence[ForetoldTrial], orders: Mapping[str, Sequence[
     return out
 
 
+def residual_powers(run: Sequence[ForetoldTrial]) -> dict[str, float]:
+    """By output, the factor on the variance of its noise that makes what is left of it likeliest.
+
+    A count that was read n times in a row is one reading: its errors count as one.
+    """
+    out = {}
+    for name in dict.fromkeys(n for one in run for n in one.outputs):
+        squares = count = 0.0
+        for one in run:
+            if name in one.outputs:
+                own = one.of_seen(np.broadcast_to(np.array(one.outputs) == name, one.seen.shape))
+                squares += float(np.sum(one.whitened[0][own] ** 2))
+                count += float(np.sum(1.0 - one.readings.again[own]))
+        if 0.0 < squares < math.inf:
+            out[name] = squares / count
+    return out
+
+
 def with_autoregressions(one: ForetoldTrial, found: Mapping[str, tuple[float, ...]]) -> ForetoldTrial:
     """The trial with other autoregressions of its outputs."""
     return replace(one, ar=tuple(found.get(o, ()) for o in one.outputs))

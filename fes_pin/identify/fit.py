@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,7 @@ from fes_pin.identify.problem import Problem
 from fes_pin.infer.noise import ORDERS, Noise, NoiseModel, as_white, estimate_noise, noise_step, thin, thinning
 from fes_pin.infer.optimum import MAX_ITERATIONS, Optimum, minimise
 from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
+from fes_pin.infer.problem import Problem as AnyProblem
 from fes_pin.infer.profile import profile_interval
 from fes_pin.infer.result import shown
 from fes_pin.models.accepted import accepted_trials
@@ -250,19 +251,41 @@ def fit_problem(
     return Fit(**ended(problem.model, found), trials=problem.trials, noise=problem.noise)
 
 
-def fit_growing(problem: Problem, start: Mapping[str, float], max_iterations: int = MAX_ITERATIONS) -> Fit:
-    """Fit a problem from afar: to the beginning of every trial, to twice as much of it, and so on to the whole.
+def grown_start(
+    of: Callable[[list[Trial]], AnyProblem], trials: Sequence[Trial], start: Mapping[str, float], max_iterations: int
+) -> tuple[dict[str, float], Unknowns | None]:
+    """Where a fit begins from afar: fitted to the beginning of every trial, to twice as much of it, and so on.
 
     What a wrong parameter does to an angle grows with time, past half a swing; the squares of a long trial then have
     many minima, those of its beginning few. Source: Voss, Timmer and Kurths, Int. J. Bifurcation Chaos 14 (2004).
+
+    Parameters
+    ----------
+    of
+        The problem on some trials.
+
+    Returns
+    -------
+    tuple
+        Values of all parameters, and the unknowns of each trial.
     """
-    values, unknowns = start, None
+    values, unknowns = dict(start), None
     for share in GROWTH:
-        trials = [t.first(max(SHORTEST, round(share * len(t)))) for t in problem.trials]
-        short = Problem(problem.model, trials, problem.noise, problem.free)
-        short.limits = problem.limits
-        near = fit_problem(short, values, unknowns, max_iterations)
+        short = of([t.first(max(SHORTEST, round(share * len(t)))) for t in trials])
+        near = minimise(short, values, unknowns, max_iterations)
         values, unknowns = near.values, near.unknowns
+    return values, unknowns
+
+
+def fit_growing(problem: Problem, start: Mapping[str, float], max_iterations: int = MAX_ITERATIONS) -> Fit:
+    """Fit a problem from afar; see `grown_start`."""
+
+    def short(trials: list[Trial]) -> Problem:
+        made = Problem(problem.model, trials, problem.noise, problem.free)
+        made.limits = problem.limits
+        return made
+
+    values, unknowns = grown_start(short, problem.trials, start, max_iterations)
     return fit_problem(problem, values, unknowns, max_iterations)
 
 

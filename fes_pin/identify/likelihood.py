@@ -13,6 +13,7 @@ Source: Kristensen, Madsen and Jorgensen, Parameter estimation in stochastic gre
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -21,7 +22,7 @@ import numpy as np
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.identify.autoregressions import autoregressions, with_autoregressions
+from fes_pin.identify.autoregressions import autoregressions, residual_powers, with_autoregressions
 from fes_pin.identify.problem import limits_of, products_of
 from fes_pin.identify.process_noise import noise_limits, spread_of_start
 from fes_pin.infer.noise import ORDERS
@@ -29,6 +30,7 @@ from fes_pin.infer.problem import Linearized, Unknowns, whitened_sse
 from fes_pin.infer.scoring import Evaluation, NoisyProblem, Point, fisher_scoring
 from fes_pin.models.compile.layout import WIDE
 from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial
+from fes_pin.models.free_run import FreeRun, with_noise
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt, Predictor
 from fes_pin.workers import check_limit, in_parallel
@@ -67,20 +69,20 @@ class LikelihoodProblem(NoisyProblem):
         self.model, self.trials, self.noise = model, tuple(trials), noise
         self.free = model.fitted_parameters() if free is None else free
         self.limits = limits_of(model, self.trials)
-        self.unknown_names = model.own_unknowns()
+        self.is_simulated = is_simulated(noise, self.trials)
+        self.unknown_names = unknown_names(model, noise, self.trials)
         self.begins = [model.rig.initial_unknowns(t) for t in starts or self.trials]
         self.priors = [spread_of_start(model, t) for t in starts or self.trials]
         self._predictor: Predictor | None = None
-        self._batched: Predictor | None = None
+        self._linearized: Predictor | FreeRun | None = None
+        self._batched: Predictor | FreeRun | None = None
 
-    @property
-    def predictor(self) -> Predictor:
-        """The compiled predictor, with sensitivities to `free` and to the effects' unknowns."""
-        if self._predictor is None:
-            columns = (*self.free, *self.unknown_names)
-            own = (self.noise.processes, self.priors, self.noise.lasts_s)
-            self._predictor = Predictor(self.model, self.trials, columns, *own)
-        return self._predictor
+    def _made(self, count: int, columns: tuple[str, ...]) -> Predictor | FreeRun:
+        """What predicts the trials so many times over, with sensitivities to some parameters and unknowns."""
+        if self.is_simulated:
+            return FreeRun(self.model, self.trials * count, columns, self.noise.lasts_s)
+        own = (self.noise.processes, self.priors * count, self.noise.lasts_s)
+        return Predictor(self.model, self.trials * count, columns, *own)
 
     @cached_property
     def products(self) -> list[tuple[int, int]]:
@@ -88,17 +90,20 @@ class LikelihoodProblem(NoisyProblem):
         return products_of(self.free, self.model.parameter_info())
 
     def start_unknowns(self) -> Unknowns:
-        """What effects have of each trial's own, as known before: at their nulls."""
-        return [self.model.own_nulls() for _ in self.trials]
+        """The unknowns that a fit begins with: starts as first samples say, where these are fitted, effects at null."""
+        own = self.model.own_nulls()
+        return [{**begin, **own} if self.is_simulated else dict(own) for begin in self.begins]
 
     def innovations(
         self, values: Mapping[str, float], unknowns: Unknowns, noise: Doubt | None = None
     ) -> list[ForetoldTrial]:
         """Every trial as foretold, with sensitivities to `free` and to the effects' unknowns; see `linearize`."""
         check_limit()
+        if self._linearized is None:
+            self._linearized = self._made(1, (*self.free, *self.unknown_names))
         own = [{**begin, **u} for begin, u in zip(self.begins, unknowns, strict=True)]
         with np.errstate(all="ignore"):
-            return self.predictor.run(values, noise or self.noise, own)
+            return self._linearized.run(values, noise or self.noise, own)
 
     @property
     def noise_parameters(self) -> dict[str, float]:
@@ -128,8 +133,7 @@ class LikelihoodProblem(NoisyProblem):
         """Every trial as foretold by each of several points, as many side by side as leave no lane idle."""
         count, trials = self.batch, len(self.trials)
         if self._batched is None:
-            own = (self.noise.processes, self.priors * count, self.noise.lasts_s)
-            self._batched = Predictor(self.model, self.trials * count, (), *own)
+            self._batched = self._made(count, ())
         predictor = self._batched
 
         def in_batch(some: Sequence[tuple[Mapping[str, float], Unknowns, Doubt]]) -> list[list[ForetoldTrial]]:
@@ -155,13 +159,32 @@ class LikelihoodProblem(NoisyProblem):
         """What is foretold of each output of each trial, also where nothing was measured."""
         given = self.start_unknowns() if unknowns is None else unknowns
         own = [{**begin, **u} for begin, u in zip(self.begins, given, strict=True)]
+        if self._predictor is None:  # what was read tells the state, also where nothing acts at random
+            random = (self.noise.processes, self.priors, self.noise.lasts_s)
+            self._predictor = Predictor(self.model, self.trials, (), *random)
         with np.errstate(all="ignore"):
-            return self.predictor.foretell(values, self.noise, own)
+            return self._predictor.foretell(values, self.noise, own)
 
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Innovations over their deviations, and sensitivities, at a parameter value; see `check_limit`."""
         parts = [self._whitened(one) for one in self.innovations(values, unknowns)]
+        if self.is_simulated:
+            return [self._marginal(p, prior) for p, prior in zip(parts, self.priors, strict=True)]
         return self._followed(parts, values, unknowns) if self._scales else parts
+
+    def _marginal(self, part: Linearized, prior: Mapping[str, float]) -> Linearized:
+        """A simulated trial with the cost of its unknown start, as a filter has it.
+
+        With H the information about the start and S the deviations of its prior, the likelihood is by Laplace's method
+        that of the likeliest start over |1 + S H S|^(1/2). A fit with process noise can be compared with one without.
+        """
+        own = [k for k, n in enumerate(self.unknown_names) if n in prior]
+        if not own:
+            return part
+        with np.errstate(all="ignore"):
+            scaled = part.local[:, own] * [prior[self.unknown_names[k]] for k in own]
+            _, logarithm = np.linalg.slogdet(np.eye(len(own)) + scaled.T @ scaled)
+        return replace(part, log_determinant=part.log_determinant + float(logarithm))
 
     @property
     def is_final(self) -> bool:
@@ -169,10 +192,12 @@ class LikelihoodProblem(NoisyProblem):
 
         There a lag would take up how smooth a random effort is, which no process of first order is.
         """
-        return not all(self.model.rig.unknowns(t.kind) for t in self.trials)
+        return self.is_simulated or not all(self.model.rig.unknowns(t.kind) for t in self.trials)
 
     def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
         """Improve the noise, in place; returns by how much that lowers the cost."""
+        if self.is_simulated:
+            return self._simulated_noise_step(values, unknowns)
         reached = fisher_scoring(self, values, unknowns, {}, NOISE_STEPS)
         self.set_noise(reached.noise)
         return reached.gained + self.renew(values, unknowns)
@@ -191,6 +216,20 @@ class LikelihoodProblem(NoisyProblem):
             self.noise = replace(self.noise, ar=found)
         return max(before - after, 0.0)
 
+    def _simulated_noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
+        """Set the noise of the readings, in place, to what a simulation leaves; returns by how much the cost falls."""
+        (run,) = self._runs([(values, unknowns, self.noise)])
+        orders, limits = {n: (len(ar),) for n, ar in self.noise.ar.items()}, self.noise_limits
+        found = replace(self.noise, ar={**self.noise.ar, **autoregressions(run, orders)})
+        powers = residual_powers([with_noise(one, found) for one in run])
+        white = {n: found.white[n] * math.sqrt(power) for n, power in powers.items()}
+        found = found.with_values({f"white.{n}": float(np.clip(v, *limits[f"white.{n}"])) for n, v in white.items()})
+        before, after = (sum(one.cost() for one in some) for some in (run, [with_noise(one, found) for one in run]))
+        if not after < before:
+            return 0.0
+        self.noise = found
+        return before - after
+
     def with_orders(self, values: Mapping[str, float], unknowns: Unknowns) -> Doubt:
         """What is random, with autoregressions of the orders that what the filter leaves shows."""
         (run,) = self._runs([(values, unknowns, self.noise)])
@@ -203,6 +242,8 @@ class LikelihoodProblem(NoisyProblem):
     @cached_property
     def _scales(self) -> tuple[str, ...]:
         """Free parameters that scale a reading: the filter's gains go with them."""
+        if self.is_simulated:  # there are no gains
+            return ()
         imposed = any(t.kind == IMPOSED for t in self.trials)
         read = ("reading", "effort") if imposed else ("reading",)
         names = [f"{e.name}.{n}" for e in self.model.effects if e.scales and e.signal in read for n in e.amplitudes()]
@@ -245,6 +286,17 @@ class LikelihoodProblem(NoisyProblem):
     def cost(self, values: Mapping[str, float], unknowns: Unknowns, noise: Doubt | None = None) -> float:
         """Twice the negative log-likelihood."""
         return sum(one.cost() for one in self.innovations(values, unknowns, noise))
+
+
+def is_simulated(noise: Doubt, trials: Sequence[Trial]) -> bool:
+    """True where there is no process noise: one-step predictions are then a free simulation."""
+    return not noise.processes and all(t.kind != IMPOSED for t in trials)
+
+
+def unknown_names(model: Model, noise: Doubt, trials: Sequence[Trial]) -> tuple[str, ...]:
+    """Unknowns that each trial has of its own, by name: of its start, where that is fitted, and of effects."""
+    begins = [n for t in trials for n in model.rig.unknowns(t.kind)] if is_simulated(noise, trials) else []
+    return (*dict.fromkeys(begins), *model.own_unknowns())
 
 
 def _added(part: Linearized, at: Sequence[int], factors: np.ndarray) -> Linearized:

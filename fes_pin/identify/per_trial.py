@@ -14,7 +14,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial, derived_trial
 from fes_pin.identify.fit import Fit
-from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood import LikelihoodProblem, unknown_names
 from fes_pin.identify.problem import Problem
 from fes_pin.identify.process_noise import spread_of_start
 from fes_pin.infer.noise import Noise, NoiseModel
@@ -107,7 +107,7 @@ def foretold_unknowns(model: Model, trial: Trial, doubt: Doubt) -> list[tuple[np
         for _ in range(STEPS):
             (part,) = problem.linearize(values, now)
             now = [_moved(part, np.ones(len(part.residual), dtype=bool), problem.unknown_names, now[0])]
-        out.append((told, now[0]))
+        out.append((told, {n: now[0][n] for n in model.own_unknowns()}))
     return out
 
 
@@ -136,8 +136,10 @@ def amplitude(fitted: Fit, effect: Effect) -> tuple[float, float]:
     The mean is over the trials of the kind that comes first among those that feel the effect, as a motion and a force
     have no unit in common; what the uncertainty of the single values adds to their squares is taken off.
     """
-    initial = fitted.model.rig.unknowns(fitted.trials[0].kind) if not isinstance(fitted.noise, Doubt) else ()
-    names = (*initial, *fitted.model.own_unknowns())
+    if isinstance(fitted.noise, Doubt):
+        names = unknown_names(fitted.model, fitted.noise, fitted.trials)
+    else:
+        names = (*fitted.model.rig.unknowns(fitted.trials[0].kind), *fitted.model.own_unknowns())
     own = np.array([names.index(f"{effect.name}.{n}") for n in effect.unknowns()])
     slopes = [slope for _, slope in normal_equations(fitted.parts).eliminated]
     squares, spread, kind = [], [], None

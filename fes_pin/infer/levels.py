@@ -31,6 +31,9 @@ an error that is small anyway is nothing. A low pass must take as much of the po
 UNFELT = 1e-4
 """Share of the largest of several squares, or eigenvalues, below which one says nothing: a hundredth in amplitude, a
 tenth of what is small (`SMALL_SHARE`)."""
+FORM_SHARE = 0.0625
+"""Share of what all causes explain that an error of form leaves: a real cause differs from its equation, and an error
+of a quarter in its form leaves a sixteenth of its likelihood to whatever else comes near."""
 RUNAWAY = 10.0
 """A prediction is lost where it is so many times as far off as readings ever are, or enlarges an error of its beginning
 so many times: where it goes to says nothing, and it counts as no farther off."""

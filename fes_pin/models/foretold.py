@@ -59,7 +59,7 @@ class Readings:
 
     def of_seen(self, array: np.ndarray) -> np.ndarray:
         """What is seen of an array of shape (n, outputs, ...), sample by sample; a view of it where that is all."""
-        return array.reshape(-1, *array.shape[2:]) if self.all_seen else array[self.seen]
+        return array.reshape(self.seen.size, *array.shape[2:]) if self.all_seen else array[self.seen]
 
 
 @dataclass(frozen=True)

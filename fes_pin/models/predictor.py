@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from fes_pin.models.autoregression import noise_ahead, stationary_variance
 from fes_pin.models.disturbance import disturbed
 from fes_pin.models.foretold import ForetoldOutput, ForetoldTrial, Readings
 from fes_pin.models.model import Model
+from fes_pin.models.rigs.base import Rig
 from fes_pin.models.simulate import (
     Block,
     is_delayed,
@@ -130,7 +131,7 @@ class Predictor:
     def _key(self, trial: Trial) -> tuple[Any, ...]:
         """What trials share that can share a block: kind, inputs, what was measured, integration steps per sample."""
         steps = substeps(self.model, trial.dt, self.max_step_s)
-        return trial.kind, self.model.driven_by(trial), _measured(self.model, trial), steps
+        return trial.kind, self.model.driven_by(trial), measured_outputs(self.model, trial), steps
 
     def run(
         self,
@@ -178,7 +179,40 @@ def _lanes_first(array: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.moveaxis(array, -1, 0))
 
 
-def _measured(model: Model, trial: Trial) -> tuple[str, ...]:
+class ReadColumns(NamedTuple):
+    """What was read of the outputs of a trial, each of shape (n, outputs).
+
+    Attributes
+    ----------
+    followed
+        Whether a sample was measured that a prediction follows.
+    measured
+        What was read; 0 elsewhere.
+    repeated
+        How often the value was read in a row.
+    readings
+        What is judged of it.
+    """
+
+    followed: np.ndarray
+    measured: np.ndarray
+    repeated: np.ndarray
+    readings: Readings
+
+
+def read_columns(rig: Rig, trial: Trial, outputs: tuple[str, ...], lasts_s: float) -> ReadColumns:
+    """What was read of the outputs of a trial, where the noise of a reading lasts so long."""
+    columns = np.column_stack([trial[name] for name in outputs])
+    hunting = np.column_stack([hunts(trial[name]) for name in outputs])
+    often = np.column_stack([repeated(c, h) for c, h in zip(columns.T, hunting.T, strict=True)])
+    followed = np.isfinite(columns) & (rig.follows(trial) & are_news(trial, lasts_s))[:, None]
+    in_counts = np.array([count_of(c) > 0.0 for c in columns.T])
+    readings = Readings(outputs, followed & ~hunting, np.where(in_counts, often, 1.0))
+    return ReadColumns(followed, np.where(followed, columns, 0.0), often, readings)
+
+
+def measured_outputs(model: Model, trial: Trial) -> tuple[str, ...]:
+    """The outputs that a trial has, in the order of its rig."""
     return tuple(n for n in model.rig.outputs(trial.kind) if n in trial.columns)
 
 
@@ -196,7 +230,7 @@ class _Prediction(Block):
         max_step_s: float,
         lasts_s: float,
     ) -> None:
-        kind, self.outputs = trials[lanes[0]].kind, _measured(model, trials[lanes[0]])
+        kind, self.outputs = trials[lanes[0]].kind, measured_outputs(model, trials[lanes[0]])
         super().__init__(disturbed(model, kind, processes), trials, lanes, columns, max_step_s, self.outputs)
         for name in self.rig.unknowns(kind):
             self._set(self.constants, f"prior.{name}", [priors[i][name] for i in lanes])
@@ -206,17 +240,9 @@ class _Prediction(Block):
         self.repeated = np.ones((self.count, len(self.outputs), self.width))
         self.readings: list[Readings] = []
         for lane, trial in enumerate(self.trials):
-            followed = self.rig.follows(trial) & are_news(trial, lasts_s)
-            judged, repeats = np.zeros((2, len(trial), len(self.outputs)))
-            for k, name in enumerate(self.outputs):
-                column, hunting = trial[name], hunts(trial[name])
-                finite = np.isfinite(column) & followed
-                self.seen[: len(trial), k, lane] = finite
-                judged[:, k] = finite & ~hunting
-                self.measured[: len(trial), k, lane] = np.where(finite, column, 0.0)
-                self.repeated[: len(trial), k, lane] = repeated(column, hunting)
-                repeats[:, k] = self.repeated[: len(trial), k, lane] if count_of(column) > 0.0 else 1.0
-            self.readings.append(Readings(self.outputs, judged.astype(bool), repeats))
+            read, n = read_columns(self.rig, trial, self.outputs, lasts_s), len(trial)
+            self.seen[:n, :, lane], self.measured[:n, :, lane], self.repeated[:n, :, lane] = read[:3]
+            self.readings.append(read.readings)
 
     def _inputs(self, shift: tuple[int, ...]) -> np.ndarray:
         """Inputs of all lanes, later by whole samples, beside what was measured and whether it was."""

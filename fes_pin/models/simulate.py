@@ -104,14 +104,16 @@ class Simulator:
         return trial.kind, self.model.driven_by(trial), substeps(self.model, trial.dt, self.max_step_s)
 
     def run(
-        self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]] | None = None
+        self,
+        values: Mapping[str, float] | Sequence[Mapping[str, float]],
+        unknowns: Sequence[Mapping[str, float]] | None = None,
     ) -> list[Simulated]:
         """Simulate every trial.
 
         Parameters
         ----------
         values
-            Every parameter of the model, by name.
+            Every parameter of the model, by name; one for all trials, or one for each.
         unknowns
             For each trial its own unknowns, if the model has any; by default as its first samples say: see `start`.
 
@@ -122,20 +124,26 @@ class Simulator:
             left out of the equations, unless sensitivities to them are asked for.
         """
         out: list[Simulated | None] = [None] * len(self.trials)
-        for block in self.run_abreast(values, self.start(values) if unknowns is None else unknowns):
+        if unknowns is None:
+            unknowns = self.start(values if isinstance(values, Mapping) else values[0])
+        for block in self.run_abreast(values, unknowns):
             for lane, i in enumerate(block.trials):
                 n = len(self.trials[i])
                 out[i] = Simulated(block.readings[:n, :, lane], self._spread(block, block.sensitivities[:n, ..., lane]))
         return [s for s in out if s is not None]
 
-    def run_abreast(self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]]) -> Iterator[Abreast]:
+    def run_abreast(
+        self, values: Mapping[str, float] | Sequence[Mapping[str, float]], unknowns: Sequence[Mapping[str, float]]
+    ) -> Iterator[Abreast]:
         """Simulate every trial, as `run` does; what comes side by side is given as it comes."""
-        for name, value in self._fixed.items():
-            if values[name] != value:
-                raise ValueError(f"{name} is {value:g} in the model that this simulator is for, not {values[name]:g}")
-        delay = total_delay(self.model, values) if self._delayed else 0.0
+        each = [values] * len(self.trials) if isinstance(values, Mapping) else values
+        for own in [values] if isinstance(values, Mapping) else each:
+            for name, value in self._fixed.items():
+                if own[name] != value:
+                    raise ValueError(f"{name} is {value:g} in the model that this simulator is for, not {own[name]:g}")
+        delays = [total_delay(self.model, own) if self._delayed else 0.0 for own in each]
         for block in self._blocks:
-            yield block.run(values, unknowns, delay)
+            yield block.run(values, unknowns, delays)
 
     def _spread(self, block: Abreast, s: np.ndarray) -> np.ndarray:
         """Sensitivities in the order asked for, zero where this kind of trial has no such unknown."""
@@ -286,8 +294,13 @@ class Block:
 class _Simulation(Block):
     """A block without measurements."""
 
-    def run(self, values: Mapping[str, float], unknowns: Sequence[Mapping[str, float]], delay: float) -> Abreast:
-        y, s = self._run(values, unknowns, [delay] * len(unknowns))
+    def run(
+        self,
+        values: Mapping[str, float] | Sequence[Mapping[str, float]],
+        unknowns: Sequence[Mapping[str, float]],
+        delays: Sequence[float],
+    ) -> Abreast:
+        y, s = self._run(values, unknowns, delays)
         for lane, trial in enumerate(self.trials):
             if len(trial) < self.count:
                 y[len(trial) :, :, lane] = s[len(trial) :, ..., lane] = 0.0

@@ -2,9 +2,9 @@
 
     .venv/bin/python scripts/benchmarks/adequate.py [--count 40] [--seed 0]
 
-Studies that hide nothing, of `scripts/accuracy free`, in white, first-order autoregressive (0.6 to
-0.9) and coloured noise (a random torque, or ARMA(2, 1) in the sensor), are fitted with the nominal model. Printed are
-quantiles of `claims.slowness`, and how many studies lie beyond `levels.SMALL_SHARE`, where no model is adequate.
+Studies that hide nothing, of `scripts/accuracy free`, in white, first-order autoregressive (0.6 to 0.9) and coloured
+noise (a random torque, or ARMA(2, 1) in the sensor), are fitted with the nominal model. Printed are quantiles of
+`driven_refused.slowness`, and how many studies lie beyond `levels.SMALL_SHARE`, where no model is adequate.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from confusion_matrix.generator import make
 from confusion_matrix.noise import FAMILIES
 from confusion_matrix.plan import Item
 
-from fes_pin.diagnosis.decide.claims import slowness
+from fes_pin.diagnosis.driven_refused import slowness
 from fes_pin.identify.fit import fit
 from fes_pin.infer.levels import SMALL_SHARE
 from fes_pin.models.nominal import nominal_model

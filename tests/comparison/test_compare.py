@@ -16,8 +16,7 @@ from fes_pin.comparison.literature import LITERATURE, published_model
 from fes_pin.comparison.own_part import own_part
 from fes_pin.comparison.result import apart_from
 from fes_pin.data.errors import InputError
-from fes_pin.diagnosis.decide.held_out import errors_of
-from fes_pin.diagnosis.errors_ahead import Ahead
+from fes_pin.diagnosis.errors_ahead import Ahead, free_errors
 from fes_pin.identify.ahead import forecast_errors, own_noise
 from fes_pin.identify.fit import rough_noise
 
@@ -66,7 +65,7 @@ def test_the_error_is_that_of_a_diagnosis(tmp_path):
     trials = [replace(t, role="held_out" if k > 4 else "fit") for k, t in enumerate(study.trials)]
     (found,) = fp.compare(replace(study, trials=tuple(trials)), ["nominal"], horizon_s=0.2).models
     held, floor = trials[5:], rough_noise(found.fit.model, trials)
-    assert found.percent["free"] == pytest.approx(errors_of(found.fit.model, held, floor).error_percent())
+    assert found.percent["free"] == pytest.approx(free_errors(found.fit.model, held, floor).error_percent())
     ahead = Ahead.of(forecast_errors(found.fit.model, held, own_noise(found.fit), floor, 0.2))
     assert found.percent["horizon"] == pytest.approx(ahead.horizon)
     assert found.percent["free"] == pytest.approx(ahead.free)
@@ -79,7 +78,7 @@ def test_columns_count_in_the_error_by_their_noise(tmp_path):
     study = fp.read_study(DEMO)
     (found,) = fp.compare(study, ["nominal"]).models
     floor = rough_noise(found.fit.model, study.trials)
-    whole = errors_of(found.fit.model, study.trials, floor).error_percent()
+    whole = free_errors(found.fit.model, study.trials, floor).error_percent()
     assert {"angle_rad", "force_n"} == set(found.rmse)
     assert whole < found.percent["free"] < 1.5 * whole  # by fits without the trials
 

@@ -6,11 +6,10 @@ import numpy as np
 from diagnosis.hidden import study_of
 
 from fes_pin.data.study import read_study
-from fes_pin.diagnosis.decide.doubts import with_error
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.search.simulation_search import Searched
-from fes_pin.identify.fit import fit
-from fes_pin.infer.result import Remainder
+from fes_pin.diagnosis.driven_refused import no_noise
+from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT
+from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels
 from fes_pin.models.least_squares import least_squares
 from fes_pin.models.nominal import nominal_model
 from fes_pin.view.report import report_html
@@ -27,15 +26,12 @@ def test_a_model_that_cannot_be_simulated_stops_with_the_reason():
 
 
 def test_a_missing_input_does_not_end_as_noise():
-    """A joint whose effort was not recorded, and no test that sees it: a long autoregression calls its motion noise."""
-    study, silent = study_of("joint", seed=2), Remainder(False, 0.38, None)
+    """A joint whose effort was not recorded: an autoregression calls its motion noise."""
+    study = study_of("joint", seed=2)
     lost = [t.with_columns(effort=np.zeros(len(t))) for t in study.trials]
-    for trials, told in ((study.trials, False), (lost, True)):
-        fitted = fit(nominal_model(study), trials)
-        searched = Searched(fitted, fitted, {}, {}, fitted, {}, [], fitted.noise)
-        left, reason = with_error(silent, searched)
-        assert left.unexplained == told
-        assert (left == silent and reason is None) if not told else "is no noise of a reading" in reason
+    for trials, expected in ((study.trials, False), (lost, True)):
+        reason = no_noise(LikelihoodModels(nominal_model(study), trials, (), False, noise=MEASUREMENT).nominal())
+        assert (reason is not None and "is no noise of a reading" in reason) == expected
 
 
 def test_the_headline_says_how_much_is_explained():

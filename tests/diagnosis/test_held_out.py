@@ -1,11 +1,9 @@
 """Errors on trials that took no part."""
 
-from dataclasses import replace
-
 import numpy as np
 from diagnosis.hidden import study_of
 
-from fes_pin.diagnosis.decide.held_out import cross_validate, errors_of, separate
+from fes_pin.diagnosis.errors_ahead import free_errors
 from fes_pin.identify.fit import fit
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.levels import RUNAWAY
@@ -18,39 +16,11 @@ def test_a_prediction_that_runs_away_counts_as_a_large_error():
     study = study_of("joint", driven=False)
     base = fit(nominal_model(study), study.trials)
     falling = effect_named("parallel_stiffness")(stiffness_nm_per_rad=1e8, rest_angle_rad=0.0)
-    errors = errors_of(base.model + falling, study.trials, base.noise)
+    errors = free_errors(base.model + falling, study.trials, base.noise)
     most = RUNAWAY * max(np.abs(t["position"]).max() for t in study.trials)
     assert np.isfinite(errors.squares).all()
-    assert errors.squares.max() > errors_of(base.model, study.trials, base.noise).squares.max()
+    assert errors.squares.max() > free_errors(base.model, study.trials, base.noise).squares.max()
     assert (errors.squares <= (1.0 + 1e-9) * errors.noise * (most / base.noise["position"].std) ** 2).all()
-
-
-def test_evidence_against_a_model_that_runs_away_is_a_number():
-    study = study_of("joint", driven=False)
-    base = fit(nominal_model(study), study.trials)
-    falling = base.model + effect_named("parallel_stiffness")(stiffness_nm_per_rad=1e8, rest_angle_rad=0.0)
-    fallen = replace(base, model=falling)
-    with_it, without_it = (
-        separate(base, one, {"cause": other}, study.trials, base.noise)
-        for one, other in ((base, fallen), (fallen, base))
-    )
-    assert 1e6 < with_it.evidence["cause"].low < np.inf
-    assert -np.inf < without_it.evidence["cause"].low < -1e6
-
-
-def test_a_causes_gain_is_not_that_of_another_set_which_the_folds_prefer():
-    """Dry friction is hidden; an offset is judged beside it: what the friction removes is not the offset's gain."""
-    study = study_of("joint", ("coulomb_friction",))
-    nominal = fit(nominal_model(study), study.trials)
-    offset, friction = (
-        fit(nominal.model + effect_named(name)(), study.trials, nominal.noise)
-        for name in ("effort_offset", "coulomb_friction")
-    )
-    alone = cross_validate(nominal, offset, {"effort_offset": nominal}, lambda _: offset, nominal.noise)
-    beside = cross_validate(nominal, offset, {"effort_offset": nominal}, lambda _: friction, nominal.noise)
-    own, found = (held_out_gain(h.nominal, h.without["effort_offset"], h.extended, 0) for h in (alone, beside))
-    assert own.high < 50.0 < held_out_gain(beside.nominal, beside.nominal, beside.chosen, 0).low
-    assert found == own
 
 
 def test_a_gain_of_units_with_next_to_no_error_is_no_large_number():

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from diagnosis.hidden import study_of
 
-from fes_pin.diagnosis.search.simulation_fits import SimulationFits
-from fes_pin.identify.fit import rough_noise
+from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT
+from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels
 from fes_pin.models.effects import effect_named
 from fes_pin.models.nominal import nominal_model
 
@@ -13,12 +13,13 @@ from fes_pin.models.nominal import nominal_model
 def test_a_size_at_the_end_of_its_range_comes_last():
     """Beside a detent an ankle that hung at 1 rad, the most that it may be tilted by, had been named."""
     study = study_of("ankle")
-    sets = SimulationFits(nominal_model(study), study.trials)
-    sets.set_noise(rough_noise(sets.model, sets.trials))
-    for name in ("base_tilt", "coulomb_friction"):
-        sets.fits[name,] = sets.fitter.fit_from([sets.model + effect_named(name)()], None, 60)
+    looked_for = [effect_named(name) for name in ("base_tilt", "coulomb_friction")]
+    sets = LikelihoodModels(nominal_model(study), study.trials, looked_for, answered=False, noise=MEASUREMENT)
+    sets.nominal()
+    sets.extend(())
+    sets.converge(1)
     tilt, friction = sets.fits["base_tilt",], sets.fits["coulomb_friction",]
-    assert not any(map(sets.is_absurd, (tilt, friction)))
+    assert all(map(sets.is_possible, (tilt, friction)))
     most = tilt.model.parameter_info()["base_tilt.tilt_rad"].upper
     ended = replace(
         tilt,
@@ -28,5 +29,5 @@ def test_a_size_at_the_end_of_its_range_comes_last():
         converged=True,
     )
     sets.fits["base_tilt",] = ended
-    assert sets.is_absurd(ended)
+    assert not sets.is_possible(ended)
     assert sets.ranked(1) == [("coulomb_friction",), ("base_tilt",)]

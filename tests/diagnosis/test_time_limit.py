@@ -7,7 +7,7 @@ import pytest
 from diagnosis.hidden import study_of
 
 from fes_pin.diagnosis.diagnosis import diagnose_joint
-from fes_pin.diagnosis.search.simulation_search import SimulationSearch
+from fes_pin.diagnosis.search.likelihood_models import LikelihoodModels
 from fes_pin.view.report import report_html
 from fes_pin.workers import OutOfTime, check_limit, in_parallel, time_limit
 
@@ -41,10 +41,10 @@ def test_without_time_nothing_is_claimed(study):
 def test_what_has_earned_its_place_is_told(study, monkeypatch):
     """The clock runs out when pairs are about to be fitted."""
 
-    def out_of_time(search, size, every=False):
+    def out_of_time(models, most):
         raise OutOfTime
 
-    monkeypatch.setattr(SimulationSearch, "_extend_beam", out_of_time)
+    monkeypatch.setattr(LikelihoodModels, "extend_by_pairs", out_of_time)
     stopped = diagnose_joint(study, limit=1e3)
     assert [c.name for c in stopped.causes] == ["coulomb_friction"] and stopped.verdict == "stopped"
     assert "stopped: best set so far: the model lacks coulomb friction" in stopped.headline()

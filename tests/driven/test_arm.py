@@ -57,7 +57,7 @@ def test_parameters_are_nearer_to_what_they_are(fitted):
 
 def test_it_foretells_more(fitted):
     """Freely in every arm; over the horizon in most, and far more than it loses in the others."""
-    ahead = [[errors_ahead([(f, f.trials)], HORIZON_S, falling=False) for f in fits] for _, *fits in fitted]
+    ahead = [[errors_ahead([(f, f, f.trials)], HORIZON_S, falling=False) for f in fits] for _, *fits in fitted]
     free, horizon = (np.log([[getattr(a, n) for a in both] for both in ahead]) for n in ("free", "horizon"))
     assert np.all(free[:, 1] < free[:, 0] + 0.05)
     assert np.mean(free[:, 1] - free[:, 0]) < -0.7

@@ -30,7 +30,7 @@ def test_errors_of_a_right_model_are_those_of_noise(horizon_s, fitted):
     found = errors_over_horizon([(fitted, fitted, fitted.trials)], horizon_s)
     assert abs(found.squares.sum() - found.noise.sum()) < 3.0 * np.sqrt(found.scatter().sum())
     assert found.noise.sum() > 5.0 * sum(map(len, fitted.trials))
-    told = errors_ahead([(fitted, fitted.trials)], horizon_s, falling=False)
+    told = errors_ahead([(fitted, fitted, fitted.trials)], horizon_s, falling=False)
     assert told.noise == pytest.approx(100.0 * found.noise.sum() / found.spread.sum(), rel=0.05)
     assert told.horizon == pytest.approx(100.0 * found.squares.sum() / found.spread.sum(), rel=0.05)
 

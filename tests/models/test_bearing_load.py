@@ -8,10 +8,12 @@ import pytest
 from cases import JOINT
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.search.simulation_fits import SimulationFits
-from fes_pin.identify.fit import rough_noise
+from fes_pin.diagnosis.search.likelihood_forms import LikelihoodForms
+from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
+from fes_pin.identify.problem import measured_columns
 from fes_pin.models.effects.coulomb_friction import CoulombFriction
 from fes_pin.models.model import Model
+from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs import Joint
 from fes_pin.models.simulate import simulate
 from fes_pin.models.stage import Signals
@@ -69,15 +71,13 @@ def test_the_load_is_told_from_swings(exponent):
         clean = swing(true, amplitude)
         measured = clean["position"] + 1e-3 * rng.standard_normal(len(TIME))
         trials.append(Trial("swing", "motion", {"position": measured}, TIME, clean.conditions))
-    sets = SimulationFits(nominal, trials)
-    sets.set_noise(rough_noise(nominal, trials))
-    names = ("coulomb_friction",)
-    sets.fits[names] = sets.fitter.fit_from([nominal + CoulombFriction(0.8 * TORQUE)], None)
-    refined, base = sets.refinement(names), sets.fits[names]
+    maxima = LikelihoodMaxima(trials)
+    base = maxima.from_start(nominal + CoulombFriction(0.8 * TORQUE), Doubt({"position": 1e-3}))
+    refined = LikelihoodForms(maxima, measured_columns(nominal, trials)).refined(base)
     if exponent:
         assert refined.values["coulomb_friction.load_exponent"] == exponent
         assert refined.values["coulomb_friction.torque_nm"] == pytest.approx(TORQUE, rel=0.03)
         assert refined.free == base.free and base.sse - refined.sse > 100.0
-        assert refined.reduced == pytest.approx(1.0, abs=0.1)
+        assert refined.noise.white["position"] == pytest.approx(1e-3, rel=0.05)
     else:
         assert refined is None or refined.sse > base.sse - 10.0

@@ -1,4 +1,4 @@
-"""What causes of driven rigs gain over a horizon: of its errors above the noise."""
+"""What causes gain of errors above the noise: over a horizon, or of free simulations."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.errors_ahead import errors_over_horizon
+from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.held_out import Errors, held_out_gain
 from fes_pin.infer.result import Gain
@@ -27,12 +27,12 @@ class Fold:
 
 
 def gains_of(
-    folds: Sequence[Fold], without: Mapping[str, LikelihoodFit], horizon_s: float, seed: int
+    folds: Sequence[Fold], without: Mapping[str, LikelihoodFit], horizon_s: float | None, seed: int
 ) -> dict[str, Gain]:
-    """What each cause gains over the horizon.
+    """What each cause gains over the horizon, or of the errors of free simulations.
 
-    Where that is nothing, over as long as the random effort lasts that stands for the cause in the fit without it: a
-    filter follows what is slow, as a spring's torque, and foretells it for so long.
+    Where it is nothing over the horizon, over as long as the random effort lasts that is mistaken for the cause in the
+    fit without it: a filter follows what is slow, as a spring's torque, and predicts it for so long.
 
     Parameters
     ----------
@@ -41,9 +41,11 @@ def gains_of(
     without
         By cause, the fit to all trials without it.
     horizon_s, seed
-        How far ahead errors look, s; of the bootstrap of their intervals.
+        How far ahead errors look, s, None for free simulations; of the bootstrap of their intervals.
     """
     found_over = _gains_over(folds, tuple(without), horizon_s, seed)
+    if horizon_s is None:
+        return found_over
     shortest = min(t.duration for f in folds for t in f.test)
     for name, gain in found_over.items():
         lasts = min(max(without[name].noise.time.values(), default=0.0), shortest)
@@ -53,12 +55,12 @@ def gains_of(
     return found_over
 
 
-def _gains_over(folds: Sequence[Fold], names: Sequence[str], horizon_s: float, seed: int) -> dict[str, Gain]:
+def _gains_over(folds: Sequence[Fold], names: Sequence[str], horizon_s: float | None, seed: int) -> dict[str, Gain]:
     """What causes gain on the trials of the folds, so far ahead."""
 
     def errors(fits: Sequence[LikelihoodFit]) -> Errors:
         pairs = zip(fits, folds, strict=True)
-        return errors_over_horizon([(one, fold.best, fold.test) for one, fold in pairs], horizon_s)
+        return squared_errors([(one, fold.best, fold.test) for one, fold in pairs], horizon_s)
 
     if not names:
         return {}

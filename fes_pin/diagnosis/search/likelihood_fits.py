@@ -17,7 +17,7 @@ from fes_pin.diagnosis.search.likelihood_maxima import LikelihoodMaxima
 from fes_pin.diagnosis.search.likelihood_screen import LikelihoodScreen
 from fes_pin.diagnosis.search.possible import is_possible
 from fes_pin.diagnosis.search.score import Scored, best_by_effect, best_pairs
-from fes_pin.diagnosis.search.starts import STARTS, from_afar, started
+from fes_pin.diagnosis.search.starts import STARTS, from_afar, refinements, started
 from fes_pin.identify.lasting import with_new_noise
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
@@ -36,6 +36,9 @@ FIRST_DOUBTS = (1.0, 30.0)
 """Sizes of random effort that the nominal fit begins with, in units of the smallest: a likelihood can have two optima,
 one in which the model explains and one in which randomness does. Beside a fit whose random effort is beyond the larger,
 further causes begin also with the smallest."""
+PROCESS, MEASUREMENT, WHITE = "process noise", "measurement noise", "white measurement noise"
+"""What noise fits have: where they have no process noise predictions are free simulations; white measurement noise
+weighs every error alike, as least squares do."""
 AFRESH_ROUNDS = 3
 """Turns of parameters and randomness of such a fit, before the best sets converge."""
 AFRESH_SETS = 3
@@ -59,6 +62,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         The causes that are looked for; by default all that are known of the rig.
     answered
         Whether an effort, if there is one, answers what is read; a property of the trials, not of the likelihood.
+    noise
+        Which noise fits have: `PROCESS`, `MEASUREMENT` or `WHITE`.
 
     Attributes
     ----------
@@ -76,9 +81,10 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         trials: Sequence[Trial],
         effects: Sequence[type[Effect]] | None = None,
         answered: bool = True,
+        noise: str = PROCESS,
     ) -> None:
         super().__init__()
-        self.model, self.trials = Model(model.rig), tuple(trials)
+        self.model, self.trials, self.answered, self.noise = Model(model.rig), tuple(trials), answered, noise
         self.library = Library(self.model, trials, effects, answered)
         self._calm: Doubt | None = None
         self._compared: dict[tuple[Names, str], LikelihoodFit] = {}
@@ -98,21 +104,31 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         if () in self.fits:
             return self.fits[()]
         from_rest = all(t.kind != IMPOSED and not self.model.rig.unknowns(t.kind) for t in self.trials)
-        self.fits[()] = self._from_rest() if from_rest else with_new_noise(self.trials, self._nominal)
+        if from_rest or not (self.answered or any(t.kind == IMPOSED for t in self.trials)):
+            self.fits[()] = self._without_process_noise_first()
+        else:
+            self.fits[()] = with_new_noise(self.trials, self._nominal)
         return self.fits[()]
 
-    def _from_rest(self) -> LikelihoodFit:
-        """The nominal fit under noise that foretells itself; with a random effort besides, if that earns its price."""
+    def _without_process_noise_first(self) -> LikelihoodFit:
+        """The nominal fit without process noise; with it, if that improves the penalised likelihood."""
         guess = first_guess(self.model, self.trials)
-        calm = self._with_orders(self._maxima.from_start(self.model, stilled(self.model, self.trials, guess)))
+        none = stilled(self.model, self.trials, guess) if self.answered else replace(guess, std={}, time={})
+        calm = self._maxima.from_afar(self.model, none)
+        calm = calm if self.noise == WHITE else self._with_orders(calm)
         self._calm = calm.noise
-        if not guess.std:
+        return min(calm, self.with_process_noise(calm), key=lambda f: f.price) if self.noise == PROCESS else calm
+
+    def with_process_noise(self, calm: LikelihoodFit) -> LikelihoodFit:
+        """A fit without process noise again, with it: the best from several sizes of it."""
+        guess = first_guess(self.model, self.trials)
+        if not guess.std or any(t.low_pass_hz for t in self.trials):  # no filter passes a state on
             return calm
         white = {n: (0.0,) * len(own) for n, own in calm.noise.ar.items()}
-        begun = [replace(calm.noise, std=guess.std, still=())]
+        begun = [replace(calm.noise, std=guess.std, time=guess.time, still=())]
         begun += [replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in FIRST_DOUBTS]
         found = in_parallel(lambda d: self._maxima.from_start(calm.model, d), begun)
-        return min(calm, self._with_orders(min(found, key=lambda f: f.sse)), key=lambda f: f.price)
+        return self._with_orders(min(found, key=lambda f: f.sse))
 
     def _with_orders(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """A fit again, with autoregressions of the orders that what its filter leaves shows."""
@@ -160,19 +176,21 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
     def _elsewhere(self, effect: Effect) -> list[LikelihoodFit]:
         """Fits from sizes of a cause that no line from its null leads to, beside the rig as it was believed.
 
-        Beside nothing alone: an effort with the wrong sign shows there, or nowhere.
+        Beside nothing alone: an effort with the wrong sign shows there, or nowhere. By least squares also from each of
+        its forms: the nominal fit to what is missed may lie far from where a cause in its right form leads.
         """
-        guess = self._guess()
-        begun = [self.model + one for one in from_afar(effect, self.library.measured)]
-        return [self._maxima.from_start(one, guess, rounds=AFRESH_ROUNDS) for one in begun]
+        guess, measured = self._guess(), self.library.measured
+        begun = [self.model + one for one in from_afar(effect, measured)]
+        begun += refinements(self.model + effect, effect, measured) if self.noise == WHITE else []
+        return in_parallel(lambda one: self._maxima.from_start(one, guess, rounds=AFRESH_ROUNDS), begun)
 
     def _afresh(self, starts: Mapping[Names, Model], base: LikelihoodFit) -> dict[Names, list[LikelihoodFit]]:
         """Fits that begin with little that is random, where another's random effort takes what a model should.
 
         All take a turn there; those that explain most then go on.
         """
-        guess = self._guess()
-        if all(n in base.noise.still or base.noise.std[n] <= FIRST_DOUBTS[-1] * v for n, v in guess.std.items()):
+        guess, least = self._guess(), first_guess(self.model, self.trials, base.noise.lasts_s).std
+        if all(base.noise.std[n] <= FIRST_DOUBTS[-1] * least[n] for n in base.noise.acting):
             return {}
         first = in_parallel(lambda start: self._maxima.from_start(start, guess, rounds=1), list(starts.values()))
         lowest = sorted(zip(starts, first, strict=True), key=lambda one: one[1].price)[:AFRESH_SETS]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,13 +10,14 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.starts import STARTS
+from fes_pin.identify.fit import GROSS, grown_start
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit, fit_of, maximise
 from fes_pin.identify.problem import limits_of
 from fes_pin.infer.covariance import moved_with
 from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.maximise import ROUNDS
-from fes_pin.infer.optimum import minimise
+from fes_pin.infer.optimum import MAX_ITERATIONS, minimise
 from fes_pin.infer.problem import completed
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
@@ -42,6 +44,20 @@ class LikelihoodMaxima:
     ) -> LikelihoodFit:
         """The maximum from a model's own values and from what is taken for random; see `maximise`."""
         return maximise(LikelihoodProblem(model, self.trials, noise), model.parameters(), unknowns, rounds, near)
+
+    def from_afar(self, model: Model, noise: Doubt) -> LikelihoodFit:
+        """The maximum from a model's own values; where it leaves a gross misfit, also from fits to ever longer trials.
+
+        Where there is process noise nothing is gross: a filter follows what a wrong model does to the state.
+        """
+        plain, rough = self.from_start(model, noise), LikelihoodProblem(model, self.trials, noise)
+        if not rough.is_simulated or _reduced(rough, plain) < GROSS:
+            return plain
+        values, unknowns = grown_start(
+            lambda trials: LikelihoodProblem(model, trials, noise), self.trials, model.parameters(), MAX_ITERATIONS
+        )
+        grown = self.from_start(model.with_parameters(values), noise, unknowns)
+        return grown if grown.sse < plain.sse or not math.isfinite(plain.sse) else plain
 
     def go_on(self, fitted: LikelihoodFit, rounds: int = ROUNDS) -> LikelihoodFit:
         """The maximum from where a fit has come to."""
@@ -80,6 +96,14 @@ class LikelihoodMaxima:
         left = off - effect.name if set(gone) >= set(effect.amplitudes()) else off
         problem = LikelihoodProblem(left, self.trials, whole.noise)
         unknowns = completed(problem.start_unknowns(), whole.unknowns)
-        moved = left.with_parameters({n: v for n, v in values.items() if n in left.parameters()})
+        moved = left.with_parameters({n: v for n, v in values.items() if n in left.fitted_parameters()})
         costs = problem.costs([(one.parameters(), unknowns) for one in (left, moved)])
         return moved if costs[1] < costs[0] else left
+
+
+def _reduced(problem: LikelihoodProblem, fitted: LikelihoodFit) -> float:
+    """Mean square of the residuals that a fit leaves, under the noise of a problem; infinite where it runs away."""
+    residuals = [p.residual for p in problem.linearize(fitted.values, fitted.unknowns)]
+    with np.errstate(all="ignore"):
+        mean = float(sum(r @ r for r in residuals)) / max(sum(map(len, residuals)), 1)
+    return mean if math.isfinite(mean) else math.inf

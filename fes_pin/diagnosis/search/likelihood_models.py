@@ -7,18 +7,18 @@ from collections.abc import Sequence
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
-from fes_pin.diagnosis.decide.claims import FORM_SHARE
 from fes_pin.diagnosis.decide.gains_ahead import Fold, gains_of
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.remainder.driven import driven_remainder
 from fes_pin.diagnosis.search.cause_sets import MOST_CAUSES
-from fes_pin.diagnosis.search.likelihood_fits import LikelihoodFits
+from fes_pin.diagnosis.search.likelihood_fits import PROCESS, WHITE, LikelihoodFits
 from fes_pin.diagnosis.search.score import Scored
-from fes_pin.diagnosis.search.simulation_search import NominalFitError
 from fes_pin.identify.ahead import default_horizon
+from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.infer.distributions import chi2_tail
+from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Search, SearchResult
 from fes_pin.models.model import Model
@@ -28,12 +28,28 @@ Found = SearchResult[LikelihoodFit]
 """What a search among causes found."""
 
 
+class NominalFitError(Exception):
+    """A study to which not even the nominal model can be fitted.
+
+    Parameters
+    ----------
+    why
+        One line.
+    nominal
+        As far as its fit came.
+    """
+
+    def __init__(self, why: str, nominal: LikelihoodFit) -> None:
+        super().__init__(why)
+        self.nominal = nominal
+
+
 class LikelihoodModels(LikelihoodFits):
     """Fits of sets of causes to one set of trials, and how a search judges them.
 
     Parameters
     ----------
-    model, trials, effects, answered
+    model, trials, effects, answered, noise
         As of `LikelihoodFits`.
     seed
         Of critical values.
@@ -49,16 +65,30 @@ class LikelihoodModels(LikelihoodFits):
         answered: bool = True,
         seed: int = 0,
         horizon_s: float | None = None,
+        noise: str = PROCESS,
     ) -> None:
-        super().__init__(model, trials, effects, answered)
+        super().__init__(model, trials, effects, answered, noise)
         self.seed, self._horizon_s = seed, horizon_s
         # no bound where motion is imposed: that excites a rig as nothing else does, and a muscle is a set of causes
         self.most_candidates = None if any(t.kind == IMPOSED for t in self.trials) else MOST_CAUSES
+
+    def with_noise(self, noise: str) -> LikelihoodModels:
+        """The same trials and causes, to be fitted with another noise."""
+        own = (self.library.effects, self.answered, self.seed, self._horizon_s, noise)
+        return LikelihoodModels(self.model, self.trials, *own)
 
     @property
     def horizon_s(self) -> float:
         """How far ahead errors over a horizon look, s."""
         return self._horizon_s or default_horizon(self.trials)
+
+    @property
+    def judged_s(self) -> float | None:
+        """How far ahead errors are judged: over the horizon where a controller answers or motion is imposed, else free.
+
+        Errors come back as input where a controller answers, and a free simulation of the best of models runs away.
+        """
+        return self.horizon_s if self.answered or any(t.kind == IMPOSED for t in self.trials) else None
 
     def nominal(self) -> LikelihoodFit:
         """Fit the nominal model, and simulate the family of score tests of all causes in it.
@@ -70,7 +100,9 @@ class LikelihoodModels(LikelihoodFits):
         """
         fitted = super().nominal()
         if not math.isfinite(fitted.sse):
-            raise NominalFitError("the nominal model foretells nothing finite from its start values on", fitted)
+            free = "the nominal model's simulation leaves the floating-point numbers from its start values on"
+            filtered = "the nominal model predicts nothing finite from its start values on"
+            raise NominalFitError(free if is_simulated(fitted.noise, fitted.trials) else filtered, fitted)
         self.family = self.screen.scores(fitted).family(self.seed)
         return fitted
 
@@ -98,21 +130,26 @@ class LikelihoodModels(LikelihoodFits):
         return not larger.noise.acting and gain < FORM_SHARE * explained
 
     def predicts_better(self, larger: LikelihoodFit, smaller: LikelihoodFit) -> bool:
-        """Whether what a set adds lessens the errors over the horizon, of the very trials that it was fitted to."""
+        """Whether what a set adds lessens the errors that it is judged by, of the very trials that it was fitted to."""
         fold = Fold(self.fits[()], larger, {"": smaller}, self.trials)
-        return gains_of([fold], fold.without, self.horizon_s, self.seed)[""].is_material
+        return gains_of([fold], fold.without, self.judged_s, self.seed)[""].is_material
 
     def leaves_noise(self, fitted: LikelihoodFit) -> bool:
         """Whether a fit has no lack of fit, and its random effort is small."""
         return not (are_large(random_parts(fitted)) or driven_remainder(fitted, self.seed).unexplained)
 
     def better_form(self, fitted: LikelihoodFit) -> LikelihoodFit | None:
-        """A set with one refinement of a form fewer, one more, or all begun again, where that is better."""
+        """A set with one refinement of a form fewer, one more, or all begun again, where that is better.
+
+        None by least squares: where a model is not right every further parameter is significant.
+        """
+        if self.noise == WHITE:
+            return None
         return self.forms.simplified(fitted) or self.forms.refined(fitted) or self.forms.reformed(fitted)
 
     def other_form(self, fitted: LikelihoodFit) -> LikelihoodFit | None:
         """See `LikelihoodForms.otherwise`."""
-        return self.forms.otherwise(fitted)
+        return None if self.noise == WHITE else self.forms.otherwise(fitted)
 
 
 class LikelihoodSearch(Search[LikelihoodFit]):
@@ -121,4 +158,4 @@ class LikelihoodSearch(Search[LikelihoodFit]):
     models: LikelihoodModels
 
 
-__all__ = ["Found", "LikelihoodModels", "LikelihoodSearch"]
+__all__ = ["Found", "LikelihoodModels", "LikelihoodSearch", "NominalFitError"]

@@ -9,8 +9,9 @@ import numpy as np
 from fes_pin.diagnosis.search.cause_sets import names_of
 from fes_pin.diagnosis.search.library import Library, Probe
 from fes_pin.diagnosis.search.score import Scores, score_test
-from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood import LikelihoodProblem, is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.infer.problem import completed
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
@@ -41,14 +42,15 @@ class LikelihoodScreen:
         measured with them or without.
         """
         nominal = Model(base.model.rig, tuple(e for e in base.model.effects if e.name in effect.beside))
-        out = []
+        out, simulated = [], is_simulated(base.noise, self._library.trials)
         for one in self._library.grid(effect):
-            key = (*(nominal + one).structure(), *(nominal + one).unused_parameters().items())
+            key = (*(nominal + one).structure(), *(nominal + one).unused_parameters().items(), simulated)
             if key not in self._probing:  # its columns are those of a fit, which shares the program
                 self._probing[key] = LikelihoodProblem(nominal + one, self._library.trials, base.noise)
             problem = self._probing[key]
             places = [problem.free.index(f"{effect.name}.{n}") for n in effect.amplitudes()]
             problem.noise = base.noise
-            parts = problem.linearize((nominal + one).parameters(), problem.start_unknowns())
+            unknowns = completed(problem.start_unknowns(), base.unknowns)
+            parts = problem.linearize((nominal + one).parameters(), unknowns)
             out.append(Probe(one, np.nan_to_num(np.concatenate([p.jacobian[:, places] for p in parts]))))
         return out

@@ -1,0 +1,95 @@
+"""The set of causes that predicts best, where no set leaves only noise.
+
+Likelihoods then compare wrong models, and a flexible one can win by what it does to single trials; a cause must help on
+trials that it was not fitted to.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fes_pin.data.trial import Trial
+from fes_pin.diagnosis.decide.folds import folds_of
+from fes_pin.diagnosis.driven_held_out import afresh
+from fes_pin.diagnosis.errors_ahead import free_residuals
+from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
+from fes_pin.identify.likelihood import LikelihoodProblem
+from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.infer.levels import FORM_SHARE
+from fes_pin.infer.optimum import minimise
+from fes_pin.infer.search import Names
+from fes_pin.models.predictor import Doubt
+from fes_pin.workers import in_parallel
+
+POOL = 6
+"""Sets of each size that are compared by prediction."""
+FEWEST = 3
+"""Trials that sets are compared by."""
+
+
+def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
+    """The smallest set whose errors on trials left out are within an error of form of the least.
+
+    A set that does worse on the trials that it is fitted to than another does on trials left out is not tried.
+
+    Parameters
+    ----------
+    search
+        That has run without process noise.
+    names
+        The set that it found; the answer where there are too few trials.
+    """
+    models = search.models
+    if len(models.trials) < FEWEST:
+        return names
+    ranked = [n for k in sorted({len(n) for n in models.fits}) for n in models.ranked(k)[:POOL]]
+    pool = [n for n in dict.fromkeys([names, *ranked]) if models.is_possible(models.fits[n])]
+    noise = models.fits[()].noise
+    inside = dict(zip(pool, in_parallel(lambda n: _error(models.fits[n], models.trials, noise), pool), strict=True))
+    errors: dict[Names, float] = {}
+    for one in sorted(pool, key=lambda n: (inside[n], n)):
+        if errors and inside[one] > min(errors.values()) + FORM_SHARE:
+            break
+        errors[one] = prediction_error(models.fits[one], noise)
+    good = [n for n in errors if errors[n] <= min(errors.values()) + FORM_SHARE]
+    return min(good, key=lambda n: (len(n), errors[n], n))
+
+
+def prediction_error(fitted: LikelihoodFit, noise: Doubt) -> float:
+    """Logarithm of the mean squared error of simulations of trials left out in turn, averaged over trials.
+
+    The logarithm keeps one large motion from deciding alone. What each trial has of its own, as its start, is estimated
+    from it.
+
+    Parameters
+    ----------
+    noise
+        In whose deviations errors are counted.
+    """
+
+    def left_out(held: Sequence[int]) -> tuple[float, int]:
+        others = [t for i, t in enumerate(fitted.trials) if i not in held]
+        return _error(afresh(fitted, others), [fitted.trials[i] for i in held], noise), len(held)
+
+    means, counts = zip(*in_parallel(left_out, folds_of(fitted.trials)), strict=True)
+    return float(np.average(means, weights=counts))
+
+
+def _error(fitted: LikelihoodFit, trials: Sequence[Trial], noise: Doubt) -> float:
+    """Mean over trials of the logarithm of the mean squared error of a simulation."""
+    if fitted.model.own_unknowns():
+        residuals = [np.concatenate(_in_deviations(fitted, t, noise)) for t in trials]
+    else:
+        problem = LikelihoodProblem(fitted.model, trials, replace(noise, ar={}), ())
+        residuals = [p.residual for p in minimise(problem, fitted.values).parts]
+    means = [float(r @ r) / max(len(r), 1) for r in residuals]
+    return float(np.mean([math.log(max(m, 1e-12)) if math.isfinite(m) else math.inf for m in means]))
+
+
+def _in_deviations(fitted: LikelihoodFit, trial: Trial, noise: Doubt) -> list[np.ndarray]:
+    missed = free_residuals(fitted.model, trial, noise)
+    return [values[np.isfinite(values)] / noise.white[n] for n, values in missed.items()]
