@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from fes_pin.data.schema import IMPOSED
-from fes_pin.diagnosis.decide.by_prediction import best_predicting
+from fes_pin.diagnosis.decide.by_prediction import FEWEST, best_predicting
 from fes_pin.diagnosis.decide.rivals import not_excluded
 from fes_pin.diagnosis.errors_ahead import squared_errors
 from fes_pin.diagnosis.search.cause_sets import Names, names_of
@@ -59,7 +59,7 @@ def searched(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found]:
         return search, found
     if not acting.price < found.best.price:
         return search, found
-    return _run_with(search, PROCESS) or (search, found)
+    return _with_process_noise(search) or (search, found)
 
 
 def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | None:
@@ -67,21 +67,26 @@ def least_error(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | No
 
     Where a model is not right, a likelihood with process noise or autoregressive measurement noise takes what it misses
     for noise. Least squares give the model that predicts best from the inputs alone (Ljung, System Identification,
-    2nd ed., section 8.3).
+    2nd ed., section 8.3). Causes are chosen by what they predict of trials left out; where there are too few of these,
+    none is.
     """
-    if search.models.answered or search.was_stopped or (made := _run_with(search, WHITE)) is None:
+    if search.models.answered or search.was_stopped:
         return None
-    other, found = made
+    other = LikelihoodSearch(search.models.with_noise(WHITE), search.progress)
     try:
         with time_limit(search.seconds_left):
-            return other, other.result(best_predicting(other, names_of(found.best)))
-    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime):
+            if len(search.models.trials) < FEWEST:
+                other.models.nominal()
+                return other, other.result(())
+            found = other.run()
+            return None if other.was_stopped else (other, other.result(best_predicting(other, names_of(found.best))))
+    except (ArithmeticError, np.linalg.LinAlgError, OutOfTime, NominalFitError):
         return None
 
 
-def _run_with(search: LikelihoodSearch, noise: str) -> tuple[LikelihoodSearch, Found] | None:
-    """The same causes searched with another noise; None if that did not end."""
-    other = LikelihoodSearch(search.models.with_noise(noise), search.progress)
+def _with_process_noise(search: LikelihoodSearch) -> tuple[LikelihoodSearch, Found] | None:
+    """The same causes searched with process noise; None if that did not end."""
+    other = LikelihoodSearch(search.models.with_noise(PROCESS), search.progress)
     try:
         with time_limit(search.seconds_left):
             found = other.run()

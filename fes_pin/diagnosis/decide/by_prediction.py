@@ -41,11 +41,9 @@ def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
     search
         That has run without process noise.
     names
-        The set that it found; the answer where there are too few trials.
+        The set that it found.
     """
     models = search.models
-    if len(models.trials) < FEWEST:
-        return names
     ranked = [n for k in sorted({len(n) for n in models.fits}) for n in models.ranked(k)[:POOL]]
     pool = [n for n in dict.fromkeys([names, *ranked]) if models.is_possible(models.fits[n])]
     noise = models.fits[()].noise
