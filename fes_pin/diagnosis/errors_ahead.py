@@ -209,7 +209,9 @@ def noise_that_is_small(fitted: LikelihoodFit) -> Doubt:
     """
     if is_simulated(fitted.noise, fitted.trials) and not any(fitted.noise.ar.values()):
         rough = first_guess(fitted.model, fitted.trials).white
-        return replace(fitted.noise, white={n: float(np.fmin(v, rough[n])) for n, v in fitted.noise.white.items()})
+        return replace(
+            fitted.noise, white={n: float(np.fmin(v, rough.get(n, v))) for n, v in fitted.noise.white.items()}
+        )
     less = {r.name: SMALL_SHARE / r.share for r in random_parts(fitted) if r.share > SMALL_SHARE}
     std = {n: value * less.get(n, 1.0) for n, value in fitted.noise.std.items()}
     return replace(fitted.noise, std=std) if less else fitted.noise

@@ -246,6 +246,7 @@ def driven_diagnosis(folder, free):
         extended=as_likely(made.extended, noise),
         ahead=AheadErrors(0.3, before, after, before, after),
         random=(RandomPart("effort", 1e-3, 0.1, 0.02),),
+        is_driven=True,
         nominal_error=(free, None),
         extended_error=(free, None),
     )
