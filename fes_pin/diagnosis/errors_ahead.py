@@ -10,7 +10,7 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.folds import FOLDS
-from fes_pin.identify.ahead import SquaredErrors, forecasts, one_step, reach_of
+from fes_pin.identify.ahead import SquaredErrors, forecast, forecasts, one_step, reach_of
 from fes_pin.identify.likelihood import is_simulated
 from fes_pin.identify.likelihood_fit import LikelihoodFit
 from fes_pin.identify.per_trial import predictions
@@ -18,6 +18,7 @@ from fes_pin.identify.process_noise import driving_size, first_guess
 from fes_pin.infer.held_out import Errors, joined_errors, percent_of_spread, within
 from fes_pin.infer.levels import RUNAWAY, SMALL_SHARE
 from fes_pin.infer.noise import NoiseModel
+from fes_pin.models.autoregression import weights_ahead
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import in_parallel
@@ -187,11 +188,25 @@ def _told(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Told:
 
 
 def _foretold(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Told:
+    if is_simulated(fitted.noise, [trial]):
+        return _foretold_freely(fitted, trial, horizon_s)
     calm = noise_that_is_small(fitted)
     told = forecasts(fitted.model, trial, fitted.noise, horizon_s)
     alone = told if calm is fitted.noise else forecasts(fitted.model, trial, calm, horizon_s)
     noise = {n: np.where(np.isfinite(trial[n]), np.nan_to_num(one.variances), 0.0) for n, one in alone.items()}
     return {n: one.values for n, one in told.items()}, noise
+
+
+def _foretold_freely(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> _Told:
+    """The same without process noise: a free simulation, and what measurement noise predicts of what it misses."""
+    told, variances = {}, {}
+    steps = max(1, round(horizon_s / trial.dt))
+    for name, missed in free_residuals(fitted.model, trial, fitted.noise).items():
+        noise = fitted.noise[name]
+        told[name] = trial[name] - missed + forecast(np.nan_to_num(missed), noise, trial.dt, horizon_s)
+        grown = np.append(1.0, weights_ahead(noise.ar, steps - 1)[:, 0] if noise.ar else np.zeros(steps - 1))
+        variances[name] = np.where(np.isfinite(missed), (noise.innovation_std**2) * float(grown @ grown), 0.0)
+    return told, variances
 
 
 def _first(fitted: LikelihoodFit, trial: Trial, horizon_s: float) -> int:
@@ -235,10 +250,15 @@ def _sums(fitted: LikelihoodFit, floor: LikelihoodFit, trial: Trial, horizon_s: 
     name = fitted.model.rig.output(trial.kind)
     measured, (told, noise) = trial[name], _told(fitted, trial, horizon_s)
     begun = np.arange(len(trial)) < _first(fitted, trial, horizon_s)
+    free = free_residuals(fitted.model, trial, fitted.noise)[name]
+    if is_simulated(fitted.noise, [trial]):
+        next_one = free - forecast(np.nan_to_num(free), fitted.noise[name], trial.dt, 0.0)
+    else:
+        next_one = one_step(fitted.model, trial, fitted.noise)[name]
     errors = (
-        one_step(fitted.model, trial, fitted.noise)[name],
+        next_one,
         np.where(begun, np.nan, measured - told[name]),
-        free_residuals(fitted.model, trial, fitted.noise)[name],
+        free,
         np.where(begun, np.nan, np.sqrt(noise[name])),
     )
     spread = (measured - np.nanmean(measured)) ** 2

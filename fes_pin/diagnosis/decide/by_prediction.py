@@ -14,14 +14,16 @@ import numpy as np
 
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.decide.folds import folds_of
-from fes_pin.diagnosis.driven_held_out import afresh
 from fes_pin.diagnosis.errors_ahead import free_residuals
 from fes_pin.diagnosis.search.likelihood_models import LikelihoodSearch
 from fes_pin.identify.likelihood import LikelihoodProblem
 from fes_pin.identify.likelihood_fit import LikelihoodFit
+from fes_pin.identify.problem import limits_of
 from fes_pin.infer.levels import FORM_SHARE
 from fes_pin.infer.optimum import minimise
+from fes_pin.infer.problem import normal_equations
 from fes_pin.infer.search import Names
+from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.workers import in_parallel
 
@@ -47,7 +49,9 @@ def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
     ranked = [n for k in sorted({len(n) for n in models.fits}) for n in models.ranked(k)[:POOL]]
     pool = [n for n in dict.fromkeys([names, *ranked]) if models.is_possible(models.fits[n])]
     noise = models.fits[()].noise
-    inside = dict(zip(pool, in_parallel(lambda n: _error(models.fits[n], models.trials, noise), pool), strict=True))
+    inside = dict(
+        zip(pool, in_parallel(lambda n: _error(models.fits[n].model, models.trials, noise), pool), strict=True)
+    )
     errors: dict[Names, float] = {}
     for one in sorted(pool, key=lambda n: (inside[n], n)):
         if errors and inside[one] > min(errors.values()) + FORM_SHARE:
@@ -60,7 +64,8 @@ def best_predicting(search: LikelihoodSearch, names: Names) -> Names:
 def prediction_error(fitted: LikelihoodFit, noise: Doubt) -> float:
     """Logarithm of the mean squared error of simulations of trials left out in turn, averaged over trials.
 
-    The logarithm keeps one large motion from deciding alone. What each trial has of its own, as its start, is estimated
+    The logarithm keeps one large motion from deciding alone. Without some trials parameters are where one Gauss-Newton
+    step leads from their fit to all, as in `chosen_again`; what each trial has of its own, as its start, is estimated
     from it.
 
     Parameters
@@ -70,24 +75,35 @@ def prediction_error(fitted: LikelihoodFit, noise: Doubt) -> float:
     """
 
     def left_out(held: Sequence[int]) -> tuple[float, int]:
-        others = [t for i, t in enumerate(fitted.trials) if i not in held]
-        return _error(afresh(fitted, others), [fitted.trials[i] for i in held], noise), len(held)
+        return _error(_without(fitted, held), [fitted.trials[i] for i in held], noise), len(held)
 
     means, counts = zip(*in_parallel(left_out, folds_of(fitted.trials)), strict=True)
     return float(np.average(means, weights=counts))
 
 
-def _error(fitted: LikelihoodFit, trials: Sequence[Trial], noise: Doubt) -> float:
+def _without(fitted: LikelihoodFit, held: Sequence[int]) -> Model:
+    """A model where one Gauss-Newton step leads without some trials."""
+    system = normal_equations([p for i, p in enumerate(fitted.parts) if i not in held])
+    moving = [k for k, n in enumerate(fitted.free) if n not in fitted.at_bound]
+    size = np.sqrt(np.maximum(np.diag(system.hessian)[moving], 1e-300))
+    scaled = system.hessian[np.ix_(moving, moving)] / np.outer(size, size)
+    step = np.linalg.lstsq(scaled, system.gradient[moving] / size, rcond=1e-12)[0] / size
+    limits = limits_of(fitted.model, fitted.trials)
+    moved = {n: fitted.values[n] + d for n, d in zip((fitted.free[k] for k in moving), step, strict=True)}
+    return fitted.model.with_parameters({n: float(np.clip(v, *limits[n])) for n, v in moved.items()})
+
+
+def _error(model: Model, trials: Sequence[Trial], noise: Doubt) -> float:
     """Mean over trials of the logarithm of the mean squared error of a simulation."""
-    if fitted.model.own_unknowns():
-        residuals = [np.concatenate(_in_deviations(fitted, t, noise)) for t in trials]
+    if model.own_unknowns():
+        residuals = [np.concatenate(_in_deviations(model, t, noise)) for t in trials]
     else:
-        problem = LikelihoodProblem(fitted.model, trials, replace(noise, ar={}), ())
-        residuals = [p.residual for p in minimise(problem, fitted.values).parts]
+        problem = LikelihoodProblem(model, trials, replace(noise, ar={}), ())
+        residuals = [p.residual for p in minimise(problem, model.parameters()).parts]
     means = [float(r @ r) / max(len(r), 1) for r in residuals]
     return float(np.mean([math.log(max(m, 1e-12)) if math.isfinite(m) else math.inf for m in means]))
 
 
-def _in_deviations(fitted: LikelihoodFit, trial: Trial, noise: Doubt) -> list[np.ndarray]:
-    missed = free_residuals(fitted.model, trial, noise)
+def _in_deviations(model: Model, trial: Trial, noise: Doubt) -> list[np.ndarray]:
+    missed = free_residuals(model, trial, noise)
     return [values[np.isfinite(values)] / noise.white[n] for n, values in missed.items()]

@@ -64,6 +64,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         Whether an effort, if there is one, answers what is read; a property of the trials, not of the likelihood.
     noise
         Which noise fits have: `PROCESS`, `MEASUREMENT` or `WHITE`.
+    calm
+        Fits of sets to the same trials without process noise, where there are such.
 
     Attributes
     ----------
@@ -82,8 +84,10 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         effects: Sequence[type[Effect]] | None = None,
         answered: bool = True,
         noise: str = PROCESS,
+        calm: Mapping[Names, LikelihoodFit] | None = None,
     ) -> None:
         super().__init__()
+        self.calm = dict(calm or {})
         self.model, self.trials, self.answered, self.noise = Model(model.rig), tuple(trials), answered, noise
         self.library = Library(self.model, trials, effects, answered)
         self._calm: Doubt | None = None
@@ -114,21 +118,23 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """The nominal fit without process noise; with it, if that improves the penalised likelihood."""
         guess = first_guess(self.model, self.trials)
         none = stilled(self.model, self.trials, guess) if self.answered else replace(guess, std={}, time={})
-        calm = self._maxima.from_afar(self.model, none)
-        calm = calm if self.noise == WHITE else self._with_orders(calm)
+        calm = self.calm.get(()) or self._maxima.from_afar(self.model, none)
+        calm = calm if self.noise == WHITE or () in self.calm else self._with_orders(calm)
         self._calm = calm.noise
         return min(calm, self.with_process_noise(calm), key=lambda f: f.price) if self.noise == PROCESS else calm
 
     def with_process_noise(self, calm: LikelihoodFit) -> LikelihoodFit:
-        """A fit without process noise again, with it: the best from several sizes of it."""
+        """A fit without process noise again, with it: from that of several sizes that is likeliest at once."""
         guess = first_guess(self.model, self.trials)
         if not guess.std or any(t.low_pass_hz for t in self.trials):  # no filter passes a state on
             return calm
         white = {n: (0.0,) * len(own) for n, own in calm.noise.ar.items()}
         begun = [replace(calm.noise, std=guess.std, time=guess.time, still=())]
         begun += [replace(guess, std={n: k * v for n, v in guess.std.items()}, ar=white) for k in FIRST_DOUBTS]
-        found = in_parallel(lambda d: self._maxima.from_start(calm.model, d), begun)
-        return self._with_orders(min(found, key=lambda f: f.sse))
+        if self.answered:
+            found = in_parallel(lambda d: self._maxima.from_start(calm.model, d), begun)
+            return self._with_orders(min(found, key=lambda f: f.sse))
+        return self._with_orders(self._maxima.from_start(calm.model, self._maxima.likeliest(calm, begun)))
 
     def _with_orders(self, fitted: LikelihoodFit) -> LikelihoodFit:
         """A fit again, with autoregressions of the orders that what its filter leaves shows."""
@@ -164,7 +170,8 @@ class LikelihoodFits(FittedSets[LikelihoodFit, Starts]):
         """The best of several first fits of each set: at what is random in the base, with little of that, from afar."""
         begun = {k: [_extended(base.model, one) for one in many] for k, many in starts.items()}
         looks = in_parallel(lambda k: self._first_fits(base, starts[k], begun[k]), list(starts))
-        afresh = self._afresh({names: models[0] for names, models in begun.items()}, base)
+        afresh = {k: [f] for k, f in self.calm.items()}
+        afresh = afresh or self._afresh({names: models[0] for names, models in begun.items()}, base)
         each = zip(begun, looks, strict=True)
         return {names: min((*fits, *afresh.get(names, ())), key=lambda f: f.price) for names, fits in each}
 

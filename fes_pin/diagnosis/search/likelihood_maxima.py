@@ -59,6 +59,16 @@ class LikelihoodMaxima:
         grown = self.from_start(model.with_parameters(values), noise, unknowns)
         return grown if grown.sse < plain.sse or not math.isfinite(plain.sse) else plain
 
+    def likeliest(self, fitted: LikelihoodFit, begun: Sequence[Doubt]) -> Doubt:
+        """The noise, of several to begin with, that is likeliest with a fit's parameters after a first step."""
+        tried = []
+        for noise in begun:
+            problem = LikelihoodProblem(fitted.model, self.trials, noise)
+            unknowns = completed(problem.start_unknowns(), fitted.unknowns)
+            problem.noise_step(fitted.values, unknowns)
+            tried.append((problem.costs([(fitted.values, unknowns)])[0], problem.noise))
+        return min(tried, key=lambda one: one[0])[1]
+
     def go_on(self, fitted: LikelihoodFit, rounds: int = ROUNDS) -> LikelihoodFit:
         """The maximum from where a fit has come to."""
         return self.from_start(fitted.model, fitted.noise, fitted.unknowns, rounds, fitted.together)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from fes_pin.data.schema import IMPOSED
 from fes_pin.data.trial import Trial
@@ -11,8 +11,8 @@ from fes_pin.diagnosis.decide.gains_ahead import Fold, gains_of
 from fes_pin.diagnosis.decide.significance import level_of
 from fes_pin.diagnosis.errors_ahead import are_large, random_parts
 from fes_pin.diagnosis.remainder.driven import driven_remainder
-from fes_pin.diagnosis.search.cause_sets import MOST_CAUSES
-from fes_pin.diagnosis.search.likelihood_fits import PROCESS, WHITE, LikelihoodFits
+from fes_pin.diagnosis.search.cause_sets import MOST_CAUSES, Names
+from fes_pin.diagnosis.search.likelihood_fits import MEASUREMENT, PROCESS, WHITE, LikelihoodFits
 from fes_pin.diagnosis.search.score import Scored
 from fes_pin.identify.ahead import default_horizon
 from fes_pin.identify.likelihood import is_simulated
@@ -49,7 +49,7 @@ class LikelihoodModels(LikelihoodFits):
 
     Parameters
     ----------
-    model, trials, effects, answered, noise
+    model, trials, effects, answered, noise, calm
         As of `LikelihoodFits`.
     seed
         Of critical values.
@@ -66,15 +66,17 @@ class LikelihoodModels(LikelihoodFits):
         seed: int = 0,
         horizon_s: float | None = None,
         noise: str = PROCESS,
+        calm: Mapping[Names, LikelihoodFit] | None = None,
     ) -> None:
-        super().__init__(model, trials, effects, answered, noise)
+        super().__init__(model, trials, effects, answered, noise, calm)
         self.seed, self._horizon_s = seed, horizon_s
         # no bound where motion is imposed: that excites a rig as nothing else does, and a muscle is a set of causes
         self.most_candidates = None if any(t.kind == IMPOSED for t in self.trials) else MOST_CAUSES
 
     def with_noise(self, noise: str) -> LikelihoodModels:
         """The same trials and causes, to be fitted with another noise."""
-        own = (self.library.effects, self.answered, self.seed, self._horizon_s, noise)
+        calm = self.fits if (self.noise, noise) == (MEASUREMENT, PROCESS) else None
+        own = (self.library.effects, self.answered, self.seed, self._horizon_s, noise, calm)
         return LikelihoodModels(self.model, self.trials, *own)
 
     @property
