@@ -65,11 +65,6 @@ def number_in(text: str, error: Callable[[str], Exception] = ValueError) -> floa
         raise error(f"expected a number, found {text[:40]!r}") from None
 
 
-def printed(value: float | None, digits: int) -> float | None:
-    """A number with so many significant digits, as results are written; None for what is not finite."""
-    return None if value is None or not math.isfinite(value) else float(f"{value:.{digits}g}")
-
-
 def in_full(*values: float) -> str:
     """Numbers as files hold them, apart by blanks: as many digits as give them back, whatever type of number they are.
 

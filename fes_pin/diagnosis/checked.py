@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from fes_pin.data.asked import asked
-from fes_pin.data.numbers import printed
 from fes_pin.data.read_only import ReadOnly
 from fes_pin.data.show import frame, table_html
 from fes_pin.data.study import Study
@@ -16,6 +15,7 @@ from fes_pin.diagnosis.decide.doubts import few_trials
 from fes_pin.diagnosis.diagnosis import measured_study, split
 from fes_pin.diagnosis.plausibility import check_study
 from fes_pin.diagnosis.testable import Testable, testable_causes
+from fes_pin.infer.result import shown
 from fes_pin.models.catalogue import Source, catalogue_of
 from fes_pin.models.nominal import nominal_model
 
@@ -56,8 +56,8 @@ class Checked(ReadOnly):
         if isinstance(found, str):
             return {**told, "not_known": found}
         lists = {"absorbed": list(found.absorbed), "silent": list(found.silent), "alike": [*map(list, found.alike)]}
-        shown = {name: printed(share, 4) for name, share in found.shown.items()}
-        return {**told, "shown": shown, **lists, "unexplained_percent": printed(100.0 * found.unexplained, 4)}
+        shares = {name: shown(share, 4) for name, share in found.shown.items()}
+        return {**told, "shown": shares, **lists, "unexplained_percent": shown(100.0 * found.unexplained, 4)}
 
     def to_frame(self) -> pandas.DataFrame:
         """One row a cause: whether it would show, and the share of its sensitivity that nothing else takes up (0 to 1).

@@ -18,9 +18,9 @@ LEAST_P = 1e-300
 """Replaces a p-value that is too small for a number: it is at most this."""
 
 
-def shown(value: float | None) -> float | None:
-    """A number as printed; None for what is not finite."""
-    return None if value is None or not math.isfinite(value) else float(f"{value:.{DIGITS}g}")
+def shown(value: float | None, digits: int = DIGITS) -> float | None:
+    """A number as printed, with so many significant digits; None for what is not finite."""
+    return None if value is None or not math.isfinite(value) else float(f"{value:.{digits}g}")
 
 
 def p_shown(value: float) -> float | None:

@@ -11,7 +11,7 @@ from fes_pin.infer.levels import SEPARABLE
 from fes_pin.infer.result import Named
 from fes_pin.view.chart import Panel, svg
 from fes_pin.view.drawing import Drawing, rows_csv
-from fes_pin.view.style import STAGES
+from fes_pin.view.style import COLOURS
 
 LEAST = 0.3
 """Where the logarithmic axis of losses begins."""
@@ -87,4 +87,4 @@ def _drawing(panel: Panel, rows: int, words: str, csv: str) -> Drawing:
 
 
 def _colour(stage: str) -> str:
-    return f"stage-{stage}" if stage in STAGES else "ink"
+    return next((name for name in (f"stage-{stage}", stage) if name in COLOURS), "ink")

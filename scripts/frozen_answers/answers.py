@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from fes_pin.data.numbers import printed
+from fes_pin.infer.result import shown
 from frozen_answers.studies import Frozen
 
 LATER = ("explained", "judged_by")
@@ -47,7 +47,7 @@ def _rounded(value: Any) -> Any:
         return {name: _rounded(one) for name, one in value.items()}
     if isinstance(value, list | tuple):
         return [_rounded(one) for one in value]
-    return printed(value, DIGITS) if isinstance(value, float) else value
+    return shown(value, DIGITS) if isinstance(value, float) else value
 
 
 def named(row: dict[str, Any]) -> list[Any]:
