@@ -25,7 +25,7 @@ def change_of(
     """What is said of one change: its size in each group, in words, and what it cannot be told from."""
     best, model, groups = found.best, found.best.model, tuple(found.best.model.models)
     assert item.group is not None
-    wider = math.sqrt(max(1.0, models.inflation(best, found.without[str(item)]).phi))
+    wider = math.sqrt(max(1.0, models.spread(best, found.without[str(item)]).phi))
     nominal = item.name in found.nominal.model.free
     parameters = _by_group(best, item, groups, nominal, wider)
     first = next(iter(parameters.values()))
@@ -93,7 +93,7 @@ def not_changed(
     single = 1.0 - (1.0 - CLAIM_LEVEL) ** (1.0 / models.family.tests)
     reach, changed = normal_quantile(1.0 - 0.5 * single) + normal_quantile(SEEN), {i.name for i in best.items}
     others = [s for s in models.screen.scores(best).scored if s.item.group is not None and s.item.name not in changed]
-    sizes = [(s, reach * s.deviation * math.sqrt(max(s.spread, 1.0))) for s in others]
+    sizes = [(s, reach * s.deviation * math.sqrt(max(s.spread.phi, 1.0))) for s in others]
     shares = _largest([(s, size / abs(v)) for s, size in sizes if s.effect is None and (v := _value(best, s))])
     largest = _largest([(s, size) for s, size in sizes if s.effect is not None])
     units = {s.item.name: _unit(best, s.effect) for s in others if s.effect is not None}

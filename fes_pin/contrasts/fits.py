@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
-from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight
+from fes_pin.contrasts.grouped import Grouped, GroupedModel, GroupedProblem, Item, Weight, by_group
 from fes_pin.contrasts.repeats import Repeats, scatter, without_scatter
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
@@ -29,8 +27,6 @@ from fes_pin.infer.projection import without_locals
 from fes_pin.models.model import Model
 from fes_pin.models.predictor import Doubt
 from fes_pin.models.stage import Effect
-
-T = TypeVar("T")
 
 FIRST_LOOK = 15
 """Iterations of a first fit of a set."""
@@ -59,11 +55,6 @@ class GroupedFits(ABC):
 
     def __init__(self, nominal: Model, trials: Mapping[str, Sequence[Trial]]) -> None:
         self.nominal, self.trials = Model(nominal.rig), dict(trials)
-
-    def by_group(self, rows: Sequence[T]) -> dict[str, list[T]]:
-        """What belongs to each trial, cut into groups."""
-        left = iter(rows)
-        return {g: list(itertools.islice(left, len(many))) for g, many in self.trials.items()}
 
     @abstractmethod
     def first(self) -> Grouped:
@@ -97,7 +88,7 @@ class GroupedFits(ABC):
         """The set again, fitted without some trials, by their numbers, under its own weights."""
         kept = {
             g: [k for k, i in enumerate(own) if i not in held]
-            for g, own in self.by_group(range(len(one.fit.trials))).items()
+            for g, own in by_group(range(len(one.fit.trials)), self.trials).items()
         }
         trials = {g: [self.trials[g][k] for k in ks] for g, ks in kept.items()}
         weights = {g: w if isinstance(w, Doubt) else w.of_trials(kept[g]) for g, w in one.weights.items()}
@@ -110,7 +101,7 @@ class GroupedFits(ABC):
         model, weight = one.model.models[group], one.weights[group]
         rows = slice(None) if alone is None else slice(alone, alone + 1)
         trials = self.trials[group][rows]
-        unknowns = self.by_group(one.fit.unknowns)[group][rows]
+        unknowns = by_group(one.fit.unknowns, self.trials)[group][rows]
         if isinstance(weight, Doubt):
             problem = LikelihoodProblem(model, trials, weight)
             return fit_of(problem, minimise(problem, model.parameters(), unknowns, LOOK_DRIVEN))
@@ -220,7 +211,7 @@ class SimulatedGroups(GroupedFits):
 
     def _repeats(self, one: Grouped) -> dict[str, Repeats]:
         """The noise of each group, with how much repeats scatter by the model of a set."""
-        names, cut, parts = self.nominal.fitted_parameters(), self.by_group(one.fit.parts), []
+        names, cut, parts = self.nominal.fitted_parameters(), by_group(one.fit.parts, self.trials), []
         columns: dict[str, list[np.ndarray]] = {}
         weights = {g: w for g, w in one.weights.items() if isinstance(w, Repeats)}
         for group, weight in weights.items():

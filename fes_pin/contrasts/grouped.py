@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Mapping, Sequence
+import itertools
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from fes_pin.models.predictor import Doubt
 from fes_pin.models.rigs.base import Rig
 from fes_pin.models.stage import Effect
 
+T = TypeVar("T")
 Weight = Repeats | Doubt
 """What weighs the residuals of a group: the noise of simulations with the scatter of repeats, or what is random about
 predictions."""
@@ -186,7 +188,7 @@ class GroupedProblem(NoisyProblem):
     def __init__(
         self, model: GroupedModel, trials: Mapping[str, Sequence[Trial]], weights: Mapping[str, Weight]
     ) -> None:
-        self.model, self.free = model, model.free
+        self.model, self.free, self._by_group = model, model.free, trials
         self.parts: dict[str, Any] = {g: group_problem(m, trials[g], weights[g]) for g, m in model.models.items()}
         self.trials = tuple(t for p in self.parts.values() for t in p.trials)
         self.unknown_names = tuple(dict.fromkeys(n for p in self.parts.values() for n in p.unknown_names))
@@ -200,14 +202,6 @@ class GroupedProblem(NoisyProblem):
     def start_unknowns(self) -> Unknowns:
         """The unknowns of each trial as its first samples suggest."""
         return [u for p in self.parts.values() for u in p.start_unknowns()]
-
-    def by_group(self, rows: Sequence[Any]) -> dict[str, list[Any]]:
-        """What belongs to each trial, cut into groups."""
-        out, at = {}, 0
-        for group, part in self.parts.items():
-            out[group] = list(rows[at : at + len(part.trials)])
-            at += len(part.trials)
-        return out
 
     @property
     def noise_parameters(self) -> dict[str, float]:
@@ -226,7 +220,7 @@ class GroupedProblem(NoisyProblem):
 
     def evaluate(self, points: Sequence[Point]) -> list[Evaluation]:
         """One-step predictions of all trials at each of several points, group after group."""
-        cut = [self.by_group(unknowns) for _, unknowns, _ in points]
+        cut = [by_group(unknowns, self._by_group) for _, unknowns, _ in points]
         each = [
             p.evaluate(
                 [(self.model.of(g, v), own[g], _of_group(r, g)) for (v, _, r), own in zip(points, cut, strict=True)]
@@ -237,7 +231,7 @@ class GroupedProblem(NoisyProblem):
 
     def noise_step(self, values: Mapping[str, float], unknowns: Unknowns) -> float:
         """Improve the noise of each group, in place; returns by how much that lowers the cost. Of driven rigs."""
-        own = self.by_group(unknowns)
+        own = by_group(unknowns, self._by_group)
         return sum(p.noise_step(self.model.of(g, values), own[g]) for g, p in self.parts.items())
 
     @cached_property
@@ -257,7 +251,7 @@ class GroupedProblem(NoisyProblem):
 
     def costs(self, points: Sequence[tuple[Mapping[str, float], Unknowns]]) -> list[float]:
         """A lower bound of the cost at several parameter values."""
-        cut = [self.by_group(unknowns) for _, unknowns in points]
+        cut = [by_group(unknowns, self._by_group) for _, unknowns in points]
         each = [
             part.costs([(self.model.of(g, values), own[g]) for (values, _), own in zip(points, cut, strict=True)])
             for g, part in self.parts.items()
@@ -267,7 +261,7 @@ class GroupedProblem(NoisyProblem):
     def linearize(self, values: Mapping[str, float], unknowns: Unknowns) -> list[Linearized]:
         """Whitened residuals and sensitivities of all trials, group after group."""
         out: list[Linearized] = []
-        cut = self.by_group(unknowns)
+        cut = by_group(unknowns, self._by_group)
         for group, part in self.parts.items():
             at = [self.free.index(self.model.path(n, group)) for n in part.free]
             own = [self.unknown_names.index(n) for n in part.unknown_names]
@@ -277,6 +271,12 @@ class GroupedProblem(NoisyProblem):
                 jacobian[:, at], local[:, own] = one.jacobian, one.local
                 out.append(dataclasses.replace(one, jacobian=jacobian, local=local))
         return out
+
+
+def by_group(rows: Iterable[T], trials: Mapping[str, Sequence[Trial]]) -> dict[str, list[T]]:
+    """What belongs to each trial, all groups end to end, cut into groups."""
+    left = iter(rows)
+    return {g: list(itertools.islice(left, len(many))) for g, many in trials.items()}
 
 
 def _of_group(parameters: Mapping[str, float], group: str) -> dict[str, float]:
@@ -355,3 +355,18 @@ class Grouped:
             return {}
         values = next(iter(self.model.models.values())).parameters()
         return {n: s / abs(values[n]) for n, s in weight.deviations.items() if values[n]}
+
+    def leaning(self, moved: np.ndarray) -> float:
+        """What of the squares that move the trials rests on how much repeats scatter.
+
+        Parameters
+        ----------
+        moved
+            Shape (m,), all trials end to end.
+        """
+        ends = np.cumsum([len(p.residual) for p in self.fit.parts])[:-1]
+        pieces, total = iter(np.split(moved, ends)), 0.0
+        for weight in self.weights.values():
+            if isinstance(weight, Repeats):
+                total += weight.leaning(list(itertools.islice(pieces, len(weight.along))))
+        return total

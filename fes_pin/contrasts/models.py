@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from fes_pin.contrasts.decide import Spread, between_trials, inflation, usual_spread
+import numpy as np
+
 from fes_pin.contrasts.fits import GroupedFits, PredictedGroups, SimulatedGroups
 from fes_pin.contrasts.grouped import Grouped, GroupedModel, Item
 from fes_pin.contrasts.screen import ItemScore, Screen
@@ -17,6 +18,7 @@ from fes_pin.infer.fits import Candidate, FittedSets, more_degrees
 from fes_pin.infer.levels import CLAIM_LEVEL, DRIVEN_LEVEL
 from fes_pin.infer.scatter import excess_scatter
 from fes_pin.infer.search import Names, Policy, Search, SearchResult
+from fes_pin.infer.spread import ByUnit, Spread
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import Progress, in_parallel
@@ -154,14 +156,30 @@ class ContrastModels(FittedSets[Grouped, list[ItemScore]]):
         noise = super().p_value(larger, smaller, gain)
         if not set(larger.changes) - set(smaller.changes) or not noise < CLAIM_LEVEL:
             return noise
-        degrees, usual = more_degrees(larger, smaller), usual_spread(self.screen.scores(larger).scored)
-        spread = between_trials(larger, self.maxima.weighed_as(smaller, larger), degrees, usual)
-        return max(noise, self.family.adjusted(spread))
+        weighed = self.maxima.weighed_as(smaller, larger)
+        between = self._spread(larger, weighed).p_value(weighed.sse - larger.sse, more_degrees(larger, smaller))
+        return max(noise, self.family.adjusted(between))
 
-    def inflation(self, larger: Grouped, smaller: Grouped) -> Spread:
-        """Variance between trials of what a set has more than another; see `decide.inflation`."""
-        usual = usual_spread(self.screen.scores(larger).scored)
-        return inflation(larger, self.maxima.weighed_as(smaller, larger), usual)
+    def spread(self, larger: Grouped, smaller: Grouped) -> Spread:
+        """Between trials, of what a set has more than another; see `infer.spread`."""
+        return self._spread(larger, self.maxima.weighed_as(smaller, larger))
+
+    def _spread(self, larger: Grouped, smaller: Grouped) -> Spread:
+        """The same of sets under the same weights; the mean of all trials and that of one group are fitted.
+
+        Of the scatter of repeats few trials tell little as well: where a share q of the gain rests on it, of f degrees
+        of freedom 1 / (1 / f + q^2 / f0) stay, with f0 those of the trials. Source: Satterthwaite, Biometrics Bulletin
+        2 (1946).
+        """
+        left = np.concatenate([p.residual for p in larger.fit.parts])
+        moved = np.concatenate([p.residual for p in smaller.fit.parts]) - left
+        units = ByUnit.of(moved, left, larger.fit.parts)
+        free = len(units.sizes) - 1 - max(1, len(larger.changes))
+        if free < 1:
+            return Spread(1.0, free)
+        both = units.clustered().pooled(self.screen.scores(larger).usual_spread)
+        share = larger.leaning(moved) / float(moved @ moved)
+        return Spread(both.phi, 1.0 / (1.0 / both.free + share**2 / free))
 
     def extension_p_value(self, fitted: Grouped) -> float:
         """Family-wise p-value of the largest score of a further item."""

@@ -5,24 +5,28 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from fes_pin.contrasts.grouped import Grouped, Item, group_problem, reweigh
+from fes_pin.contrasts.grouped import Grouped, Item, by_group, group_problem, reweigh
 from fes_pin.data.trial import Trial
 from fes_pin.diagnosis.search.library import Library
 from fes_pin.diagnosis.search.starts import near_null, started
-from fes_pin.infer.family import MIN_UNITS, Family
-from fes_pin.infer.levels import PARAMETER_PRICE, UNFELT
+from fes_pin.infer.family import Family
+from fes_pin.infer.levels import PARAMETER_PRICE
 from fes_pin.infer.problem import Linearized, Unknowns, completed
 from fes_pin.infer.projection import Projection
+from fes_pin.infer.spread import ByUnit, Spread, usual_spread
 from fes_pin.models.model import Model
 from fes_pin.models.stage import Effect
 from fes_pin.workers import in_parallel
 
 FEWEST_TRIALS = 6
 """Trials that alone show how much repeats differ; of fewer each is cut into pieces, as a diagnosis does."""
+FITTED = 2
+"""Parameters that are fitted along an item: the mean of all trials, and that of one group."""
 LEAST_KEPT = 1e-6
 """Share of its norm that an item's sensitivity must keep to be scored: below it is rounding."""
 
@@ -45,8 +49,8 @@ class ItemScore:
         Standard deviation of its first amplitude.
     start
         Values of parameters that the model has, by path.
-    spread, spread_degrees
-        Variance of what single trials say of it, in units of what the noise explains, and its degrees of freedom.
+    spread
+        Of what single trials say of its first amplitude.
     """
 
     item: Item
@@ -56,8 +60,7 @@ class ItemScore:
     kept: float
     deviation: float
     start: Mapping[str, float]
-    spread: float = 1.0
-    spread_degrees: int = 0
+    spread: Spread
 
     @property
     def net_gain(self) -> float:
@@ -84,6 +87,11 @@ class ItemScores:
     def family(self, seed: int) -> Family:
         """The family of the tests of all changes."""
         return Family(self.gram, self.blocks, seed)
+
+    @cached_property
+    def usual_spread(self) -> Spread:
+        """Of the items: see `infer.spread`."""
+        return usual_spread([s.spread for s in self.scored], len({s.item.name for s in self.scored}))
 
 
 @dataclass(frozen=True)
@@ -137,7 +145,7 @@ class Screen:
         blocks = [slice(a, b) for a, b in itertools.pairwise(ends)]
         scored = []
         for c, b in zip(made, blocks, strict=True):
-            spread = _spread(left[:, b.start], projection.residual, base.fit.parts)
+            spread = ByUnit.of(left[:, b.start], projection.residual, base.fit.parts).spread(FITTED)
             scored.append(_score(c, gram[b, b], along[b], spread))
         return ItemScores(scored, gram, [b for c, b in zip(made, blocks, strict=True) if c.item.group is not None])
 
@@ -146,7 +154,7 @@ class Screen:
         rows = _rows(base.fit.parts, self._trials)
         for item in self._differing(base):
             yield _own(base, item, rows[str(item.group)])
-        unknowns = {g: base.fit.unknowns[k] for g, k in _places(self._trials).items()}
+        unknowns = by_group(base.fit.unknowns, self._trials)
         wanted = [e for e in self._effects if Item(e.name) not in base.items]
         for many in in_parallel(lambda e: list(self._of_cause(e, base, unknowns, rows)), wanted):
             yield from many
@@ -201,16 +209,11 @@ class Screen:
         return out
 
 
-def _places(trials: Mapping[str, Sequence[Trial]]) -> dict[str, slice]:
-    """Places of the trials of each group, all groups end to end."""
-    ends = itertools.accumulate((len(many) for many in trials.values()), initial=0)
-    return {g: slice(a, b) for g, (a, b) in zip(trials, itertools.pairwise(ends), strict=True)}
-
-
 def _rows(parts: Sequence[Linearized], trials: Mapping[str, Sequence[Trial]]) -> dict[str, slice]:
     """The rows of each group, all trials end to end."""
-    ends = [0, *itertools.accumulate(len(p.residual) for p in parts)]
-    return {g: slice(ends[k.start], ends[k.stop]) for g, k in _places(trials).items()}
+    sizes = [sum(len(p.residual) for p in own) for own in by_group(parts, trials).values()]
+    ends = itertools.pairwise(itertools.accumulate(sizes, initial=0))
+    return {g: slice(a, b) for g, (a, b) in zip(trials, ends, strict=True)}
 
 
 def _at_null(model: Model, kind: type[Effect]) -> Effect:
@@ -236,7 +239,7 @@ def _own(base: Grouped, item: Item, rows: slice) -> _Column:
     return _Column(item, None, amplitudes, columns)
 
 
-def _score(one: _Column, gram: np.ndarray, along: np.ndarray, spread: tuple[float, int]) -> ItemScore:
+def _score(one: _Column, gram: np.ndarray, along: np.ndarray, spread: Spread) -> ItemScore:
     """The score of an item from its columns without what the set takes up.
 
     Parameters
@@ -244,13 +247,13 @@ def _score(one: _Column, gram: np.ndarray, along: np.ndarray, spread: tuple[floa
     gram, along
         Inner products of the projected columns, with each other and with the residual.
     spread
-        Of what single trials say of it, with its degrees of freedom.
+        Of what single trials say of its first amplitude.
     """
     size, norms = np.sqrt(np.maximum(np.diag(gram), 0.0)), np.linalg.norm(one.columns, axis=0)
     kept = float(np.max(size / np.where(norms > 0.0, norms, np.inf), initial=0.0))
     degrees = len(one.amplitudes) if one.effect is None else len(one.effect.fitted_parameters())
     if kept < LEAST_KEPT:
-        return ItemScore(one.item, one.effect, 0.0, degrees, 0.0, np.inf, {}, *spread)
+        return ItemScore(one.item, one.effect, 0.0, degrees, 0.0, np.inf, {}, spread)
     scale = 1.0 / np.maximum(size, 1e-300)
     inverse = np.linalg.pinv(gram * np.outer(scale, scale), rcond=1e-10, hermitian=True)
     nulls, low, high = np.array(list(one.amplitudes.values())).T
@@ -259,32 +262,6 @@ def _score(one: _Column, gram: np.ndarray, along: np.ndarray, spread: tuple[floa
     deviation = float(scale[0] * np.sqrt(max(inverse[0, 0], 0.0)))
     values = dict(zip(one.amplitudes, (nulls + step).tolist(), strict=True))
     if one.effect is not None:
-        return ItemScore(one.item, started(one.effect, values), gain, degrees, kept, deviation, {}, *spread)
+        return ItemScore(one.item, started(one.effect, values), gain, degrees, kept, deviation, {}, spread)
     start = {f"{n}@{one.item.group}": v or one.amplitudes[n][0] for n, v in values.items()}
-    return ItemScore(one.item, None, gain, degrees, kept, deviation, start, *spread)
-
-
-def units(parts: Sequence[Linearized]) -> list[slice]:
-    """Rows of each unit of evidence: a trial, or a piece of one where trials are few."""
-    pieces = 1 if len(parts) >= FEWEST_TRIALS else -(-MIN_UNITS // len(parts))
-    ends = itertools.accumulate((len(p.residual) for p in parts), initial=0)
-    cuts = [np.linspace(a, b, pieces + 1).round().astype(int) for a, b in itertools.pairwise(ends)]
-    return [slice(int(a), int(b)) for cut in cuts for a, b in itertools.pairwise(cut)]
-
-
-def by_unit(
-    moved: np.ndarray, left: np.ndarray, parts: Sequence[Linearized]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of each unit the squares of what moves it, their inner product with its residual, and whether it is moved."""
-    cuts = units(parts)
-    sizes = np.array([float(moved[c] @ moved[c]) for c in cuts])
-    along = np.array([float(moved[c] @ left[c]) for c in cuts])
-    felt = sizes > UNFELT * max(float(sizes.max()), 1e-300)
-    return sizes, along, felt
-
-
-def _spread(column: np.ndarray, residual: np.ndarray, parts: Sequence[Linearized]) -> tuple[float, int]:
-    """Variance of what each unit says of a parameter, in units of what the noise explains; its degrees of freedom."""
-    sizes, along, felt = by_unit(column, residual, parts)
-    free = int(felt.sum()) - 2
-    return (float(np.sum(along[felt] ** 2 / sizes[felt])) / free, free) if free > 0 else (1.0, 0)
+    return ItemScore(one.item, None, gain, degrees, kept, deviation, start, spread)

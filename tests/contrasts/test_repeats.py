@@ -7,10 +7,7 @@ import pytest
 from contrast_pairs.free import free_pair
 
 import fes_pin as fp
-from fes_pin.contrasts.decide import Spread, usual_spread
-from fes_pin.contrasts.grouped import Item
 from fes_pin.contrasts.repeats import RepeatedProblem, Repeats, scatter, without_scatter
-from fes_pin.contrasts.screen import ItemScore
 from fes_pin.identify.fit import fit
 from fes_pin.identify.problem import Problem
 from fes_pin.infer.problem import Linearized
@@ -78,35 +75,6 @@ def test_the_squares_are_those_of_the_covariance(tmp_path):
         )
         assert back.residual == pytest.approx(one.residual, abs=1e-9)
         assert back.log_determinant == pytest.approx(0.0, abs=1e-9)
-
-
-def spreads(values, free=4):
-    return [
-        ItemScore(Item(f"cause{k}"), None, 0.0, 1, 1.0, 1.0, {}, spread=float(v), spread_degrees=free)
-        for k, v in enumerate(values)
-    ]
-
-
-def test_a_spread_that_all_causes_share_stands_behind_each():
-    rng = np.random.default_rng(1)
-    usual = usual_spread(spreads(2.0 * rng.chisquare(4, 200) / 4.0))
-    assert usual.phi == pytest.approx(2.0, rel=0.2)
-    assert usual.free > 30.0
-    assert Spread(1.0, 4.0).pooled(usual).free == pytest.approx(usual.free + 4.0)
-    assert Spread(1.0, 4.0).pooled(usual).phi == pytest.approx(2.0, rel=0.25)
-
-
-def test_a_spread_of_its_own_stands_alone():
-    """Repeats that differ in one thing say nothing of it by what they share."""
-    usual = Spread(1.0, 30.0)
-    odd = Spread(30.0, 4.0).pooled(usual)
-    assert odd.phi == 30.0
-    assert odd.free == pytest.approx(4.0, abs=0.1)
-
-
-def test_spreads_that_differ_stand_behind_little():
-    rng = np.random.default_rng(2)
-    assert usual_spread(spreads(np.exp(2.0 * rng.standard_normal(200)))).free < 2.0
 
 
 def test_a_change_shows_through_trials_that_scatter(tmp_path):
