@@ -50,7 +50,7 @@ def allocate(
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Moment arms and options, told apart by their values."""
+    """Moment arms and options, equal where their values are."""
 
     key: Any
     nerves: Any = field(compare=False)
@@ -59,7 +59,7 @@ class Asked:
 
 
 def allocator_for(nerves: Any, q: Any, options: Mapping[str, Any]) -> Allocator:
-    """The program for these moment arms and options, made anew only if it is not among the recent ones."""
+    """The program for these moment arms and options, made only if it is not among the recent ones."""
     asked = Asked(key_of((nerves, q, options)), nerves, q, options)
     try:
         hash(asked)

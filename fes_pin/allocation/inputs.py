@@ -1,4 +1,4 @@
-"""Torques and torque matrices as people give them: checked, and refused where no body makes such numbers."""
+"""Checks of given torques and torque matrices; numbers that no body makes are input errors."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def has_names(torque: Any, joints: tuple[str, ...], other: tuple[str, ...] | Non
     Raises
     ------
     InputError
-        An array without names beside a posture in another order.
+        An array without names together with a posture in another order.
     """
     if hasattr(torque, "keys"):
         return True

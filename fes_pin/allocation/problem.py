@@ -30,7 +30,7 @@ EPSILON = float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class Options:
-    """What an `Allocator` may be told; what does not need the channels is checked here.
+    """Options of an `Allocator`; those that do not depend on the channels are checked here.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Options:
         number or one each.
     effort_kind
         `squares`; `cubes` (of recruitment, which spreads it over more channels); `fatigue` (squares, dearer the less
-        strength a channel has left: by one over the square of what is left).
+        strength a fatigued channel has: by one over its square).
     lexicographic
         First the least torque error, whatever it costs; among all choices that reach it, the least effort and change.
     change

@@ -185,8 +185,9 @@ def _split_foot(
 ) -> tuple[Segment, Segment]:
     """Hindfoot and forefoot: together they have de Leva's mass, centre along the foot and inertia.
 
-    The forefoot is an even slab from the MTP joint to the toe tip; the hindfoot is what is left. Its centre lies on the
-    line from ankle to MTP, as the paper assumes; its inertia is that of the foot less the forefoot's, along the foot.
+    The forefoot is an even slab from the MTP joint to the toe tip; the hindfoot is the foot without it. The hindfoot's
+    centre lies on the line from ankle to MTP, as the paper assumes; its inertia is that of the foot less the
+    forefoot's, along the foot.
     The greater of the two cross radii is about the vertical (a foot is wider than high; the table does not say).
     """
     mass = per_percent * row.mass

@@ -1,4 +1,4 @@
-"""Whether a set of inputs catches a fall in the body's full equations of motion, planned anew at every pulse.
+"""Whether a set of inputs catches a fall in the body's full equations of motion, planned again at every pulse.
 
 The controller knows the state and the linear model: at every pulse it solves the plan whose modes stray least
 (`fes_pin.body.plans`) and gives its first input. The body that it acts on is Pinocchio's: finite angles and velocities.
@@ -100,7 +100,7 @@ def close_the_loop(
     settle_deg, balance
         As `fes_pin.body.catchable.catchable` takes them.
     moving_arms
-        Whether nerves have the moment arms of the posture of each moment; the controller is told them at each pulse.
+        Whether nerves have the moment arms of the posture of each moment; the controller knows them at each pulse.
 
     Raises
     ------

@@ -5,8 +5,8 @@ feet close, J g'' = 0 in A g'' - B g - C = D + J' l, linear in deviations and to
 
     l = -(J A^-1 J')^-1 J A^-1 (B g + C + D)
 
-(R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 8.3). The first foot takes the rest. Where braces hold
-so much that J loses rank, some of l moves no joint that is left, and rigid bodies do not say how much of it there is.
+(R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 8.3). The first foot takes the remaining force. Where
+braces hold so much that J loses rank, some of l moves no free joint, and rigid bodies do not determine that part.
 The feet can then carry the body if any such share keeps both centres of pressure on their soles.
 """
 

@@ -3,8 +3,8 @@
 That a sensor sees a mode says little: what counts is how far off the lean is that one believes in after a look. The
 figure is the posterior of a Bayesian regression: before, every mode's angle and rate (over its rate of growth or
 frequency) are normal with a deviation of `PRIOR_DEG`; angles are then read for `LOOK_S` seconds, `RATE_HZ` times a
-second, each with white noise of `NOISE_DEG`; what is left is the deviation of each mode's angle at the end of the look
-(S. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, section 11.6).
+second, each with white noise of `NOISE_DEG`. The uncertainty is the standard deviation of each mode's angle at the end
+of the look (S. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, 1993, section 11.6).
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class ModalObservability(Tabulated):
     def __str__(self) -> str:
         lines = ["goniometers: " + ", ".join(self.sensors)]
         look = f"{NOISE_DEG:g} deg of noise, {RATE_HZ:g} Hz, {LOOK_S:g} s"
-        lines.append(f"left in doubt by a look ({look}), degrees of the mode's greatest joint:")
+        lines.append(f"uncertainty after a look ({look}), degrees of the mode's greatest joint:")
         for mode, seen, left in zip(self.modes, self.observable, self.posterior_deg, strict=True):
             lines.append(f"  {mode.name:66s} {'seen' if seen else 'NOT seen':9s} {left:8.2g} deg")
         return "\n".join(lines)

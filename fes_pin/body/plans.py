@@ -45,7 +45,7 @@ class Plans:
     ----------
     linear, inputs, settle_deg, balance
         The body, its inputs, and the limits: every mode stays within `settle_deg` of the posture, at all times and
-        at the rest that the last input keeps; each foot's centre of pressure stays on its sole.
+        in the equilibrium that the last input keeps; each foot's centre of pressure stays on its sole.
     rest_deg
         How far from the posture falling modes may come to rest, degrees; `settle_deg` by default. 0: in the posture
         itself, as the null-controllable region has it.
@@ -255,7 +255,7 @@ class Plans:
         return LinearProgram(np.zeros(len(upper)), rows, limits, self._musts, start, lower, upper)
 
     def gentlest(self, eta: np.ndarray, rate: np.ndarray) -> LinearProgram:
-        """The plan whose modes stray least, on the way and at the rest in the end.
+        """The plan whose modes stray least, on the way and in the equilibrium at its end.
 
         Further variables are how far each mode strays, on the way and in the end, as a part of `settle_deg`, and, the
         last, how far the centre of pressure lies outside the soles, m, where no plan keeps it inside. The sum is least;

@@ -76,7 +76,7 @@ def _of_a_body(command: Callable) -> Callable:
 def modes(
     linear,
     goniometers: Annotated[bool, typer.Option("--goniometers", help="also the fewest that see every fall")] = False,
-    doubt: Annotated[float, typer.Option(help="with --goniometers: doubt they may leave of a fall, degrees")] = 1.0,
+    doubt: Annotated[float, typer.Option(help="with --goniometers: greatest uncertainty of a fall, degrees")] = 1.0,
 ) -> None:
     """How the body falls and swings at a posture: the eigenpairs of A^-1 B."""
     from fes_pin.body.balance import place_of_weight

@@ -1,4 +1,4 @@
-"""`fes-pin compare`: models from the literature on a study's trials, ranked by what they foretell."""
+"""`fes-pin compare`: models from the literature on a study's trials, ranked by errors on held-out trials."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def compare(
         float | None, typer.Option(metavar="SECONDS", help="How far ahead. [default: as a diagnosis looks]")
     ] = None,
     given: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Also foretell the rest of each trial from its beginning.")
+        float | None, typer.Option(metavar="SECONDS", help="Also predict each trial from its first seconds.")
     ] = None,
     out: Annotated[Path | None, output("Folder for compare.json.")] = None,
     trials: Trials = None,

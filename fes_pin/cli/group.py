@@ -29,7 +29,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def needs(**rules: str) -> Callable[[F], F]:
-    """Say of options of a command when they have a meaning: where they would be ignored they are refused.
+    """A decorator that says when options of a command have a meaning: where they have none they are input errors.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ def python_names(**words: str) -> Callable[[F], F]:
     return _noting("words", words)
 
 
-def _noting(what: str, told: dict[str, str]) -> Callable[[F], F]:
+def _noting(what: str, notes: dict[str, str]) -> Callable[[F], F]:
     def noted(command: F) -> F:
-        command.__dict__.setdefault(what, {}).update(told)
+        command.__dict__.setdefault(what, {}).update(notes)
         return command
 
     return noted
@@ -187,8 +187,8 @@ def _check_needs(ctx: typer.Context, words: Mapping[str, str], rules: Mapping[st
         others = rule.removeprefix("not ").split()
         there = [n for n in others if n in given]
         if name in given and bool(there) == rule.startswith("not "):
-            told = " or ".join(words[n] for n in there or others)
-            raise InputError(f"{'does not go' if there else 'goes only'} with {told}", column=words[name])
+            options = " or ".join(words[n] for n in there or others)
+            raise InputError(f"{'does not go' if there else 'goes only'} with {options}", column=words[name])
 
 
 def _word(one: Any) -> str:
@@ -196,13 +196,13 @@ def _word(one: Any) -> str:
     return max(one.opts, key=len) if one.param_type_name == "option" else one.name.upper()
 
 
-def _in_options(error: InputError, own: Mapping[str, str], told: Mapping[str, str]) -> InputError:
+def _in_options(error: InputError, own: Mapping[str, str], renamed: Mapping[str, str]) -> InputError:
     """An error with options of the command line in place of arguments of Python."""
     column, message = error.column, error.message.replace("force=True", "--force")
     if error.file is None and column is not None:
-        column = told.get(column, own.get(column, column))
-    if told:
-        message = re.sub(rf"\b({'|'.join(map(re.escape, told))})\b", lambda found: told[found[0]], message)
+        column = renamed.get(column, own.get(column, column))
+    if renamed:
+        message = re.sub(rf"\b({'|'.join(map(re.escape, renamed))})\b", lambda found: renamed[found[0]], message)
     return InputError(message, file=error.file, row=error.row, column=column)
 
 

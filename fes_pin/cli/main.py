@@ -64,10 +64,10 @@ def diagnose(
     out: Annotated[Path, output("Folder for diagnosis.json, model.toml and report.html.")],
     seed: Annotated[int, typer.Option(min=0, help="Of simulated critical values and bootstrap intervals.")] = 0,
     limit: Annotated[
-        float | None, typer.Option(min=0.0, help="Seconds of search; then the best set of causes so far is told.")
+        float | None, typer.Option(min=0.0, help="Seconds of search; then the answer is the best set of causes so far.")
     ] = None,
     tables: Annotated[
-        str | None, typer.Option(help="csv or parquet: also trajectories.csv, every sample beside both models.")
+        str | None, typer.Option(help="csv or parquet: also trajectories.csv, samples and predictions of both models.")
     ] = None,
     trials: Trials = None,
     exclude: Exclude = None,
@@ -99,13 +99,13 @@ def diagnose(
     with progress() as tell:
         to_be_said = [catalogue]
 
-        def told(share: float, words: str) -> None:
-            while to_be_said:  # now that the study is accepted: nothing stands before the line of an input error
+        def report(share: float, words: str) -> None:
+            while to_be_said:  # now that the study is accepted: the line of an input error comes first
                 say_whose_code(to_be_said.pop())
             tell(DIAGNOSING * share, words)
 
         brought = None if measured.schema.owner is None else catalogue
-        found = find(measured, library=brought, seed=seed, limit=limit, progress=told)
+        found = find(measured, library=brought, seed=seed, limit=limit, progress=report)
         tell(DIAGNOSING, "report")
         files = answer_files(found.by_command(this_command()))
         if table is not None and isinstance(found, Diagnosis):

@@ -64,7 +64,7 @@ def _named(words: str, names: Sequence[str], option: str) -> list[str]:
 
 
 def output(help: str, *names: str) -> Any:
-    """An option that says where to write; one without a name, as of a variable that is not set, is refused."""
+    """An option that says where to write; an empty path, as of a variable that is not set, is an input error."""
     return typer.Option(*names, parser=_output_path, metavar="PATH", help=help)
 
 

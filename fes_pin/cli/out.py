@@ -54,7 +54,7 @@ def pulses(
     width: Annotated[float | None, typer.Option(help="us, for a trial of single pulses.")] = None,
     force: Force = False,
 ) -> None:
-    """Write a trial as a list of pulses within stated limits; one beyond them is refused."""
+    """Write a trial as a list of pulses within stated limits; a trial beyond them is an input error."""
     from fes_pin.data.outputs import Outputs
     from fes_pin.data.pulses import PulseLimits, pulse_list
     from fes_pin.data.tabular import check_table, table_bytes

@@ -227,8 +227,8 @@ def _schema(rig: str | None, catalogue: Catalogue, urdf: Path | None) -> RigSche
     rigs = known_rigs(catalogue.schemas())
     schema = rigs[one_of(rig or "joint", tuple(rigs), partial(InputError, column="--rig"))]
     if schema.owner is not None and ("urdf" in schema.files) != (urdf is not None):
-        told = "--urdf FILE, or --pendulum LENGTH MASS, --rod or --slide" if urdf is None else "no URDF"
-        raise InputError(f"expected {told} for rig {schema.name}", column="--urdf")
+        wanted = "--urdf FILE, or --pendulum LENGTH MASS, --rod or --slide" if urdf is None else "no URDF"
+        raise InputError(f"expected {wanted} for rig {schema.name}", column="--urdf")
     if urdf is not None and schema.check_files is not None:
         schema.check_files({"urdf": urdf})
     return schema

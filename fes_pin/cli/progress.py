@@ -22,7 +22,7 @@ def catalogue_with(library: list[str] | None) -> Catalogue:
 
 
 def say_whose_code(catalogue: Catalogue) -> None:
-    """Say on standard error whose code runs beside that of fes-pin, a line for each file or module."""
+    """Print on standard error whose code runs in addition to that of fes-pin, a line for each file or module."""
     for where, names in catalogue.origins().items():
         remark(f"fes-pin: runs the code of {where}: {', '.join(names)}")
 

@@ -49,8 +49,8 @@ class Work:
     def key(self) -> str:
         """What the answer depends on: the study's files, the code, the versions, seed, limit and library."""
         files = [hashlib.sha256(Path(n).read_bytes()).hexdigest() for n in self.library if Path(n).is_file()]
-        told = [asdict(self) | {"folder": "", "command": ""}, hashes(Path(self.folder)), versions(), code_hash(), files]
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+        used = [asdict(self) | {"folder": "", "command": ""}, hashes(Path(self.folder)), versions(), code_hash(), files]
+        return hashlib.sha256(json.dumps(used, sort_keys=True).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

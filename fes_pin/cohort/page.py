@@ -47,7 +47,7 @@ def cohort_html(
     seed: int,
     command: str = "",
 ) -> str:
-    """The page, which links the reports beside it and needs nothing else."""
+    """The page, complete in one file; it links the reports that lie next to it."""
     good = [r for r in studies if r["verdict"] != "failed"]
     parts = [
         _head(studies, good, prevalence),
@@ -88,7 +88,7 @@ def _head(studies: Sequence[PageRow], good: Sequence[PageRow], prevalence: Seque
 def _prevalence(rows: Sequence[PageRow], studies: int) -> list[Markup]:
     if not rows:
         return [element("p", "None.")]
-    found = ("share [95 %]", "median gain", "told apart in", "false discovery rate below 5 % in")
+    found = ("share [95 %]", "median gain", "only cause in its set in", "false discovery rate below 5 % in")
     head = ("cause", "stage", "studies", *found)
     cells: list[list[Content]] = [
         [

@@ -1,4 +1,4 @@
-"""Models from the literature ranked by what they foretell of trials that took no part in their fits."""
+"""Models from the literature ranked by their errors of prediction on held-out trials."""
 
 from __future__ import annotations
 
@@ -47,17 +47,17 @@ def compare(
     Parameters
     ----------
     study
-        Of a stimulated muscle or ankle. Trials with the role "held_out" are foretold; without such roles each trial is
-        foretold by fits without it.
+        Of a stimulated muscle or ankle. Trials with the role "held_out" are predicted; without such roles each trial is
+        predicted by fits without it.
     models
         Names as in `literature.LITERATURE`, and "nominal"; by default all that the study's trials allow.
     extended
-        Models of one's own by name, as `diagnose` finds them: from memory or `model.toml`. They are fitted anew without
-        the trials that they foretell.
+        Models of one's own by name, as `diagnose` finds them: from memory or `model.toml`. They are refitted without
+        the trials that they predict.
     horizon_s
         How far ahead, s; by default that of a diagnosis.
     given_s
-        Also foretell the rest of each trial from its first seconds.
+        Also predict each trial after its first `given_s` seconds from those seconds.
     library
         Where causes of `extended` come from that are not written here.
     progress
@@ -91,13 +91,13 @@ def compare(
     noted = [*measured.warnings, *check_study(joined, nominal)]
     parts = partings(fitted, held)
     scale, floor = spreads(nominal, every), rough_noise(nominal, every)
-    told = []
+    compared = []
     with one_thread_each():
         for k, one in enumerate(chosen):
             tell(k / len(chosen), one.name)
-            told.append(_compared(one, parts, fitted, scale, floor, horizon, given_s))
+            compared.append(_compared(one, parts, fitted, scale, floor, horizon, given_s))
     tell(1.0, "done")
-    ranked = sorted(told, key=lambda m: m.percent["free"])
+    ranked = sorted(compared, key=lambda m: m.percent["free"])
     return Comparison(
         study=study,
         models=tuple(_with_apart(ranked, 1 if held else len(parts))),

@@ -24,7 +24,7 @@ from fes_pin.workers import in_parallel
 
 @dataclass(frozen=True)
 class Parting:
-    """Trials that are fitted, and others that are foretold by that fit."""
+    """Trials that are fitted, and others that this fit predicts."""
 
     fitted: tuple[Trial, ...]
     held: tuple[Trial, ...]
@@ -37,8 +37,9 @@ class LeftOutErrors:
     Attributes
     ----------
     free, horizon, begun
-        Shape (trials,): from the inputs alone; each sample from what was measured up to the horizon before it; the rest
-        of a trial from its beginning (None if that was not asked for, or too few trials tell how they differ).
+        Shape (trials,): of predictions from the inputs alone; of each sample from what was measured up to the horizon
+        before it; of a trial's remaining samples from its first ones (None if that was not asked for, or trials are too
+        few to estimate how they differ).
     free_rest
         As `free`, of the same samples as `begun`.
     around
@@ -53,7 +54,7 @@ class LeftOutErrors:
 
 
 def partings(fitted: Sequence[Trial], held: Sequence[Trial]) -> tuple[Parting, ...]:
-    """Every trial foretold once: those that the study holds out, or else each by fits without it."""
+    """Partings that predict each trial once: trials that the study holds out, or else each by a fit without it."""
     if held:
         return (Parting(tuple(fitted), tuple(held)),)
     folds = folds_of(fitted)
@@ -102,8 +103,8 @@ def _of_parting(
         most = RUNAWAY * scale[name]
         left = within(trial[name] - readings[:, 0], most)
         free.append(float(np.mean(left**2)))
-        foretold = forecast(left, noise[name], trial.dt, horizon_s)
-        ahead.append(float(np.mean(within(left - foretold, most) ** 2)))
+        predicted = forecast(left, noise[name], trial.dt, horizon_s)
+        ahead.append(float(np.mean(within(left - predicted, most) ** 2)))
     begun, rest = (None, None) if given_s is None else _begun(fitted, part, scale, given_s)
     return np.array(free), np.array(ahead), begun, rest
 
@@ -111,7 +112,7 @@ def _of_parting(
 def _begun(
     fitted: Fit, part: Parting, scale: Mapping[str, float], given_s: float
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Mean squared errors of the rest of trials: from their beginnings, and from the inputs alone."""
+    """Mean squared errors after the first seconds of trials: predicted from those, and from the inputs alone."""
 
     def counts(trials: Sequence[Trial]) -> list[int]:
         return [math.ceil(given_s / (stride(t) * t.dt) - 1e-9) for t in trials]

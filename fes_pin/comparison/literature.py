@@ -1,4 +1,4 @@
-"""Models of stimulated muscle from the literature, as compositions of effects beside the nominal model.
+"""Models of stimulated muscle from the literature: the nominal model with compositions of effects.
 
 A composition keeps the nominal recruitment and the rig; what a publication has beyond that is named, and so is what it
 has not in common with it. Start values are the publication's where it has any; all parameters are fitted.

@@ -1,12 +1,12 @@
-"""What is a trial's own, told by its beginning: parameters that differ from trial to trial about their common value.
+"""Random effects of a trial, estimated from its first samples: parameters differ between trials about a common value.
 
 Of trial i, with J the sensitivities at the common fit and r the residual,
 
     r_i = J_i d_i + e_i,   d_i ~ N(0, D),   e_i ~ N(0, s^2 c I).
 
 D and s are estimated from the fitted trials by expectation and maximisation; c, how many samples of e weigh as one, is
-the one of `WORTH` that foretells the rest of the fitted trials best from their beginnings. Of a new trial d is
-estimated from its beginning alone. Laird and Ware, Biometrics 38 (1982).
+the one of `WORTH` that predicts the later samples of the fitted trials best from their first ones. Of a new trial d is
+estimated from its first samples alone. Laird and Ware, Biometrics 38 (1982).
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class OwnPart:
     variance: float
 
     def left(self, pair: Pair, begun: int) -> np.ndarray:
-        """What is left of the residual after its first `begun` samples, once those have told d; shape (n - begun,)."""
+        """The residual after its first `begun` samples, less the effect of the d that those estimate: (n - begun,)."""
         r, jacobian = pair[0], pair[1] / self.scale
         first = jacobian[:begun]
         prior = np.linalg.inv(self.covariance + 1e-9 * np.trace(self.covariance) * np.eye(len(self.scale)))
@@ -77,7 +77,7 @@ def stride(trial: Trial) -> int:
 
 
 def own_part(pairs: Sequence[Pair], begun: Sequence[int]) -> OwnPart | None:
-    """How much trials differ, by what foretells their rest best; None of fewer than `FEWEST`.
+    """The distribution of d that predicts trials best after their first samples; None for fewer than `FEWEST` trials.
 
     Parameters
     ----------

@@ -110,9 +110,9 @@ class Comparison(Saveable):
     models
         Least free error first.
     held_out
-        Names of the trials that were foretold, in the order of `squares`.
+        Names of the trials that were predicted, in the order of `squares`.
     by
-        "role" if the study holds trials out, else "folds": each trial was foretold by fits without it.
+        "role" if the study holds trials out, else "folds": each trial was predicted by fits without it.
     horizon_s, given_s
         How far ahead, and how much of a trial was given; s.
     """
@@ -140,7 +140,7 @@ class Comparison(Saveable):
         raise InputError(f"no model {name!r}; there are {', '.join(m.name for m in self.models)}", column="name")
 
     def best(self, kind: str = "free") -> tuple[str, ...]:
-        """The models that no held-out trial tells from the best by "free" or "horizon" error, the best first."""
+        """The models whose "free" or "horizon" error is not significantly above the least, the best first."""
         order = sorted(self.models, key=lambda m: m.percent[kind])
         return tuple(m.name for m in order if (a := m.apart[kind]) is None or not a.told)
 
@@ -211,8 +211,8 @@ def headline(found: Comparison) -> str:
     first, *others = found.best()
     trials = f"{len(found.held_out)} held-out trials"
     if not others:
-        return f"{first} foretells {trials} best."
-    return f"{trials} do not tell {first} from {', '.join(others)}."
+        return f"{first} predicts {trials} best."
+    return f"{trials} do not distinguish {first} from {', '.join(others)}."
 
 
 def _head(found: Comparison) -> tuple[str, ...]:
@@ -225,15 +225,16 @@ def _row(found: Comparison, one: Compared) -> tuple[str, ...]:
     cells = [_cell(one, ("free",)), _cell(one, ("horizon",))]
     if found.given_s is not None:
         cells.append(_cell(one, ("free_rest", "begun")) if "begun" in one.percent else "-")
-    told = []
+    differences = []
     for kind, word in (("free", "free"), ("horizon", "ahead")):
         apart = one.apart[kind]
         if apart is None:
-            told.append(f"{word} best")
+            differences.append(f"{word} best")
         else:
             interval = f"[{apart.low:.2g}, {apart.high:.2g}]"
-            told.append(f"{word} {apart.more:.2g} {interval} %" + ("" if apart.told else " not told apart"))
-    return one.name, str(one.parameters), *cells, "; ".join(told)
+            unclear = "" if apart.told else " not significant"
+            differences.append(f"{word} {apart.more:.2g} {interval} %{unclear}")
+    return one.name, str(one.parameters), *cells, "; ".join(differences)
 
 
 def _cell(one: Compared, kinds: Sequence[str]) -> str:

@@ -22,7 +22,7 @@ SEEN = 0.95
 def change_of(
     models: ContrastModels, found: Found, item: Item, catalogue: Catalogue, evidence: Evidence | None
 ) -> Change:
-    """What is said of one change: its size in each group, in words, and what it cannot be told from."""
+    """One change of the result: its size in each group, in words, and the candidates equivalent to it."""
     best, model, groups = found.best, found.best.model, tuple(found.best.model.models)
     assert item.group is not None
     wider = math.sqrt(max(1.0, models.spread(best, found.without[str(item)]).phi))

@@ -177,7 +177,7 @@ class _Work:
         said += [*state.weighed.said, *_smoothed(best), *(UNCONFIRMED.format(n) for n in state.refused)]
         if left.unexplained:  # sizes that would have been seen hold for a model that is right
             unchanged, excluded = {}, {}
-            said.append("beside what is left unexplained it cannot be said what did not change")
+            said.append("with a lack of fit in one group it cannot be said what did not change")
         return Contrast(
             study=self.study,
             groups=tuple(models.trials),
@@ -206,7 +206,7 @@ def _provenance(study: Study, after: Study | None, seed: int) -> Provenance:
 
 
 def _smoothed(best: Grouped) -> tuple[str, ...]:
-    """What is to be said of readings of a driven rig that were smoothed: their noise lasts as long in all groups."""
+    """Remarks on smoothed readings of a driven rig: their noise has the same correlation time in all groups."""
     noise = next(iter(best.weights.values()))
     return words_of_reading(noise_in(noise), best.model.rig, best.fit.trials)
 

@@ -80,6 +80,6 @@ def _late_beside(models: ContrastModels, one: Grouped) -> float | None:
 
 
 def is_likelier(timed: Grouped, recorded: Grouped) -> bool:
-    """True if efforts in time explain the same readings at a lower price."""
+    """True if efforts in time explain the same readings with a lower penalised likelihood."""
     one, other = ({w.lasts_s for w in f.weights.values() if isinstance(w, Doubt)} for f in (timed, recorded))
     return one == other and timed.price < recorded.price

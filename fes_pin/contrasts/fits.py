@@ -125,16 +125,16 @@ class PredictedGroups(GroupedFits):
     first_steps = LOOK_DRIVEN
 
     def first(self) -> Grouped:
-        """Fit the nominal model to all groups, from what is random in each group fitted alone."""
+        """Fit the nominal model to all groups; the search starts from the noise of each group fitted alone."""
         alone = self._alone()
-        doubts = {g: f.noise for g, f in alone.items()}
-        little = {g: first_guess(self.nominal, t, doubts[g].lasts_s) for g, t in self.trials.items()}
-        self._begun: list[Mapping[str, Weight]] = [dict(little), dict(doubts)]
+        noises = {g: f.noise for g, f in alone.items()}
+        little = {g: first_guess(self.nominal, t, noises[g].lasts_s) for g, t in self.trials.items()}
+        self._begun: list[Mapping[str, Weight]] = [dict(little), dict(noises)]
         model = GroupedModel(dict.fromkeys(self.trials, self.nominal))
-        return self.converged(model.with_parameters(next(iter(alone.values())).values), (), doubts, None)
+        return self.converged(model.with_parameters(next(iter(alone.values())).values), (), noises, None)
 
     def _alone(self) -> dict[str, LikelihoodFit]:
-        """The nominal fit of each group by itself; noise of a reading lasts as long in all of them."""
+        """The nominal fit of each group alone; measurement noise has the same correlation time in all groups."""
 
         def fitted(group: str, lasts_s: float) -> LikelihoodFit:
             trials = self.trials[group]

@@ -30,7 +30,7 @@ def left_in_groups(models: ContrastModels, best: Grouped, seed: int) -> tuple[Re
         return Remainder(False, p, least.where), [words]
     if not open_ or not p < CLAIM_LEVEL:
         return Remainder(False, p, None), []
-    return Remainder(True, p, least.where), [f"something is left unexplained in the group {g}" for g in open_]
+    return Remainder(True, p, least.where), [f"lack of fit in the group {g}" for g in open_]
 
 
 def _left_by(fitted: Fit, seed: int) -> Remainder:

@@ -167,10 +167,10 @@ class _Scatter:
             best, cost = wanted, least
 
     def _with(self, deviations: np.ndarray, k: int) -> tuple[float, np.ndarray]:
-        """The cost with one deviation more, and all of them, refined beside each other."""
+        """The cost with one deviation more, and all deviations, each refined with the others held."""
         now, cost = deviations.copy(), np.inf
-        beside: list[int] = np.flatnonzero(now).tolist()
-        for one in [k, *beside, k] if beside else [k]:
+        others: list[int] = np.flatnonzero(now).tolist()
+        for one in [k, *others, k] if others else [k]:
             cost, now[one] = self._best(now, one)
         return cost, now
 

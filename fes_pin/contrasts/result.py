@@ -93,16 +93,16 @@ class Contrast(Result):
         left = self.remainder
         state = f"in one group alone ({probability(left.p_value)})" if left.unexplained else "none in one group alone"
         sizes = [f"{n} {p.value:.2g} {p.unit}".strip() for n, p in self.excluded.items()]
-        told = [
+        rows = [
             ("in all groups alike, so no change", ", ".join(self.common)),
             ("repeats scatter by (standard deviation)", _shares(self.repeats)),
             (f"did not change {SEEN}", _shares(self.unchanged)),
             (f"did not come {SEEN}", ", ".join(sizes)),
             ("could have changed unseen", ", ".join(self.untestable)),
             ("fitted by", "predictions one sample ahead" if self.driven else "simulations from the inputs"),
-            ("lack of fit", state),  # what every group lacks is the model's error, and is a warning
+            ("lack of fit", state),  # a lack of fit that all groups share is an error of the model, and is a warning
         ]
-        return [(topic, words) for topic, words in told if words] + super().notes()
+        return [(topic, words) for topic, words in rows if words] + super().notes()
 
     def advice(self) -> str:
         """What to do next."""

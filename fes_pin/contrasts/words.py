@@ -12,14 +12,14 @@ from fes_pin.models.stage import Effect
 
 @dataclass(frozen=True)
 class Words:
-    """How a change of a nominal parameter is told.
+    """How a change of a nominal parameter is reported.
 
     Attributes
     ----------
     more, less
         What happened if the value rose, and if it fell.
     by_share
-        True if the ratio of the values is told, not their difference.
+        True if the ratio of the values is reported, not their difference.
     """
 
     more: str
@@ -54,7 +54,7 @@ def of_nominal(rig: Rig, name: str, before: float, after: float, unit: str) -> s
 
 def of_cause(kind: type[Effect], before: float, after: float, unit: str, there_before: bool) -> str:
     """What happened to a cause, by its first parameter."""
-    told = sentence(kind).removesuffix(".")
+    cause = sentence(kind).removesuffix(".")
     if not there_before:
-        return f"new: {told}, {after:.3g} {unit}".strip()
-    return f"changed: {told}, {before:.3g} -> {after:.3g} {unit}".strip()
+        return f"new: {cause}, {after:.3g} {unit}".strip()
+    return f"changed: {cause}, {before:.3g} -> {after:.3g} {unit}".strip()

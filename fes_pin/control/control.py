@@ -39,7 +39,7 @@ from fes_pin.models.model import Model
 from fes_pin.muscles.recruitment import LinearRecruitment
 
 START_READINGS = 5
-"""Valid readings in a row, before the first pulse: 0.11 s, in which the observer learns what turns the idle joint."""
+"""Valid readings in a row, before the first pulse: 0.11 s, in which the observer estimates the torque at rest."""
 START_RAD = math.radians(10.0)
 """The first pulse waits for a joint this near to where the model has it at rest: load, sensor's zero, its sign."""
 MARGIN_RAD = math.radians(2.0)
@@ -82,8 +82,8 @@ class PositionController:
     limits
         What the stimulation may do, as `StimulationLimits` or a mapping of their names; by default what the muscle can.
     resolution_rad
-        Step of the sensor's readings. The coarser beside its noise, the later a frozen reading is told from one that
-        is just the same again.
+        Step of the sensor's readings. The coarser it is in units of the noise, the later a frozen reading is
+        distinguished from equal readings of a joint at rest.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ class PositionController:
             )
         self.observer = copy.deepcopy(observer) if observer is not None else JointObserver(dynamics)
         given = GivenAnkle(model, dynamics)
-        with np.errstate(all="ignore"):  # what is not finite is no loop, and is refused
+        with np.errstate(all="ignore"):  # a model that is not finite has no gains, and is an input error
             self.gains = tune(dynamics, self.observer, given if given.names else None)
         self.monitor = FaultMonitor(
             dynamics, self.limits.range_of_motion_rad, self.observer.angle_std_rad, resolution_rad
@@ -165,7 +165,7 @@ class PositionController:
             self._rehearse(given)
 
     def reset(self) -> None:
-        """Begin anew, after a fault or for another bout: waiting for readings, fresh, without a trajectory.
+        """Start again, after a fault or for another bout: waiting for readings, not fatigued, without a trajectory.
 
         After a fault call this when its cause was found and mended, not by a program. What charge was given in the last
         second still counts.
@@ -271,7 +271,7 @@ class PositionController:
         InputError
             For what is no reading, no reference or no time: text, lists, booleans, degrees, angles outside the range of
             motion, times that go on faster than pulses by more than jitter. It is a fault, too. A number that no joint
-            can have is refused only before the first pulse; later it is the sensor that is at fault, not the caller.
+            can have is an input error only before the first pulse; later it is a fault of the sensor.
         """
         try:
             self._notice(time_s)

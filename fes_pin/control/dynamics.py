@@ -1,4 +1,4 @@
-"""Eq. (1) of one ankle (`fes_pin.paper.equation_1`) from pulse to pulse, with an unknown torque beside it."""
+"""Eq. (1) of one ankle (`fes_pin.paper.equation_1`) from pulse to pulse, with an unknown torque added."""
 
 from __future__ import annotations
 

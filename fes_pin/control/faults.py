@@ -1,4 +1,4 @@
-"""Notices readings that must not be acted on: missing, impossible, frozen, or far from what the model foretells.
+"""Notices readings that must not be acted on: missing, impossible, frozen, or far from the model's prediction.
 
 1. A reading is bad if there is none, if no joint can have it, or if the joint would have to jump. Bad ones count 1,
    good ones take 1 / 2 off; at `BAD_READINGS` it is a fault: so many in a row, or a third of all for long.
@@ -44,10 +44,10 @@ IGNORANCE = 0.3
 MEMORY = 8
 """Pulses whose activations count as motion of the muscle: 0.18 s, more than three of its time constants."""
 LEAST_SHARE = 0.15
-"""Share of the believed gain below which a muscle is taken for silent: a muscle 30 % weaker than believed has 0.25 left
-when it is tired as far as muscles tire (Riener and Fuhr 1998: 0.35)."""
+"""Share of the believed gain below which a muscle counts as not answering: a muscle 30 % weaker than believed has 0.25
+when it is fatigued as far as muscles are (Riener and Fuhr 1998: 0.35)."""
 MOST_TORQUE = 0.3
-"""Share of the muscle's greatest torque that an unknown torque may have: a load of 0.2 kg that nobody told of makes
+"""Share of the muscle's greatest torque that an unknown torque may have: a load of 0.2 kg that the model lacks makes
 0.12, 30 % in stiffness 0.07 to 0.17."""
 LASTING = 9
 """Pulses in a row that an estimate must be absurd for: 0.2 s."""
@@ -62,7 +62,7 @@ class Status(Enum):
     IMPOSSIBLE = "readings that this joint cannot have: sensor, cable, or units"
     JUMPING = "readings jump farther than a joint can move: sensor slipped, mirrored or loose"
     FROZEN = "readings are frozen: the same number again and again while the muscle is stimulated"
-    INCONSISTENT = "readings are far from what the model foretells: sensor, muscle, electrode, or a joint that is held"
+    INCONSISTENT = "readings are far from the model's prediction: sensor, muscle, electrode, or a joint that is held"
     SILENT = "the joint does not answer to stimulation: electrode, cable, muscle, or a sensor that is loose"
     SWINGING = "the loop swings by itself and calming it did not help: a late sensor, or a model that lacks something"
     REFUSED = "what was handed in was no reading or no reference: see the error that was raised"

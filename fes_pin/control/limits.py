@@ -13,8 +13,8 @@ from fes_pin.data.numbers import as_number, between, shortened
 from fes_pin.data.pulses import RANGES, in_range
 
 BURST = 0.2
-"""Share of a second's charge that may be given at once; the rest is what may be given steadily. Together they are what
-any one second can hold."""
+"""Share of a second's charge that may be given at once; the remaining charge may be given steadily. Together they are
+the most that any one second can hold."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class StimulationLimits:
     current_ma
         Amplitude of the pulses, mA.
     range_of_motion_rad
-        Angles that this joint may have: references outside are refused, readings outside are faults.
+        Angles that this joint may have: references outside are input errors, readings outside are faults.
     ramp_s
         Time that pulses take to ramp down after a fault, s: a loaded joint that is let go at once falls. 0 is at once.
 

@@ -52,7 +52,7 @@ def subject_nerves(
     body
         Whose nerves.
     names
-        `left_femoral`; `femoral` stands for both sides. All nerves of the table by default.
+        `left_femoral`; `femoral` means both sides. All nerves of the table by default.
     strength
         1 is the strength of `whose_strength`; not given: that of paralysed, stimulated muscle, as everywhere.
     years

@@ -63,7 +63,8 @@ class Nerves(ReadOnly):
     fatigue
         Factor per name on the strength that is left, 0 (nothing: a dead channel) to 1; absent names are fresh.
     size
-        Factor on all strengths beside `strength` (body mass over 72.6 kg), which is that of an adult of this size.
+        Factor on all strengths in addition to `strength`, which is that of an adult of this size (body mass over
+        72.6 kg).
 
     Raises
     ------
@@ -88,7 +89,7 @@ class Nerves(ReadOnly):
         table = standard_muscles()
         known = tuple(dict.fromkeys(table.nerves))
         if not isinstance(self.fatigue, Mapping):
-            raise InputError("fatigue is given by what is left of each nerve by name")
+            raise InputError("fatigue is given as the share of strength that each nerve still has, by name")
         names = known if self.names is None else nerve_names(self.names)
         for name in names:
             if name not in known and name not in table.names:
@@ -217,7 +218,7 @@ class Nerves(ReadOnly):
         Parameters
         ----------
         q
-            Joint angles, rad: mapping by joint name or array (..., 19); of many postures the farthest is told.
+            Joint angles, rad: mapping by joint name or array (..., 19); of many postures the farthest is reported.
         """
         return self.table.held(q)
 

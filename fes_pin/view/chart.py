@@ -24,7 +24,7 @@ svg.chart { font: 11px system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu San
 .chart .tick { font-size: 10px; } .chart text { fill: INK; stroke: none; }
 .chart .axis { fill: none; stroke: INK; stroke-width: 0.8; }
 """
-"""What a chart looks like; INK stands for the colour of its axes."""
+"""What a chart looks like; INK is replaced by the colour of its axes."""
 
 
 def colour(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Influence of inputs on joints and modes, as a table and as a heat map: the paper's last promise."""
+"""Influence of inputs on joints and modes, as a table and as a heat map: what the paper announces at its end."""
 
 from __future__ import annotations
 

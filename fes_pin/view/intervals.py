@@ -50,7 +50,7 @@ def intervals_drawing(rows: Sequence[Row], axis: str, x: tuple[float, ...] = ())
 def rivals_drawing(cause: Named, rivals: Sequence[tuple[str, float, str]]) -> Drawing:
     """Rivals of a cause by the loss of twice the log-likelihood with each in its place, on a logarithmic axis.
 
-    The grey band is what chance alone makes; a hollow dot is a rival that is not told apart.
+    The grey band is what chance alone makes; a hollow dot is an equivalent rival.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def rivals_drawing(cause: Named, rivals: Sequence[tuple[str, float, str]]) -> Dr
     shown = powers[:: max(1, -(-len(powers) // 5))]
     axis = "loss of twice the log-likelihood"
     panel.x_axis(axis, [(p, f"{p:g}" if p < 1e4 else f"{p:.0e}".replace("e+0", "e")) for p in shown])
-    words = "; ".join(f"{n} {v:.3g}{', not told apart' if n in cause.equivalents else ''}" for n, v, _ in rivals)
+    words = "; ".join(f"{n} {v:.3g}{', equivalent' if n in cause.equivalents else ''}" for n, v, _ in rivals)
     about = f"Rivals of {cause.name}, {axis} with each in its place: {words}. Chance alone makes {SEPARABLE:.2g}."
     return _drawing(panel, len(rivals), about, rows_csv(("rival", axis.replace(" ", "_")), [r[:2] for r in rivals]))
 

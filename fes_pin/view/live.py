@@ -20,7 +20,7 @@ setInterval(async () => {{
 }}, 300);
 </script>
 """
-"""A page asks which scene is shown, and is loaded anew when it is another one."""
+"""A page asks which scene is shown, and is loaded again when that has changed."""
 
 
 class LiveViewer:

@@ -1,8 +1,8 @@
 """Equations of docstrings as MathML, which browsers set as mathematics; what cannot be parsed stays as it is written.
 
 The notation: products by a space, quotients by /, powers by ^, calls by a bracket that follows at once, v' and v'' for
-derivatives, b+ for the next value, x_y for an index of a letter, -> for "becomes". Three spaces part what is said
-beside an equation.
+derivatives, b+ for the next value, x_y for an index of a letter, -> for "becomes". Three spaces separate an equation
+from a remark on it.
 
 Source: MathML Core, W3C.
 """

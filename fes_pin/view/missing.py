@@ -168,9 +168,9 @@ def smoothed(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
 def smooth(values: np.ndarray) -> np.ndarray:
     """The smoothest curve that leaves no more than the noise, shape (n,).
 
-    It minimises the sum of squares beside it plus a penalty on its third differences, as a torque that changes little
-    from instant to instant has; the penalty is the largest that leaves the noise's standard deviation, which is read
-    off the second differences of the values (Morozov's discrepancy principle).
+    It minimises the sum of squared residuals plus a penalty on its third differences, which are small for a torque that
+    changes little from instant to instant. The penalty is the largest whose residuals have the noise's standard
+    deviation, which is estimated from second differences of the values (Morozov's discrepancy principle).
     """
     if len(values) < 12:
         return np.asarray(values, dtype=float)

@@ -139,7 +139,7 @@ def unit_text(unit: str) -> str:
 
 
 def key(*entries: tuple[str, str]) -> Markup:
-    """A legend for the figures beneath it: colour names of `style.COLOURS`, and what they stand for."""
+    """A legend for the figures beneath it: colour names of `style.COLOURS`, and their meanings."""
     made = [
         element("span", Markup(f'<i style="background: var(--{colour})"></i>'), words, class_="entry")
         for colour, words in entries

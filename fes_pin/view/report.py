@@ -69,13 +69,13 @@ def _header(result: Result, counts: str, elsewhere: tuple[str, ...]) -> Markup:
     partly = " partly" if result.causes and result.remainder.unexplained else ""
     style = f"verdict {STYLES.get(result.verdict, result.verdict)}{partly}"
     rows = [(_heading(one), _answer(result, one)) for one in result.causes]
-    told = [("explained", str(result.explained))] if result.explained and result.causes else []
-    told += [note for note in result.notes() if not note[0].startswith(elsewhere)]
+    further = [("explained", str(result.explained))] if result.explained and result.causes else []
+    further += [note for note in result.notes() if not note[0].startswith(elsewhere)]
     return element(
         "header",
         element("p", f"{result.study.name} · rig {result.study.rig} · {counts}", class_="eyebrow"),
         element("h1", _upper(result.title()), class_=style),
-        answers([*rows, *((element("span", _upper(topic)), said) for topic, said in told)]),
+        answers([*rows, *((element("span", _upper(topic)), said) for topic, said in further)]),
     )
 
 
@@ -107,10 +107,11 @@ def _upper(words: str) -> str:
 
 
 def told_apart(one: Named) -> str:
-    """How sure it is, and what these data cannot tell it from."""
-    others = f"cannot tell it from {', '.join(one.equivalents)}: read them as one set"
-    told = others if one.equivalents else f"tell it apart from every other {type(one).__name__.lower()} in the library"
-    return f"By chance alone over the whole library: {probability(one.p_value)}. These data {told}."
+    """The family-wise error of a cause or change, and the candidates that are equivalent to it."""
+    kind = type(one).__name__.lower()
+    found = f"{kind} from {', '.join(one.equivalents) or f'every other {kind} in the library'}"
+    data = f"cannot distinguish this {found}: read them as one set" if one.equivalents else f"distinguish this {found}"
+    return f"By chance alone over the whole library: {probability(one.p_value)}. These data {data}."
 
 
 def _errors(result: Result) -> list[Markup]:
@@ -168,7 +169,7 @@ def _rivals(result: Result, cause: Named) -> Markup:
     near = sorted(found.items(), key=lambda pair: pair[1])[:RIVALS]
     rows = [(n, v, str(getattr(result.effect(n.partition(" + ")[0]), "stage", ""))) for n, v in near]
     caption = (
-        f"Rivals in place of {cause.name}: by how much twice the log-likelihood of the whole fit falls. Hollow: not "
-        "told apart; the grey band is what chance alone makes. Colours are the stages of the signal path."
+        f"Rivals in place of {cause.name}: by how much twice the log-likelihood of the whole fit falls. Hollow: "
+        "equivalent; the grey band is what chance alone makes. Colours are the stages of the signal path."
     )
     return figure(rivals_drawing(cause, rows), caption, "narrow", f"rivals_{cause.name}")

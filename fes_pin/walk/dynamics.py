@@ -95,7 +95,7 @@ def joint_torques(
     feet
         Ground reaction of `left` and `right`: (n, 6) force and moment about the world's origin.
     residual_on
-        The segment that what is left pushes, so that no joint between it and the feet carries it.
+        The segment that the residual wrench acts on, so that no joint between it and the feet carries that wrench.
 
     Returns
     -------

@@ -10,7 +10,7 @@ from fes_pin.walk.likelihood import FLOOR_N, by_frequency
 from fes_pin.walk.models import WalkFit
 
 SEEN = 3.0
-"""Standard deviations that an effect of plausible size must have beside the nuisance to be testable."""
+"""A cause is testable if an effect of plausible size is so many standard deviations from zero, the nuisance fitted."""
 WAVES = ("mean", "once a stride", "twice a stride")
 CHANNELS = ("forward force", "leftward force", "vertical force", "moment about forward", "moment about left",
             "moment about vertical")  # fmt: skip

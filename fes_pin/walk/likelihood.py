@@ -1,10 +1,10 @@
-"""One likelihood for everything a set of causes is judged by: what is left of the ground reaction, as coloured noise.
+"""The one likelihood by which sets of causes are judged: residuals of the ground reaction, as coloured noise.
 
 Residuals are waves of the stride, in the mean over strides: soft tissue moves alike in each, so more strides are no
 more evidence. They are Gaussian, independent from wave to wave and, after a rotation of the six channels, from channel
 to channel, with a variance whose logarithm is a level of the channel and a course over frequency that all channels
-share: Whittle's likelihood at the walk's own frequencies. What effects and nuisance may have taken from what is left is
-given back before variances are taken from it (the expected squares, not the least). Means over a stride are known
+share: Whittle's likelihood at the walk's own frequencies. Variances are taken from expected squares: the squares that
+effects and nuisance fitted away are added to those of the residuals first. Means over a stride are known
 better: momentum comes back to what it was, so a mean force is wrong by some 0.05 % of the weight (0.5 mm of noise at
 both ends of a stride), a mean moment by what a centre of mass 1 mm off makes.
 
@@ -30,8 +30,9 @@ PRIOR_LEFT = 1e-4
 FLOOR_N = 0.3
 """N, or N m: a plate's own noise in a stride's wave; no residual is smaller."""
 MEAN_FORCE, MEAN_ARM_M, MEAN_TWIST_NM = 0.0005, 0.001, 1.5
-"""Errors of mean force, in weights, and of mean level moments, in weights times m, beside the nuisance; see above. The
-moment about the vertical has no weight in it: the plates' free moment is what is off there (a round figure)."""
+"""Errors of mean force, in weights, and of mean level moments, in weights times m, that the nuisance does not hold; see
+above. The moment about the vertical has no weight in it: its error is that of the plates' free moment (a round
+figure)."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class Fitted:
 
 
 def rotation(left: np.ndarray, harmonics: np.ndarray) -> np.ndarray:
-    """Scale and rotation under which the waves of what is left (n, 6, k) are uncorrelated between channels: (6, 6)."""
+    """Scale and rotation that make the waves of residuals (n, 6, k) uncorrelated between channels: (6, 6)."""
     left = left[:, :, harmonics > 0]
     scale = 1.0 / np.maximum(np.sqrt(np.mean(left**2, axis=(0, 2))), FLOOR_N)
     scaled = (scale[:, None] * left).transpose(1, 0, 2).reshape(6, -1)
@@ -140,8 +141,8 @@ def fit_many(y: np.ndarray, x: np.ndarray, prior: np.ndarray, noise: WalkNoise, 
         inverse = np.linalg.inv(gram)
         values = inverse @ (weighted.transpose(0, 2, 1) @ aim)
         left = (aim - flat @ values).reshape(y.shape)
-        doubt = np.sum((flat @ inverse) * flat, axis=2).reshape(y.shape)
-        variance = spectra.update(left**2 + doubt)
+        fitted_away = np.sum((flat @ inverse) * flat, axis=2).reshape(y.shape)
+        variance = spectra.update(left**2 + fitted_away)
     deviance = np.sum(np.log(variance) + left**2 / variance, axis=(1, 2, 3)) + spectra.penalty()
     values = values[:, :, 0]
     deviance += np.sum(values**2, axis=1) + np.linalg.slogdet(gram)[1]
@@ -184,7 +185,7 @@ class Spectra:
         self.white = white
 
     def update(self, squares: np.ndarray) -> np.ndarray:
-        """One round; `squares` (b, n, 6, k) are expected squares of what is left. Variances of the same shape."""
+        """Variances (b, n, 6, k) after one round; `squares`, of the same shape, are expected squares of residuals."""
         slope, curve = self._scores(squares)
         moved = np.linalg.solve(curve, slope[:, :, None])[:, :, 0]
         self.level += np.clip(moved[:, :6], -2.0, 2.0)

@@ -17,7 +17,7 @@ LEVEL = 1e-4
 is one law among many, and the channels' rotation has seen the data: what is counted in walks made otherwise is more."""
 SIMULATED_ROUNDS = 4
 FLOOR_SHARE = 0.3
-"""Of the fitted noise beside soft tissue's, as amplitudes."""
+"""Share of the fitted noise, as an amplitude, that is simulated in addition to soft tissue."""
 
 
 @dataclass(frozen=True)

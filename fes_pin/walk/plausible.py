@@ -1,4 +1,4 @@
-"""Whether plates and motion can be of one walk: what is refused with a reason, and which part of a record is used."""
+"""Whether plates and motion can be of one walk: which records are errors, and which part of a record is used."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class WalkDiagnosis(Result):
     Attributes
     ----------
     remainder
-        Whether residuals of the same course come again in every stride.
+        Lack of fit: whether residuals of the same course come again in every stride.
     absorbed
         Causes that these data could not show.
     nominal_error, extended_error
@@ -119,7 +119,7 @@ class WalkDiagnosis(Result):
         """What is said besides the table, by topic."""
         where = f", most in {self.remainder.where}" if self.remainder.where else ""
         state = "comes again in every stride" if self.remainder.unexplained else "nothing comes again in every stride"
-        told = [
+        rows = [
             ("noise from stride to stride alone", f"E {percent(self.ceiling_percent)}"),
             ("low pass", f"{self.cutoff_hz:g} Hz"),
             ("lack of fit", f"{state} ({probability(self.remainder.p_value)}{where})"),
@@ -127,7 +127,7 @@ class WalkDiagnosis(Result):
         for cause in self.causes:
             if (gain := cause.further.get("other_leg")) is not None:
                 words = f"{gain:.0f} % of its squared error, in single supports"
-                told.append((f"{cause.name} of one leg's size gains on the other", words))
+                rows.append((f"{cause.name} of one leg's size gains on the other", words))
             if cause.elsewhere:
-                told.append((f"{cause.name} as well at", "; ".join(cause.elsewhere[:4])))
-        return [*told, *([("not testable here", ", ".join(self.absorbed))] if self.absorbed else []), *super().notes()]
+                rows.append((f"{cause.name} as well at", "; ".join(cause.elsewhere[:4])))
+        return [*rows, *([("not testable here", ", ".join(self.absorbed))] if self.absorbed else []), *super().notes()]

@@ -85,7 +85,7 @@ class WalkVerdict(Verdict[WalkFit, WalkWeighed]):
         return not form.site.startswith(("left", "right")) and not form.shifts
 
     def lack_of_fit(self, state: Judgement) -> Remainder:
-        """Whether the residual comes again in every stride, or a cause was refused."""
+        """Lack of fit: the residual comes again in every stride, or held-out strides rejected a cause."""
         remainder = state.weighed.lack_of_fit
         left = remainder.unexplained or bool(state.refused)
         return replace(remainder, unexplained=left, where=remainder.where if left else None)

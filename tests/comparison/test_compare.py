@@ -1,4 +1,4 @@
-"""A twin of one model ranks that model first, equal models are not told apart, bad questions are refused."""
+"""A twin of one model ranks that model first, equal models do not differ significantly, bad questions are errors."""
 
 import json
 import sys
@@ -42,14 +42,14 @@ def test_a_twin_of_one_model_ranks_it_first():
     assert all(m.apart["free"].told for m in found.models[1:])
     fitted = found.models[0].fit.values
     assert fitted["ding2003.tau_1_s"] == pytest.approx(0.04, rel=0.1)
-    assert "ding2003 foretells 12 held-out trials best" in str(found)
+    assert "ding2003 predicts 12 held-out trials best" in str(found)
 
 
 def test_equal_models_are_not_told_apart():
     """Each of them holds the truth, a single lag, as a special case."""
     found = fp.compare(twins.study("lag", 3), ["nominal", "second_order", "hill"])
     assert set(found.best()) == {"nominal", "second_order", "hill"}
-    assert "do not tell" in str(found)
+    assert "do not distinguish" in str(found)
 
 
 def test_trials_that_the_study_holds_out_are_the_judges():

@@ -180,7 +180,7 @@ def test_the_first_screen_answers_what_a_reader_asks():
         "Dry friction at the joint",
         "torque 0.01 \u00b1 0.10 N m",
         "By chance alone over the whole library: p = 1e-09",
-        "These data cannot tell it from quadratic_damping",
+        "These data cannot distinguish this cause from quadratic_damping",
         "Explained 80 % of the squared error of free simulations (99 % of what is above the noise)",
         "E 9.1 % \u2192 1.8 %",
         "on what was fitted; noise alone leaves 1.7 %",
